@@ -12,7 +12,7 @@ const unsigned char* as_bytes(std::string_view text) {
 }  // namespace
 
 std::string to_base64(std::string_view bytes) {
-  // OpenSSL ends the text with a zero of its own.
+  // OpenSSL appends a zero.
   std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
   const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), as_bytes(bytes),
                                    static_cast<int>(bytes.size()));
@@ -35,7 +35,7 @@ std::optional<std::string> from_base64(std::string_view text) {
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   constexpr std::size_t kGroup = 4;
   const std::size_t padding = text.ends_with("==") ? 2 : text.ends_with('=') ? 1 : 0;
-  // OpenSSL passes over white space, and takes padding in the middle.
+  // OpenSSL skips white space and accepts padding in the middle.
   const std::string_view digits = text.substr(0, text.size() - padding);
   if (text.size() % kGroup != 0 || digits.find_first_not_of(kAlphabet) != std::string_view::npos) {
     return std::nullopt;
@@ -44,7 +44,7 @@ std::optional<std::string> from_base64(std::string_view text) {
   const int length = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()), as_bytes(text),
                                      static_cast<int>(text.size()));
   if (length < 0) return std::nullopt;
-  bytes.resize(static_cast<std::size_t>(length) - padding);  // it counts the padding as zeros
+  bytes.resize(static_cast<std::size_t>(length) - padding);  // OpenSSL counts the padding as zeros
   return bytes;
 }
 

@@ -13,11 +13,11 @@ namespace isomesh {
 std::string to_base64(std::span<const std::uint8_t> bytes);
 std::string to_base64(std::string_view bytes);
 
-// Writes the text at `out`, where there is room for it and a zero behind it. Returns where the text
-// ends.
+// Writes the text and a terminating zero at `out`, which has room for both. Returns the end of the
+// text.
 char* write_base64(std::span<const std::byte> bytes, char* out);
 
-// The bytes; empty for anything but whole groups of four of its characters.
+// Returns empty unless `text` is whole groups of four base64 characters.
 std::optional<std::string> from_base64(std::string_view text);
 
 }  // namespace isomesh

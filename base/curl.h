@@ -1,5 +1,4 @@
-// What libcurl hands out, let go of when it is not needed any more. For those who are linked with
-// it.
+// Owners of libcurl's handles. Header only, for targets that link libcurl.
 #pragma once
 
 #include <filesystem>
@@ -26,9 +25,9 @@ using Easy = std::unique_ptr<CURL, EasyCleanup>;
 using Multi = std::unique_ptr<CURLM, MultiCleanup>;
 using Headers = std::unique_ptr<curl_slist, ListCleanup>;
 
-// To be called before anything else of the library. Throws Error kInternal.
+// Call before any other function of libcurl. Throws Error kInternal.
 inline void start() {
-  // Not thread safe in every version, so it is called once.
+  // curl_global_init is not thread safe in every version, so it is called once.
   static const CURLcode ready = curl_global_init(CURL_GLOBAL_DEFAULT);
   if (ready != CURLE_OK) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
 }
@@ -47,9 +46,8 @@ inline Easy make_easy() {
   return easy;
 }
 
-// Connections go straight to the server that was named: volumes and secrets must not pass by a
-// machine that a proxy of the environment or a redirect names. `authorities` is a file of trusted
-// certificates; empty: the system's.
+// Disables proxies and redirects: volumes and secrets must only reach the named server.
+// `authorities` is a file of trusted certificates; empty: the system's.
 inline void connect_directly(CURL* easy, const std::filesystem::path& authorities) {
   curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);
@@ -58,11 +56,11 @@ inline void connect_directly(CURL* easy, const std::filesystem::path& authoritie
   curl_easy_setopt(easy, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
   if (authorities.empty()) return;
   curl_easy_setopt(easy, CURLOPT_CAINFO, authorities.c_str());
-  // libcurl would trust the system's folder of certificates besides.
+  // Otherwise libcurl also trusts the system's folder of certificates.
   curl_easy_setopt(easy, CURLOPT_CAPATH, static_cast<char*>(nullptr));
 }
 
-// Adds a header's line, which holds no control characters.
+// Appends a header line, which must not hold control characters.
 inline void append(Headers& headers, const std::string& line) {
   curl_slist* longer = curl_slist_append(headers.get(), line.c_str());
   if (longer == nullptr) throw std::bad_alloc();

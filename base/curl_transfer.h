@@ -1,5 +1,5 @@
-// A transfer of libcurl on the calling thread, with callbacks that may throw. For those who are
-// linked with it.
+// A libcurl transfer on the calling thread, with callbacks that may throw. Header only, for targets
+// that link libcurl.
 #pragma once
 
 #include <cstddef>
@@ -17,10 +17,11 @@
 
 namespace isomesh::curl {
 
-// An exception must not pass through libcurl, which is C: it is kept, and ends the transfer.
+// Keeps an exception, which must not pass through libcurl, because that is C. The exception ends
+// the transfer.
 class Guard {
  public:
-  // What `run` returns, or `on_failure` if it throws.
+  // Returns the result of `run`, or `on_failure` if it throws.
   template <class Run>
   std::size_t operator()(std::size_t on_failure, const Run& run) {
     try {
@@ -39,18 +40,18 @@ class Guard {
   std::exception_ptr thrown_;
 };
 
-// The callbacks of a transfer. What one of them throws ends the transfer.
+// The callbacks of a transfer. An exception in one of them ends the transfer.
 struct TransferCallbacks {
-  // Fills the buffer with the next bytes of the body that is sent; returns how many, 0 at its end.
+  // Fills the buffer with the next bytes of the request's body. Returns their number, 0 at the end.
   std::function<std::size_t(std::span<std::byte> buffer)> source = {};
   // Takes the next bytes of the response's body. False ends the transfer.
   std::function<bool(std::span<const std::byte> bytes)> sink = {};
-  // Takes a line of the response's headers, with its line break; those of interim responses too.
+  // Takes one header line of the response, with its line break; also those of interim responses.
   std::function<void(std::string_view line)> header = {};
 };
 
-// Runs the transfer that `easy` is set up for. Returns how it ended. Throws what a callback threw,
-// and Error kCancelled when `stop` is requested.
+// Runs the transfer that `easy` is set up for. Returns libcurl's result. Rethrows a callback's
+// exception; throws Error kCancelled if `stop` is requested.
 class Transfer {
  public:
   Transfer(CURL* easy, TransferCallbacks callbacks, std::stop_token stop)

@@ -16,7 +16,8 @@ InputFile::InputFile(const std::filesystem::path& path) : InputFile(path, "") {}
 
 InputFile InputFile::chosen(const std::filesystem::path& path) { return {path, path.string()}; }
 
-// Without waiting for the other end of a pipe, which is then refused as no regular file.
+// O_NONBLOCK: opening a pipe must not wait for its writer. A pipe is then rejected as not a regular
+// file.
 InputFile::InputFile(const std::filesystem::path& path, std::string shown)
     : shown_(std::move(shown)), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
   if (file_.number() < 0) fail("opening a file", errno);

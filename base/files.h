@@ -1,4 +1,4 @@
-// Files as those need them who read anywhere, write in order, and leave nothing behind.
+// Files for random reads, files for sequential writes, and temporary files.
 #pragma once
 
 #include <cstddef>
@@ -13,31 +13,32 @@
 
 namespace isomesh {
 
-// A regular file that is only read. Safe to read from several threads.
+// A regular file, opened for reading. Safe to read from several threads.
 class InputFile {
  public:
-  // Throws Error kInternal or kNotFound when it cannot be opened or is no regular file.
+  // Throws Error kInternal or kNotFound if it cannot be opened or is not a regular file.
   explicit InputFile(const std::filesystem::path& path);
 
-  // Takes a file that is open for reading. Throws Error kInternal when it is no regular file.
+  // Takes a file that is open for reading. Throws Error kInternal if it is not a regular file.
   explicit InputFile(Descriptor file) : InputFile(std::move(file), "") {}
 
-  // The same for a file that a person chose: what goes wrong, now or later, is Error
-  // kInvalidParameter that names the file.
+  // For a file that a person chose: all errors, also later ones, are Error kInvalidParameter and
+  // name the file.
   static InputFile chosen(const std::filesystem::path& path);
 
-  // The size when it was opened.
+  // The size on opening.
   std::uint64_t size() const { return size_; }
   int descriptor() const { return file_.number(); }
 
-  // Reads up to `target.size()` bytes from `offset` on; fewer only at the file's end. Returns how
-  // many. Throws Error kInternal when the disk fails.
+  // Reads up to `target.size()` bytes from `offset`; fewer only at the end of the file. Returns
+  // their number. Throws Error kInternal if reading fails.
   std::size_t read(std::uint64_t offset, std::span<std::byte> target) const;
 
-  // Fills `target`; throws also where the file ends before that, because it was cut meanwhile.
+  // Fills `target`. Throws Error kInternal also if the file ends early, because it was truncated
+  // meanwhile.
   void read_exactly(std::uint64_t offset, std::span<std::byte> target) const;
 
-  // The bytes from `offset` on, at most `count` of them.
+  // Returns at most `count` bytes from `offset`.
   std::string text(std::uint64_t offset, std::size_t count) const;
 
  private:
@@ -46,12 +47,12 @@ class InputFile {
   void look();
   [[noreturn]] void fail(std::string_view call, int error_number) const;
 
-  std::string shown_;  // what messages call it; empty where they must not
+  std::string shown_;  // the file's name in messages; empty: not named
   Descriptor file_;
   std::uint64_t size_ = 0;
 };
 
-// A temporary file with a name of its own, removed at the end of its life. Not thread safe.
+// A temporary file with a unique name, removed by the destructor. Not thread safe.
 class ScratchFile {
  public:
   // Throws Error kOutOfSpace or kInternal.
@@ -70,7 +71,7 @@ class ScratchFile {
   Descriptor file_;
 };
 
-// Whether both files hold the same bytes. Throws as InputFile does.
+// True if both files hold the same bytes. Throws as InputFile does.
 bool same_bytes(const std::filesystem::path& one, const std::filesystem::path& other);
 
 // The file's whole text. Throws Error kNotFound or kInternal.

@@ -1,1 +1,1 @@
-// The precompiled headers of most libraries belong to this source.
+// Compiled once for the precompiled headers that most libraries share.

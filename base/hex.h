@@ -1,4 +1,4 @@
-// Bytes as lower-case hexadecimal digits, two a byte. Pure functions.
+// Bytes as lower-case hexadecimal digits, two per byte. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace isomesh {
 std::string to_hex(std::span<const std::uint8_t> bytes);
 std::string to_hex(std::string_view bytes);
 
-// The bytes; empty for anything but pairs of lower-case digits.
+// Returns empty unless `digits` is pairs of lower-case digits.
 std::optional<std::string> from_hex(std::string_view digits);
 
 }  // namespace isomesh

@@ -23,8 +23,8 @@ std::string random_hex(std::size_t bytes) {
 }
 
 std::string time_ordered_id(std::chrono::system_clock::time_point now) {
-  // Ids of the same millisecond are told apart, and put in order, by the twelve bits behind the
-  // time (RFC 9562, section 6.2, method 1).
+  // A counter in the twelve bits after the time orders the ids of one millisecond (RFC 9562,
+  // section 6.2, method 1).
   static std::mutex mutex;
   static std::int64_t last_stamp = 0;
   constexpr int kCounterBits = 12;

@@ -1,5 +1,4 @@
-// Names that nobody else gives. Thread safe; all throw Error kInternal when the system has no
-// random bytes.
+// Unique names. Thread safe. All functions throw Error kInternal if the system has no random bytes.
 #pragma once
 
 #include <chrono>
@@ -8,11 +7,11 @@
 
 namespace isomesh {
 
-// Lower-case hexadecimal from the system's random source, two digits a byte.
+// Lower-case hexadecimal from the system's random source, two digits per byte.
 std::string random_hex(std::size_t bytes);
 
-// A name that sorts after all that this process made before: a UUID of version 7 (RFC 9562). Those
-// of several processes are in order as far as they give the time of one clock.
+// Returns a UUID of version 7 (RFC 9562). It sorts after all earlier ones of this process. Ids of
+// several processes are ordered as far as their clocks agree.
 std::string time_ordered_id(
     std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
 

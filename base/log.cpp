@@ -22,7 +22,7 @@ LogFormat chosen_format = LogFormat::kText;
 LogLevel lowest_level = LogLevel::kOff;
 
 std::string quoted(std::string_view text) {
-  // ASCII alone: other characters can reverse or hide a line on a terminal.
+  // Only ASCII: other characters can reverse or hide a line on a terminal.
   return Json(text).dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
@@ -43,7 +43,7 @@ std::string text_member(std::string_view name, std::string_view value) {
   return member(name, bare ? std::string(value) : quoted(value));
 }
 
-// The name of an event stands before its members.
+// The event's name precedes its members.
 std::string event_member(std::string_view name) {
   return chosen_format == LogFormat::kJson ? ",\"event\":" + quoted(name) : ' ' + std::string(name);
 }
@@ -70,9 +70,9 @@ LogLine::~LogLine() {
             ? "{\"time\":\"" + timestamp() + "\",\"level\":\"" + level + '"' + text_ + "}\n"
             : timestamp() + ' ' + level + text_ + '\n';
     std::fwrite(line.data(), 1, line.size(),
-                stderr);  // stderr has no buffer: one call writes it whole
+                stderr);  // stderr is unbuffered: one call writes the whole line
   } catch (const std::bad_alloc&) {
-    // The line is lost, but the request that it tells of is served.
+    // Without memory the line is lost, but its request is served.
   }
 }
 

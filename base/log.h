@@ -1,12 +1,12 @@
-// The daemon's log: one line an event, on standard error, in one of two forms.
+// The daemon's log: one line per event, on standard error, in one of two forms.
 //
-// As text:
+// Text:
 //   2026-11-20T06:40:00.123Z info request id=4bf9... method=GET status=200
-// As JSON:
+// JSON:
 //   {"time":"2026-11-20T06:40:00.123Z","level":"info","event":"request","id":"4bf9...",...}
 //
-// Whatever a value holds, it stays one value on one line. Lines never hold patient data, names of
-// uploaded files, queries or tokens: callers see to that.
+// Values are escaped, so that each is one value on one line. Lines never hold patient data, names
+// of uploaded files, queries or tokens; callers ensure this.
 #pragma once
 
 #include <array>
@@ -23,10 +23,10 @@ namespace isomesh {
 enum class LogFormat { kText, kJson };
 enum class LogLevel { kDebug, kInfo, kWarn, kError, kCritical, kOff };
 
-// To be called before threads start; until then nothing is written.
+// Call before threads start. Nothing is written before.
 void start_log(LogFormat format, LogLevel level);
 
-// One line, written when it goes, unless no memory is left for it. Not thread safe; lines of
+// One line, written by the destructor; lost if memory is exhausted. Not thread safe, but lines of
 // several threads do not mix.
 class LogLine {
  public:
@@ -42,18 +42,17 @@ class LogLine {
   LogLine& add(std::string_view name, std::integral auto value) {
     return add_number(name, static_cast<std::int64_t>(value));
   }
-  // With three digits behind the point.
+  // With three decimals.
   LogLine& add(std::string_view name, double value);
 
  private:
   LogLine& add_number(std::string_view name, std::int64_t value);
 
   LogLevel level_;
-  std::string text_;  // empty when the level is not logged
+  std::string text_;  // empty if the level is not logged
 };
 
-// A value takes the place of a {} in a message. It allocates nothing, and refers to a text that
-// outlives it.
+// Replaces a {} in a message. Allocates nothing and refers to a text that outlives it.
 class LogValue {
  public:
   LogValue(std::string_view text) : text_(text) {}
@@ -74,8 +73,8 @@ class LogValue {
   std::ptrdiff_t length_ = 0;
 };
 
-// An event "message" with one member "text": `text` with each {} replaced by the next of `values`.
-// Thread safe; never throws: a message that no memory is left for is lost.
+// Logs an event "message" with one member "text": `text` with each {} replaced by the next of
+// `values`. Thread safe. Never throws: the message is lost if memory is exhausted.
 void log_message(LogLevel level, std::string_view text,
                  std::initializer_list<LogValue> values) noexcept;
 

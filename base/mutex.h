@@ -1,9 +1,9 @@
-// A mutex whose use the compiler checks: clang's thread-safety analysis, which tests/lint runs,
-// finds what is touched without the lock that guards it. Other compilers see a plain mutex.
+// A mutex for clang's thread-safety analysis, which tests/lint runs. It reports access to guarded
+// members without the lock. Other compilers see a plain mutex.
 //
 //   Mutex mutex_;
 //   int count_ ISOMESH_GUARDED_BY(mutex_) = 0;
-//   void grow() ISOMESH_REQUIRES(mutex_);          // to be called with the lock held
+//   void grow() ISOMESH_REQUIRES(mutex_);          // call with the lock held
 //
 //   Lock lock(mutex_);
 //   changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return count_ > 0; });
@@ -33,7 +33,7 @@ class ISOMESH_THREAD_ATTRIBUTE(capability("mutex")) Mutex {
   std::mutex mutex_;
 };
 
-// Holds a mutex for as long as it lives, but for the time between unlock() and lock().
+// Holds a mutex for its lifetime, except between unlock() and lock().
 class ISOMESH_THREAD_ATTRIBUTE(scoped_lockable) Lock {
  public:
   explicit Lock(Mutex& mutex) ISOMESH_THREAD_ATTRIBUTE(acquire_capability(mutex)) : lock_(mutex) {}
@@ -48,7 +48,7 @@ class ISOMESH_THREAD_ATTRIBUTE(scoped_lockable) Lock {
   std::unique_lock<Mutex> lock_;
 };
 
-// Waits take a Lock; see std::condition_variable_any for the rest, waiting with a stop token too.
+// Waits on a Lock; otherwise std::condition_variable_any, with stop tokens too.
 using Condition = std::condition_variable_any;
 
 }  // namespace isomesh

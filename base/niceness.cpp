@@ -9,7 +9,7 @@
 namespace isomesh {
 namespace {
 
-// As sched_attr in linux/sched/types.h, which cannot be included beside the C library's sched.h.
+// sched_attr from linux/sched/types.h, which conflicts with the C library's sched.h.
 struct SchedulingAttributes {
   std::uint32_t size = 0;
   std::uint32_t policy = 0;
@@ -21,12 +21,12 @@ struct SchedulingAttributes {
   std::uint64_t period_ns = 0;
 };
 
-// The least that the kernel gives.
+// The kernel's minimum.
 constexpr std::uint64_t kPromptSlice_ns = 100'000;
 constexpr std::uint64_t kUsualSlice_ns = 0;
 
-// The C library has names for these calls since glibc 2.41. All else stays as it is. A kernel that
-// does not know slices, or a sandbox that allows neither call, leaves the usual ones.
+// Direct system calls: the C library has names for them only since glibc 2.41. All other attributes
+// stay unchanged. An older kernel, or a sandbox that forbids the calls, keeps the usual slices.
 void set_slice(std::uint64_t slice_ns) {
   SchedulingAttributes attributes;
   if (::syscall(SYS_sched_getattr, 0, &attributes, sizeof(attributes), 0) != 0) return;
@@ -36,7 +36,8 @@ void set_slice(std::uint64_t slice_ns) {
 
 }  // namespace
 
-// On Linux of this thread alone. It is refused to nobody, and what it returns is no error.
+// On Linux it applies to this thread only. Raising the niceness needs no privilege, and the
+// returned value is not an error code.
 void be_nicer(int by) {
   if (by == 0) return;
   std::ignore = ::nice(by);

@@ -1,25 +1,23 @@
-// Who goes before whom where the processors are busy. Requests for what is there already are at 0:
-// they take little, and somebody waits for each.
+// CPU priorities. Requests for existing data run at niceness 0: they are cheap, and a client waits
+// for each.
 #pragma once
 
 namespace isomesh {
 
-// Of an upload's import, which its answer waits for.
+// For imports: the upload's response waits for them.
 inline constexpr int kImportNiceness = 3;
-// Of answers that take long by their nature: lists, slices, histograms.
+// For expensive responses: lists, slices, histograms.
 inline constexpr int kComputingNiceness = 7;
-// Of meshes.
+// For mesh jobs.
 inline constexpr int kJobNiceness = 10;
 
-// Makes the calling thread nicer by that, if by anything, and with it the threads and processes
-// that it starts from now on, whose slices are the usual ones again. It cannot be undone. Thread
-// safe.
+// Raises the niceness of the calling thread and of the threads and processes that it starts later,
+// and resets their time slices. Does nothing for 0. Cannot be undone. Thread safe.
 void be_nicer(int by);
 
-// Of a busy machine the calling thread, and the threads and processes that it starts from now on,
-// get short slices, so that they wait less for whoever runs when they wake: for those who answer
-// much and compute little. Linux 6.12 and later; before, and where the kernel refuses, it does
-// nothing. Thread safe.
+// Shortens the time slices of the calling thread and of the threads and processes that it starts
+// later, so that they wake up faster on a busy machine. For threads that respond often and compute
+// little. Needs Linux 6.12; does nothing on older kernels or if the kernel refuses. Thread safe.
 void be_prompt();
 
 }  // namespace isomesh

@@ -11,8 +11,7 @@
 
 namespace isomesh {
 
-// The digest of bytes that come piece by piece. Not thread safe. Everything throws Error kInternal
-// when OpenSSL refuses.
+// Hashes bytes incrementally. Not thread safe. All members throw Error kInternal if OpenSSL fails.
 class Sha256 {
  public:
   static constexpr std::size_t kBytes = 32;
@@ -26,7 +25,7 @@ class Sha256 {
   void update(std::span<const std::byte> bytes);
   void update(std::string_view bytes) { update(std::as_bytes(std::span(bytes))); }
 
-  // The digest of all bytes so far; to be called once.
+  // Returns the digest of all bytes. Call once.
   Digest finish();
 
  private:
@@ -34,7 +33,7 @@ class Sha256 {
   std::unique_ptr<State> state_;
 };
 
-// The digest of a text, in hex.
+// The hexadecimal digest of a text.
 std::string sha256_of(std::string_view text);
 
 }  // namespace isomesh

@@ -1,4 +1,4 @@
-// How several parties share a number of places, so that none of them can take all.
+// Fair sharing of a limited number of places.
 #pragma once
 
 #include <cstddef>
@@ -6,9 +6,9 @@
 
 namespace isomesh {
 
-// Whether a party that holds so many places may have one more of those that are free: while it
-// holds fewer than are free. Alone it gets half, and however many take what they can, there is
-// always a share for one more. The party "" is nobody in particular, and may take every place.
+// True if a party that holds `held` places may take one of the `free` ones: while it holds fewer
+// than are free. One party alone gets half, and however many parties compete, a share remains for
+// one more. The party "" is anonymous and may take every place.
 constexpr bool has_share(std::string_view party, std::size_t held, std::size_t free) {
   return party.empty() ? free > 0 : held < free;
 }

@@ -19,8 +19,8 @@ std::optional<Number> parse(std::string_view text) {
   return value;
 }
 
-// The length in UTF-8 of the control character or noncharacter that the text begins with; 0: of
-// neither.
+// The length in UTF-8 of the control character or noncharacter at the start of the text; 0 if it
+// starts with neither.
 std::size_t unseen_bytes(std::string_view text) {
   const auto byte = [&](std::size_t at) -> unsigned {
     return at < text.size() ? static_cast<unsigned char>(text[at]) : 0;

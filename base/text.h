@@ -1,5 +1,5 @@
-// Text of headers and queries: lines, words and numbers, independent of the locale. Pure functions;
-// views that are returned are views of the argument.
+// Parsing of lines, words and numbers, independent of the locale. Pure functions. Returned views
+// refer to the argument.
 #pragma once
 
 #include <cstddef>
@@ -11,40 +11,38 @@
 
 namespace isomesh {
 
-// Without the white space around it.
+// Removes white space at both ends.
 std::string_view trimmed(std::string_view text);
 std::string lower(std::string_view text);  // ASCII only
 
-// True if a text that is UTF-8 has what nobody can see and XML cannot hold: control characters
+// True if a UTF-8 text has characters that are invisible and not allowed in XML: control characters
 // other than tabs, or noncharacters (Unicode 15, 23.7).
 bool has_control_characters(std::string_view text);
 
-// A text that is UTF-8, or should be, with U+FFFD for each of those, and for tabs.
+// Replaces invalid UTF-8, tabs and the characters of has_control_characters() by U+FFFD.
 std::string printable(std::string_view text);
 
-// The beginning of a text that is UTF-8, of at most so many bytes, without half a character.
+// The longest prefix of a UTF-8 text of at most `most_bytes` bytes that does not split a character.
 std::string_view beginning(std::string_view text, std::size_t most_bytes);
 
-// The parts between separators, each without the white space around it; one more than there are
-// separators.
+// The parts between separators, trimmed; one more than there are separators.
 std::vector<std::string_view> split(std::string_view text, char separator);
 
 // The words between white space.
 std::vector<std::string_view> words(std::string_view text);
 
-// The lines that hold more than white space, without what surrounds it.
+// The lines that are not only white space, trimmed.
 std::vector<std::string_view> lines(std::string_view text);
 
-// The whole of `text` as a number; empty when it is anything else.
+// The whole of `text` as a number; empty if it is not one.
 std::optional<double> parse_double(std::string_view text);
 std::optional<std::int64_t> parse_int64(std::string_view text);
 std::optional<std::uint64_t> parse_uint64(std::string_view text);
 
-// A number as a person reads it: the shortest text that is read back as the same.
+// The shortest text that reads back as the same number.
 std::string to_text(double value);
 
-// What may be repeated to a client from a header: printable ASCII, at most 40 characters, in
-// quotes.
+// A header's value, safe to repeat to a client: printable ASCII, at most 40 characters, in quotes.
 std::string in_quotes(std::string_view text);
 
 // "i", "j" or "k", or "4", "5", ... beyond.

@@ -1,4 +1,4 @@
-// Texts in XML. Pure functions.
+// Escapes text for XML. Pure functions.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace isomesh {
 
-// As an attribute's value or an element's content. What XML cannot hold becomes U+FFFD.
+// For an attribute's value or an element's content. Characters that XML cannot hold become U+FFFD.
 std::string xml_escaped(std::string_view text);
 
 }  // namespace isomesh

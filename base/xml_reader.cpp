@@ -20,7 +20,7 @@ struct XmlReader::Callbacks {
   template <class Action>
   static void guard(void* self, const Action& action) {
     auto& reader = *static_cast<XmlReader*>(self);
-    // The library goes on to the end of an empty element after it was stopped.
+    // A stopped parser still reports the end of an empty element.
     if (reader.failure_ || reader.is_stopped_) return;
     try {
       action(reader);
@@ -68,7 +68,7 @@ XmlReader::XmlReader(XmlHandler& handler)
 XmlReader::~XmlReader() = default;
 
 void XmlReader::read(std::string_view piece, bool is_last) {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 20;  // the library counts them in an int
+  constexpr std::size_t kMostBytes = std::size_t{1} << 20;  // expat takes an int
   do {
     if (is_stopped_) return;
     const std::string_view next = piece.substr(0, kMostBytes);

@@ -1,4 +1,4 @@
-// XML documents of strangers, read piece by piece.
+// Incremental reader of untrusted XML documents.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,10 @@ struct XML_ParserStruct;
 
 namespace isomesh {
 
-// Of one element, valid while it is handled; no name twice.
+// The attributes of one element, valid only in its callback. Names are unique.
 class XmlAttributes {
  public:
-  // `pairs`: names and values by turns, up to a null.
+  // `pairs`: alternating names and values, up to a null.
   explicit XmlAttributes(const char* const* pairs) : pairs_(pairs) {}
 
   std::optional<std::string_view> find(std::string_view name) const;
@@ -30,25 +30,25 @@ class XmlAttributes {
   const char* const* pairs_;
 };
 
-// What is done with a document. What one of these throws ends the reading, and is thrown by it.
+// Callbacks of a document. XmlReader::read rethrows their exceptions and stops.
 class XmlHandler {
  public:
   virtual ~XmlHandler() = default;
   virtual void start_element(std::string_view name, const XmlAttributes& attributes) = 0;
   virtual void end_element(std::string_view /*name*/) {}
-  // In UTF-8; one text may come in several parts.
+  // In UTF-8; one text may arrive in several parts.
   virtual void text(std::string_view /*part*/) {}
-  // What the document's declaration says; not called without one that does.
+  // The encoding in the document's declaration; not called without one.
   virtual void encoding(std::string_view /*name*/) {}
 };
 
-// The document cannot be read; what() is a part of a sentence that says why, and in which line.
+// The document cannot be read. what() is a part of a sentence with the reason and the line.
 struct XmlError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Nothing in a document makes it read a file or take much more memory than the longest tag: to
-// declare an entity, which may grow without bounds, is an XmlError.
+// Reads no other files, and takes little more memory than the longest tag. Entity declarations,
+// which can expand without bounds, are an XmlError.
 class XmlReader {
  public:
   explicit XmlReader(XmlHandler& handler);
@@ -56,15 +56,16 @@ class XmlReader {
   XmlReader(const XmlReader&) = delete;
   XmlReader& operator=(const XmlReader&) = delete;
 
-  // The next bytes; nothing happens after stop(). Throws XmlError, and what the handler throws.
+  // Parses the next bytes; does nothing after stop(). Throws XmlError, and exceptions of the
+  // handler.
   void read(std::string_view piece, bool is_last);
 
-  // Called by a handler: nothing more is read.
+  // Called by a handler: ends the reading.
   void stop();
   bool is_stopped() const { return is_stopped_; }
 
-  // Of what is handled, or else read, in bytes from the document's beginning: where it starts and
-  // ends.
+  // The byte range, from the start of the document, of the event in its callback, otherwise of the
+  // bytes read.
   std::uint64_t begin() const;
   std::uint64_t end() const;
 

@@ -1,6 +1,6 @@
-// The fields of every type that has a JSON form, each name once: `visit(value, field)` calls
-// field(name, member) for each, in the order in which they are written. Those of a job's parameters
-// are in parameters.h. For json_values.h and request_reader.h.
+// The fields of every type with a JSON form, for json_values.h and request_reader.h. `visit(value,
+// field)` calls field(name, member) for each field, in the order of writing. The fields of a job's
+// parameters are in parameters.h.
 #pragma once
 
 #include <type_traits>
@@ -319,7 +319,7 @@ void visit(Is<UploadedVolume> auto& self, auto&& field) {
   field("problem", self.problem);
 }
 
-// `volume` and `priority` stand beside the parameters too; the members inside are the truth.
+// `volume` and `priority` repeat members of the parameters, which are authoritative.
 void visit(Is<Job> auto& self, auto&& field) {
   field("id", self.id);
   field("state", self.state);

@@ -17,7 +17,7 @@ bool is_long(const Job& job) {
          asked.label_colors.size() > kMost || asked.label_values.size() > kMost;
 }
 
-// Answers say little of very many labels; their pages have a route of their own.
+// Responses omit long lists of labels; a route of their own pages through them.
 Job bounded(Job job) {
   bound(job.parameters.label_names);
   bound(job.parameters.label_colors);

@@ -1,7 +1,7 @@
 // JSON <-> types. The only place that spells the API's field names.
 //
-// All functions are thread safe. Reading an answer ignores members that this version does not know,
-// so that an older client understands a newer server; reading a request refuses them.
+// All functions are thread safe. Readers of responses ignore unknown members, so that an older
+// client understands a newer server. Readers of requests reject them.
 #pragma once
 
 #include <optional>
@@ -15,10 +15,10 @@
 
 namespace isomesh {
 
-// Without what only its owner's record has, its labels.
+// Omits `labels`, which only the record has.
 std::string to_json(const Volume& volume);
-// Without lists of more than MeshSummary::kMostListedLabels labels: `labels_count` replaces
-// `labels`, and a longer map of the parameters is empty.
+// Omits lists of more than MeshSummary::kMostListedLabels labels: `labels_count` replaces `labels`,
+// and a longer map in the parameters is empty.
 std::string to_json(const Job& job);
 std::string to_json(const JobParameters& parameters);
 std::string to_json(const MeshParameters& parameters);
@@ -30,7 +30,7 @@ std::string to_json(const Timing& timing);
 std::string to_json(const JobEvent& event);
 // {"volumes": [...], "next": cursor}; `next` is null on the last page.
 std::string to_json(const std::vector<Volume>& volumes, const std::string& next = "");
-// {"volumes": [...]}: the answer to an upload of several.
+// {"volumes": [...]}: the response to an upload of several.
 std::string to_json(const std::vector<UploadedVolume>& volumes);
 // As a page of volumes, with "jobs".
 std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
@@ -41,7 +41,7 @@ std::string to_json(const std::vector<LabelSummary>& labels, const std::string& 
 // The body of PATCH /v1/volumes/{id}.
 std::string volume_name_to_json(const std::optional<std::string>& name);
 
-// Reads an answer of the server. Throws Error kInternal when it is not what the API says.
+// Reads a server's response. Throws Error kInternal if it does not follow the API.
 Volume volume_from_json(std::string_view text);
 Job job_from_json(std::string_view text);
 std::vector<UploadedVolume> uploaded_volumes_from_json(std::string_view text);
@@ -55,37 +55,36 @@ std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 std::vector<LabelSummary> labels_from_json(std::string_view text);
 
-// A volume as a store keeps it and as an import tells it: to_json() with its labels.
+// A volume as stores and imports write it: to_json() with its labels.
 std::string to_record(const Volume& volume);
-// A job as a store keeps it: whole, with the file of its labels.
+// A job as a store keeps it: to_json() in full, with the file of its labels.
 std::string to_record(const Job& job);
 
-// Reads what to_record(), or to_json() of a timing, made in this version or an older
-// one: members that it did not know yet have their defaults. Throws Error kInternal.
+// Reads the text of to_record(), or of to_json() for a timing, from this version or an older one.
+// Members that the older version lacked have their defaults. Throws Error kInternal.
 Volume volume_from_record(std::string_view text);
 Job job_from_record(std::string_view text);
 Timing timing_from_record(std::string_view text);
 
-// Reads the body of POST /v1/jobs. Throws Error kInvalidParameter that names every member which is
+// Reads the body of POST /v1/jobs. Throws Error kInvalidParameter that names every member that is
 // unknown, missing, of the wrong type or out of range.
 JobParameters parse_job_parameters(std::string_view body);
 
-// Reads the body of PATCH /v1/volumes/{id}, {"name": TEXT or null}: the name that the volume is to
-// have, empty for none. Throws as parse_job_parameters does.
+// Reads the body of PATCH /v1/volumes/{id}, {"name": TEXT or null}. Returns the new name; empty
+// removes it. Throws as parse_job_parameters does.
 std::optional<std::string> parse_volume_name(std::string_view body);
 
 using QueryParameters =
     std::vector<std::pair<std::string, std::string>>;  // names and values, decoded
 
-// The same from a query, where everything is text and parameters go by query_name_of()
-// (parameters.h): `format` (several, separated by commas) stands for `formats`, `speed` for the
-// member of `draco`. The volume is a parameter of its own, or the request's body and then stays
-// empty here.
+// Reads the parameters from a query, under the names of query_name_of() (parameters.h). `format`
+// (several, separated by commas) stands for `formats`, `speed` for the member of `draco`. With
+// kBody the request's body is the volume, and `volume` stays empty.
 enum class VolumeIn { kQuery, kBody };
 JobParameters parse_job_parameters(const QueryParameters& query,
                                    VolumeIn volume_in = VolumeIn::kBody);
 
-// The inverse of VolumeIn::kQuery. What a query cannot say, such as the callback, is left out.
+// The inverse of VolumeIn::kQuery. Omits members that a query cannot express, such as the callback.
 QueryParameters to_query(const JobParameters& parameters);
 
 }  // namespace isomesh

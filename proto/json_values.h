@@ -1,5 +1,5 @@
-// JSON <-> types of which `visit` tells the fields: one writer and one reader for requests,
-// answers, records and the messages between processes. They throw as json_tree.h does.
+// JSON <-> types whose fields `visit` lists: one writer and one reader for requests, responses,
+// records and the messages between processes. Errors are those of json_tree.h.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ constexpr bool kIsPerFormat<std::map<MeshFormat, T>> = true;
 template <class T>
 constexpr bool kIsPerLabel = std::is_same_v<T, LabelTexts> || std::is_same_v<T, LabelValues>;
 
-// An enumeration whose values have no names crosses as a number. `last_of(value)` is its last one.
+// An enumeration without names is written as a number. `last_of(value)` is its last value.
 template <class T>
 concept Numbered = Enumeration<T> && requires(T value) {
   last_of(value);
@@ -126,13 +126,11 @@ std::string page(const char* name, const std::vector<T>& items, const std::strin
   return dump(tree.root());
 }
 
-// A volume with its labels.
 inline void write_record(Json& place, const Volume& volume) {
   write(place, volume);
   if (!volume.labels.empty()) write_field(place, "labels", volume.labels);
 }
 
-// A job with the file of its labels.
 inline void write_record(Json& place, const Job& job) {
   write(place, job);
   if (job.mesh && job.mesh->label_list) {
@@ -153,7 +151,7 @@ constexpr bool kIsOptional<std::optional<T>> = true;
 inline bool may_be_absent(const char* /*name*/) { return false; }
 inline bool may_be_absent(const Parameter& parameter) { return parameter.may_be_absent; }
 
-// What a label is called as a member's name.
+// Labels are the names of members.
 inline std::int64_t label_from(const std::string& text) {
   const auto label = parse_int64(text);
   if (!label) throw_wrong_kind();
@@ -178,8 +176,8 @@ template <class T>
 void read_members(const Json& json, T& value) {
   check_object(json);
   visit(value, [&](const auto& name, auto& member) {
-    // RFC 9457 requires no member of a problem; lists of other things came after the first version,
-    // or are left out where they are empty.
+    // RFC 9457 requires no member of a problem. Other lists are newer than the first version, or
+    // are omitted if empty.
     using Member = std::remove_reference_t<decltype(member)>;
     constexpr bool kMayHaveNoList = std::is_same_v<T, Volume> || std::is_same_v<T, MeshSummary> ||
                                     std::is_same_v<T, Estimate> || std::is_same_v<T, DicomIdentity>;

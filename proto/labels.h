@@ -1,4 +1,4 @@
-// What is known of the labels of a segmentation. Plain values.
+// The labels of a segmentation. Plain values.
 #pragma once
 
 #include <array>
@@ -11,36 +11,36 @@
 
 namespace isomesh {
 
-// What a file says of one of its labels. Segments are named after organs, so that names may be
-// shown wherever the volume is.
+// A label as a file describes it. Segments are named after organs, so names may be shown wherever
+// the volume is.
 struct LabelEntry {
   static constexpr std::size_t kMostNameBytes = 255;
 
   std::int64_t label = 0;
   std::string name = {};                  // UTF-8 without control characters; may be empty
-  std::optional<std::string> color = {};  // as is_color() has it
-  // The sample values that belong to it, ascending; empty: its own number alone. Where segments
-  // overlap, values number their combinations, and one value belongs to several labels.
+  std::optional<std::string> color = {};  // see is_color()
+  // The sample values of the label, ascending; empty: only its own number. Overlapping segments
+  // share values: each value is a combination of labels.
   std::vector<std::int64_t> values = {};
 
   bool operator==(const LabelEntry&) const = default;
 };
 
-// Whether that is "#rrggbb", in lower case.
+// True for "#rrggbb" in lower case.
 bool is_color(std::string_view text);
 
-// One label of a volume: what its samples say, and what its file did.
+// One label of a volume, from its samples and its file.
 struct VolumeLabel {
   std::int64_t label = 0;
   std::uint64_t voxels = 0;  // at least 1
-  double volume_mm3 = 0;     // of so many voxels
-  // The smallest and the largest sample along x, y and z that has it.
+  double volume_mm3 = 0;     // the voxels' total volume
+  // The smallest and the largest index along x, y and z of its samples.
   std::array<std::uint32_t, 3> low = {0, 0, 0};
   std::array<std::uint32_t, 3> high = {0, 0, 0};
-  // The smallest and the largest corner, in millimetres (LPS), of the box of these voxels.
+  // The bounding box of its voxels: smallest and largest corner, in millimetres (LPS).
   std::array<std::array<double, 3>, 2> bounds = {};
   std::optional<std::string> name = {};
-  std::optional<std::string> color = {};  // as is_color() has it
+  std::optional<std::string> color = {};  // see is_color()
 
   bool operator==(const VolumeLabel&) const = default;
 };
@@ -53,9 +53,9 @@ struct VolumeLabels {
   bool operator==(const VolumeLabels&) const = default;
 };
 
-// Which labels of a segmentation a job separates.
+// The labels of a segmentation that a job separates.
 struct LabelChoice {
-  std::vector<std::int64_t> values;  // empty: all that the volume has
+  std::vector<std::int64_t> values;  // empty: all labels of the volume
 
   bool is_all() const { return values.empty(); }
   bool operator==(const LabelChoice&) const = default;

@@ -1,4 +1,4 @@
-// What a finished job says about its mesh. Plain values.
+// A finished job's report on its mesh. Plain values.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 namespace isomesh {
 
-// kVtk: VTK's legacy file, kVtp: its XML file, kGii: GIFTI. kZip: one file for each label, in the
-// other formats that are asked for, but glb and 3mf; else in STL.
+// kVtk: VTK's legacy file. kVtp: VTK's XML file. kGii: GIFTI. kZip: one file per label in each
+// other requested format except glb and 3mf; STL if there is none.
 enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, k3mf, kOff, kVtk, kVtp, kGii, kZip };
 
 struct MeshFile {
@@ -23,7 +23,7 @@ struct MeshFile {
   bool operator==(const MeshFile&) const = default;
 };
 
-// One label's file, which is a part of the ZIP.
+// One label's file within the ZIP.
 struct LabelFile {
   std::uint64_t bytes = 0;
   std::string sha256;        // hex
@@ -33,8 +33,8 @@ struct LabelFile {
   bool operator==(const LabelFile&) const = default;
 };
 
-// One label of a finished job: the samples that have it, and its own surface after smoothing. What
-// two labels share is in the surfaces of both.
+// One label of a finished job: its samples, and its own surface after smoothing. A wall between two
+// labels belongs to both surfaces.
 struct LabelSummary {
   std::int64_t label = 0;
   std::optional<std::string> name = {};
@@ -48,14 +48,13 @@ struct LabelSummary {
   bool oriented = false;
   std::uint64_t components = 0;
   double area_mm2 = 0;
-  double volume_mm3 = 0;  // that it encloses
+  double volume_mm3 = 0;  // enclosed by the surface
   std::map<MeshFormat, LabelFile> files = {};
 
   bool operator==(const LabelSummary&) const = default;
 };
 
-// The file that holds a job's labels when they are too many for its record
-// (server/jobs/label_pages.h).
+// The file of a job's labels if they are too many for its record (server/jobs/label_pages.h).
 struct LabelListFile {
   std::uint64_t bytes = 0;
   std::string sha256;  // hex
@@ -63,27 +62,26 @@ struct LabelListFile {
   bool operator==(const LabelListFile&) const = default;
 };
 
-// How a quantity is spread over the triangles of a mesh. All zero when there are none.
+// The distribution of a quantity over the triangles of a mesh. All zero for an empty mesh.
 struct Distribution {
   static constexpr std::size_t kBins = 20;
 
   double mean = 0;
   double min = 0;
-  std::array<std::uint64_t, kBins> histogram = {};  // measured triangles in equal bins from zero on
+  std::array<std::uint64_t, kBins> histogram = {};  // triangles in equal bins from zero
 
   bool operator==(const Distribution&) const = default;
 };
 
-// Where a surface runs through itself.
+// Intersections of a surface with itself.
 struct SelfIntersections {
   std::uint64_t pairs = 0;                         // of triangles that intersect
-  std::uint64_t triangles = 0;                     // that intersect any other
-  std::vector<std::array<double, 3>> places = {};  // of the first pairs, in mm, LPS; 100 at most
+  std::uint64_t triangles = 0;                     // that intersect another one
+  std::vector<std::array<double, 3>> places = {};  // of the first pairs, at most 100; mm, LPS
 
   bool operator==(const SelfIntersections&) const = default;
 };
 
-// How good a mesh is.
 struct MeshQuality {
   struct Stages {
     Distribution extracted;
@@ -92,23 +90,23 @@ struct MeshQuality {
     bool operator==(const Stages&) const = default;
   };
 
-  bool closed = false;    // no edge belongs to one triangle only
+  bool closed = false;    // no edge belongs to only one triangle
   bool manifold = false;  // at most two triangles at an edge, one fan of them around a vertex
   bool oriented = false;  // neighbours run through their edge in opposite directions
   std::uint64_t components = 0;
-  std::optional<std::int64_t> genus;  // handles, all components together; of a closed manifold
+  std::optional<std::int64_t> genus;  // handles of all components together; closed manifolds only
   Stages aspect_ratio;                // 2 * inradius / circumradius: 1 is equilateral; bins of 0.05
   Stages smallest_angle_deg;          // of each triangle: 60 is equilateral; bins of 3 degrees
-  // Whether the volumes are what the surface encloses. Those of an open surface depend on the point
-  // that they are summed from, and mean nothing by themselves.
+  // True if the volumes are those that the surface encloses. The volumes of an open surface depend
+  // on the origin of the sum and are meaningless.
   bool encloses_volume = false;
-  std::optional<SelfIntersections> self_intersections = {};  // of a job that is certified
+  std::optional<SelfIntersections> self_intersections = {};  // only if the job is certified
 
   bool operator==(const MeshQuality&) const = default;
 };
 
-// Distances from points of one surface, its vertices and the centres of its triangles, to the
-// nearest points of another one's triangles. Exact, in double precision, but kept in single.
+// Distances from points of one surface, its vertices and triangle centres, to the nearest points of
+// another surface's triangles. Computed exactly in double precision, stored in single.
 struct DistanceSummary {
   static constexpr std::size_t kBins = 20;
 
@@ -116,48 +114,47 @@ struct DistanceSummary {
   double max_mm = 0;
   double mean_mm = 0;
   double rms_mm = 0;
-  double p99_mm = 0;  // 99 of 100 points are this near: the smallest distance that is one of them
-  std::array<std::uint64_t, kBins> histogram = {};  // points, in equal bins from zero to max_mm
+  double p99_mm = 0;  // the smallest distance that at least 99 % of the points do not exceed
+  std::array<std::uint64_t, kBins> histogram = {};  // points in equal bins from zero to max_mm
 
   bool operator==(const DistanceSummary&) const = default;
 };
 
-// How max_error_mm was shared out; the three make it up.
+// The shares of max_error_mm; they add up to it.
 struct ErrorBudget {
-  double smoothing = 0;       // the farthest that it moved a vertex
-  double quantisation = 0;    // the most that rounding a file's coordinates moves one
-  double simplification = 0;  // the rest
+  double smoothing = 0;       // the largest displacement of a vertex
+  double quantisation = 0;    // the largest rounding error of a file's coordinates
+  double simplification = 0;  // the remainder
 
   bool operator==(const ErrorBudget&) const = default;
 };
 
-// How far the files are from the surface as it was extracted, before it was smoothed.
+// The deviation of the files from the surface as extracted, before smoothing.
 struct MeshCertificate {
-  MeshFormat file = MeshFormat::kDrc;         // of several the one that is farthest
-  double max_mm = 0;                          // both ways
-  DistanceSummary from_mesh;                  // shows what has been added
-  DistanceSummary from_extracted;             // shows what has been left out
-  std::optional<ErrorBudget> budget_mm = {};  // where max_error_mm is given
+  MeshFormat file = MeshFormat::kDrc;         // the file with the largest deviation
+  double max_mm = 0;                          // in both directions
+  DistanceSummary from_mesh;                  // shows what was added
+  DistanceSummary from_extracted;             // shows what was left out
+  std::optional<ErrorBudget> budget_mm = {};  // if max_error_mm is given
 
   bool operator==(const MeshCertificate&) const = default;
 };
 
-// What simplification did.
 struct Simplification {
   enum class Bound { kError, kTriangles, kTopology };
 
   std::uint64_t triangles_before = 0;
-  // What kept it from going on: the error, the number of triangles that it was to reach, or, above
-  // that number, the surface itself: whatever goes, it would be of another kind.
+  // The limit that ended it: the error, the requested number of triangles, or the topology, if any
+  // further collapse would change it.
   Bound bound_by = Bound::kError;
 
   bool operator==(const Simplification&) const = default;
 };
 
-// What a finished job says about its mesh. Lengths in millimetres, after smoothing unless named
-// otherwise. Of a job by labels: triangles, vertices and areas are those of the walls, each once;
-// volumes are those of all labels together; components and boundary edges are those of the labels'
-// own surfaces, and quality says what holds for every one of them.
+// A finished job's report on its mesh. Lengths are in millimetres, after smoothing unless named
+// otherwise. For a job by labels: triangles, vertices and areas count each wall once; volumes are
+// those of all labels together; components and boundary edges are those of the labels' own
+// surfaces; quality holds for every one of them.
 struct MeshSummary {
   struct Enclosed {
     double extracted = 0;
@@ -166,7 +163,7 @@ struct MeshSummary {
     bool operator==(const Enclosed&) const = default;
   };
 
-  // What the filter of components took away.
+  // Removed by the filter of components.
   struct Dropped {
     std::uint64_t components = 0;
     std::uint64_t triangles = 0;
@@ -174,7 +171,7 @@ struct MeshSummary {
     bool operator==(const Dropped&) const = default;
   };
 
-  // How far smoothing moved the vertices.
+  // Of vertices, by smoothing.
   struct Displacement {
     double mean = 0;
     double max = 0;
@@ -182,15 +179,15 @@ struct MeshSummary {
     bool operator==(const Displacement&) const = default;
   };
 
-  std::optional<double> iso = {};  // the value that was used; none by labels
-  bool empty = false;              // there is no surface
+  std::optional<double> iso = {};  // the value used; none by labels
+  bool empty = false;              // no surface
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t boundary_edges = 0;
   std::uint64_t components = 0;
   std::int64_t euler = 0;
   Dropped dropped;
-  std::optional<Simplification> simplified = {};  // of a job that asks for fewer triangles
+  std::optional<Simplification> simplified = {};  // if fewer triangles were requested
   MeshQuality quality;
   double area_mm2 = 0;
   double area_extracted_mm2 = 0;
@@ -198,8 +195,8 @@ struct MeshSummary {
   Displacement displacement_mm;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
-  // Of a job by labels, ascending. Jobs with more than kMostListedLabels have their number and a
-  // file of them instead. Only records name that file.
+  // Of a job by labels, ascending. Jobs with more than kMostListedLabels have `labels_count` and a
+  // file instead. Only records name that file.
   std::vector<LabelSummary> labels = {};
   std::optional<std::uint64_t> labels_count = {};
   std::optional<LabelListFile> label_list = {};

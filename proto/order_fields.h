@@ -1,5 +1,5 @@
-// The fields of orders, as fields.h has those of everything else; those of requests have rows, for
-// request_reader.h. Private to this folder.
+// The fields of orders, as in fields.h. Requests have rows, for request_reader.h. Private to this
+// folder.
 #pragma once
 
 #include "proto/fields.h"
@@ -47,7 +47,7 @@ void visit(Is<Order> auto& self, auto&& field) {
   field("error", self.error);
 }
 
-// Without `parameters`, which parse_order_parameters reads.
+// Omits `parameters`, which parse_order_parameters reads.
 void visit(Is<OrderRequest> auto& self, auto&& field) {
   field(Parameter{.name = "source", .is_required = true}, self.source);
   field(Parameter{.name = "rule"}, self.rule);

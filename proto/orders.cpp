@@ -33,7 +33,7 @@ Json object_of(std::string_view text, const std::string& what) {
   return json;
 }
 
-// What is wrong with members whose type alone does not tell.
+// Checks that the members' types do not cover.
 void check(const Json& json, const OrderRequest& request, RequestReader& reader) {
   for (const char* name : {"study", "series"}) {
     const Json::json_pointer place(std::string("/source/") + name);
@@ -106,7 +106,7 @@ std::string to_callback_json(const Order& order) {
   json_values::write_field(json, "created", order.created);
   json_values::write_field(json, "finished", order.finished);
   json["error"] = nullptr;
-  // The detail may tell of the images.
+  // Omits the detail, which may describe the images.
   if (order.error) {
     json["error"] = {{"type", order.error->type}, {"title", order.error->title}};
   }
@@ -161,7 +161,7 @@ MeshParameters parse_order_parameters(std::string_view rules, std::string_view o
   Json merged = object_of(rules, prefix + "parameters");
   const Json changes = object_of(own, prefix + "parameters");
   for (const auto& [name, value] : changes.items()) {
-    // Of the two kinds of jobs the order's own is meant.
+    // The order's own parameters decide between a job by labels and one at an iso-value.
     if (name == "labels") merged.erase("iso");
     if (name == "iso") merged.erase("labels");
     merged[name] = value;

@@ -1,4 +1,4 @@
-// Orders: images of a PACS that become meshes which go back into it.
+// Orders: images from a PACS are meshed, and the meshes are stored there.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 namespace isomesh {
 
 enum class OrderState {
-  kWaiting,    // until the series is in the PACS and does not grow any more
-  kFetching,   // its instances are read
+  kWaiting,    // for the series to be complete in the PACS
+  kFetching,   // reading its instances
   kMeshing,    // its job is queued or runs
-  kSending,    // what the job made goes to the PACS
-  kSucceeded,  // everything is stored there
+  kSending,    // storing the results in the PACS
+  kSucceeded,  // all results are stored
   kFailed,
   kCancelled,
 };
 
-// True for the three states that an order does not leave by itself.
+// True for the three states that an order does not leave on its own.
 bool is_final(OrderState state);
 
 std::string_view to_string(OrderState value);
@@ -34,15 +34,15 @@ struct OrderSource {
   std::string pacs;  // its name
   std::string study;
   std::string series;
-  std::optional<std::uint32_t> instances = {};  // once the series is known to be whole
+  std::optional<std::uint32_t> instances = {};  // once the series is complete
 
   bool operator==(const OrderSource&) const = default;
 };
 
-// Where a mesh goes, and as what.
+// The destination and the format of a mesh.
 struct SendTarget {
   std::string pacs;
-  MeshFormat format = MeshFormat::kStl;  // the only one that DICOM objects are made of
+  MeshFormat format = MeshFormat::kStl;  // the only format for DICOM objects
 
   bool operator==(const SendTarget&) const = default;
 };
@@ -55,7 +55,7 @@ struct OrderResult {
   std::string series_uid;
   std::string sop_instance_uid;
   std::uint64_t bytes = 0;
-  bool stored = false;  // the PACS has said so, and finds it
+  bool stored = false;  // the PACS confirmed it, and a query found it
 
   bool operator==(const OrderResult&) const = default;
 };
@@ -68,41 +68,41 @@ struct Order {
   MeshParameters parameters;
   Priority priority = Priority::kRoutine;
   std::vector<SendTarget> send;
-  std::optional<std::string> volume = {};  // once it has been fetched
+  std::optional<std::string> volume = {};  // once fetched
   std::optional<std::string> job = {};
   std::vector<OrderResult> results;
-  std::uint32_t attempts = 0;                    // that failed and are made again
-  std::optional<std::string> next_attempt = {};  // RFC 3339, UTC, as all times
+  std::uint32_t attempts = 0;                    // failed attempts that are retried
+  std::optional<std::string> next_attempt = {};  // RFC 3339, UTC, like all times
   std::string created;
   std::optional<std::string> finished = {};
-  std::optional<Problem> error = {};  // why it failed, or what the last attempt met with
+  std::optional<Problem> error = {};  // of the order or of its last attempt
 
   bool operator==(const Order&) const = default;
 };
 
-// What the service keeps of an order besides: in its record, never in an answer.
+// Internal state of an order: in its record, never in a response.
 struct OrderWork {
   std::vector<std::string> listed;          // SOP Instance UIDs of the series, ascending
-  std::optional<std::string> listed_since;  // since when that is the list
-  std::uint32_t failures = 0;               // in a row: how long the next pause is
-  std::uint32_t looks = 0;                  // for a series that is not there, in a row
-  std::string begun;                        // when the order was accepted, or tried anew
+  std::optional<std::string> listed_since;  // when this list was first seen
+  std::uint32_t failures = 0;               // in a row; determines the back-off
+  std::uint32_t looks = 0;                  // in a row, for a series that is missing
+  std::string begun;                        // when the order was accepted or restarted
   std::optional<DicomIdentity> identity;    // of the images that were fetched
   std::vector<std::string> blobs;           // of the objects, in the order of the results
-  std::string label;                        // what the mesh is called
+  std::string label;                        // the mesh's label
   std::optional<std::int64_t> series_number;
   std::optional<std::string> callback;  // a URL
-  // How far a mesh may be from the surface that is simplified to fit into what its PACS takes.
+  // The bound of simplification that fits the mesh into the PACS's size limit.
   std::optional<double> max_error_mm = {};
-  std::optional<std::uint32_t> triangles = {};  // that fit, once it is known that all do not
-  std::optional<std::string> queried = {};      // when the query of the audit trail was made
-  // The step that has to succeed before the failures are forgotten. Empty: there were none.
+  std::optional<std::uint32_t> triangles = {};  // the number that fits, if not all do
+  std::optional<std::string> queried = {};      // when the query of the audit trail was recorded
+  // The failures are forgotten once this step succeeds. Empty: there were none.
   std::optional<OrderState> failed_in = {};
 
   bool operator==(const OrderWork&) const = default;
 };
 
-// What a client asks for. What it leaves out its rule says.
+// An order as a client requests it. Its rule supplies omitted members.
 struct OrderRequest {
   OrderSource source;
   std::optional<std::string> rule;
@@ -112,17 +112,17 @@ struct OrderRequest {
   std::optional<Callback> callback;
 };
 
-// How a PACS is, as far as is known since the service began.
+// The state of a PACS since the service started.
 struct PacsStatus {
   std::string name;
   std::optional<std::string> last_success = {};
   std::optional<std::string> last_failure = {};
-  std::optional<std::string> reason = {};  // of that failure, in a word
+  std::optional<std::string> reason = {};  // of that failure, in one word
 
   bool operator==(const PacsStatus&) const = default;
 };
 
-// A name for every UID that DICOM allows (PS3.5, 9.1): digits and dots, at most 64.
+// True for every UID that DICOM allows (PS3.5, 9.1): digits and dots, at most 64.
 bool is_uid(std::string_view text);
 
 std::string to_json(const Order& order);
@@ -130,28 +130,27 @@ std::string to_json(const Order& order);
 std::string to_json(const std::vector<Order>& orders, const std::string& next = "");
 // {"pacs": [...]}
 std::string to_json(const std::vector<PacsStatus>& pacs);
-// What a callback tells: neither patients nor identifiers of DICOM.
+// The body of a callback: no patients, no DICOM identifiers.
 std::string to_callback_json(const Order& order);
 std::string to_json(const OrderRequest& request);
 
-// Reads an answer of the server. Throws Error kInternal when it is not what the API says.
+// Reads a server's response. Throws Error kInternal if it does not follow the API.
 Order order_from_json(std::string_view text);
 std::vector<Order> orders_from_json(std::string_view text);
 std::vector<PacsStatus> pacs_from_json(std::string_view text);
 
-// As a store keeps them. Reading fills in what an older version did not know; throws Error
+// For stores. Readers give members that an older version lacked their defaults. They throw Error
 // kInternal.
 std::string to_record(const OrderWork& work);
 Order order_from_record(std::string_view text);
 OrderWork order_work_from_record(std::string_view text);
 
-// Reads the body of POST /v1/orders. Throws Error kInvalidParameter that names what is wrong.
+// Reads the body of POST /v1/orders. Throws Error kInvalidParameter that names each error.
 OrderRequest parse_order_request(std::string_view body);
 
-// The parameters of an order's job: those of `own`, where it has them, and else of `rules`, both
-// JSON objects as in POST /v1/jobs without `volume`, `priority` and `callback`; "" is none. Their
-// formats are "stl" unless they say otherwise. Throws Error kInvalidParameter whose fields begin
-// with `prefix`.
+// The parameters of an order's job: `rules`, overridden by `own`. Both are JSON objects as in POST
+// /v1/jobs without `volume`, `priority` and `callback`; "" is none. `formats` defaults to "stl".
+// Throws Error kInvalidParameter whose fields begin with `prefix`.
 MeshParameters parse_order_parameters(std::string_view rules, std::string_view own,
                                       const std::string& prefix);
 

@@ -44,7 +44,7 @@ struct Parameter {
   const char* unless = nullptr;  // a required parameter may be missing if this one is given
   JobKind jobs = JobKind::kAny;
   std::optional<double> by_labels = {};  // the default for jobs by labels, if it differs
-  bool may_be_absent = false;            // jobs that it does not concern lack it
+  bool may_be_absent = false;            // omitted for jobs that it does not concern
   bool in_query = true;
   const char* query = nullptr;   // its name in a query, if it is not `name`
   const char* option = nullptr;  // its name on the command line, if it is not the query's

@@ -1,8 +1,8 @@
-// The table of a job's parameters: each has one row in the functions `visit` below, beside the
-// member that holds it. Its type, its default and the names of its values are those of the member.
-// The following are made from the rows: requests, queries and their refusals (requests.cpp), the
-// command's options and help (client/cli/parameter_options.cpp), and openapi.yaml
-// (openapi/describe.cpp), from which the page's form is made.
+// The table of a job's parameters: each has one row in the functions `visit` below, beside its
+// member. The member has the type, the default and the names of the values. The rows generate:
+// requests, queries and their errors (requests.cpp), the command's options and help
+// (client/cli/parameter_options.cpp), and openapi.yaml (openapi/describe.cpp), from which the
+// page's form is generated.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace isomesh {
 
-// True if the member is visited: readers see every member, writers only those that say something.
+// True if the member is visited: readers visit every member, writers only those with a value.
 template <class T>
 bool is_told(T& /*owner*/, bool has_something) {
   return has_something || !std::is_const_v<T>;
@@ -195,7 +195,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
               "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume.",
           .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume"}},
       self.smoothing);
-  // With more than 0.66 in Taubin's, what varies fastest would grow with every pass, whatever the
+  // Above 0.66, Taubin smoothing amplifies the highest frequencies in every pass, whatever the
   // pass-band.
   parameter(
       Parameter{
@@ -434,7 +434,7 @@ std::string option_name_of(const Parameter& parameter);
 // empty if every number is allowed.
 std::string range_of(const Parameter& parameter);
 
-// "must be a whole number from 0 to 1000": what a number that was rejected has to be.
+// "must be a whole number from 0 to 1000": the requirement that a rejected number failed.
 std::string must_be(const Parameter& parameter, bool is_whole);
 
 // The shortest text that reads back as the same number: "0.33", "4294967295".

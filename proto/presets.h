@@ -1,5 +1,4 @@
-// What iso-values that suit volumes of a kind are called: the server finds their values, the
-// command takes their names.
+// Names of iso-value presets: the server finds their values, the command takes their names.
 #pragma once
 
 #include <array>

@@ -23,18 +23,18 @@
 
 namespace isomesh {
 
-// Types that a request has as objects: their `visit` has rows.
+// Types that are objects in a request: their `visit` has rows.
 template <class T>
 constexpr bool kIsRequestObject = ParameterGroup<T> || std::is_same_v<T, Callback>;
 
 // Collects the errors of all members, so that one response names them all.
 class RequestReader {
  public:
-  // How errors spell a member's path. Without this they show the path as it is.
+  // Sets how errors spell a member's path. The default is the path itself.
   using Spelling = std::string (*)(const std::string& path);
   void spell_by(Spelling spelling) { spelling_ = spelling; }
 
-  // Reads `json` into `value` by the rows of `visit`. Any other member is an error.
+  // Reads `json` into `value` by the rows of `visit`. Rejects any other member.
   template <class T>
   void read_object(const Json& json, T& value, const std::string& prefix) {
     std::vector<std::string> known;
@@ -51,7 +51,7 @@ class RequestReader {
     }
   }
 
-  // The same for a whole object: a member whose row says that it is required must be there.
+  // As read_object, for a whole object: required members must be present.
   template <class T>
   void read_whole_object(const Json& json, T& value, const std::string& prefix) {
     read_object(json, value, prefix);
@@ -252,7 +252,7 @@ class RequestReader {
     read_member(json, path, parameter, value->values);
   }
 
-  // An object whose members are named by labels.
+  // Reads an object whose member names are labels.
   template <class T>
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::map<std::int64_t, T>& value) {
@@ -295,7 +295,8 @@ class RequestReader {
   // The table's row for the range of a label.
   static const Parameter& label_range() {
     static const Parameter range = [] {
-      MeshParameters parameters;  // not constant, for those members that may be absent
+      MeshParameters parameters;  // not constant, so that `visit` reaches members that may be
+                                  // absent
       Parameter found;
       visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
         if (std::string_view(parameter.name) == "background") found = parameter;
@@ -321,7 +322,7 @@ class RequestReader {
     for (const Json& element : json) read_member(element, path, parameter, values.emplace_back());
   }
 
-  // Null is for members that may be nothing.
+  // Null is allowed for optional members.
   template <class T>
   requires(!std::is_arithmetic_v<T>) void read_member(const Json& json, const std::string& path,
                                                       const Parameter& parameter,
@@ -334,8 +335,8 @@ class RequestReader {
   std::vector<FieldError> errors_;
 };
 
-// A request's body. Adds an error for each member that an object has twice: readers differ in which
-// one they use. Throws Error kInvalidParameter if the body is not one JSON object.
+// Parses a request's body. Adds an error for each duplicate member, because JSON parsers differ in
+// which one they use. Throws Error kInvalidParameter if the body is not one JSON object.
 Json request_body(std::string_view body, RequestReader& reader);
 
 }  // namespace isomesh

@@ -43,7 +43,7 @@ constexpr QueryName::Kind kind_of() {
 const std::map<std::string, QueryName>& query_names() {
   static const std::map<std::string, QueryName> names = [] {
     std::map<std::string, QueryName> by_name;
-    JobParameters parameters;  // not constant, for those members that may be absent
+    JobParameters parameters;  // not constant, so that `visit` reaches members that may be absent
     visit_leaves(parameters,
                  [&](const std::string& path, const Parameter& parameter, const auto& member) {
                    using Member = std::remove_cvref_t<decltype(member)>;
@@ -67,10 +67,10 @@ Json::json_pointer pointer_to(std::string path) {
   return Json::json_pointer('/' + path);
 }
 
-// Stands for half of a surrogate pair. It is a noncharacter, which no text of a request may hold.
+// Replaces half of a surrogate pair. It is a noncharacter, which no text of a request may hold.
 constexpr std::string_view kHalfPair = "\uFFFF";
 
-// The code unit of the \u escape at that place (RFC 8259, 7); 0 if there is none.
+// The code unit of the \u escape at `place` (RFC 8259, 7); 0 if there is none.
 unsigned escaped_unit(std::string_view json, std::size_t place) {
   constexpr std::size_t kLength = 6;
   const std::string_view escape = json.substr(std::min(place, json.size()), kLength);
@@ -80,8 +80,8 @@ unsigned escaped_unit(std::string_view json, std::size_t place) {
   return std::from_chars(escape.data() + 2, end, unit, 16).ptr == end ? unit : 0;
 }
 
-// JSON with kHalfPair for each escaped half of a surrogate pair without the other, about which the
-// parser says only that the text is not JSON.
+// Replaces each unpaired escaped surrogate with kHalfPair. The parser would only say that the text
+// is not JSON.
 std::string without_half_pairs(std::string_view json) {
   const auto is_high = [](unsigned unit) { return unit >= 0xD800 && unit < 0xDC00; };
   const auto is_low = [](unsigned unit) { return unit >= 0xDC00 && unit < 0xE000; };
@@ -98,8 +98,8 @@ std::string without_half_pairs(std::string_view json) {
   return result += json;
 }
 
-// Finds what the parser accepts and a request must not have, while it parses: members that an
-// object has twice, and texts with kHalfPair.
+// Finds errors that the parser accepts, during parsing: duplicate members, and texts with
+// kHalfPair.
 class Flaws {
  public:
   void see(Json::parse_event_t event, const Json& parsed) {
@@ -120,11 +120,11 @@ class Flaws {
  private:
   struct Open {
     std::set<std::string> names;
-    std::string name;  // whose value comes next
+    std::string name;  // of the next value
   };
 
   void see_text(const std::string& text) {
-    constexpr std::size_t kMost = 20;  // that are told of
+    constexpr std::size_t kMost = 20;  // errors reported
     if (text.find(kHalfPair) == std::string::npos || halves_.size() >= kMost) return;
     halves_.push_back(path());
   }
@@ -180,7 +180,7 @@ void check_case(const std::string& path, const Parameter& parameter, Smoothing s
   }
 }
 
-// Rejects members that jobs with labels, or jobs without them, do not have.
+// Rejects members that do not apply to jobs with labels, or to jobs without them.
 void check_labels(const Json& json, const JobParameters& parameters, RequestReader& reader) {
   const auto refuse_if = [&](bool is_wrong, const char* name, const std::string& message) {
     if (is_wrong) reader.add(name, message);
@@ -189,7 +189,7 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
     return std::ranges::find(parameters.formats, format) != parameters.formats.end();
   };
   if (!parameters.labels) {
-    JobParameters all;  // not constant, for those members that may be absent
+    JobParameters all;  // not constant, so that `visit` reaches members that may be absent
     visit(all, [&](const Parameter& parameter, const auto& /*member*/) {
       const bool is_wrong = parameter.jobs == JobKind::kByLabels;
       refuse_if(is_wrong && json.contains(parameter.name), parameter.name,
@@ -222,7 +222,7 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
 void settle(const Json& json, JobParameters& parameters, RequestReader& reader) {
   // Clients that send every member also send the default of `close`.
   if (parameters.crop) parameters.close = true;
-  // The error of simplification is measured unless the request says otherwise.
+  // Simplification is measured unless the request says otherwise.
   if (parameters.triangles && !json.contains("certify")) parameters.certify = true;
   if (parameters.max_error_mm) {
     if (json.contains("certify") && !parameters.certify) {
@@ -280,7 +280,7 @@ void visit(VolumeName& self, auto&& field) {
 // True for members of a body that a query lacks or spells differently.
 bool is_for_bodies(const std::string& name) {
   bool found = false;
-  JobParameters parameters;  // not constant, for those members that an empty one hides
+  JobParameters parameters;  // not constant, so that `visit` reaches members that may be absent
   visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
     found = found || name == parameter.name;
   });
@@ -317,7 +317,7 @@ std::string text_of(const Json& value) {
   std::string list;
   for (const Json& item : value) {
     if (!list.empty()) list += ',';
-    list += text_of(item);  // of points: all their numbers
+    list += text_of(item);  // all numbers of all points
   }
   return list;
 }

@@ -1,5 +1,5 @@
-// The eight types of sample as types of C++. What depends on the type of a volume's samples is
-// written once, as a template, and called through with_sample.
+// The eight sample types as C++ types. Code that depends on the sample type is a template called
+// through with_sample.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 #include "proto/types.h"
 
-// Writes X(type of C++, name, enumerator of SampleType) once for each of the eight: for what no
-// template can do, which is to instantiate templates and to fill tables of functions.
+// Writes X(C++ type, name, enumerator of SampleType) for each of the eight types: to instantiate
+// templates and to fill tables of functions.
 #define ISOMESH_FOR_EACH_SAMPLE_TYPE(X) \
   X(std::uint8_t, uint8, kUint8)        \
   X(std::int8_t, int8, kInt8)           \
@@ -21,8 +21,8 @@
 
 namespace isomesh {
 
-// Calls `use` with a value-initialised sample of the type, for its static type, and returns what
-// that returns, which must be of one type for all eight.
+// Calls `use` with a value-initialised sample of the type and returns its result, which has the
+// same type for all eight.
 template <class Use>
 decltype(auto) with_sample(SampleType type, Use&& use) {
   switch (type) {
@@ -32,10 +32,9 @@ decltype(auto) with_sample(SampleType type, Use&& use) {
     ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_USE)
 #undef ISOMESH_USE
   }
-  __builtin_unreachable();  // an enumeration of ours has no other values
+  __builtin_unreachable();  // our own enumeration has no other values
 }
 
-// The type that a sample of C++ has.
 template <class Sample>
 constexpr SampleType sample_type() {
 #define ISOMESH_IS(Other, name, kType) \

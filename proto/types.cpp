@@ -10,7 +10,6 @@
 namespace isomesh {
 namespace {
 
-// One table of names per enumeration; every conversion reads it.
 template <class Enum>
 struct Names;
 
@@ -119,8 +118,7 @@ bool is_integer(SampleType type) {
 }
 
 double default_lambda(Smoothing smoothing) {
-  // A third, as Taubin has it: larger shares move the brain's volume by more than a tenth of a
-  // percent in 20 passes.
+  // A third, after Taubin: larger factors move the brain's volume by more than 0.1 % in 20 passes.
   constexpr double kTaubin = 0.33;
   return smoothing == Smoothing::kTaubin ? kTaubin : 1;
 }
@@ -136,9 +134,8 @@ bool is_final(JobState state) {
 }
 
 double default_lambda(const MeshParameters& parameters) {
-  // Whole steps leave the steps between half-way vertices as they are, and take half a percent to
-  // one off the volume of labels in ten passes; thirds even them out, and take a third of a
-  // percent.
+  // Factor 1 keeps the steps between half-way vertices, and takes 0.5 to 1 % off the volume of
+  // labels in ten passes. Factor 1/3 evens out the steps, and takes a third of a percent.
   constexpr double kLabels = 0.33;
   const bool is_laplacian = parameters.smoothing == Smoothing::kLaplacian;
   return parameters.labels && is_laplacian ? kLabels : default_lambda(parameters.smoothing);

@@ -1,5 +1,5 @@
-// Requests and answers of the HTTP API as C++ values. Their JSON is in json.h; the contract that
-// both follow is openapi.yaml. Plain values: safe to copy and to read from several threads.
+// Requests and responses of the HTTP API as C++ values. json.h has their JSON, openapi.yaml the
+// contract. Plain values: safe to copy and to read from several threads.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace isomesh {
 
-// The type of one sample as it is stored, little-endian.
+// Stored little-endian.
 enum class SampleType {
   kUint8,
   kInt8,
@@ -32,9 +32,9 @@ enum class SampleType {
 std::size_t bytes_per_sample(SampleType type);
 bool is_integer(SampleType type);
 
-// Where the samples lie: sample (i,j,k) is at origin + direction * diag(spacing) * (i,j,k), in
-// millimetres, in DICOM's patient space (LPS). `direction` is row-major, its columns are the unit
-// vectors of the axes i, j, k.
+// The position of sample (i,j,k) is origin + direction * diag(spacing) * (i,j,k), in millimetres,
+// in DICOM's patient space (LPS). `direction` is row-major; its columns are the unit vectors of the
+// axes i, j, k.
 struct Geometry {
   std::array<double, 3> origin = {0, 0, 0};
   std::array<double, 3> spacing = {1, 1, 1};
@@ -43,7 +43,7 @@ struct Geometry {
   bool operator==(const Geometry&) const = default;
 };
 
-// What a request says about raw samples, which say nothing about themselves.
+// A request's description of raw samples, which have no header.
 struct RawDescription {
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
   SampleType type = SampleType::kUint8;
@@ -53,7 +53,7 @@ struct RawDescription {
   bool operator==(const RawDescription&) const = default;
 };
 
-// An iso-value that is known to suit volumes of a kind.
+// A suggested iso-value for a kind of volume.
 struct Preset {
   std::string name;
   double iso = 0;  // in the volume's units
@@ -61,7 +61,7 @@ struct Preset {
   bool operator==(const Preset&) const = default;
 };
 
-// Something in an upload that is no part of the volume.
+// An object of an upload that is not part of the volume.
 struct IgnoredObject {
   std::string name;  // of the file or archive member, without folders
   std::string reason;
@@ -69,7 +69,7 @@ struct IgnoredObject {
   bool operator==(const IgnoredObject&) const = default;
 };
 
-// A DICOM object that samples came from.
+// A DICOM object that contributed samples.
 struct DicomInstance {
   std::string sop_class_uid;
   std::string sop_instance_uid;
@@ -77,7 +77,7 @@ struct DicomInstance {
   bool operator==(const DicomInstance&) const = default;
 };
 
-// An entry of a coding scheme (PS3.3, 8.8); empty where nothing was coded.
+// An entry of a coding scheme (PS3.3, 8.8); empty if nothing was coded.
 struct DicomCode {
   std::string value;
   std::string scheme;
@@ -86,12 +86,12 @@ struct DicomCode {
   bool operator==(const DicomCode&) const = default;
 };
 
-// What a segment of a segmentation is, by its codes.
+// A segment's number and codes.
 struct DicomSegment {
-  std::int64_t label = 0;  // the volume's label that it became: its number
+  std::int64_t label = 0;  // the segment's number, and its label in the volume
   DicomCode category;      // such as "Anatomical Structure"
   DicomCode type;          // such as "Liver"
-  DicomCode region;        // where it lies, where that is told besides
+  DicomCode region;        // anatomic region, if coded separately
 
   bool operator==(const DicomSegment&) const = default;
 };
@@ -107,9 +107,8 @@ struct DicomEquipment {
   bool operator==(const DicomEquipment&) const = default;
 };
 
-// Whose volume it is and what it was made from, as DICOM tells it, in UTF-8; empty where it does
-// not tell. What a mesh needs to be sent back with. Only for the volume's owner, and never in a
-// log.
+// The patient and the source images of a volume, as DICOM tells them, in UTF-8; unknown members are
+// empty. A mesh needs them to be stored in a PACS. Only for the volume's owner, and never in a log.
 struct DicomIdentity {
   std::string patient_name;
   std::string patient_id;
@@ -128,7 +127,7 @@ struct DicomIdentity {
   std::string frame_of_reference_uid;
   std::vector<DicomInstance> instances;  // in the order of the slices
   std::string issuer_of_patient_id;
-  std::string patient_identity_removed;  // "YES" or "NO" where it is told
+  std::string patient_identity_removed;  // "YES", "NO" or empty
   std::string deidentification_method;
   std::string acquisition_datetime;
   std::string position_reference_indicator;
@@ -138,15 +137,15 @@ struct DicomIdentity {
   bool operator==(const DicomIdentity&) const = default;
 };
 
-// The two ways in which a NIfTI header may say where its samples lie.
+// The two transformations of a NIfTI header.
 enum class NiftiForm { kSform, kQform };
 
 struct Volume {
   std::string id;  // hex SHA-256 of the canonical samples and geometry
-  // What its owner calls it: the series or file that it came as, until it is renamed. May name a
-  // patient, so it is in no log. UTF-8; empty where nothing told one.
+  // Initially the name of the uploaded series or file; the owner may rename it. May name a patient,
+  // so it is in no log. UTF-8; empty if unknown.
   std::optional<std::string> name = {};
-  std::string format;  // what was uploaded: "raw", "nifti", "nrrd", "metaimage", "dicom"
+  std::string format;  // of the upload: "raw", "nifti", "nrrd", "metaimage", "dicom"
   std::array<std::uint32_t, 3> dims = {0, 0, 0};  // samples along x, y, z; x runs fastest
   SampleType type = SampleType::kUint8;
   Geometry geometry;
@@ -154,15 +153,15 @@ struct Volume {
   double suggested_iso = 0;              // Otsu's threshold
   std::uint64_t bytes = 0;               // of the samples
   std::string created;                   // RFC 3339, UTC
-  std::optional<std::string> modality;   // DICOM's: "CT", "MR", ...; empty when it is not told
+  std::optional<std::string> modality;   // DICOM's: "CT", "MR", ...; empty if unknown
   std::vector<Preset> presets;           // within `range`
   std::vector<IgnoredObject> ignored;
-  // What was decided, corrected or left open when the upload was read; each code once. Of the
-  // upload that came first, as all but samples and geometry is.
+  // Decisions, corrections and assumptions of the import, each code once. Like everything except
+  // samples and geometry, they are those of the first upload.
   std::vector<Note> notes = {};
-  std::optional<DicomIdentity> dicom;  // of a volume that came as DICOM
-  // What the upload told of its labels, ascending, at most kMostLabels. In records and in what an
-  // import tells, never in answers (json.h).
+  std::optional<DicomIdentity> dicom;  // if it came as DICOM
+  // The labels that the upload declares, ascending, at most kMostLabels. In records and import
+  // results, never in responses (json.h).
   std::vector<LabelEntry> labels = {};
   static constexpr std::size_t kMostLabels = 65535;
 
@@ -170,10 +169,10 @@ struct Volume {
   bool operator==(const Volume&) const = default;
 };
 
-// What became of one volume of an upload that holds several.
+// The result for one volume of an upload that holds several.
 struct UploadedVolume {
   std::string member;  // of the archive
-  int status = 0;      // as if it had come alone: 201, 200, or that of the problem
+  int status = 0;      // as for a single upload: 201, 200, or the problem's
   std::optional<Volume> volume = {};
   std::optional<Problem> problem = {};
 
@@ -184,7 +183,7 @@ enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
-enum class Space { kLps, kRas };           // which ways x, y and z of a file's coordinates run
+enum class Space { kLps, kRas };           // directions of a file's x, y and z
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {
@@ -194,30 +193,32 @@ struct DracoParameters {
   bool operator==(const DracoParameters&) const = default;
 };
 
-// Which parts of the surface a job keeps. All when empty; with several members, those nearest to
-// the places that are large enough, and the largest of them.
+// Selects connected components. Keeps all if empty. With several members: of the components nearest
+// to the points that are large enough, the largest ones.
 struct ComponentFilter {
-  std::optional<std::uint32_t> keep;              // so many of the largest; at least 1
-  std::optional<std::uint32_t> min_triangles;     // those of so many triangles; at least 1
-  std::vector<std::array<double, 3>> nearest_to;  // those at these places, in mm, LPS
+  std::optional<std::uint32_t> keep;              // number of the largest components to keep; at
+                                                  // least 1
+  std::optional<std::uint32_t> min_triangles;     // drops smaller components; at least 1
+  std::vector<std::array<double, 3>> nearest_to;  // the components nearest to these points, in mm,
+                                                  // LPS
   static constexpr std::size_t kMostPlaces = 1000;
 
   bool keeps_all() const { return !keep && !min_triangles && nearest_to.empty(); }
   bool operator==(const ComponentFilter&) const = default;
 };
 
-// A box along the axes of LPS: its smallest and its largest corner, in millimetres.
+// A box along the axes of LPS: smallest and largest corner, in millimetres.
 using Box = std::array<std::array<double, 3>, 2>;
 
-// Whom to tell that a job has ended.
+// The URL to notify when a job has ended.
 struct Callback {
   std::string url;
 
   bool operator==(const Callback&) const = default;
 };
 
-// What determines a mesh's bytes beside its volume, and nothing else: files carry it, and jobs that
-// agree in it share their result. What each member means and may be is in parameters.h.
+// Everything beside the volume that determines a mesh's bytes, and nothing else. Files carry it,
+// and jobs with equal parameters share their result. parameters.h has the meanings and ranges.
 struct MeshParameters {
   std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
   Scheme scheme = Scheme::kSix;
@@ -225,82 +226,82 @@ struct MeshParameters {
   int passes = 5;
   Smoothing smoothing = Smoothing::kLaplacian;
   std::optional<double> lambda;               // empty: default_lambda(smoothing)
-  double pass_band = 0.1;                     // of Taubin's smoothing
-  std::optional<double> max_displacement_mm;  // empty: no vertex is held back
+  double pass_band = 0.1;                     // of Taubin smoothing
+  std::optional<double> max_displacement_mm;  // empty: no limit
   bool close = false;
   ComponentFilter components;
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
   DracoParameters draco;
   bool normals = true;     // in glb
-  bool distances = false;  // in glb: each vertex's to the surface as it was extracted
-  // How far the files may be from the surface as it was extracted; empty: as far as the other
-  // parameters let them.
+  bool distances = false;  // in glb: of each vertex to the surface as extracted
+  // Largest allowed deviation of the files from the surface as extracted; empty: no limit.
   std::optional<double> max_error_mm = {};
-  std::optional<std::uint32_t> triangles = {};  // at most so many; empty: all
-  std::vector<double> lods = {};  // in glb: levels of detail, as shares of the triangles
+  std::optional<std::uint32_t> triangles = {};  // at most this many; empty: all
+  std::vector<double> lods = {};  // in glb: levels of detail, as fractions of the triangles
   static constexpr std::size_t kMostLods = 8;
-  bool merge = false;  // in glb: one primitive for each surface and level
+  bool merge = false;  // in glb: one primitive per surface and level
   GlbCodec glb_codec = GlbCodec::kDraco;
-  Space space = Space::kLps;     // of files whose format leaves it open
+  Space space = Space::kLps;     // of files whose format does not define it
   std::optional<Box> crop = {};  // empty: the whole volume
   bool fill_cavities = false;
-  // Of a job by labels, which has no iso-value and no interpolation: its vertices lie half-way.
+  // Of a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
   // label_parameters() has its defaults.
   std::optional<LabelChoice> labels = {};
-  std::int64_t background = 0;  // the value of what is no label
+  std::int64_t background = 0;  // the value outside of all labels
   LabelTexts label_names = {};
   LabelTexts label_colors = {};   // "#rrggbb"
-  LabelValues label_values = {};  // of labels that are more than the samples of their own value
+  LabelValues label_values = {};  // of labels with more values than their own number
 
   bool operator==(const MeshParameters&) const = default;
 };
 
-// What a job is asked to do: a mesh of a volume, when, and whom to tell.
+// A job request: the mesh's parameters, the volume, the priority and the callback.
 struct JobParameters : MeshParameters {
   std::string volume;
   Priority priority = Priority::kRoutine;
   std::optional<Callback> callback = {};
-  bool certify = false;  // measures how far the files are from the surface as it was extracted
+  bool certify = false;  // measures the deviation of the files from the surface as extracted
 
   bool operator==(const JobParameters&) const = default;
 };
 
-// A job by labels with the defaults that such a job has; those of a job at an iso-value are the
-// structure's own.
+// Parameters with the defaults of a job by labels. The structure's own defaults are those of a job
+// at an iso-value.
 JobParameters label_parameters(LabelChoice labels);
 
-// The space of the coordinates in a file of that format: GIFTI's is RAS, GLB has its own node for
-// it, and the others follow the parameter.
+// The space of a file's coordinates: GIFTI is RAS, GLB has a node of its own for it, other formats
+// follow the parameter.
 Space space_of(MeshFormat format, const MeshParameters& parameters);
 
-// Whether one file of that format holds all labels.
+// True if one file of the format holds all labels.
 bool holds_all_labels(MeshFormat format);
 
-// The files that a job makes, in order: its formats; of a job by labels those that hold all labels,
+// The files of a job, in order: its formats. For a job by labels: the formats that hold all labels,
 // and a ZIP of the others.
 std::vector<MeshFormat> files_of(const MeshParameters& parameters);
 
 // The formats of the files in a ZIP of labels, in order.
 std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
 
-// The share of the way to the mean of its neighbours that a vertex goes, unless the client says.
+// The default relaxation factor: the fraction of the way to the mean of its neighbours that a
+// vertex moves.
 double default_lambda(Smoothing smoothing);
-double default_lambda(const MeshParameters& parameters);  // which labels have a say in
+double default_lambda(const MeshParameters& parameters);  // labels have a default of their own
 
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
 
-// What a queued job waits for besides a worker.
-enum class WaitingFor { kDisk };  // room for its files
+// The reason, beside busy workers, that a job is still queued.
+enum class WaitingFor { kDisk };  // space for its files
 
 // True for the three states that a job does not leave again.
 bool is_final(JobState state);
 
-// The path of a job's mesh, or of one of its labels, on its server.
+// The path of a job's mesh, or of one label's file, on its server.
 std::string mesh_path(const std::string& job, MeshFormat format,
                       std::optional<std::int64_t> label = std::nullopt);
 
-// Wall-clock milliseconds of each stage; a stage that has not run yet is 0.
+// Wall-clock milliseconds of each stage; 0 for a stage that has not run.
 struct Timing {
   double queue = 0;
   double load = 0;
@@ -324,24 +325,24 @@ struct Job {
   std::optional<std::string> started;
   std::optional<std::string> finished;
   Timing timing;
-  std::optional<MeshSummary> mesh;  // of a job that succeeded
-  std::optional<Problem> error;     // of a job that failed
-  bool reused = false;              // took the mesh of a job like it instead of making one
+  std::optional<MeshSummary> mesh;  // if it succeeded
+  std::optional<Problem> error;     // if it failed
+  bool reused = false;              // took the mesh of an equal job
   std::optional<WaitingFor> waiting_for = {};
 
   bool operator==(const Job&) const = default;
 };
 
-// How often samples have which values: bins of equal width over the volume's range.
+// A volume's sample values in bins of equal width over its range.
 struct Histogram {
   std::string volume;
-  std::array<double, 2> range = {0, 0};  // where the first bin begins and the last one ends
+  std::array<double, 2> range = {0, 0};  // start of the first bin and end of the last
   std::vector<std::uint64_t> counts;     // of each bin
 
   bool operator==(const Histogram&) const = default;
 };
 
-// What a job with these parameters would make and take.
+// The expected result and cost of a job with these parameters.
 struct Estimate {
   struct Queue {
     std::uint64_t queued = 0;
@@ -350,7 +351,7 @@ struct Estimate {
     bool operator==(const Queue&) const = default;
   };
 
-  // Of one label's own surface.
+  // One label's own surface.
   struct Label {
     std::int64_t label = 0;
     std::uint64_t triangles = 0;  // exact
@@ -359,23 +360,23 @@ struct Estimate {
   };
 
   std::string volume;
-  std::optional<double> iso = {};  // Otsu's threshold where that was asked for; none by labels
+  std::optional<double> iso = {};  // also if it is Otsu's threshold; none by labels
   Scheme scheme = Scheme::kSix;
-  std::uint64_t triangles = 0;  // exact, as `vertices`, of the surface as it is extracted
+  std::uint64_t triangles = 0;  // exact, like `vertices`, for the surface as extracted
   std::uint64_t vertices = 0;
-  // About how many are left where the job asks for fewer, by an error or a number.
+  // The approximate number after simplification, if the job asks for it.
   std::optional<std::uint64_t> simplified_triangles = {};
   std::map<MeshFormat, std::uint64_t> bytes;  // of each file
-  std::uint64_t memory_bytes = 0;             // at the job's peak, beside its mapped volume
-  bool fits = false;                          // whether one job may take that much
+  std::uint64_t memory_bytes = 0;             // the job's peak, without its mapped volume
+  bool fits = false;                          // true if one job may use that much memory
   double milliseconds = 0;                    // of the run, without the time in the queue
   Queue queue;
-  std::vector<Label> labels = {};  // ascending; of a job by labels
+  std::vector<Label> labels = {};  // ascending; only of a job by labels
 
   bool operator==(const Estimate&) const = default;
 };
 
-// How far a job is, as a stream of events tells it.
+// A job's progress, as a stream of events reports it.
 struct JobEvent {
   JobState state = JobState::kQueued;
   Stage stage = Stage::kQueue;
@@ -384,7 +385,7 @@ struct JobEvent {
   bool operator==(const JobEvent&) const = default;
 };
 
-// The names that the API uses for the values of the enumerations above.
+// The API's names of the values.
 std::string_view to_string(SampleType value);
 std::string_view to_string(NiftiForm value);
 std::string_view to_string(Interpolation value);
@@ -398,7 +399,7 @@ std::string_view to_string(Stage value);
 std::string_view to_string(WaitingFor value);
 std::string_view to_string(Simplification::Bound value);
 
-// The inverse: empty for a name that is none of them.
+// The inverse; empty for an unknown name.
 template <class Enum>
 std::optional<Enum> from_string(std::string_view name);
 
@@ -427,7 +428,7 @@ extern template std::vector<GlbCodec> values_of();
 extern template std::vector<Space> values_of();
 extern template std::vector<Priority> values_of();
 
-// All names of an enumeration as a person reads them: `"stat", "routine" or "bulk"`.
+// All names of an enumeration as prose: `"stat", "routine" or "bulk"`.
 template <class Enum>
 std::string names_of();
 

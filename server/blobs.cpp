@@ -8,7 +8,7 @@ namespace isomesh {
 namespace {
 
 store::S3ClientOptions client_options(const BlobOptions& options) {
-  // Told now rather than by the first request.
+  // Report errors now instead of on the first request.
   store::read_s3_credentials(options.credentials);
   store::S3ClientOptions client;
   client.address = store::parse_s3_url(options.place);

@@ -1,4 +1,4 @@
-// Where the bytes of volumes and meshes are, by what a person has set.
+// The configured store of volumes and meshes.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +12,17 @@
 namespace isomesh {
 
 struct BlobOptions {
-  std::string place;                             // s3://..., or a folder; empty: in that of --data
-  std::uint64_t cache = std::uint64_t{8} << 30;  // bytes of copies, of blobs in S3
-  std::filesystem::path credentials;             // a file; empty: of the environment
-  std::filesystem::path authorities;             // of certificates; empty: the system's
+  std::string place;                             // s3://... or a folder; empty: within --data
+  std::uint64_t cache = std::uint64_t{8} << 30;  // bytes of local copies of blobs in S3
+  std::filesystem::path credentials;             // a file; empty: the environment
+  std::filesystem::path authorities;             // file of certificates; empty: the system's
 };
 
-// Throws what opening the store would, of what can be told without it: Error kInvalidParameter.
+// Throws Error kInvalidParameter for errors that can be found without opening the store.
 void check_blobs(const BlobOptions& options);
 
-// The folder must outlive it. Throws Error kUnavailable where a shared folder is not there, and
-// what check_blobs throws.
+// The folder must outlive the store. Throws Error kUnavailable if a shared folder is missing, and
+// as check_blobs does.
 std::unique_ptr<store::BlobStore> open_blobs(const BlobOptions& options,
                                              const store::DataFolder& folder);
 

@@ -55,13 +55,13 @@ struct Commands::State {
   TokenRequest token = {};
   std::string shell = {};
   std::filesystem::path folder = {};
-  std::string target = {};  // of move
-  std::uint64_t after = 0;  // of the audit trail
-  bool verify = false;      // it
+  std::string target = {};  // for move
+  std::uint64_t after = 0;  // for the audit trail
+  bool verify = false;      // the audit trail
   std::function<void()> chosen = {};
   int status = 0;
 
-  // Later options of the program itself may follow a subcommand.
+  // Options of the program itself may follow a subcommand.
   CLI::App& add(CLI::App& parent, const std::string& name, const std::string& help,
                 const std::function<void()>& act) {
     CLI::App& command = *parent.add_subcommand(name, help);
@@ -145,7 +145,7 @@ struct Commands::State {
     move.add_option("--to", target, "The database, as postgresql://USER@HOST/NAME")->required();
   }
 
-  // May be asked for while a daemon runs.
+  // Can run beside a daemon.
   void add_audit_command() {
     CLI::App& audit = add(
         cli, "audit",
@@ -183,7 +183,7 @@ struct Commands::State {
     std::cout << std::endl;
   }
 
-  // Half a copy is none.
+  // A copy without the database is incomplete.
   void refuse_database(const std::string& instead) const {
     if (options.store.empty()) return;
     throw Error(ErrorCode::kInvalidParameter,

@@ -1,4 +1,4 @@
-// What isomeshd does when it does not serve: tokens, its configuration, and what installing needs.
+// Subcommands of isomeshd other than serving: tokens, configuration, installation.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@ namespace isomesh {
 
 struct Options;
 
-// The subcommands of `cli`, which must outlive it, as `options` must.
+// Adds the subcommands to `cli`, which must outlive it, as `options` must.
 class Commands {
  public:
   Commands(CLI::App& cli, const Options& options);
@@ -19,11 +19,11 @@ class Commands {
   Commands(const Commands&) = delete;
   Commands& operator=(const Commands&) = delete;
 
-  // Whether one of them was asked for, after `cli` has parsed.
+  // True if `cli` has parsed one of them.
   bool asked() const;
 
-  // Runs it, and returns the status to end with: 1 where it did what it could, and has told what is
-  // lost. Throws what it throws: Error.
+  // Runs it and returns the exit status: 1 if it succeeded partly and has reported losses. Throws
+  // Error.
   int run();
 
  private:

@@ -24,7 +24,7 @@ std::terminate_handler default_terminate = nullptr;
       std::fprintf(stderr, "isomeshd: %s\n", reason.data());  // allocates nothing
       std::_Exit(EXIT_FAILURE);
     }
-  } catch (...) {  // a defect, as all others: the core dump shows where it is
+  } catch (...) {  // a bug, like all others: the core dump has its place
   }
   default_terminate();
   std::abort();
@@ -40,7 +40,7 @@ sigset_t block_signals() {
   sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+  std::signal(SIGXFSZ, SIG_IGN);  // makes the file size limit an error like a full disk
   return signals;
 }
 

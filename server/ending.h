@@ -1,4 +1,4 @@
-// How the process ends: by signals, and for want of memory.
+// The end of the process: by signals, and if memory is exhausted.
 #pragma once
 
 #include <csignal>
@@ -8,20 +8,20 @@
 
 namespace isomesh {
 
-// Blocks the signals that end or reload the service, for this thread and those that it starts, and
-// returns them. Ignores those that a write may cause, which reports an error instead.
+// Blocks the signals that stop or reload the service, for this thread and those that it starts, and
+// returns them. Ignores signals caused by writes, which then fail with an error.
 sigset_t block_signals();
 
-// Ends the process with status 0 at SIGTERM or SIGINT until the thread is stopped. A start may take
-// long, as when it waits for a database, and has nothing yet that would have to be drained.
+// Until the thread is stopped, SIGTERM or SIGINT ends the process with status 0. For a long start,
+// such as waiting for a database, with nothing to drain yet.
 std::jthread end_start_on_signal(sigset_t signals);
 
-// The reason, if the error says that the system gives no more memory or threads; else empty. A
-// null-terminated constant.
+// The reason, if the system has no more memory or threads; otherwise empty. A null-terminated
+// constant.
 std::string_view shortage(const std::exception& error);
 
-// An exception of that kind that nothing catches ends the process with a message and status 1 from
-// now on, not by a signal. Jobs that were running are run again at the next start.
+// From now on an uncaught exception of that kind ends the process with a message and status 1, not
+// by a signal. Interrupted jobs run again at the next start.
 void end_clearly_without_memory();
 
 }  // namespace isomesh

@@ -54,12 +54,12 @@ namespace {
 
 using namespace isomesh;
 
-// Three quarters of the machine's memory, divided by the number of jobs that run at the same time.
+// Three quarters of the machine's memory, divided by the number of concurrent jobs.
 std::uint64_t default_job_memory(std::size_t workers) {
   return jobs::usable_memory() / 4 * 3 / std::max<std::size_t>(workers, 1);
 }
 
-// Where a build puts it, or where an installation does.
+// In the folder of a build or of an installation.
 std::filesystem::path program_of_ours(const std::string& name) {
   const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   for (const auto& program :
@@ -71,15 +71,15 @@ std::filesystem::path program_of_ours(const std::string& name) {
                                         ISOMESH_LIBEXEC + " relative to it");
 }
 
-// A quarter of the time that things are kept, within bounds: what expired goes soon, and the disk
+// A quarter of the retention time, within bounds: expired objects are removed soon, and the disk
 // cannot fill up between two rounds.
 std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::seconds(1),
                                                std::chrono::seconds(30));
 }
 
-// How far the clock may be ahead of what was stored last. A clock that is wrong by less makes
-// things expire early by a quarter of their time at most.
+// How far the clock may be ahead of the last stored time. A smaller error expires objects early by
+// at most a quarter of their time.
 std::chrono::milliseconds clock_tolerance(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::hours(1),
                                                std::chrono::days(7));
@@ -130,7 +130,7 @@ callbacks::CallbackOptions callback_options(const Options& options) {
               std::chrono::duration<double>(options.callback_retry_seconds))};
 }
 
-// Keeps what was read before when the file cannot be read now.
+// Keeps the previous content if the file cannot be read.
 void reload_one(const std::function<void()>& read) {
   try {
     read();
@@ -146,7 +146,7 @@ void reload(const Options& options, const Files& files, callbacks::Callbacks& ca
   reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
 }
 
-// What a start would make of the places of files. Makes none.
+// Checks the places of files as a start would, without creating any.
 void check_places(const Options& options) {
   std::error_code absent;
   if (options.data.empty()) throw invalid_parameter("data", "must name a folder");
@@ -176,8 +176,8 @@ std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
 }  // namespace hospital
 #endif
 
-// Tells what would be used. Throws what a start would that finds a mistake in it; touches neither
-// the data folder nor the address.
+// Prints the effective configuration. Throws as a start would for errors in it; touches neither the
+// data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
@@ -253,8 +253,8 @@ int run(const Options& options, const sigset_t& signals) {
   server.start();
   starting.request_stop();
   starting.join();
-  // Declared after the server, so that the workers end before it and the end of their last job is
-  // still logged and counted.
+  // Declared after the server, so that the workers end first and the end of their last job is still
+  // logged and counted.
   const jobs::WorkerOptions worker_options = {
       .threads = options.workers,
       .program = job_program,
@@ -279,8 +279,8 @@ int run(const Options& options, const sigset_t& signals) {
   return 0;
 }
 
-// A daemon that cannot start says why whatever its log's level is, and in the log's form where that
-// is read by machines.
+// A daemon that cannot start reports the reason regardless of the log's level, in the log's form if
+// machines read it.
 void tell_failure(LogFormat format, const std::string& reason) {
   if (format == LogFormat::kText) {
     std::cerr << "isomeshd: " << reason << std::endl;

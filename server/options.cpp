@@ -19,7 +19,7 @@
 namespace isomesh {
 namespace {
 
-// As TOML has it: numbers and truth values bare.
+// As in TOML: numbers and booleans unquoted.
 std::string quoted(const std::string& value) {
   const bool is_number = !value.empty() &&
                          value.find_first_not_of("0123456789.") == std::string::npos &&
@@ -41,7 +41,7 @@ const std::map<std::string, LogLevel> kLogLevels = {{"debug", LogLevel::kDebug},
 const std::map<std::string, LogFormat> kLogFormats = {{"text", LogFormat::kText},
                                                       {"json", LogFormat::kJson}};
 
-// The library keeps an enumerator's number in place of its name.
+// The library stores an enumerator's number instead of its name.
 template <class Enum>
 std::string name_in(const std::map<std::string, Enum>& names, const std::string& number) {
   for (const auto& [name, value] : names) {
@@ -60,7 +60,7 @@ std::string value_of(const CLI::Option& option) {
   return value;
 }
 
-// CLI::CheckedTransformer, with an error that lists the names only.
+// CLI::CheckedTransformer, but its error lists only the names.
 template <class Enum>
 CLI::Validator one_of(const std::map<std::string, Enum>& names) {
   const CLI::CheckedTransformer checked(names);
@@ -73,7 +73,7 @@ CLI::Validator one_of(const std::map<std::string, Enum>& names) {
           ""};
 }
 
-// CLI::Range lets NaN through.
+// CLI::Range accepts NaN.
 CLI::Validator number_between(double least, double most) {
   const CLI::Range range(least, most);
   return {[range](std::string& text) {
@@ -84,8 +84,7 @@ CLI::Validator number_between(double least, double most) {
           range.get_description()};
 }
 
-// Bytes with their unit. CLI::AsSizeValue takes what is negative or has more than 64 bits for
-// another number.
+// Bytes with a unit. CLI::AsSizeValue misreads negative values and those beyond 64 bits.
 CLI::Validator size_of_bytes(std::uint64_t least = 0) {
   const CLI::AsSizeValue with_unit(false);
   return {
@@ -103,7 +102,7 @@ CLI::Validator size_of_bytes(std::uint64_t least = 0) {
       with_unit.get_description()};
 }
 
-// Of a page: "https://viewer.example", or all of them.
+// A page's origin such as "https://viewer.example", or `*` for all.
 std::string wrong_origin(const std::string& text) {
   const bool is_origin = text == "*" || text.starts_with("http://") || text.starts_with("https://");
   return is_origin ? "" : text + " is not an origin such as https://viewer.example";
@@ -200,8 +199,8 @@ void add_check(CLI::App& cli, Options& options) {
       ->callback([&options] { options.check_only = true; });
 }
 
-// CLI11 lets the file win over the environment. Here the environment wins, so that a container's or
-// a unit's variables change what an installed file says.
+// In CLI11 the file overrides the environment. Here the environment overrides the file, so that
+// variables of a container or a unit change an installed configuration.
 class FileBelowEnvironment : public CLI::ConfigTOML {
  public:
   explicit FileBelowEnvironment(const CLI::App& cli) : cli_(cli) {}
@@ -221,7 +220,7 @@ class FileBelowEnvironment : public CLI::ConfigTOML {
   const CLI::App& cli_;
 };
 
-// Of one start only, so neither in a file nor in the environment.
+// For a single start, so neither in a file nor in the environment.
 void add_operators_word(CLI::App& cli, Options& options) {
   cli.add_flag("--adopt", options.word.adopt,
                "Start although the database and the files of volumes and meshes do not belong "
@@ -405,7 +404,7 @@ std::string describe_config_error(const std::string& library_text) {
   constexpr std::string_view kUnknown = "INI was not able to parse ";
   if (!library_text.starts_with(kUnknown)) return "the file of --config: " + library_text;
   std::string name = library_text.substr(kUnknown.size());
-  // What the library calls the beginning of a section.
+  // The library's name for the beginning of a section.
   constexpr std::string_view kSection = ".++";
   if (name.ends_with(kSection)) {
     name.resize(name.size() - kSection.size());

@@ -1,4 +1,4 @@
-// What a person can set of the daemon.
+// The daemon's options.
 #pragma once
 
 #include <cstddef>
@@ -23,21 +23,21 @@ class App;
 namespace isomesh {
 
 struct Options {
-  bool check_only = false;  // tell what would be used, and end
+  bool check_only = false;  // print the configuration and exit
   std::string listen = "127.0.0.1:8080";
   std::filesystem::path data = "isomesh-data";
-  std::string store;  // URL of the database that keeps the records; empty: one in the data folder
+  std::string store;  // URL of the database of records; empty: one in the data folder
   BlobOptions blobs;
   std::size_t workers = 2;
-  int threads = 0;  // of the kernels; 0: one a processor
+  int threads = 0;  // for kernels; 0: one per processor
   bool open_network = false;
   unsigned drain_seconds = 30;
   LogLevel log_level = LogLevel::kInfo;
   LogFormat log_format = LogFormat::kText;
-  std::filesystem::path tokens;  // empty: requests are not authenticated
+  std::filesystem::path tokens;  // empty: no authentication
   std::filesystem::path tls_certificate;
   std::filesystem::path tls_key;
-  std::filesystem::path hospital;  // empty: no PACS is known
+  std::filesystem::path hospital;  // empty: no PACS
   std::vector<std::string> callback_targets;
   std::filesystem::path callback_secrets;
   std::filesystem::path callback_authorities;
@@ -45,7 +45,7 @@ struct Options {
   store::JobStoreOptions jobs;
   double keep_days = 30;
   std::uint64_t max_disk = 0;
-  std::optional<std::uint64_t> disk_reserve;  // empty: what is usual on a disk of that size
+  std::optional<std::uint64_t> disk_reserve;  // empty: the default for a disk of that size
   store::OperatorsWord word;
   unsigned lease_seconds = 30;
   unsigned longest_job_minutes = 60;
@@ -56,21 +56,21 @@ struct Options {
   std::uint64_t job_memory = 0;  // 0: see default_job_memory
 };
 
-// Every option also as ISOMESH_... in the environment and by its name in the file of --config,
-// which may hold nothing else. `options` is filled in when `cli` parses.
+// Adds all options, also as ISOMESH_... in the environment and by name in the file of --config,
+// which may have no other entries. `options` is set when `cli` parses.
 void add_options(CLI::App& cli, Options& options);
 
-// Warnings about variables of the environment that begin with ISOMESH_ and set nothing, here or in
-// the clients.
+// Warnings about environment variables that begin with ISOMESH_ but are unknown here and in the
+// clients.
 std::vector<std::string> unknown_variables(const CLI::App& cli);
 
 enum class Remarks { kNo, kYes };
 
-// What `cli` has parsed as the lines of a file of --config that says all of it; those that nobody
-// has set are comments. With remarks on what each option means.
+// The parsed options as lines for a file of --config; defaults are comments. `remarks` explain the
+// options.
 std::string as_config(const CLI::App& cli, Remarks remarks);
 
-// What a person is told of a mistake in the file of --config.
+// The message for an error in the file of --config.
 std::string describe_config_error(const std::string& library_text);
 
 }  // namespace isomesh

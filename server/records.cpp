@@ -32,7 +32,7 @@ store::JobStoreOptions job_options(const Options& options) {
   return result;
 }
 
-// What is the same in all databases, which are opened before it.
+// Common to all databases; they are opened first.
 class SqlRecords : public Records {
  public:
   explicit SqlRecords(store::SqlDatabase& database)
@@ -50,7 +50,7 @@ class SqlRecords : public Records {
   store::SqlReceivedStore received_;
 };
 
-// In the data folder, which one process has.
+// In the data folder, which one process owns.
 class FolderRecords : public SqlRecords {
  public:
   FolderRecords(const Options& options, std::unique_ptr<store::Database> database,
@@ -78,10 +78,10 @@ std::string host_of_node() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
 }
 
-// Requests wait for each other rather than for many connections, of which a server has few.
+// Requests wait for each other, because a database server has few connections.
 constexpr std::size_t kRequestConnections = 12;
 
-// In a database that several processes share.
+// In a database shared by several processes.
 class SharedRecords : public SqlRecords {
  public:
   SharedRecords(const Options& options, std::unique_ptr<store::postgresql::Database> database,
@@ -121,7 +121,7 @@ std::unique_ptr<Records> open_records(const Options& options, const store::DataF
                                            blobs, tolerance);
   }
   store::postgresql::check_url(options.store);
-  // A copy of a folder on another machine is another one.
+  // A copied folder on another machine is another node.
   auto database = std::make_unique<store::postgresql::Database>(
       store::postgresql::DatabaseOptions{.url = options.store,
                                          .node = folder.name() + '@' + host_of_node(),

@@ -1,4 +1,4 @@
-// The stores of records, of whatever engine.
+// The stores of records, for any database engine.
 #pragma once
 
 #include <chrono>
@@ -27,24 +27,24 @@ class Records {
   virtual store::OrderStore& orders() = 0;
   virtual store::AuditTrail& audit() = 0;
   virtual store::ReceivedStore& received() = 0;
-  // The time, as far as it can be believed.
+  // The current time, as far as the clock is plausible (store/believed_clock.h).
   virtual store::Time now() = 0;
 
-  // Takes it upon this process to carry out orders. Throws Error kUnavailable when another one that
-  // shares the records does.
+  // Makes this process responsible for orders. Throws Error kUnavailable if another process that
+  // shares the records is.
   virtual void take_orders() = 0;
 };
 
-// Opens those that --store names; how far a clock may be ahead is `tolerance`. Throws Error
-// kUnavailable when they do not answer, or do not belong to the blobs. Both must outlive it.
+// Opens the stores of --store; `tolerance` is how far a clock may be ahead. Throws Error
+// kUnavailable if they do not respond, or do not belong to the blobs. Both must outlive it.
 std::unique_ptr<Records> open_records(const Options& options, const store::DataFolder& folder,
                                       store::BlobStore& blobs, std::chrono::milliseconds tolerance);
 
-// Opens the audit trail alone, beside a daemon that uses it, and reads it; see AuditTrail::read.
+// Opens only the audit trail, also beside a daemon, and reads it; see AuditTrail::read.
 void read_audit_trail(const Options& options, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line);
 
-// The same, and checks the digests of all entries.
+// The same, but verifies the digests of all entries.
 store::AuditCheck verify_audit_trail(const Options& options);
 
 }  // namespace isomesh

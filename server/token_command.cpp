@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kShownDigits = 12;  // of a hash: enough to tell tokens apart
+constexpr std::size_t kShownDigits = 12;  // of a hash: enough to distinguish tokens
 
 [[noreturn]] void cannot_write() {
   throw Error(ErrorCode::kInternal, "the file of tokens cannot be written");
@@ -30,8 +30,8 @@ void check_is_given(const fs::path& file) {
   if (file.empty()) throw invalid_parameter("tokens", "name the file with --tokens FILE");
 }
 
-// Held while the file is read and written, so that two commands do not lose each other's lines. Of
-// the folder, because the file is replaced.
+// Held while the file is read and written, so that concurrent commands lose no lines. Locks the
+// folder, because the file is replaced.
 Descriptor lock_folder_of(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -49,7 +49,7 @@ std::vector<std::string> lines_of(const fs::path& file) {
   return lines;
 }
 
-// In place of the file that is there: with its owner and mode, and never half.
+// Replaces the file atomically, with its owner and mode.
 void replace(const fs::path& file, const std::vector<std::string>& lines) {
   std::string text;
   for (const std::string& line : lines) text += line + '\n';
@@ -80,7 +80,7 @@ struct TokenLine {
   std::string hash;
 };
 
-// The names are empty where the line is a comment or blank.
+// The names are empty for a comment or a blank line.
 TokenLine parsed(const std::string& line) {
   TokenLine token;
   std::istringstream words(line);
@@ -106,7 +106,7 @@ void add_token(const TokenRequest& request) {
     if (fs::exists(request.file)) lines = lines_of(request.file);
     const bool has_tokens = std::ranges::any_of(
         lines, [](const std::string& each) { return !parsed(each).name.empty(); });
-    // The next start would refuse it otherwise.
+    // The next start would reject it otherwise.
     if (has_tokens) const http::Tokens readable(request.file, http::ReadBy::kAdministrator);
     for (const std::string& each : lines) {
       const TokenLine other = parsed(each);
@@ -116,7 +116,7 @@ void add_token(const TokenRequest& request) {
       }
     }
     lines.push_back(line);
-    tell(token);  // first: one that nobody has seen is of no use, and its hash would stay
+    tell(token);  // first: an unseen token is useless, and its hash would stay
     replace(request.file, lines);
     return;
   }

@@ -1,4 +1,4 @@
-// `isomeshd token`: the file of tokens, as an operator handles it.
+// `isomeshd token`: manages the file of tokens.
 #pragma once
 
 #include <filesystem>
@@ -7,25 +7,25 @@
 namespace isomesh {
 
 struct TokenRequest {
-  std::string name;  // whose; of a revocation, whose tokens
+  std::string name;  // the owner; for a revocation, of which to revoke tokens
   std::string role = "user";
-  std::string hash;            // of a revocation: the beginning of the one token's hash; empty: all
-  std::filesystem::path file;  // empty, for a new token: its line is printed
+  std::string hash;            // for a revocation: prefix of one token's hash; empty: all
+  std::filesystem::path file;  // empty for a new token: its line is printed
 };
 
-// Changes to the file are made one after the other, also by several processes, and are there whole
-// or not at all. All throw Error kInvalidParameter for what cannot be done with these names or that
-// file, and kInternal when it cannot be written.
+// Changes to the file are atomic and serialised, also between processes. All functions throw Error
+// kInvalidParameter if the names or the file do not allow the change, and kInternal if the file
+// cannot be written.
 
-// Makes a token and prints it, which is the only time that it is seen: its line for the file holds
-// the hash.
+// Creates a token and prints it. It cannot be printed again: its line in the file has only the
+// hash.
 void add_token(const TokenRequest& request);
 
-// Prints name, role and the beginning of the hash of each.
+// Prints each token's name, role and prefix of the hash.
 void list_tokens(const TokenRequest& request);
 
-// Takes tokens out of the file, and says how many. Throws also where none would be left, because a
-// daemon keeps those that it knows rather than read such a file.
+// Removes tokens from the file and prints their number. Throws if none would remain, because a
+// daemon rejects such a file and keeps its old tokens.
 void revoke_tokens(const TokenRequest& request);
 
 }  // namespace isomesh

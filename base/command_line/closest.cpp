@@ -8,7 +8,7 @@
 namespace isomesh::command_line {
 namespace {
 
-// Levenshtein's: letters to insert, delete or replace.
+// The Levenshtein distance: letters to insert, delete or replace.
 std::size_t edits_between(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});

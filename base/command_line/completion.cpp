@@ -13,7 +13,7 @@ std::string joined(const std::vector<std::string>& words, const std::string& bet
   return text;
 }
 
-// Puts text in single quotes of a shell; `quote` is how that shell writes one inside them.
+// Quotes text for a shell; `quote` is that shell's escape for a single quote.
 std::string quoted(std::string_view text, std::string_view quote) {
   std::string result = "'";
   for (const char c : text) {
@@ -62,7 +62,7 @@ void visit(const CLI::App& app, const std::function<void(const CLI::App&)>& each
 struct Operand {
   std::string name = {};
   std::vector<std::string> words = {};
-  std::string listing = {};  // a shell's command that prints the values
+  std::string listing = {};  // a shell command that prints the values
 };
 
 Operand operand_of(const CLI::App& command, const std::string& program, const Listings& listings) {
@@ -189,7 +189,7 @@ std::string zsh_options(const CLI::App& app) {
   return lines;
 }
 
-// How _arguments completes what is not an option.
+// The _arguments entry for positionals and subcommands.
 std::string zsh_operands(const CLI::App& command, const Operand& operand) {
   std::vector<std::string> own = command_names(command);
   own.insert(own.end(), operand.words.begin(), operand.words.end());

@@ -1,4 +1,4 @@
-// Completion of a program's arguments in shells, made from its own table of options.
+// Shell completion of a program's arguments, generated from its own table of options.
 #pragma once
 
 #include <map>
@@ -17,12 +17,12 @@ enum class Shell { kBash, kZsh, kFish };
 // The shell called "bash", "zsh" or "fish".
 std::optional<Shell> shell_from(std::string_view name);
 
-// Arguments by which the program prints the values of a positional, one a line, by the name of the
-// positional: {"JOB", "ids jobs"}.
+// Arguments by which the program prints the values of a positional, one per line, by the name of
+// the positional: {"JOB", "ids jobs"}.
 using Listings = std::map<std::string, std::string>;
 
-// A script for that shell. It completes subcommands, their options, the words that a value may be,
-// files, and positionals that `listings` has. Options and subcommands without a group are left out.
+// Returns a script for the shell. It completes subcommands, their options, enumerated values,
+// files, and the positionals in `listings`. Options and subcommands without a group are omitted.
 std::string completion(const CLI::App& app, Shell shell, const Listings& listings = {});
 
 }  // namespace isomesh::command_line

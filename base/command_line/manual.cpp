@@ -10,7 +10,7 @@
 namespace isomesh::command_line {
 namespace {
 
-// Escapes text for roff: hyphens can be copied, and nothing is a macro.
+// Escapes text for roff, with hyphens that can be copied.
 std::string plain(std::string_view text) {
   std::string escaped;
   bool begins_line = true;

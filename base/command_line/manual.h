@@ -1,4 +1,4 @@
-// A program's manual page, made from its own table of options.
+// A program's manual page, generated from its own table of options.
 #pragma once
 
 #include <string>
@@ -23,8 +23,8 @@ struct Manual {
   std::vector<Section> sections;  // after the options
 };
 
-// The page in roff's man macros (man(7)): options by their groups, and each subcommand with its
-// own options and its footer. Options and subcommands without a group are left out.
+// The page in roff's man macros (man(7)): options by their groups, and each subcommand with its own
+// options and its footer. Options and subcommands without a group are omitted.
 std::string manual_page(const CLI::App& app, const Manual& manual);
 
 }  // namespace isomesh::command_line

@@ -90,7 +90,7 @@ int wait(const Options& options, const std::stop_token& stop) {
     try {
       range = client.volume(job.parameters.volume).range;
     } catch (const Error&) {
-      // The volume may have been deleted since.
+      // The volume may have been deleted meanwhile.
     }
   }
   return status_of(job, options, {}, range);

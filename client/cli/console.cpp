@@ -55,7 +55,7 @@ std::string files_in_words(const std::vector<PackedFile>& files) {
          (files.size() == 1 ? " file" : " files");
 }
 
-// A folder may hold more than its name suggests.
+// The folder's content may differ from its name.
 void tell_folders(const std::vector<std::filesystem::path>& files) {
   for (const std::filesystem::path& path : files) {
     std::error_code error;

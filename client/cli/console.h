@@ -1,4 +1,4 @@
-// The commands share this: a client, and messages to people. Private to this folder.
+// Shared by the commands: a client, and messages to users. Private to this folder.
 #pragma once
 
 #include <array>
@@ -45,7 +45,7 @@ void tell_notes(const Volume& volume, const std::string& subject);
 // Without a terminal no progress is shown, so the client uses the longest polls.
 Job wait(Client& client, const std::string& id, ProgressBar& bar);
 
-// The job with all of its labels. A job with many labels is told without them.
+// The job with all of its labels, which are omitted in a job with many.
 Job with_labels(Client& client, Job job);
 
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
@@ -58,8 +58,8 @@ std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
                                        const UploadOptions& how, ProgressBar& bar,
                                        const std::string& subject = {});
 
-// The iso-value that a preset of the volume has, such as "bone". Throws Error kInvalidParameter,
-// which lists the presets, if there is none with that name.
+// The iso-value of a volume's preset, such as "bone". Throws Error kInvalidParameter, which lists
+// the presets, if there is none with that name.
 double preset_of(const Volume& volume, const std::string& name);
 
 // A line for each file that was written.

@@ -6,7 +6,7 @@
 
 namespace isomesh::cli {
 
-// The overview's examples, one a line, indented by two blanks.
+// The overview's examples, one per line, indented by two blanks.
 std::string general_examples();
 
 // The examples of one subcommand in the same form; empty if it has none.

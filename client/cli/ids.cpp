@@ -21,7 +21,7 @@ bool is_hexadecimal(const std::string& text) {
   return std::ranges::all_of(text, is_digit);
 }
 
-// Text that can only be looked up as it is; the server says what is wrong with the rest.
+// True for text that is looked up as given; the server reports errors in it.
 bool is_whole(const std::string& text, std::size_t whole) {
   const auto is_of_id = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-'; };
   return text.size() < kShortest || text.size() >= whole || !std::ranges::all_of(text, is_of_id);
@@ -35,7 +35,7 @@ std::vector<Candidate> volumes_of(Client& client) {
   return all;
 }
 
-// All pages, or the first one alone.
+// All pages, or only the first.
 std::vector<Candidate> jobs_of(Client& client, bool is_first_page) {
   std::vector<Candidate> all;
   std::string cursor;

@@ -9,10 +9,10 @@
 
 namespace isomesh::cli {
 
-// One of the things that an id may stand for.
+// An object that an id may stand for.
 struct Candidate {
   std::string id;
-  std::string title;  // what tells it from others, for a person
+  std::string title;  // distinguishes it from others, for a person
 };
 
 // True for text that could be a volume's id or a shortened one: at least four hexadecimal digits.
@@ -21,13 +21,14 @@ bool may_be_volume_id(const std::string& text);
 // True for an argument FILE that names no file but could be a volume's id.
 bool is_stored_volume(const std::filesystem::path& path);
 
-// The one id that `text` is, begins or ends. Throws Error kNotFound if there is none, and
-// kInvalidParameter, which lists them, if there are several. `kind` is "volume", "job" or "order".
+// The only id that equals, begins with or ends with `text`. Throws Error kNotFound if there is
+// none, and kInvalidParameter, which lists them, if there are several. `kind` is "volume", "job" or
+// "order".
 std::string whole_id(const std::string& text, const std::string& kind,
                      const std::vector<Candidate>& candidates);
 
-// The whole ids on the server. Whole ids and those with fewer than four characters are returned as
-// they are, without a request. Throws Error as whole_id and Client do.
+// The full ids on the server. Full ids and those with fewer than four characters are returned
+// unchanged, without a request. Throws Error as whole_id and Client do.
 std::string volume_id(Client& client, const std::string& text);
 std::string job_id(Client& client, const std::string& text);
 std::string order_id(Client& client, const std::string& text);

@@ -1,4 +1,4 @@
-// Ctrl-C as a stop request instead of a sudden end.
+// Ctrl-C as a stop request instead of an immediate end.
 #pragma once
 
 #include <atomic>
@@ -7,9 +7,9 @@
 
 namespace isomesh::cli {
 
-// Create it first in main, while only one thread runs: it blocks SIGINT and SIGTERM for all threads
-// and waits for them on a thread of its own. The first signal asks to stop; a second one ends the
-// process at once, by that signal.
+// Construct it first in main, while only one thread runs: it blocks SIGINT and SIGTERM for all
+// threads and waits for them on a thread of its own. The first signal requests a stop; a second one
+// ends the process immediately, by that signal.
 class Interrupt {
  public:
   Interrupt();
@@ -19,7 +19,7 @@ class Interrupt {
 
   std::stop_token token() const { return source_.get_token(); }
 
-  // Ends the process by the signal that came, with its default action; returns if none came. A
+  // Ends the process by the received signal, with its default action; returns if there was none. A
   // shell ends its loop only if the command has died by SIGINT.
   void end_by_signal() const;
 

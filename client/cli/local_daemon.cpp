@@ -46,7 +46,7 @@ fs::path find_program(const fs::path& given) {
               "the program isomeshd was not found; give its path by --daemon FILE");
 }
 
-// The environment may configure another daemon, so this one does not get those variables.
+// Omits variables that may configure another daemon.
 std::vector<std::string> environment() {
   std::vector<std::string> all;
   for (char** entry = environ; *entry != nullptr; ++entry) {
@@ -117,7 +117,7 @@ void LocalDaemon::start(const fs::path& program, int jobs) {
   const pid_t parent = ::getpid();
   process_ = ::fork();
   if (process_ == 0) {
-    // Only calls that are safe after a fork. Ctrl-C is for the command, which ends the daemon.
+    // Only async-signal-safe calls after a fork. Ctrl-C is for the command, which ends the daemon.
     ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(1);

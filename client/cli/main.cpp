@@ -1,4 +1,4 @@
-// isomesh: the command that asks a server for meshes.
+// isomesh: the command-line client.
 
 #include <csignal>
 #include <exception>
@@ -13,7 +13,7 @@
 
 namespace {
 
-// True if the reader of the output has ended, as `head` does. That is not an error to report.
+// True if the reader of the output has ended, for example `head`. That is not an error to report.
 bool reader_has_left() {
   pollfd output{.fd = STDOUT_FILENO, .events = POLLOUT, .revents = 0};
   return ::poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;

@@ -99,7 +99,8 @@ class Leftovers {
   std::set<std::string> ids_;
 };
 
-// Takes one input at a time: uploads it, meshes it and downloads the mesh. One object per thread.
+// Processes one input at a time: uploads it, meshes it and downloads the mesh. One object per
+// thread.
 class Run {
  public:
   Run(const Options& options, const std::stop_token& stop, bool is_one_of_many,
@@ -146,7 +147,7 @@ class Run {
   }
 
  private:
-  // A volume that is on the server already.
+  // A volume already on the server.
   int stored(const std::string& id, const std::string& name) {
     const Volume found = client_.volume(volume_id(client_, id));
     if (!options_.quiet) tell_notes(found, is_one_of_many_ ? name : "");
@@ -177,7 +178,7 @@ class Run {
     return status_of(*job, options_, about, volume.range);
   }
 
-  // Returns the job when it has ended; nothing after an interrupt.
+  // Returns the job when it has ended; empty after an interrupt.
   std::optional<Job> made(const JobParameters& parameters) {
     Job job = client_.submit(parameters);
     try {
@@ -191,7 +192,7 @@ class Run {
     }
   }
 
-  // If the server is lost, the job goes on there; the error says how to resume.
+  // If the server is lost, the job continues there; the error says how to resume.
   template <class Step>
   void resumable(const std::string& job, const Step& step) {
     try {
@@ -242,7 +243,7 @@ class Run {
   ClientTiming seen_;
 };
 
-// Meshes some inputs at a time and reports each of them.
+// Meshes several inputs concurrently and reports each of them.
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
              Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;

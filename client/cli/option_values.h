@@ -1,4 +1,4 @@
-// Options that take values, and the reading of those values; private to this folder.
+// Options with values, and parsers of these values; private to this folder.
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,8 @@ std::array<Number, N> numbers_from(const std::string& option, std::string_view t
   return *numbers;
 }
 
-// "must be a whole number from 0 to 4294967295": what a rejected number has to be, by its type.
+// "must be a whole number from 0 to 4294967295": the requirement of the type, for a rejected
+// number.
 template <class Number>
 std::string must_be_number() {
   if constexpr (std::is_floating_point_v<Number>) return "must be a number";

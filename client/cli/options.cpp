@@ -273,7 +273,7 @@ class Parser {
     check_stored();
   }
 
-  // Rejects what the server would reject, before anything is sent.
+  // Rejects in advance what the server would reject.
   void check_parameters() const {
     const bool is_job = options_.command == Command::kMesh ||
                         options_.command == Command::kSubmit ||

@@ -1,4 +1,4 @@
-// The command line as a value.
+// The parsed command line.
 #pragma once
 
 #include <filesystem>
@@ -70,11 +70,11 @@ struct Options {
 
   std::vector<std::filesystem::path> files;  // mesh, upload; "-" is standard input
   UploadOptions upload;                      // mesh, upload; without progress
-  std::string id;                            // of a job, a volume or an order; may be short
+  std::string id;                            // of a job, a volume or an order; may be shortened
   JobParameters parameters;                  // mesh, submit, estimate
   std::string preset;                        // the iso-value's name; empty: see parameters
   bool dry_run = false;                      // mesh: only an estimate
-  int jobs = 1;                              // mesh: inputs at the same time
+  int jobs = 1;                              // mesh: inputs processed concurrently
   bool is_local = false;                     // mesh: with a daemon of its own
   std::filesystem::path daemon;              // its program; empty: searched for
   std::string key;                           // submit
@@ -91,7 +91,7 @@ struct Options {
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on
-// standard output when the status is 0, on standard error otherwise.
+// standard output if the status is 0, otherwise on standard error.
 class EarlyExit : public std::runtime_error {
  public:
   EarlyExit(int status, const std::string& text) : std::runtime_error(text), status_(status) {}

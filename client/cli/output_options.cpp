@@ -48,7 +48,7 @@ bool is_folder(const std::string& path) {
   return path.ends_with('/') || fs::is_directory(path, error);
 }
 
-// "x.glb,y.stl" would be a valid name, but is meant as a list.
+// "x.glb,y.stl" is a valid file name, but was meant as a list.
 void refuse_list(const std::string& path) {
   const auto is_output = [](std::string_view part) {
     const std::string suffix = lower(fs::path(part).extension().string());

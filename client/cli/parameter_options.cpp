@@ -42,7 +42,7 @@ std::string default_of(const Parameter& parameter, const T& standard) {
   }
 }
 
-// The words that a value may be; empty if it is something else.
+// The enumerated values; empty if there are none.
 template <class T>
 std::string words_of() {
   if constexpr (std::is_same_v<T, Scheme>) {
@@ -253,7 +253,7 @@ class ParameterOptions {
     constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::int64_t> labels;
     for (const std::string_view each : split(text, ',')) {
-      const std::size_t dash = each.find('-', 1);  // at the beginning it is a sign
+      const std::size_t dash = each.find('-', 1);  // a leading one is a sign
       const auto first = number_from<std::int64_t>(each.substr(0, dash));
       const auto last =
           dash == std::string_view::npos ? first : number_from<std::int64_t>(each.substr(dash + 1));
@@ -304,7 +304,7 @@ const std::map<std::string, std::string>& options_of_fields() {
   static const std::map<std::string, std::string> options = [] {
     std::map<std::string, std::vector<std::string>> by_path;
     JobParameters all;
-    all.callback.emplace();  // not constant, for those members that may be absent
+    all.callback.emplace();  // not constant, so that `visit` reaches members that may be absent
     visit_leaves(all, [&](const std::string& path, const Parameter& parameter, const auto&) {
       const std::string option = "--" + option_name_of(parameter);
       by_path[path].push_back(option);
@@ -318,7 +318,7 @@ const std::map<std::string, std::string>& options_of_fields() {
   return options;
 }
 
-// The options of raw samples and of a choice in the upload are called as their fields.
+// The options of raw samples, and those that select within the upload, have their fields' names.
 bool is_of_upload(const std::string& field) {
   constexpr std::array kFields = {"dims",      "type",       "spacing",   "origin",
                                   "direction", "byte_order", "series",    "member",
@@ -337,7 +337,7 @@ std::string option_of_field(const std::string& field) {
   return "--" + name;
 }
 
-// Replaces the names of fields that are no words of their own, such as max_error_mm.
+// Replaces field names that are not ordinary words, such as max_error_mm.
 std::string with_option_names(std::string text) {
   for (const auto& [path, option] : options_of_fields()) {
     if (path.find('_') == std::string::npos) continue;

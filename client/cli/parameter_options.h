@@ -1,5 +1,5 @@
-// The options of a job's parameters, made from their table (proto/parameters.h); private to this
-// folder.
+// The options of a job's parameters, generated from their table (proto/parameters.h); private to
+// this folder.
 #pragma once
 
 #include <string>

@@ -14,7 +14,7 @@ namespace isomesh::cli {
 std::string bar_line(const std::string& label, double share, const std::string& note,
                      std::size_t columns);
 
-// The reason why a job waits; empty when it runs. Pure.
+// The reason why a job waits; empty if it runs. Pure.
 std::string note_of(const Job& job);
 
 // Draws on standard error if that is a terminal and drawing is wanted; otherwise it does nothing.

@@ -27,7 +27,7 @@ std::string histogram_report(const Histogram& histogram);
 std::string estimate_report(const Estimate& estimate);
 std::string job_report(const Job& job);
 
-// The options that would resolve an error, a line each; empty if there are none.
+// The options that would resolve an error, one per line; empty if there are none.
 std::string remedy_report(const Remedy& remedy);
 
 // The note's detail, with the command's options instead of the API's members.

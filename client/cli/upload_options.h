@@ -1,4 +1,4 @@
-// The options that say what to upload; private to this folder.
+// The options that select what to upload; private to this folder.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,10 +11,10 @@ namespace isomesh::cli {
 inline constexpr const char* kUploadGroup = "Upload";
 inline constexpr const char* kRawGroup = "Raw samples";
 
-// The things that the argument FILE may name.
+// The kinds of objects that the argument FILE may name.
 enum class Inputs { kFiles, kFilesAndVolumes };
 
-// FILE and the options that choose a volume in it.
+// FILE and the options that select a volume in it.
 void add_file(CLI::App& app, Options& options, Inputs inputs = Inputs::kFiles);
 
 // The options that describe raw samples.

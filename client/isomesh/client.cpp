@@ -60,13 +60,13 @@ std::string upload_query(const UploadOptions& options) {
   return pairs.empty() ? std::string() : query_string(pairs);
 }
 
-// Names of files may name patients: they go in a header, because logs hold targets.
+// File names may name patients, so they are sent in a header: logs contain targets.
 std::string disposition_of(const std::filesystem::path& path, const std::string& name) {
   const auto file = (path.has_filename() ? path : path.parent_path()).filename();
   return "attachment; filename*=UTF-8''" + percent_encode(name.empty() ? file.string() : name);
 }
 
-// The SHA-256 of the body, in base64.
+// The body's SHA-256, in base64.
 std::string digest_of(const UploadBody& file) {
   Sha256 sha256;
   std::vector<char> piece(kDigestBytes);
@@ -82,7 +82,7 @@ std::string digest_of(const UploadBody& file) {
 std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_segment(id); }
 std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(id); }
 
-// The cursor in a page that jobs_from_json has accepted.
+// The cursor of a page that jobs_from_json has accepted.
 std::string next_of(const std::string& page) {
   const auto json = nlohmann::json::parse(page, nullptr, false);
   const auto next = json.find("next");
@@ -245,7 +245,7 @@ Job Client::follow(const std::string& id, const JobListener& listener) {
     request.headers.clear();
     if (!events.last_id().empty()) request.headers = {{"Last-Event-ID", events.last_id()}};
   });
-  // A stream may end before the job does, for instance because a proxy cuts it.
+  // A stream may end before the job, for example because a proxy cuts it.
   return events.job() ? *events.job() : wait(id);
 }
 

@@ -1,4 +1,4 @@
-// A mesh on its way from the server to a file.
+// Downloads a mesh to a file.
 #pragma once
 
 #include <cstdint>
@@ -16,28 +16,27 @@
 
 namespace isomesh {
 
-// The file of a finished job in that format; of a job by labels, with `label`, one label's own.
-// Throws as Client::fetch does where there is none.
+// The file of a finished job in that format; with `label`, one label's own file of a job by labels.
+// Throws as Client::fetch does if there is none.
 MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> label);
 
-// Writes a mesh as it arrives and compares it with the size and digest that the job announced. Not
-// thread safe.
+// Writes a mesh as it arrives and checks it against the job's size and digest. Not thread safe.
 class Download {
  public:
   Download(MeshFile announced, const std::filesystem::path& target,
            const TransferProgress& progress)
       : announced_(std::move(announced)), file_(target), progress_(progress) {}
 
-  // What to ask for to go on where a connection broke; all of it where nothing has come yet.
+  // The request headers to resume a download; none if nothing has arrived.
   std::vector<std::pair<std::string, std::string>> headers() const;
 
-  // The status of the answer that comes: of all bytes, or of those that were asked for.
+  // Takes the status of the response: the whole file, or the requested range.
   void begin(int status);
 
-  // Throws Error kDigestMismatch for more bytes than were announced.
+  // Throws Error kDigestMismatch for too many bytes.
   void take(std::string_view piece);
 
-  // Throws Error kDigestMismatch when other bytes came.
+  // Throws Error kDigestMismatch for wrong bytes.
   void publish();
 
  private:

@@ -6,7 +6,7 @@
 namespace isomesh {
 namespace {
 
-// A job's JSON has some kilobytes, so a longer line is no event of a job.
+// A job's JSON has a few kilobytes, so a longer line is not an event.
 constexpr std::size_t kLongestLine = 1024 * 1024;
 
 }  // namespace
@@ -32,8 +32,7 @@ void EventReader::restart() {
   id_.clear();
 }
 
-// A line is a field with its value, a comment, which begins with a colon, or empty, which ends an
-// event.
+// A line is a field, a comment, which begins with a colon, or empty, which ends an event.
 void EventReader::take_line(std::string_view line) {
   if (line.empty()) return finish_event();
   const std::size_t colon = line.find(':');

@@ -9,22 +9,22 @@
 
 namespace isomesh {
 
-// Reads a job's stream of server-sent events, which comes in pieces. Not thread safe.
+// Parses a job's stream of server-sent events incrementally. Not thread safe.
 class EventReader {
  public:
   using Listener = std::function<void(const JobEvent& event)>;
 
   explicit EventReader(Listener listener) : listener_(std::move(listener)) {}
 
-  // Calls the listener for each event that is complete. Throws Error kInternal for what is no
-  // stream of a job's events.
+  // Calls the listener for each complete event. Throws Error kInternal for anything other than a
+  // job's events.
   void take(std::string_view piece);
 
-  // Another stream follows, from after last_id().
+  // Call before the bytes of another stream, which continues after last_id().
   void restart();
 
   const std::string& last_id() const { return last_id_; }
-  // The job, once it is over.
+  // The job, once it has ended.
   const std::optional<Job>& job() const { return job_; }
 
  private:
@@ -32,7 +32,7 @@ class EventReader {
   void finish_event();
 
   Listener listener_;
-  std::string line_;  // what has come of one
+  std::string line_;  // incomplete line
   std::string name_;
   std::string data_;
   std::string id_;

@@ -34,7 +34,7 @@ std::filesystem::path part_beside(const std::filesystem::path& target) {
   return target.parent_path() / ("." + target.filename().string() + "." + random_hex(8) + ".part");
 }
 
-// 0666 as any program's output: the umask of the process narrows it.
+// 0666, reduced by the process's umask, like the output of any program.
 int create(const std::filesystem::path& path) {
   return ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 }

@@ -1,5 +1,5 @@
-// A file of this machine that appears at once, whole, or not at all. Errors are Error
-// kInvalidParameter that name the file (the caller chose it), or kOutOfSpace.
+// A local file that is replaced atomically. Errors are Error kInvalidParameter with the file's
+// name, which the caller chose, or kOutOfSpace.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@
 
 namespace isomesh {
 
-// A file under construction beside `target`. What was written appears at `target`, replacing what
-// is there, with `publish`; without it nothing remains. A target that is a link is followed; one
-// that is neither a regular file nor absent is refused by the constructor.
+// A temporary file beside `target`. `publish` moves it to `target`, replacing an existing file;
+// without it nothing remains. Follows links. The constructor rejects an existing target that is not
+// a regular file.
 class PartFile {
  public:
   explicit PartFile(const std::filesystem::path& target);
@@ -24,10 +24,10 @@ class PartFile {
 
   void write(std::string_view bytes);
 
-  // Forgets what was written.
+  // Discards all bytes.
   void restart();
 
-  // Makes the bytes durable, then visible. Is called once, as the last method.
+  // Syncs the bytes to disk, then moves the file. Call once, last.
   void publish();
 
  private:

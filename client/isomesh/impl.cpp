@@ -31,7 +31,7 @@ TransportOptions transport_options(ClientOptions&& options) {
           .stop = std::move(options.stop)};
 }
 
-// For refusals by something in front of the daemon, which does not send our problem documents.
+// For errors of intermediaries, which do not send our problem documents.
 ErrorCode code_of_status(int status) {
   switch (status) {
     case 400:

@@ -1,4 +1,4 @@
-// How a Client sends its requests. Private to this folder.
+// Sends a Client's requests. Private to this folder.
 #pragma once
 
 #include <chrono>
@@ -12,9 +12,9 @@
 
 namespace isomesh {
 
-// Of one long poll.
+// The duration of one long poll.
 inline constexpr std::chrono::seconds kLongestWait{30};
-// The least time between two looks, for a server that answers a long poll at once.
+// The minimum interval between polls, for a server that answers long polls immediately.
 inline constexpr std::chrono::milliseconds kShortestLook{200};
 inline constexpr std::size_t kKeyBytes = 16;  // of an idempotency key
 
@@ -22,7 +22,7 @@ inline bool is_success(const HttpAnswer& answer) {
   return answer.status >= 200 && answer.status < 300;
 }
 
-// What an answer that is no success says.
+// The error of an unsuccessful response.
 Error refusal(const HttpAnswer& answer);
 
 // Thread safe.
@@ -30,23 +30,23 @@ class Client::Impl {
  public:
   explicit Impl(ClientOptions&& options);
 
-  // Returns a successful answer; every other answer is thrown as an Error.
+  // Returns a successful response; throws all others as Error.
   HttpAnswer answer(const HttpRequest& request) const;
 
   std::string send(const HttpRequest& request) const { return answer(request).body; }
 
-  // Sends a request that may be repeated when its connection breaks. `before` runs ahead of each
-  // try.
+  // Sends a request that may be repeated after a broken connection. Calls `before` ahead of each
+  // attempt.
   HttpAnswer repeated(const HttpRequest& request, const std::function<void()>& before = {}) const;
   std::string repeat(const HttpRequest& request, const std::function<void()>& before = {}) const {
     return repeated(request, before).body;
   }
 
-  // Sends a request with a source so that it goes on where its connection breaks; as answer() to a
-  // server that does not know that.
+  // Sends a request with a source, and resumes it after a broken connection. Works as answer() with
+  // a server that does not support this.
   HttpAnswer resumed(const HttpRequest& request) const;
 
-  // Ends at once with Error kCancelled when asked to stop.
+  // Throws Error kCancelled immediately on a stop request.
   void pause(std::chrono::milliseconds duration) const;
 
  private:

@@ -1,4 +1,4 @@
-// What the client knows of orders.
+// The client's methods for orders.
 #include "proto/orders.h"
 
 #include <algorithm>
@@ -39,8 +39,7 @@ Order Client::order(const std::string& id, seconds wait) {
 
 Order Client::wait_for_order(const std::string& id, const OrderProgress& progress) {
   using std::chrono::milliseconds;
-  // With a callback every step is to be seen, and some take little time: it is looked often first,
-  // and once a second later.
+  // With a callback, poll often at first to report short steps, and later once a second.
   milliseconds pause = kShortestLook / 4;
   while (true) {
     const auto asked = std::chrono::steady_clock::now();

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFiles = 20000;  // as many as the server unpacks
+constexpr std::size_t kMostFiles = 20000;  // the server's limit
 constexpr std::size_t kBlock = 512;
 
 // --- Which files ---------------------------------------------------------------------------------
@@ -56,7 +56,7 @@ std::vector<std::string> lines_of(const fs::path& path) {
   return lines;
 }
 
-// The value of the field `name` where the line, "Name = value" or "name: value", is that field.
+// The value of the field `name` if the line is "Name = value" or "name: value".
 std::optional<std::string> field(const std::string& line, char sign, std::string_view name) {
   const std::size_t at = line.find(sign);
   if (at == std::string::npos) return std::nullopt;
@@ -66,8 +66,8 @@ std::optional<std::string> field(const std::string& line, char sign, std::string
   return std::string(trimmed(std::string_view(line).substr(at + 1)));
 }
 
-// The files of a folder that a pattern such as "slice%03d.raw 1 93 1" may name. The server, which
-// has the whole pattern, takes those that it does name.
+// The files of a folder that may match a pattern such as "slice%03d.raw 1 93 1". The server
+// evaluates the whole pattern.
 std::vector<std::string> names_like(const fs::path& folder, std::string_view said) {
   const std::string_view pattern = said.substr(0, said.find_first_of(" \t"));
   const std::size_t percent = pattern.find('%');
@@ -92,7 +92,7 @@ std::vector<std::string> names_like(const fs::path& folder, std::string_view sai
 std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::string_view name) {
   std::vector<PackedFile> files = {{path.filename().string(), path}};
   const auto add = [&](const std::string& data) {
-    // Data outside of the header's folder is not sent: the server refuses such a header.
+    // Data outside of the header's folder is not sent: the server rejects such a header.
     const fs::path below = fs::path(data).lexically_normal();
     const bool outside = data.empty() || below.is_absolute() || below.string().starts_with("..");
     if (!outside && below != files.front().name) {
@@ -115,7 +115,7 @@ std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::st
   return files;
 }
 
-// The header and the image of a pair, whichever of them was named.
+// The header and the image of a pair, from either of them.
 std::vector<PackedFile> pair_of(const fs::path& path) {
   std::vector<PackedFile> files;
   std::error_code error;
@@ -137,7 +137,7 @@ struct Member {
   std::uint64_t bytes = 0;
 };
 
-// A member's header block. Values that its fields cannot hold are in the pax record ahead of it.
+// A member's header block. Values that do not fit are in the preceding pax record.
 std::string header_of(const Member& member) {
   constexpr std::size_t kLongestName = 100;
   std::string block(kBlock, '\0');
@@ -171,7 +171,7 @@ std::string padded(std::string text) {
   return text;
 }
 
-// Such as "30 path=...\n", where the number is the record's length, its own digits included.
+// For example "30 path=...\n", where the number is the record's length, including its own digits.
 std::string pax_record(const std::string& key, const std::string& value) {
   const std::string rest = " " + key + "=" + value + "\n";
   std::size_t length = rest.size() + 1;
@@ -179,7 +179,7 @@ std::string pax_record(const std::string& key, const std::string& value) {
   return std::to_string(length) + rest;
 }
 
-// Everything ahead of a member's bytes: its pax record and its header.
+// The bytes before a member's content: its pax record and its header.
 std::string lead_of(const Member& member) {
   const std::string records =
       pax_record("path", member.name) + pax_record("size", std::to_string(member.bytes));

@@ -1,4 +1,4 @@
-// What a path stands for as the body of an upload: a file, or several of them as one TAR.
+// The body of an upload: a file, or several as one TAR.
 #pragma once
 
 #include <cstddef>
@@ -19,39 +19,39 @@ struct PackedFile {
   std::filesystem::path path;
 };
 
-// The files that belong to an upload of `path`: of a folder all regular files below it, without
-// links, sorted by name (the server skips what is no part of a volume); of a MetaImage or NRRD
-// header (.mhd, .nhdr) it and the files beside it that it names, or that a pattern in it may name;
-// of a NIfTI or Analyze header (.hdr) or its image (.img) both; of any other file itself. Throws
-// Error kInvalidParameter for a folder without files, or one of more than 20000.
+// The files to upload for `path`. Of a folder: all regular files below it, without links, sorted by
+// name (the server skips files that are not part of a volume). Of a MetaImage or NRRD header (.mhd,
+// .nhdr): it and the files beside it that it names, or that may match its pattern. Of a NIfTI or
+// Analyze header (.hdr) or its image (.img): both. Of any other file: itself. Throws Error
+// kInvalidParameter for a folder without files or with more than 20000.
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path);
-// The same for several paths that are sent together: all of them as if they lay in one folder.
-// Throws also for two files of one name.
+// The same for several paths that are sent together, as if in one folder. Throws also for two files
+// with the same name.
 std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>& paths);
 
-// A body of known size that is made while it is read, so it is never held whole. The same files
-// make the same bytes, whatever their times and owners are.
+// A body of known size that is generated while it is read, and never held in memory. Equal files
+// give equal bytes, regardless of times and owners.
 class UploadBody {
  public:
-  // Takes the sizes of all files. Throws Error kInvalidParameter that names a file which cannot be
-  // read.
+  // Reads the sizes of all files. Throws Error kInvalidParameter with the name of an unreadable
+  // file.
   explicit UploadBody(const std::filesystem::path& path)
       : UploadBody(std::vector<std::filesystem::path>{path}) {}
   explicit UploadBody(const std::vector<std::filesystem::path>& paths);
 
   std::uint64_t size() const { return size_; }
 
-  // Fills `target` from `offset`. Throws Error kInvalidParameter when a file was cut meanwhile. Not
-  // thread safe.
+  // Fills `target` from `offset`. Throws Error kInvalidParameter if a file was truncated meanwhile.
+  // Not thread safe.
   void read(std::uint64_t offset, std::span<char> target) const;
 
  private:
-  // A run of the body: text of ours, or a whole file.
+  // A range of the body: generated text, or a whole file.
   struct Part {
     std::uint64_t offset = 0;
     std::uint64_t bytes = 0;
     std::string text;
-    std::filesystem::path path;  // empty: it is text
+    std::filesystem::path path;  // empty for text
   };
 
   void add_text(std::string text);
@@ -61,7 +61,7 @@ class UploadBody {
 
   std::vector<Part> parts_;
   std::uint64_t size_ = 0;
-  // The file that was read last; bodies are read from their beginning to their end.
+  // The last file read; bodies are read sequentially.
   mutable std::size_t open_part_ = 0;
   mutable std::unique_ptr<InputFile> open_file_;
 };

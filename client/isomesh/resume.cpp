@@ -1,5 +1,5 @@
-// Uploads that go on where their connection broke: "Resumable Uploads for HTTP"
-// (draft-ietf-httpbis-resumable-upload), of which docs/uploads.md tells what the server knows.
+// Resumable uploads: "Resumable Uploads for HTTP" (draft-ietf-httpbis-resumable-upload);
+// docs/uploads.md has the server's subset.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -17,15 +17,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// How long no byte gets through before an upload is given up. A daemon that is started anew takes
-// some seconds.
+// The longest outage before an upload is given up. A restart of the daemon takes a few seconds.
 constexpr milliseconds kLongestCut{60'000};
 constexpr milliseconds kFirstPause{100};
 constexpr milliseconds kLongestPause{3'000};
 
 constexpr const char* kPlaces = "/v1/uploads/";
 
-// That the whole body has a digest is told with its beginning, which is empty.
+// The digest of the whole body is sent with its beginning, which is empty.
 HttpRequest beginning_of(const HttpRequest& upload) {
   HttpRequest request{.method = upload.method, .target = upload.target};
   for (const auto& [name, value] : upload.headers) {
@@ -48,7 +47,7 @@ HttpRequest rest_of(const HttpRequest& upload, const std::string& place, std::ui
   return request;
 }
 
-// All of it is there, and whoever asks like this hears what has become of it.
+// Asks for the result of a complete upload.
 HttpRequest reading_of(const HttpRequest& upload, const std::string& place) {
   const char* sign = upload.target.find('?') == std::string::npos ? "?" : "&";
   return {.method = upload.method,
@@ -56,14 +55,13 @@ HttpRequest reading_of(const HttpRequest& upload, const std::string& place) {
           .headers = {{"Content-Type", "application/octet-stream"}}};
 }
 
-// Whether asking again may help: the server is busy, or ends, or still has the connection that
-// broke.
+// True if a retry may help: the server is busy, stops, or still has the broken connection.
 bool may_pass(int status) {
   constexpr std::array kPassing = {408, 409, 429, 502, 503, 504};
   return std::ranges::count(kPassing, status) > 0;
 }
 
-// How far an upload has come, as the server says.
+// The upload's state, as the server reports it.
 struct Progress {
   std::uint64_t offset = 0;
   bool is_whole = false;
@@ -77,15 +75,15 @@ Progress progress_of(const HttpAnswer& answer, std::uint64_t bytes) {
   return {*offset, answer.header("upload-complete") == "?1"};
 }
 
-// How long to go on trying.
+// The time limit and the back-off of retries.
 class Patience {
  public:
-  // A byte has got through.
+  // Call after progress.
   void renew() {
     is_cut_ = false;
     pause_ = kFirstPause;
   }
-  // Asked after each failure.
+  // Call after each failure.
   bool is_over() {
     if (!std::exchange(is_cut_, true)) since_ = Clock::now();
     return Clock::now() - since_ >= kLongestCut;
@@ -105,8 +103,7 @@ std::string Client::Impl::begin_upload(const HttpRequest& request) const {
     std::string place = repeated(beginning_of(request)).header("location");
     return place.starts_with(kPlaces) ? place : std::string();
   } catch (const Error& error) {
-    // A server of an earlier version does not take an empty body. If it is anything else that is
-    // wrong, it says so again.
+    // Older servers reject an empty body. Other errors recur with the fallback.
     if (error.code() != ErrorCode::kInvalidParameter) throw;
     return {};
   }
@@ -118,9 +115,9 @@ HttpAnswer Client::Impl::resumed(const HttpRequest& request) const {
   try {
     return finish_upload(request, place);
   } catch (const NoAnswer&) {
-    throw;  // nobody is there who could be told
+    throw;  // cannot be reported to the server
   } catch (const Error& error) {
-    // It has expired, or another daemon answers than the one that has it.
+    // It has expired, or another daemon answered.
     if (error.code() == ErrorCode::kGone) return answer(request);
     give_up(place);
     throw;
@@ -134,7 +131,7 @@ void Client::Impl::give_up(const std::string& place) const {
   try {
     transport_.send({.method = "DELETE", .target = place});
   } catch (const Error&) {
-    return;  // what is left there expires
+    return;  // the rest expires on the server
   }
 }
 

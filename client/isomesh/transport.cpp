@@ -18,9 +18,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// libcurl bounds each line of an answer's head, but not every version bounds the whole head.
+// libcurl limits each line of a response's head, but not in every version the whole head.
 constexpr std::size_t kLongestHead = 64 * 1024;
-// A list of some ten thousand jobs has this size.
+// The size of a list of about ten thousand jobs.
 constexpr std::size_t kLongestBody = 64 * 1024 * 1024;
 
 constexpr int kLastStatus = 599;  // RFC 9110, 15
@@ -38,7 +38,7 @@ void check(bool done) {
 }
 
 void append(Headers& headers, const std::string& name, const std::string& value) {
-  // libcurl sends lines as they are, so a line break would begin another header.
+  // libcurl sends lines unchanged, so a line break would begin another header.
   if (has_control_characters(value)) {
     throw invalid_parameter(name, "must not contain control characters");
   }
@@ -76,7 +76,7 @@ std::string reason_of(CURLcode code) {
   }
 }
 
-// One request on its way, and the answer as it comes.
+// One request and its response.
 class Transfer {
  public:
   Transfer(const TransportOptions& options, const HttpRequest& request)
@@ -98,10 +98,10 @@ class Transfer {
       throw no_answer("the server did not respond in time", is_sending());
     }
     if (*end != CURLE_OK) throw no_answer(reason_of(*end), is_broken(*end));
-    // libcurl accepts a head that the end of the connection cuts off.
+    // libcurl accepts a truncated head.
     if (!head_is_whole_) throw no_answer(reason_of(CURLE_PARTIAL_FILE), true);
     answer_.status = static_cast<int>(info<long>(CURLINFO_RESPONSE_CODE));
-    // libcurl 8.14 takes the first three digits of what is no status for one.
+    // libcurl 8.14 accepts the first three digits of an invalid status.
     if (answer_.status > kLastStatus) throw no_answer(reason_of(CURLE_WEIRD_SERVER_REPLY), false);
     const char* type = info<char*>(CURLINFO_CONTENT_TYPE);
     if (type != nullptr) answer_.content_type = type;
@@ -126,7 +126,7 @@ class Transfer {
     set(CURLOPT_PATH_AS_IS, 1L);
     curl::connect_directly(easy_.get(), options_.authorities);
     set(CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
-    // A transfer that is given up does not wait for the thread that looks up the server's name.
+    // An aborted transfer does not wait for the resolver's thread.
     set(CURLOPT_QUICK_EXIT, 1L);
     set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options_.connect_timeout.count()));
     if (!options_.server.socket.empty()) {
@@ -160,8 +160,8 @@ class Transfer {
     set(CURLOPT_READFUNCTION, &Transfer::on_source);
   }
 
-  // Returns how the transfer ended, or nothing when it was given up, because the server is silent
-  // or the caller has asked to stop. A stop request wakes the poll.
+  // Returns the transfer's result; empty if it was aborted, because the server is silent or on a
+  // stop request, which wakes the poll.
   std::optional<CURLcode> run() {
     const std::stop_callback wake(options_.stop, [this] { curl_multi_wakeup(multi_.get()); });
     while (!options_.stop.stop_requested()) {
@@ -180,7 +180,7 @@ class Transfer {
     return std::nullopt;
   }
 
-  // How much longer the server may be silent. Connecting has a time limit of its own.
+  // The remaining time that the server may be silent. Connecting has its own time limit.
   milliseconds patience_left() {
     const auto now = std::chrono::steady_clock::now();
     const curl_off_t moved = info<curl_off_t>(CURLINFO_SIZE_UPLOAD_T) +
@@ -196,7 +196,7 @@ class Transfer {
     return allowed - std::chrono::duration_cast<milliseconds>(now - moved_at_);
   }
 
-  // Whether bytes of the source are still to get through.
+  // True if bytes of the source are still to be sent.
   bool is_sending() const {
     return request_.source && info<curl_off_t>(CURLINFO_SIZE_UPLOAD_T) <
                                   static_cast<curl_off_t>(request_.source_bytes);
@@ -206,7 +206,7 @@ class Transfer {
     return {"no response from " + options_.server_url + ": " + reason, broken};
   }
 
-  // Lines of the answer's head, and of interim answers (1xx) ahead of it.
+  // Lines of the response's head, and of preceding interim responses (1xx).
   static std::size_t on_head(char* line, std::size_t, std::size_t size, void* self) {
     auto& transfer = *static_cast<Transfer*>(self);
     const std::string_view text(line, size);
@@ -257,8 +257,8 @@ class Transfer {
     answer_.body += piece;
   }
 
-  // A server that answers in the middle of a body may close the connection at once, and then
-  // sending fails. So what it has said is read before more is sent.
+  // A server that responds during a body may close the connection, and then sending fails. So its
+  // response is read before more is sent.
   std::size_t provide(std::span<char> space) {
     const std::uint64_t left = request_.source_bytes - provided_;
     const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(left, space.size()));
@@ -286,7 +286,7 @@ class Transfer {
   curl::Guard guard_;
   std::uint64_t provided_ = 0;  // of the source
   bool sink_has_begun_ = false;
-  bool is_paused_ = false;  // the source waits until what the server says is read
+  bool is_paused_ = false;  // the source waits until the response was read
   std::size_t head_bytes_ = 0;
   bool head_is_whole_ = false;
   curl_off_t moved_ = 0;  // bytes, in both directions

@@ -1,4 +1,4 @@
-// One HTTP request at a time over libcurl, which nothing outside transport.cpp sees.
+// Sends one HTTP request at a time with libcurl, which only transport.cpp uses.
 #pragma once
 
 #include <chrono>
@@ -23,18 +23,18 @@ struct HttpRequest {
   std::vector<std::pair<std::string, std::string>> headers = {};
   std::string body = {};
 
-  // A body that is read piece by piece instead: fills its argument with the bytes from `offset`,
-  // and may be asked for the same ones twice.
+  // A body read in pieces instead: fills its argument with the bytes from `offset`. The same bytes
+  // may be requested twice.
   std::function<void(std::uint64_t offset, std::span<char> piece)> source = {};
   std::uint64_t source_bytes = 0;
 
-  // Takes the body of a successful answer. Without it, and for refusals, the body is in the
+  // Takes the body of a successful response. Without it, and for errors, the body is in the
   // HttpAnswer.
   std::function<void(std::string_view piece)> sink = {};
-  // Is told the status ahead of the sink's first piece.
+  // Called with the status before the sink's first piece.
   std::function<void(int status)> before_sink = {};
 
-  // How much longer than usual the server may be silent.
+  // Added to the limit on the server's silence.
   std::chrono::milliseconds patience{0};
 };
 
@@ -44,11 +44,11 @@ struct HttpAnswer {
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers;  // names in lower case
 
-  // The first of that name, which is in lower case; empty without one.
+  // The first header of that name, given in lower case; empty if missing.
   std::string header(std::string_view name) const;
 };
 
-// kUnreachable, and whether the connection was there and broke: then trying again can help.
+// kUnreachable; `broken` if the connection was established and broke, so that a retry may help.
 class NoAnswer : public Error {
  public:
   NoAnswer(const std::string& detail, bool broken)
@@ -62,11 +62,11 @@ class NoAnswer : public Error {
 
 struct TransportOptions {
   ServerAddress server;
-  std::string server_url;  // as messages name it
+  std::string server_url;  // its name in messages
   std::string token;
   std::filesystem::path authorities;                // empty: the system's
-  std::chrono::milliseconds connect_timeout{0};     // 0: five minutes, which is libcurl's
-  std::chrono::milliseconds silence_timeout{0};     // from the connection on
+  std::chrono::milliseconds connect_timeout{0};     // 0: libcurl's default of five minutes
+  std::chrono::milliseconds silence_timeout{0};     // after connecting
   std::chrono::milliseconds stall_timeout{60'000};  // the same while a source is sent
   std::stop_token stop;
 };
@@ -80,11 +80,11 @@ class Transport {
  public:
   explicit Transport(TransportOptions options) : options_(std::move(options)) {}
 
-  // Returns the answer, whatever its status. Throws NoAnswer; Error kCancelled when asked to stop,
-  // kInvalidParameter for a header with control characters, kInternal for a body beyond what the
-  // API ever sends; and what source or sink throw.
+  // Returns the response, whatever its status. Throws NoAnswer; Error kCancelled on a stop request,
+  // kInvalidParameter for a header with control characters, kInternal for a body larger than the
+  // API's; and exceptions of source and sink.
   //
-  // A server that refuses before it has taken the whole body is heard: the rest is not sent.
+  // If the server responds before it has read the whole body, the rest is not sent.
   HttpAnswer send(const HttpRequest& request) const;
 
  private:

@@ -10,7 +10,7 @@
 namespace isomesh {
 namespace {
 
-// The longest name that DNS has, and a port.
+// The longest DNS name, and a port.
 constexpr std::size_t kLongestAuthority = 253 + 6;
 
 constexpr const char* kForms = "must be http://HOST:PORT, https://HOST:PORT or unix:PATH";
@@ -23,7 +23,7 @@ bool take_prefix(std::string_view& text, std::string_view prefix) {
   return true;
 }
 
-// What connects also says what a host and a port are.
+// Uses the URL parser of the connection.
 void check_host_and_port(const std::string& origin) {
   const std::unique_ptr<CURLU, decltype(&curl_url_cleanup)> parts(curl_url(), &curl_url_cleanup);
   if (!parts) throw std::bad_alloc();
@@ -44,7 +44,7 @@ ServerAddress parse_server_address(std::string_view url) {
     refuse("must begin with http://, https:// or unix:");
   }
   if (authority.ends_with('/')) authority.remove_suffix(1);
-  // libcurl takes a path, a query, a user, and a port that is empty or 0, too.
+  // libcurl also accepts a path, a query, a user, and a port that is empty or 0.
   if (authority.size() > kLongestAuthority || authority.ends_with(':') ||
       authority.ends_with(":0") || authority.find_first_of("/\\?#@") != std::string_view::npos) {
     refuse(kForms);
@@ -55,7 +55,7 @@ ServerAddress parse_server_address(std::string_view url) {
 }
 
 std::string percent_encode(std::string_view text) {
-  if (text.empty()) return {};  // a length of 0 would mean that it ends with a zero
+  if (text.empty()) return {};  // libcurl takes a length of 0 for a null-terminated text
   const std::unique_ptr<char, decltype(&curl_free)> encoded(
       curl_easy_escape(nullptr, text.data(), static_cast<int>(text.size())), &curl_free);
   if (!encoded) throw std::bad_alloc();
@@ -63,7 +63,7 @@ std::string percent_encode(std::string_view text) {
 }
 
 std::string path_segment(std::string_view text) {
-  // Servers take an encoded slash for one that divides.
+  // Servers decode an encoded slash to a separator.
   if (text.empty() || text == "." || text == ".." || text.find('/') != text.npos) {
     throw invalid_parameter("id", "\"" + std::string(text) + "\" is not an identifier");
   }

@@ -1,4 +1,4 @@
-// What is put into URLs, and where a server is.
+// Encodes URLs and parses server addresses.
 #pragma once
 
 #include <filesystem>
@@ -9,26 +9,26 @@
 
 namespace isomesh {
 
-// Where a server listens.
+// A server's address.
 struct ServerAddress {
-  std::string origin;                 // scheme, host and perhaps a port: what URLs begin with
-  std::filesystem::path socket = {};  // of this machine; empty: the origin's host and port
+  std::string origin;                 // scheme, host and optional port: the prefix of URLs
+  std::filesystem::path socket = {};  // a local socket; empty: the origin's host and port
 
   bool operator==(const ServerAddress&) const = default;
 };
 
-// Reads `http://HOST[:PORT]`, `https://HOST[:PORT]` (IPv6 in brackets; one closing slash is
+// Parses `http://HOST[:PORT]`, `https://HOST[:PORT]` (IPv6 in brackets; one trailing slash is
 // ignored) or `unix:PATH`. Throws Error kInvalidParameter for anything else.
 ServerAddress parse_server_address(std::string_view url);
 
-// `text` with every byte that is not unreserved in RFC 3986 as %XX.
+// Encodes every byte of `text` that is not unreserved in RFC 3986 as %XX.
 std::string percent_encode(std::string_view text);
 
-// One segment of a path. Throws Error kInvalidParameter for text that no identifier is and that
-// would name another resource: nothing, "." and "..".
+// Encodes a segment of a path. Throws Error kInvalidParameter for text that is not an identifier
+// and would name another resource: empty, ".", ".." and text with a slash.
 std::string path_segment(std::string_view text);
 
-// `?a=1&b=2` with names and values encoded, empty when there are no pairs.
+// `?a=1&b=2` with encoded names and values; empty without pairs.
 std::string query_string(const std::vector<std::pair<std::string, std::string>>& pairs);
 
 }  // namespace isomesh

@@ -24,7 +24,7 @@ std::string reference(const std::string& kind, const std::string& name) {
   return "$ref: '#/components/" + kind + '/' + name + "'";
 }
 
-// --- What a schema says of a member's type -------------------------------------------------------
+// --- The schema of a member's type ---------------------------------------------------------------
 
 template <class T>
 constexpr bool kIsOptional = false;
@@ -94,7 +94,7 @@ std::string default_of(const T& value) {
 
 // --- One parameter -------------------------------------------------------------------------------
 
-// PassBand for pass_band; without a unit at its end.
+// PassBand for pass_band; without a trailing unit.
 std::string schema_name_of(const Parameter& parameter) {
   std::string name = parameter.name;
   const std::string unit = std::string("_") + parameter.unit;
@@ -175,7 +175,6 @@ std::string label_list(const Parameter& parameter) {
 
 constexpr const char* kPlace = "{ type: array, minItems: 3, maxItems: 3, items: { type: number } }";
 
-// Its type, and whatever else it may be.
 template <class T>
 void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
   if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
@@ -241,7 +240,7 @@ void write_schema(Yaml& yaml, const Parameter& parameter, const T& standard) {
 
 // --- The parts -----------------------------------------------------------------------------------
 
-// Texts and lists are described where they stand; all others have a schema of their own.
+// Texts and lists are described in place; all others have a schema of their own.
 template <class T>
 constexpr bool kStandsAlone =
     !std::is_same_v<T, std::string> && !std::is_same_v<T, std::vector<MeshFormat>>;
@@ -277,7 +276,7 @@ void write_properties(Yaml& yaml, T& parameters) {
   });
 }
 
-// Not constant, for those members that may be absent.
+// Not constant, so that `visit` reaches members that may be absent.
 JobParameters complete_parameters() {
   JobParameters parameters;
   parameters.callback.emplace();
@@ -327,7 +326,7 @@ std::string schemas() {
   return yaml.str();
 }
 
-// Calls each(parameter) for those that a query spells as a body does.
+// Calls each(parameter) for parameters that a query spells as a body does.
 template <class Each>
 void visit_query(const Each& each) {
   JobParameters parameters = complete_parameters();
@@ -380,7 +379,7 @@ std::string formats() {
   return yaml.str();
 }
 
-// The codes of notes and what each means, and those of them that can be accepted.
+// All codes of notes with their meanings, and the codes that can be accepted.
 std::string notes() {
   std::vector<std::string> all;
   std::vector<std::string> acceptable;
@@ -408,7 +407,7 @@ std::string notes() {
   return yaml.str();
 }
 
-// Where the line that holds `text` begins, and where the next one does.
+// The start of the line that holds `text`, and of the next line.
 std::pair<std::size_t, std::size_t> line_with(const std::string& description,
                                               const std::string& text, std::size_t from) {
   const std::size_t found = description.find("# " + text + '\n', from);

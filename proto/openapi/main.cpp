@@ -1,4 +1,4 @@
-// isomesh-openapi FILE: brings the parts of openapi.yaml that are made up to date.
+// isomesh-openapi FILE: updates the generated parts of openapi.yaml.
 #include <exception>
 #include <fstream>
 #include <iostream>

@@ -1,4 +1,4 @@
-// Text of YAML, as openapi.yaml is written. Private to this folder.
+// Writes YAML in the style of openapi.yaml. Private to this folder.
 #pragma once
 
 #include <cctype>
@@ -11,7 +11,7 @@
 
 namespace isomesh {
 
-// A word as YAML, in quotes if YAML 1.1 reads it as true or false. PyYAML reads YAML 1.1.
+// Quotes a word that YAML 1.1, and so PyYAML, reads as true or false.
 inline std::string yaml_word(const std::string& word) {
   for (const char* const truth : {"on", "off", "yes", "no", "y", "n"}) {
     if (word == truth) return '"' + word + '"';
@@ -19,7 +19,7 @@ inline std::string yaml_word(const std::string& word) {
   return word;
 }
 
-// Words of a list or a mapping, without its brackets.
+// The items of a list or a mapping, without its brackets.
 inline std::string with_commas(const std::vector<std::string>& items) {
   std::string text;
   for (const std::string& item : items) {
@@ -29,7 +29,7 @@ inline std::string with_commas(const std::vector<std::string>& items) {
   return text;
 }
 
-// Lines of YAML, each indented as deep as the mapping that it stands in.
+// Lines of YAML, each indented by its depth.
 class Yaml {
  public:
   static constexpr std::size_t kWidth = 104;
@@ -38,7 +38,7 @@ class Yaml {
 
   void line(const std::string& text) { text_ += std::string(2 * depth_, ' ') + text + '\n'; }
 
-  // `name:` and what `inner` writes below it.
+  // Writes `name:` and the lines of `inner` below it.
   void under(const std::string& name, const std::function<void()>& inner) {
     line(name + ':');
     ++depth_;
@@ -46,8 +46,7 @@ class Yaml {
     --depth_;
   }
 
-  // A text of any length, on the name's own line where it is short and nothing in it means
-  // something to YAML.
+  // Writes a text of any length, on the name's own line if it is short and needs no quoting.
   void text(const std::string& name, const std::string& value) {
     const bool is_plain = std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
                           value.find(": ") == std::string::npos &&

@@ -22,7 +22,7 @@ using std::chrono::milliseconds;
 constexpr std::size_t kAtOnce = 64;
 constexpr std::size_t kAtOncePerReceiver = 4;
 constexpr milliseconds kLongestSleep{5'000};
-// After the database could not be read or written.
+// Pause after the database could not be read or written.
 constexpr milliseconds kPause{1'000};
 
 using curl::append;
@@ -31,7 +31,7 @@ using curl::Headers;
 using curl::make_multi;
 using curl::Multi;
 
-// An attempt under way; what the transfer points to lives here.
+// An attempt in progress; owns what the transfer refers to.
 struct Attempt {
   store::Delivery delivery;
   Reach reach = Reach::kPublic;
@@ -108,7 +108,8 @@ class Callbacks::Sender {
 
   void begin_due(store::Time now) {
     if (attempts_.size() >= kAtOnce) return;
-    // Those under way are due still and come first, so that they take the places of their receiver.
+    // Attempts in progress are still due and come first, so they count against their receiver's
+    // limit.
     for (store::Delivery& delivery : outbox_.due(now, kAtOncePerReceiver)) {
       if (attempts_.size() >= kAtOnce) return;
       if (!attempts_.contains(delivery.job)) begin(std::move(delivery));
@@ -134,7 +135,7 @@ class Callbacks::Sender {
     const store::Delivery& delivery = attempt.delivery;
     const std::int64_t now = seconds_now();
     append(attempt.headers, "Content-Type: application/json");
-    append(attempt.headers, "Expect:");  // the body goes at once
+    append(attempt.headers, "Expect:");  // send the body at once
     append(attempt.headers, "webhook-id: " + delivery.job);
     append(attempt.headers, "webhook-timestamp: " + std::to_string(now));
     {
@@ -154,15 +155,15 @@ class Callbacks::Sender {
     curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, drop);
     curl_easy_setopt(easy, CURLOPT_OPENSOCKETFUNCTION, open_socket);
     curl_easy_setopt(easy, CURLOPT_OPENSOCKETDATA, &attempt);
-    // A connection that is kept was checked for the reach of another entry.
+    // A reused connection was checked for another entry's reach.
     curl_easy_setopt(easy, CURLOPT_FRESH_CONNECT, 1L);
     curl_easy_setopt(easy, CURLOPT_FORBID_REUSE, 1L);
     curl_easy_setopt(easy, CURLOPT_PRIVATE, &attempt);
   }
 
-  // Lets all attempts go on and ends those that have ended; returns how long nothing is to be done
-  // unless a socket or wake() says so. What was due before `now` has begun, or waits for a place,
-  // which the end of an attempt gives.
+  // Advances all attempts and finishes those that have ended. Returns the time until the next
+  // action, unless a socket or wake() comes first. Deliveries due before `now` have begun, or wait
+  // for a place, which the end of an attempt frees.
   milliseconds turn(store::Time now) {
     int running = 0;
     curl_multi_perform(multi_.get(), &running);
@@ -213,8 +214,8 @@ class Callbacks::Sender {
     observer_(delivery, CallbackOutcome::kGivenUp, reason);
   }
 
-  // Doubles, and is spread over its upper half, so that what failed together does not come back
-  // together.
+  // Exponential back-off with jitter over its upper half, so that simultaneous failures are not
+  // repeated simultaneously.
   milliseconds delay_after(int attempts) {
     constexpr int kMostDoublings = 20;
     const milliseconds whole =
@@ -233,7 +234,7 @@ class Callbacks::Sender {
   std::mt19937_64 random_{std::random_device()()};
   const Multi multi_;
   std::map<std::string, std::unique_ptr<Attempt>> attempts_;  // by job
-  std::jthread thread_;                                       // last: runs on all of the above
+  std::jthread thread_;                                       // last: it uses all of the above
 };
 
 Callbacks::Callbacks(store::Outbox& outbox, const CallbackTargets& targets, CallbackOptions options,

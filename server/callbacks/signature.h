@@ -1,5 +1,5 @@
-// Signatures of callbacks, as the Standard Webhooks specification 1.0 makes them, so that its
-// libraries can check them: HMAC-SHA-256 over "ID.TIMESTAMP.BODY".
+// Signs callbacks as in the Standard Webhooks specification 1.0, so that its libraries can verify
+// them: HMAC-SHA-256 over "ID.TIMESTAMP.BODY".
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,10 @@
 
 namespace isomesh::callbacks {
 
-// The keys of a file, one a line; with several, each signs, so that a key can be replaced without a
-// gap. `whsec_` and base64, or the bytes of the line as they are. Throws Error kInvalidParameter
-// for a file without a key, or with one of fewer than 24 bytes; never with its text.
+// Reads a file's keys, one per line. With several, each signs, so that a key can be replaced
+// without interruption. A key is `whsec_` and base64, or the bytes of the line. Throws Error
+// kInvalidParameter, without the key's text, for a file without a key or with a key of fewer than
+// 24 bytes.
 std::vector<std::string> read_callback_secrets(const std::filesystem::path& file);
 
 // The value of the header webhook-signature. Throws Error kInternal.

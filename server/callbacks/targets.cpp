@@ -21,8 +21,7 @@ constexpr std::size_t kLongestUrl = 2000;
 
 using CurlUrl = std::unique_ptr<CURLU, decltype(&curl_url_cleanup)>;
 
-// What connects reads the URL in the same way: two parsers that disagree are how lists like this
-// one are got around.
+// Uses the same URL parser as the connection: differing parsers are a way around such lists.
 std::optional<std::string> part_of(const CurlUrl& url, CURLUPart part, unsigned flags = 0) {
   char* text = nullptr;
   if (curl_url_get(url.get(), part, &text, flags) != CURLUE_OK) return std::nullopt;
@@ -31,7 +30,7 @@ std::optional<std::string> part_of(const CurlUrl& url, CURLUPart part, unsigned 
   return result;
 }
 
-// Paths that one server may read as another path than the next one.
+// True for paths that servers may interpret differently.
 bool is_ambiguous(const std::string& path) {
   const std::string text = lower(path);
   for (const std::string_view trick : {"%2e", "%2f", "%5c", "\\", "/../", "/./", "//"}) {
@@ -57,7 +56,7 @@ std::optional<std::string> decoded(const std::string& text) {
   return result;
 }
 
-// Servers of Java take what follows a semicolon out of each segment.
+// Removes parameters, as Java servers do: the text after a semicolon in each segment.
 std::string without_parameters(const std::string& path) {
   std::string result;
   bool is_parameter = false;
@@ -68,8 +67,8 @@ std::string without_parameters(const std::string& path) {
   return result;
 }
 
-// The path as the most forgiving of servers behind servers may read it: decoded as often as it can
-// be, without parameters. Nothing for one that is ambiguous on the way.
+// The path as the most lenient chain of servers may read it: decoded repeatedly, without
+// parameters. Empty if it is ambiguous.
 std::optional<std::string> as_read(std::string path) {
   constexpr int kMostDecodings = 4;
   for (int n = 0; n < kMostDecodings; ++n) {
@@ -82,7 +81,7 @@ std::optional<std::string> as_read(std::string path) {
   return std::nullopt;
 }
 
-// Whether the path is the prefix, or lies below it.
+// True if the path is the prefix or lies below it.
 bool lies_below(const std::string& path, const std::string& prefix) {
   return path.starts_with(prefix) &&
          (prefix.ends_with('/') || path.size() == prefix.size() || path[prefix.size()] == '/');
@@ -103,7 +102,7 @@ bool holds(const Network& network, std::uint32_t address) {
   return (address ^ network.address) >> (kAddressBits - network.bits) == 0;
 }
 
-// Of IANA's registry of special addresses: those behind which an organisation's own machines are.
+// From IANA's registry of special addresses: networks of an organisation's own machines.
 constexpr std::array kPrivateNetworks = {Network{0x0A000000, 8},     // 10.0.0.0
                                          Network{0xAC100000, 12},    // 172.16.0.0
                                          Network{0xC0A80000, 16},    // 192.168.0.0
@@ -137,7 +136,7 @@ bool is_within_v6(Reach reach, const in6_addr& address) {
   if (is_6to4) return is_within_v4(reach, v4_at(address, 2));
   const bool is_unique_local = (bytes[0] & 0xFE) == 0xFC;
   if (IN6_IS_ADDR_LOOPBACK(&address) || is_unique_local) return reach == Reach::kPrivate;
-  const bool is_global = (bytes[0] & 0xE0) == 0x20;  // 2000::/3, all that is given out
+  const bool is_global = (bytes[0] & 0xE0) == 0x20;  // 2000::/3, the assigned addresses
   return is_global;
 }
 

@@ -1,6 +1,6 @@
-// Where jobs may call back to. The addresses come from clients, and the daemon stands inside a
-// network that they do not: only what its operator listed is called, and a listed name does not
-// lead to a private address unless its entry says so.
+// Restricts the URLs of callbacks. Clients choose them, and the daemon is inside a network that
+// clients cannot reach. Only URLs in the operator's list are called, and names lead to private
+// addresses only if their entry permits it.
 #pragma once
 
 #include <optional>
@@ -13,29 +13,29 @@
 
 namespace isomesh::callbacks {
 
-// What a name that stands in the list may resolve to.
+// The addresses that a listed name may resolve to.
 enum class Reach {
-  kPublic,   // public addresses alone
-  kPrivate,  // private networks and this machine too; never link-local ones, where clouds keep
+  kPublic,   // only public addresses
+  kPrivate,  // also private networks and this machine; never link-local ones, where clouds keep
              // their credentials
-  kAny,      // the entry names the address itself
+  kAny,      // any; the entry is an address itself
 };
 
 // Constant after construction.
 class CallbackTargets {
  public:
-  // Each entry is the beginning of allowed URLs: http or https, a host, a port where it is not the
-  // scheme's, and perhaps a path, whose last part must match whole. `private:` before an entry lets
-  // its name lead to private addresses. Throws Error kInvalidParameter that names the entry.
+  // Each entry is the prefix of allowed URLs: http or https, a host, a port if it is not the
+  // default, and optionally a path, whose last segment must match completely. Prefix an entry with
+  // `private:` to allow private addresses. Throws Error kInvalidParameter with the entry.
   explicit CallbackTargets(const std::vector<std::string>& allowed);
 
   bool empty() const { return entries_.empty(); }
 
-  // Throws Error kInvalidParameter for the field `callback.url` when the URL is malformed or not
+  // Throws Error kInvalidParameter for the field `callback.url` if the URL is malformed or not
   // allowed.
   void check(const std::string& url) const;
 
-  // How far the URL may reach; empty when it is not allowed (any more).
+  // The permitted addresses of the URL; empty if it is not allowed (any more).
   std::optional<Reach> reach_of(const std::string& url) const;
 
  private:
@@ -49,7 +49,7 @@ class CallbackTargets {
     std::string host;
     std::string port;
     std::string path;
-    std::string read_path;  // as the most forgiving server may read it
+    std::string read_path;  // as the most lenient server may read it
   };
   struct Entry {
     Url url;
@@ -58,7 +58,7 @@ class CallbackTargets {
   std::vector<Entry> entries_;
 };
 
-// Whether a connection to that address is within reach.
+// True if a connection to the address is permitted.
 bool is_within(Reach reach, const sockaddr& address);
 
 }  // namespace isomesh::callbacks

@@ -1,4 +1,4 @@
-// Records of a file in bounded memory; private to this folder.
+// Writes a file's records in bounded memory. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +9,17 @@
 
 namespace isomesh::codec {
 
-// Hands equal jobs of formatting to several threads and the bytes to one sink in order. Holds a
-// block of bytes a thread. Not thread safe.
+// Formats blocks of records on several threads and writes their bytes in order. Holds one block per
+// thread. Not thread safe.
 class BlockWriter {
  public:
-  // `records` is how many all calls of write will write together, for the progress.
+  // `records` is the total over all calls of write, for the progress.
   BlockWriter(const mesh::Context& context, const Sink& sink, std::size_t records)
       : context_(context), sink_(sink), records_(records) {}
 
-  // Writes the records [0, count). one_record(index, out) formats one at `out` and returns where it
-  // ends, at most `most_bytes` behind; it is called from several threads. Throws Error kCancelled,
-  // looked at before each block.
+  // Writes the records [0, count). one_record(index, out) formats one at `out` and returns its end,
+  // at most `most_bytes` behind; several threads call it. Throws Error kCancelled, checked before
+  // each block.
   template <class OneRecord>
   void write(std::size_t count, std::size_t most_bytes, OneRecord one_record) {
     write_blocks(count, most_bytes, [&](std::size_t begin, std::size_t end, std::byte* out) {

@@ -11,8 +11,8 @@
 namespace isomesh::codec {
 namespace {
 
-// Where Draco itself goes over from valence coding, which is smaller and slower than ours, to the
-// standard one.
+// The speeds at which Draco itself uses standard edgebreaker. Slower speeds use valence coding,
+// which is smaller and slower than our encoder.
 constexpr int kSlowestOurs = 5;
 constexpr int kFastestOurs = 9;
 
@@ -60,8 +60,8 @@ std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_
   const auto layers = static_cast<double>(mesh.layers());
   const auto target = static_cast<double>(triangles_per_block);
   if (mesh.triangles.size() == 0) return {};
-  // As if the volume were as deep as it is high: then a block of n layers by a layer's nth part is
-  // a cube.
+  // Assumes that the volume is as deep as it is high: then a block of n layers by a layer's nth
+  // part is a cube.
   const auto parts =
       static_cast<std::size_t>(std::max(1.0, std::round(std::sqrt(triangles / target))));
   const auto depth = static_cast<std::size_t>(
@@ -107,7 +107,7 @@ DracoStream DracoEncoder::encode_whole(const mesh::Mesh& mesh, const DracoOption
   return stream;
 }
 
-// The one place that decides who encodes.
+// The only place that chooses the encoder.
 DracoStream DracoEncoder::encode(const Part& part, const DracoOptions& options,
                                  edgebreaker::Threads threads, const mesh::Context& context) {
   most_triangles_ = std::max(most_triangles_, part.triangles.size());
@@ -128,7 +128,7 @@ DracoStream DracoEncoder::encode(const Part& part, const DracoOptions& options,
                               options.speed);
 }
 
-// What is known of the block that was taken last, in the mesh's numbers.
+// The topology of the last block, in the mesh's vertex numbers.
 mesh::PartTopology DracoEncoder::in_mesh(mesh::PartTopology part) const {
   const std::vector<std::uint32_t>& origin = part_.origin;
   part.first_word = part_.lowest / 64;
@@ -148,9 +148,8 @@ mesh::PartTopology DracoEncoder::in_mesh(mesh::PartTopology part) const {
   return part;
 }
 
-// Numbers the block's vertices anew, in the order in which its triangles name them. Those that a
-// run is the first to name are a layer above it, since the next run may name them too, and no
-// other.
+// Renumbers the block's vertices in the order of their first use by its triangles. Vertices that a
+// run uses first form the layer above it: only the next run may use them too.
 void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block, const VertexData& data) {
   constexpr std::uint32_t kUnnamed = std::numeric_limits<std::uint32_t>::max();
   std::uint32_t low = kUnnamed;
@@ -161,7 +160,7 @@ void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block, const Vertex
       high = std::max({high, triangle[0], triangle[1], triangle[2]});
     });
   }
-  // Triangles of neighbouring layers name vertices of neighbouring layers, so the range is short.
+  // Triangles of neighbouring layers use vertices of neighbouring layers, so the range is short.
   part_.number.assign(std::size_t{high} - low + 1, kUnnamed);
   part_.lowest = low;
   part_.origin.clear();

@@ -1,5 +1,5 @@
-// Blocks of triangles as Draco streams on one shared quantisation grid, and who encodes them;
-// private to this folder.
+// Encodes blocks of triangles as Draco streams on one shared quantisation grid, and chooses their
+// encoder. Private to this folder.
 #pragma once
 
 #include <array>
@@ -25,13 +25,13 @@ struct DracoStream {
   std::uint32_t distance_id = 0;
   mesh::Vec3 low = {0, 0, 0};  // bounds of the decoded positions
   mesh::Vec3 high = {0, 0, 0};
-  // What encoding it has shown of the triangles, in the mesh's numbers of vertices; libdraco shows
-  // nothing.
+  // The topology of the triangles, found during encoding, in the mesh's vertex numbers. libdraco
+  // reports none.
   std::optional<mesh::PartTopology> topology;
 };
 
-// The topology of a mesh whose triangles these streams have between them; none where one of them
-// has shown nothing, or it does not follow.
+// Combines the topology of streams that cover all triangles of the mesh. Empty if a stream has
+// none, or if the parts do not determine it.
 std::optional<mesh::Topology> topology_of(const mesh::Mesh& mesh, std::span<DracoStream> streams,
                                           const mesh::Context& context);
 
@@ -41,20 +41,20 @@ struct Run {
   std::size_t end = 0;
 };
 
-// Triangles that are encoded together: a run from each of some consecutive layers.
+// Triangles that are encoded together: one run from each of several consecutive layers.
 using Block = std::vector<Run>;
 
-// Cuts the mesh into blocks of about that many triangles which are as compact as the order of the
-// triangles allows, because blocks share the vertices on their seams: a layer is cut into equal
-// runs, and runs of the same place in consecutive layers lie above each other. Every triangle is in
-// one block. No empty blocks.
+// Cuts the mesh into blocks of about that many triangles. Blocks are as compact as the order of the
+// triangles allows, because they duplicate the vertices on their seams: a layer is cut into equal
+// runs, and a block stacks the runs at one place of consecutive layers. Every triangle is in one
+// block. No block is empty.
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
 
-// What vertices have beside their positions; of each as many as positions, or none.
+// Vertex attributes beside the positions; each has one element per position or none.
 struct VertexData {
   std::span<const mesh::Vec3> normals = {};
   std::span<const float> distances = {};  // millimetres
-  float most_distance = 0;                // of all that share a grid; finite
+  float most_distance = 0;                // the maximum over all that share a grid; finite
 
   bool empty() const { return normals.empty() && distances.empty(); }
 };
@@ -64,28 +64,28 @@ struct DracoOptions {
   int speed = 7;
 };
 
-// Encodes blocks of a mesh, or all of it, one after the other in memory that it keeps. Our own
-// encoder takes what it covers at the speeds 5 to 9: see draco/encoder.h. libdraco takes the rest:
-// the slower speeds, whose streams are smaller, speed 10, which is sequential, distances, finer
-// grids, and surfaces that are no oriented manifolds. Not thread safe. Throws
-// Error kInternal when libdraco refuses, and kCancelled, which libdraco does not look at.
+// Encodes blocks of a mesh, or all of it, in memory that it keeps. Our own encoder takes the
+// surfaces that it supports at the speeds 5 to 9; see draco/encoder.h. libdraco takes the rest:
+// slower speeds, whose streams are smaller; speed 10, which is sequential; distances; finer grids;
+// and surfaces that are not oriented manifolds. Not thread safe. Throws Error kInternal if libdraco
+// fails, and kCancelled, which libdraco does not check.
 class DracoEncoder {
  public:
-  // The block's triangles with the vertices they name, on one thread. `data` is of the mesh's
+  // Encodes the block's triangles and their vertices on one thread. `data` is indexed by the mesh's
   // vertices; it decodes to the same bits in every stream.
   DracoStream encode_block(const mesh::Mesh& mesh, const Block& block, const DracoOptions& options,
                            const VertexData& data, const mesh::Context& context);
 
-  // All triangles with the vertices they name, which are all vertices. Our own encoder takes
-  // several threads, and gives the same bytes on any number.
+  // Encodes all triangles; every vertex is in one. Our own encoder uses several threads; the bytes
+  // do not depend on their number.
   DracoStream encode_whole(const mesh::Mesh& mesh, const DracoOptions& options,
                            const VertexData& data, const mesh::Context& context);
 
-  // Of those that it has encoded at once: its memory follows from it.
+  // The largest number of triangles encoded at once, which determines its memory.
   std::size_t most_triangles() const { return most_triangles_; }
 
  private:
-  // What is encoded, as arrays; layers as mesh::Mesh has them.
+  // Input arrays, in layers as in mesh::Mesh.
   struct Part {
     std::span<const mesh::Vec3> positions;
     VertexData data;
@@ -93,7 +93,7 @@ class DracoEncoder {
     std::span<const std::uint64_t> layer_vertices;
     std::span<const std::uint64_t> layer_triangles;
   };
-  // A block, with vertices of its own.
+  // A block with its own vertices.
   struct PartMemory {
     std::vector<mesh::Vec3> positions;
     std::vector<mesh::Vec3> normals;
@@ -101,9 +101,9 @@ class DracoEncoder {
     std::vector<mesh::Triangle> triangles;
     std::vector<std::uint64_t> layer_vertices;
     std::vector<std::uint64_t> layer_triangles;
-    std::uint32_t lowest = 0;           // of the mesh's vertices
-    std::vector<std::uint32_t> number;  // of the mesh's vertices from the lowest on
-    std::vector<std::uint32_t> origin;  // of the block's vertices, in the mesh
+    std::uint32_t lowest = 0;           // lowest mesh vertex of the block
+    std::vector<std::uint32_t> number;  // block vertex of each mesh vertex from `lowest` on
+    std::vector<std::uint32_t> origin;  // mesh vertex of each block vertex
   };
 
   mesh::PartTopology in_mesh(mesh::PartTopology part) const;

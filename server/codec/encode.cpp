@@ -12,15 +12,15 @@ constexpr std::string_view kUnregistered = "application/octet-stream";
 
 double as_double(std::uint64_t count) { return static_cast<double>(count); }
 
-// Bytes of a vertex in Draco, which takes `usual` at the default of bits. A bit more for a
-// coordinate is about a bit more for each coordinate of each vertex.
+// Bytes per vertex in Draco, which are `usual` at the default number of bits. Another bit per
+// coordinate adds about one bit per coordinate and vertex.
 double draco_bytes_per_vertex(double usual, const MeshParameters& parameters) {
   constexpr double kSmallest = 1;
   const double more_bits = parameters.draco.position_bits - DracoParameters{}.position_bits;
   return std::max(kSmallest, usual + 3 * more_bits / 8);
 }
 
-// How many times the finest level's triangles all levels of detail have together.
+// The triangles of all levels of detail, relative to the finest.
 double levels_of(const MeshParameters& parameters) {
   return parameters.lods.empty()
              ? 1
@@ -47,8 +47,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // Measured: libdraco at its slowest speed, and our own encoder, also where all
-                 // vertices lie in two layers.
+                 // Measured: libdraco at its slowest speed, and our own encoder in the worst case,
+                 // all vertices in two layers.
                  constexpr std::uint64_t kLibdracoPerTriangle = 100;
                  constexpr std::uint64_t kOwnPerTriangle = 75;
                  const std::uint64_t turned = parameters.space == Space::kLps
@@ -65,7 +65,7 @@ constexpr std::array kFormats = {
            .milliseconds_per_triangle = 4.0e-5,
            .bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // Of a vertex; measured.
+                 // Per vertex; measured.
                  constexpr double kNormalBytes = 1.5;
                  constexpr double kDistanceBytes = 1.5;
                  constexpr double kMeshoptBytes = 7;
@@ -80,13 +80,13 @@ constexpr std::array kFormats = {
                },
            .memory_bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // Measured: its parts and their bytes.
+                 // Measured: its blocks and their bytes.
                  constexpr std::uint64_t kPerTriangle = 15;
                  constexpr std::uint64_t kNormalsPerTriangle = 8;
                  // Arrays of all vertices and triangles of a primitive.
                  constexpr std::uint64_t kMeshoptPerTriangle = 40;
                  constexpr std::uint64_t kMergedPerTriangle = 75;
-                 // A copy of the surface, and its simplification.
+                 // A copy of the surface and its simplification.
                  constexpr std::uint64_t kLevelsPerTriangle = 130;
                  std::uint64_t bytes = surface.triangles * kPerTriangle;
                  if (parameters.normals) {
@@ -140,7 +140,7 @@ constexpr std::array kFormats = {
                },
            .memory_bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // A label's surface, which may be nearly all.
+                 // One label's surface can be almost everything.
                  constexpr std::uint64_t kLabelPerTriangle = 30;
                  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
                },
@@ -196,7 +196,7 @@ constexpr std::array kFormats = {
                },
            .memory_bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 // What is encoded at once, and its bytes.
+                 // Encoder memory and output of the labels in progress.
                  std::uint64_t bytes = 0;
                  for (const MeshFormat format : zipped_formats(parameters)) {
                    const Format& row = describe(format);

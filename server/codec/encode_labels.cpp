@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kFaceBytes = kPlyFaceBytes + sizeof(std::uint32_t);
 
-// One colour of the series after the other is a golden section of the circle of hues away.
+// Consecutive labels are a golden section of the hue circle apart.
 std::array<double, 3> series_color(std::int64_t label) {
   constexpr double kGoldenSection = 0.6180339887498949;
   constexpr double kSaturation = 0.5;
@@ -28,14 +28,14 @@ std::array<double, 3> series_color(std::int64_t label) {
   const double hue = 6 * (turns - std::floor(turns));
   std::array<double, 3> color;
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    // A. R. Smith's hexcone (1978), in the form that needs no cases.
+    // A. R. Smith's hexcone (1978), in the form without case distinctions.
     const double k = std::fmod(5 - 2 * static_cast<double>(channel) + hue, 6);
     color[channel] = kValue * (1 - kSaturation * std::max(0.0, std::min({k, 4 - k, 1.0})));
   }
   return color;
 }
 
-// The title without blanks, which would begin another group's name, and unlike those before.
+// A unique title without blanks, which would separate group names.
 std::string group_of(const LabelSummary& label, std::set<std::string>& taken) {
   std::string title = title_of(label);
   std::ranges::replace_if(

@@ -15,53 +15,51 @@
 
 namespace isomesh::codec {
 
-// What the files of labels are made of. All of it must outlive the encoding.
+// The input of encoders of labels. All of it must outlive the encoding.
 struct LabelledSurface {
   const mesh::SeparatingSurface& walls;
   const mesh::LabelTriangles& triangles;  // of the walls
   std::span<const LabelSummary> labels;   // in the order of the walls' own
-  // The walls as they were extracted; for files that ask for the distances to them.
+  // The walls as extracted; for files with distances.
   const mesh::TriangleGrid* extracted = nullptr;
 };
 
-// What a label is called in files: its name, or "label 3" where it has none.
+// A label's name in files; "label 3" if it has none.
 std::string title_of(const LabelSummary& label);
 
-// Its colour, red, green and blue from 0 to 1, as a screen has them (sRGB): the one that it has, or
-// the one of a fixed series that follows from its value.
+// Its colour: red, green and blue from 0 to 1, in sRGB. Without a colour of its own, a fixed series
+// determines it from the label's value.
 std::array<double, 3> color_of(const LabelSummary& label);
 
-// Binary glTF 2.0: as encode_glb (encode.h), with a node, a mesh and a material for each label
-// under the one that turns LPS millimetres into glTF's metres. A node has the label's title, and
-// label, voxels, volume_mm3 and area_mm2 as extras. All labels share one quantisation grid: what
-// two of them have in common decodes to the same bits. Coarser levels are of each label's node; the
-// walls are simplified together, so labels have them in common there too. Throws as encode_glb
-// does.
+// Binary glTF 2.0 as in encode_glb (encode.h), with a node, a mesh and a material per label, below
+// the node that transforms LPS millimetres to glTF's metres. A node has the label's title, and
+// label, voxels, volume_mm3 and area_mm2 as extras. All labels share one quantisation grid: shared
+// walls decode to the same bits. Each label's node has its own coarser levels; the walls are
+// simplified together, so shared walls match there too. Throws as encode_glb does.
 void encode_labels_glb(const LabelledSurface& surface, const Provenance& provenance,
                        const mesh::Context& context, const Sink& sink);
 
-// Binary PLY as encode_ply makes it, with an int property `label` of faces. Every label's surface
-// is there whole and turned outward: a face between two labels is there for each of them. Throws
-// Error kCancelled.
+// Binary PLY as encode_ply writes it, with an int property `label` of faces. Every label's surface
+// is complete and oriented outward: a face between two labels occurs once for each. Throws Error
+// kCancelled.
 void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink);
 
-// OBJ as encode_obj makes it, with a group of faces for each label, which has its title, blanks
-// replaced; where titles are alike, with its value behind it. As in PLY every label's surface is
-// there whole. Throws Error kCancelled.
+// OBJ as encode_obj writes it, with a group of faces per label, named by its title with blanks
+// replaced; equal titles get the label's value appended. Surfaces are complete, as in PLY. Throws
+// Error kCancelled.
 void encode_labels_obj(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink);
 
-// VTK's legacy file and its XML file as encode_vtk and encode_vtp make them, with the label of each
-// triangle as the cell data `label`. As in PLY every label's surface is there whole. Throw as those
-// do.
+// VTK's legacy and XML files as encode_vtk and encode_vtp write them, with each triangle's label as
+// the cell data `label`. Surfaces are complete, as in PLY. They throw as those do.
 void encode_labels_vtk(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink);
 void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
                        const mesh::Context& context, const Sink& sink);
 
-// A format's encoder of all labels, for those of which one file holds them. Throws Error kInternal
-// for others, and as that encoder does. A part of the target isomesh_zip.
+// Calls the encoder of a format that holds all labels in one file. Throws Error kInternal for other
+// formats, and as that encoder does. Part of the target isomesh_zip.
 void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
                    const mesh::Context& context, const Sink& sink);
 

@@ -13,7 +13,7 @@ Encoders& Encoders::instance() {
 std::unique_ptr<DracoEncoder> Encoders::take(std::size_t triangles) {
   const Lock lock(mutex_);
   if (idle_.empty()) return std::make_unique<DracoEncoder>();
-  // The smallest that is large enough, or the largest.
+  // The smallest that is large enough, otherwise the largest.
   const auto best = std::ranges::min_element(idle_, {}, [&](const auto& encoder) {
     const std::size_t has = encoder->most_triangles();
     return has >= triangles ? std::pair(0, has) : std::pair(1, triangles - has);

@@ -1,4 +1,4 @@
-// Draco encoders with their memory, for whoever encodes next; private to this folder.
+// A pool of Draco encoders with their memory. Private to this folder.
 #pragma once
 
 #include <memory>
@@ -9,16 +9,16 @@
 
 namespace isomesh::codec {
 
-// Fresh memory costs a fifth of an encoding, so encoders outlive jobs, as the meshes of workers do.
-// Thread safe.
+// Fresh memory costs a fifth of the encoding time, so encoders outlive jobs, as the workers' meshes
+// do. Thread safe.
 class Encoders {
  public:
-  // The process's. It keeps encoders that have together encoded at most kMostIdleTriangles at once,
-  // which is some 250 MiB.
+  // The process's pool. Idle encoders have together encoded at most kMostIdleTriangles at once,
+  // about 250 MiB.
   static Encoders& instance();
   static constexpr std::size_t kMostIdleTriangles = 8'000'000;
 
-  // The one whose memory fits so many triangles best; a new one if none is idle.
+  // Returns the idle encoder whose memory fits `triangles` best, or a new one.
   std::unique_ptr<DracoEncoder> take(std::size_t triangles);
   void give_back(std::unique_ptr<DracoEncoder> encoder);
 

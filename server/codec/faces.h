@@ -1,5 +1,4 @@
-// The triangles of a file, one after the other, whether it is of one surface or of labels; private
-// to this folder.
+// The triangles of a file, of one surface or of labels. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -12,26 +11,25 @@
 
 namespace isomesh::codec {
 
-// Triangles of one label. `at` may be called from several threads; what it was made of has to
-// outlive it.
+// The triangles of one label. Several threads may call `at`; its source must outlive it.
 struct FaceRun {
   std::size_t count = 0;
-  std::uint32_t label = 0;  // or of a signed one the bits
+  std::uint32_t label = 0;  // for signed labels, its bits
   std::function<mesh::Triangle(std::size_t)> at;
 };
 
 std::vector<FaceRun> faces_of(const mesh::Mesh& mesh);
 
-// Of every label its own surface, turned outward: a wall is there for each that it belongs to.
+// Each label's own surface, oriented outward: a wall occurs once for each of its labels.
 std::vector<FaceRun> faces_of(const LabelledSurface& surface);
 
 std::size_t count_of(const std::vector<FaceRun>& runs);
 
-// Whether the labels are too large for signed numbers of 32 bits; then none is negative.
+// True if the labels exceed signed 32-bit numbers; then none is negative.
 bool has_wide_labels(const LabelledSurface& surface);
 
-// Formats whose indices are signed numbers of 32 bits hold so many vertices, and so many corners.
-// Throws Error kTooLarge with the format's name where there are more.
+// Throws Error kTooLarge with the format's name if signed 32-bit numbers cannot count the vertices
+// or the triangles' corners.
 void check_signed_indices(std::size_t vertices, std::size_t triangles, MeshFormat format);
 
 }  // namespace isomesh::codec

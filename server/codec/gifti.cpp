@@ -14,7 +14,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the GIFTI written here is so, too");
 
-// A vertex and a triangle have twelve bytes each, which are sixteen of base64 without padding.
+// A vertex and a triangle have twelve bytes each: sixteen characters of base64 without padding.
 constexpr std::size_t kRecordBytes = 12;
 static_assert(sizeof(mesh::Vec3) == kRecordBytes && sizeof(mesh::Triangle) == kRecordBytes);
 constexpr std::size_t kRecordText = kRecordBytes / 3 * 4;
@@ -49,7 +49,7 @@ void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
   const std::size_t triangles = mesh.triangles.size();
   check_signed_indices(vertices, triangles, MeshFormat::kGii);
   const auto text = [&](const std::string& lines) { sink(std::as_bytes(std::span(lines))); };
-  // Arrays of nothing are read by few.
+  // Few readers accept empty arrays.
   const bool is_empty = triangles == 0;
   text(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"

@@ -22,16 +22,16 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "GLB is little-endian");
 
-// Measured: of half as many, the vertices that blocks share cost 1.5 % more bytes; of twice as
-// many, the first come later and their vertices no longer have 16 bits.
+// Measured: with half as many, duplicated seam vertices cost 1.5 % more bytes; with twice as many,
+// the first block arrives later and its vertices no longer fit 16 bits.
 constexpr std::size_t kTrianglesPerBlock = 100'000;
-// Of glTF's specification, section 4.4.
+// glTF 2.0, section 4.4.
 constexpr std::uint32_t kMagic = 0x46546C67;
 constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;
 
-// The distances of a mesh's vertices, where they are asked for.
+// The distances of a mesh's vertices, if requested.
 struct Distances {
   Distances() = default;
   Distances(const mesh::Mesh& mesh, const MeshParameters& parameters,
@@ -59,7 +59,7 @@ GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& dis
   if (mesh.triangles.size() == 0) return level;
   const DracoOptions options = {grid, parameters.draco.speed};
   const mesh::Context quiet = {context.stop, nullptr};
-  // Of the whole mesh, so that they are the same on both sides of a seam.
+  // Computed on the whole mesh, so both sides of a seam have the same.
   mesh::Buffer<mesh::Vec3> normals;
   if (parameters.normals) vertex_normals(mesh, quiet, normals);
   const VertexData data = {std::as_const(normals).span(), distances.values.span(), distances.most};
@@ -119,7 +119,7 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
   }
 }
 
-// glTF's colours are linear, a screen's are not (IEC 61966-2-1).
+// glTF's colours are linear; screen colours are not (IEC 61966-2-1).
 double linear_of(double srgb) {
   return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
 }
@@ -132,17 +132,17 @@ GlbPart part_of(const LabelSummary& label) {
   return part;
 }
 
-// The shares of the coarser levels.
+// The triangle fractions of the coarser levels.
 std::span<const double> coarser_shares(const MeshParameters& parameters) {
   return std::span(parameters.lods).subspan(parameters.lods.empty() ? 0 : 1);
 }
 
-// Of so many triangles.
 std::uint64_t count_of(double share, const mesh::Mesh& mesh) {
   return static_cast<std::uint64_t>(share * static_cast<double>(mesh.triangles.size()));
 }
 
-// The part of one level of all, and in it that of simplification, which takes most of the time.
+// The part of the progress of one level, and within it of simplification, which takes most of the
+// time.
 struct LevelProgress {
   mesh::Context simplify;
   mesh::Context encode;
@@ -167,12 +167,12 @@ Distances of_label(const Distances& of_walls, const LabelledSurface& surface, st
   return own;
 }
 
-// The parts' next level, from walls of about that share.
+// Adds a coarser level to all parts, from simplified walls.
 void add_levels(const LabelledSurface& surface, double share, const Grid& grid,
                 const MeshParameters& parameters, const mesh::Context& context,
                 std::vector<GlbPart>& parts) {
   const mesh::Context quiet = {context.stop, nullptr};
-  // Of the walls, so that both labels have the same ones where they touch.
+  // Computed on the walls, so touching labels have the same.
   const Distances of_walls(surface.walls.mesh, parameters, surface.extracted, quiet);
   mesh::parallel_for(context, parts.size(), [&](std::size_t n) {
     mesh::Mesh mesh;

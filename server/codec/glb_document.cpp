@@ -17,9 +17,9 @@ constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
 constexpr const char* kMeshoptExtension = "EXT_meshopt_compression";
 constexpr const char* kQuantizationExtension = "KHR_mesh_quantization";
 constexpr const char* kLodExtension = "MSFT_lod";
-// Of an application's own, which glTF has begin with an underscore.
+// glTF requires the underscore for application-specific attributes.
 constexpr const char* kDistanceAttribute = "_DISTANCE_MM";
-// Of glTF's specification, sections 3.4 and 3.6.2.
+// glTF 2.0, sections 3.4 and 3.6.2.
 constexpr int kByte = 5120;
 constexpr int kUnsignedShort = 5123;
 constexpr int kUnsignedInt = 5125;
@@ -27,7 +27,7 @@ constexpr int kFloat = 5126;
 constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
 
-// One primitive of the last mesh, with the accessors and the buffer view that it names.
+// Adds a primitive to the last mesh, with its accessors and its buffer view.
 void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
                    const MeshParameters& parameters) {
   const std::size_t view = gltf["bufferViews"].size();
@@ -59,8 +59,8 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
        {"extensions", {{kDracoExtension, {{"bufferView", view}, {"attributes", attributes}}}}}});
 }
 
-// One array of the last chunk as a view: of the second buffer, which is nowhere, for readers that
-// unpack it from the first. Returns its number.
+// Adds one array of the last chunk as a buffer view and returns its index. The view lies in the
+// second buffer, which has no data; readers decompress it from the first.
 std::size_t add_view(Json& gltf, const MeshoptArray& array, std::size_t offset) {
   const bool is_indices = array.kind == MeshoptArray::Kind::kIndices;
   const std::size_t bytes = array.count * array.stride;
@@ -82,7 +82,7 @@ std::size_t add_view(Json& gltf, const MeshoptArray& array, std::size_t offset) 
   return gltf["bufferViews"].size() - 1;
 }
 
-// As the other, of unpacked arrays.
+// As above, for decompressed arrays.
 void add_primitive(Json& gltf, const MeshoptChunk& chunk, std::size_t offset) {
   Json attributes = Json::object();
   std::size_t indices = 0;
@@ -126,8 +126,8 @@ Json asset_of(const Provenance& provenance) {
   return {{"version", "2.0"}, {"generator", "isomesh"}, {"extras", provenance_json(provenance)}};
 }
 
-// Positions are LPS millimetres; glTF wants metres, Y up and the front towards +Z: a quarter turn
-// about x takes S to +Y and A to +Z.
+// Positions are LPS millimetres; glTF has metres, Y up and the front towards +Z. A quarter turn
+// about x maps S to +Y and A to +Z.
 constexpr double kMetresPerMillimetre = 0.001;
 
 Json turned_node(const std::string& name) {
@@ -137,7 +137,7 @@ Json turned_node(const std::string& name) {
           {"scale", {kMetresPerMillimetre, kMetresPerMillimetre, kMetresPerMillimetre}}};
 }
 
-// Steps of a grid to LPS millimetres, where positions are that.
+// Transforms grid steps to LPS millimetres, if positions are steps.
 class Steps {
  public:
   Steps(const Grid& grid, const MeshParameters& parameters)
@@ -145,14 +145,14 @@ class Steps {
         low_{grid.low[0], grid.low[1], grid.low[2]},
         step_(double{grid.side} / (std::exp2(grid.bits) - 1)) {}
 
-  // In a node that does nothing else.
+  // For a node without another transformation.
   void put_into(Json& node) const {
     if (!are_used_) return;
     node["translation"] = low_;
     node["scale"] = {step_, step_, step_};
   }
 
-  // In the turned node, before what it does.
+  // For the root node, before its rotation.
   void put_into_turned(Json& node) const {
     if (!are_used_) return;
     const double scale = step_ * kMetresPerMillimetre;
@@ -177,7 +177,7 @@ Json material_of(const GlbPart& part) {
             {"roughnessFactor", 0.6}}}};
 }
 
-// Adds a mesh with all that it names; of the material that was added last.
+// Adds a mesh with its primitives, using the last material.
 void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::size_t offset,
               const MeshParameters& parameters) {
   gltf["meshes"].push_back({{"name", name}, {"primitives", Json::array()}});
@@ -191,9 +191,9 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
   }
 }
 
-// Down to which share of the screen's height or width each level is drawn: where the next one has
-// as many triangles for a part of the screen as the finest has when it fills it. The last one
-// always is.
+// For each level, the smallest fraction of the screen's height or width at which it is drawn. There
+// the next level has as many triangles per screen area as the finest has at full screen. The last
+// level is always drawn.
 Json extras_of(const LabelSummary& label) {
   return {{"label", label.label},
           {"voxels", label.voxels},
@@ -210,16 +210,15 @@ Json screen_coverage(const GlbPart& part) {
   return coverage;
 }
 
-// All nodes: the root, its children, and behind them the coarser levels of any, which are no node's
-// children but named by MSFT_lod, in place of the node that has it.
+// All nodes: the root, its children, and then the coarser levels. Those are not children of a node;
+// MSFT_lod refers to them.
 class Nodes {
  public:
   Nodes(Json& gltf, const GlbLayout& layout, const MeshParameters& parameters)
       : gltf_(gltf), layout_(layout), parameters_(parameters) {}
 
-  // The node as it is to be for the part, with its meshes; `levels_from` is the number that the
-  // first of its coarser levels' nodes gets. Those are like the node in all but name and mesh.
-  // Empty parts have no mesh.
+  // Completes a part's node with its meshes. Nodes of coarser levels start at index `levels_from`;
+  // they differ from the node in name and mesh only. Empty parts have no mesh.
   Json node_of(const GlbPart& part, std::size_t number, Json node, std::size_t levels_from) {
     const Json bare = node;
     if (part.label) node["extras"] = extras_of(*part.label);
@@ -287,7 +286,7 @@ std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout
     Json extensions = Json::array({is_draco ? kDracoExtension : kMeshoptExtension});
     if (!is_draco) {
       extensions.push_back(kQuantizationExtension);
-      // Whose bytes nobody has.
+      // A buffer without data.
       gltf["buffers"].push_back(
           {{"byteLength", 0}, {"extensions", {{kMeshoptExtension, {{"fallback", true}}}}}});
     }

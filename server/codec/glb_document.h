@@ -1,4 +1,4 @@
-// The JSON of a GLB file, and what it is about; private to this folder.
+// The JSON document of a GLB file. Private to this folder.
 #pragma once
 
 #include <array>
@@ -17,14 +17,14 @@
 
 namespace isomesh::codec {
 
-// Of the file's chunks and buffer views.
+// Of chunks and buffer views, in bytes.
 inline constexpr std::size_t kGlbAlignment = 4;
 
 constexpr std::size_t glb_padded(std::size_t bytes) {
   return (bytes + kGlbAlignment - 1) / kGlbAlignment * kGlbAlignment;
 }
 
-// A surface with about `share` of its triangles, in chunks of one kind or the other.
+// A surface with about `share` of its triangles, as Draco or as meshopt chunks.
 struct GlbLevel {
   double share = 1;
   std::vector<DracoStream> streams = {};
@@ -45,17 +45,17 @@ struct GlbLevel {
   }
 };
 
-// One surface, with a material and a node of its own.
+// One surface with its own material and node.
 struct GlbPart {
   std::string name;
   std::string material;
   std::array<double, 3> color = {0.8, 0.8, 0.8};  // linear
-  std::optional<LabelSummary> label = {};         // whose members the node has as extras
-  // From the finest to the coarsest, each with fewer triangles than the one before; none of an
-  // empty surface.
+  std::optional<LabelSummary> label = {};         // written as the node's extras
+  // From finest to coarsest, each with fewer triangles than the previous one. None for an empty
+  // surface.
   std::vector<GlbLevel> levels = {};
 
-  // Leaves out a level that gains nothing.
+  // Omits a level without fewer triangles than the previous one.
   void add_level(GlbLevel level) {
     const std::uint64_t triangles = level.triangles();
     if (triangles == 0) return;
@@ -64,15 +64,15 @@ struct GlbPart {
   }
 };
 
-// Where the levels' bytes begin in the file's binary data. The coarsest are in front, so that
-// whoever reads the file as it arrives has the whole surface early.
+// The offsets of the levels in the file's binary data. The coarsest come first, so that a streaming
+// reader has the whole surface early.
 class GlbLayout {
  public:
   explicit GlbLayout(std::span<const GlbPart> parts);
 
   std::size_t bytes() const { return bytes_; }
   std::size_t begin(std::size_t part, std::size_t level) const { return begins_[part][level]; }
-  // Of the parts, which have to outlive it.
+  // Refers to the parts, which must outlive it.
   const std::vector<const GlbLevel*>& order() const { return order_; }
 
  private:
@@ -81,10 +81,9 @@ class GlbLayout {
   std::vector<const GlbLevel*> order_;
 };
 
-// glTF's document: of one surface, which is the turned node's own, or of one for each label, in
-// nodes below it. Coarser levels of either are nodes behind all others that MSFT_lod names. Where
-// the chunks' positions are steps on the grid, the nodes that have meshes turn them into LPS
-// millimetres.
+// glTF's document of one surface, which is the root node's own, or of one surface per label, in
+// child nodes. Coarser levels are nodes after all others, referred to by MSFT_lod. If the chunks'
+// positions are grid steps, the nodes with meshes transform them to LPS millimetres.
 std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
                          const Provenance& provenance);
 

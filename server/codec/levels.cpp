@@ -7,8 +7,8 @@
 namespace isomesh::codec {
 namespace {
 
-// Measured on a surface of 1.3 million triangles: one with a twentieth of them is five times as
-// near to it when it is made by way of a quarter, and that takes hardly longer.
+// Measured on a surface of 1.3 million triangles: a level with a twentieth of them is five times as
+// accurate if it is made by way of a quarter, at almost the same time.
 constexpr std::uint64_t kMostAtOnce = 4;
 
 template <class T>
@@ -24,7 +24,7 @@ void coarsen_in_steps(std::uint64_t triangles, const mesh::Context& context, con
   for (bool is_last = false; !is_last && mesh.triangles.size() > triangles;) {
     const std::uint64_t nearer = mesh.triangles.size() / kMostAtOnce;
     is_last = nearer <= triangles;
-    // Each step has a fraction of what the one before had to do.
+    // Each step has a fraction of the previous step's work.
     const double end = is_last ? 1 : begin + (1 - begin) * (1 - 1.0 / kMostAtOnce);
     const mesh::SimplificationEffect effect =
         simplify({.triangles = std::max({triangles, nearer, std::uint64_t{1}})},

@@ -1,4 +1,4 @@
-// Coarser levels of detail; private to this folder.
+// Coarser levels of detail. Private to this folder.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@ namespace isomesh::codec {
 mesh::Mesh copy_of(const mesh::Mesh& mesh);
 mesh::SeparatingSurface copy_of(const mesh::SeparatingSurface& walls);
 
-// Simplifies the mesh in place to about so many triangles, without a bound of the error
-// (server/mesh/simplify/simplify.h); to more where its boundary, or the lines between walls, leave
-// no choice. Takes what simplification takes. Throws Error kCancelled.
+// Simplifies the mesh in place to about that many triangles, without an error bound
+// (server/mesh/simplify/simplify.h). More remain if its boundary or junction curves require them.
+// Needs the memory of simplification. Throws Error kCancelled.
 void coarsen(std::uint64_t triangles, const mesh::Context& context, mesh::Mesh& mesh);
 
-// As above for walls between labels: labels next to each other still have theirs in common.
+// As above for walls between labels: adjacent labels still share their walls.
 void coarsen(std::uint64_t triangles, const mesh::Context& context, mesh::SeparatingSurface& walls);
 
-// A part of what the context's progress tells. The context has to outlive it.
+// A context for a part of the progress. `context` must outlive it.
 mesh::Context portion_of(const mesh::Context& context, double begin, double end);
 
 }  // namespace isomesh::codec

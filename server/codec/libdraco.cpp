@@ -15,17 +15,16 @@ namespace {
 constexpr int kSequentialSpeed = 10;
 constexpr int kDistanceBits = 12;
 
-// Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4
-// GiB at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
+// Draco's entropy coder counts values in an array over all possible values, four bytes each: 4 GiB
+// at 30 bits. Finer grids are stored without it, in up to four bytes per coordinate.
 constexpr int kMostEntropyCodedBits = 24;
 
-// libdraco's decoder refuses sequential streams in which less than three bytes a triangle follow
-// the numbers at their beginning, which compressed ones may have. Zeros behind their end are
-// ignored.
+// libdraco's decoder rejects sequential streams with less than three bytes per triangle after the
+// initial counts, which compressed streams may have. It ignores trailing zeros.
 constexpr std::size_t kLeastPerTriangle = 3;
 constexpr std::size_t kHeadBytes = 32;
 
-// Adds one vector, or one number, a point. Returns the attribute's id within the stream.
+// Adds an attribute with one vector or number per point. Returns its id in the stream.
 template <class T>
 std::uint32_t add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
                             std::span<const T> values) {
@@ -34,12 +33,12 @@ std::uint32_t add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type ty
                    0);
   draco::PointAttribute* attribute = mesh.attribute(
       mesh.AddAttribute(description, true, static_cast<std::uint32_t>(values.size())));
-  // One write for all: the attribute's buffer has the layout of our arrays.
+  // One write for all: the attribute's buffer has our arrays' layout.
   if (!values.empty()) attribute->buffer()->Write(0, values.data(), values.size_bytes());
   return attribute->unique_id();
 }
 
-// Built from arrays: Draco's soup builder would look for duplicates again.
+// Built from arrays: Draco's soup builder would search for duplicates again.
 std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
                                       std::span<const mesh::Triangle> triangles) {
   auto result = std::make_unique<draco::Mesh>();
@@ -53,8 +52,8 @@ std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
   return result;
 }
 
-// The same triangles with the vertices that they name. Draco's own decoder refuses sequential
-// streams of more vertices than corners.
+// The triangles with only the vertices that they use. Draco's decoder rejects sequential streams
+// with more vertices than corners.
 struct Named {
   explicit Named(const Arrays& arrays) : most_distance(arrays.data.most_distance) {
     constexpr std::uint32_t kUnnamed = ~std::uint32_t{0};
@@ -84,7 +83,7 @@ struct Named {
   std::vector<mesh::Triangle> triangles;
 };
 
-// Edgebreaker leaves out triangles that repeat a vertex.
+// Edgebreaker drops triangles that repeat a vertex.
 bool is_sequential(std::span<const mesh::Triangle> triangles, int speed) {
   return speed == kSequentialSpeed || std::ranges::any_of(triangles, [](const auto& triangle) {
            const auto& [a, b, c] = triangle;
@@ -114,7 +113,7 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
   if (!data.distances.empty()) {
     stream.distance_id =
         add_attribute(*draco_mesh, draco::GeometryAttribute::GENERIC, data.distances);
-    // One scale for all streams, by which a vertex on a seam has the same number on both sides.
+    // All streams share one scale, so a seam vertex has the same number on both sides.
     const float nearest = 0;
     const float range = data.most_distance > 0 ? data.most_distance : 1;
     encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::GENERIC, kDistanceBits, 1,
@@ -123,14 +122,14 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
   encoder.SetSpeedOptions(speed, speed);
   if (grid.bits > kMostEntropyCodedBits) {
     encoder.options().SetGlobalBool("use_built_in_attribute_compression", false);
-    // The predictions of the slowest speeds count values too.
+    // The predictions of the slowest speeds also count values in such an array.
     encoder.SetAttributePredictionScheme(draco::GeometryAttribute::POSITION,
                                          draco::PREDICTION_DIFFERENCE);
   }
-  // Of the sequential encoding: indices as entropy coded differences, a third of their size.
+  // In sequential encoding: indices as entropy-coded differences, a third of their size.
   encoder.options().SetGlobalBool("compress_connectivity", true);
   if (arrays.triangles.empty()) {
-    // Neither edgebreaker nor quantisation has a code for nothing.
+    // Neither edgebreaker nor quantisation supports an empty mesh.
     encoder.SetEncodingMethod(draco::MESH_SEQUENTIAL_ENCODING);
   } else {
     encoder.SetEncodingMethod(sequential ? draco::MESH_SEQUENTIAL_ENCODING
@@ -138,7 +137,7 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
     encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::POSITION, grid.bits, 3,
                                              grid.low.data(), grid.side);
   }
-  // Where a block's cut leaves two fans at one vertex, edgebreaker makes two of it.
+  // If a block's cut leaves two fans at a vertex, edgebreaker duplicates it.
   encoder.SetTrackEncodedProperties(true);
   draco::EncoderBuffer buffer;
   const draco::Status status = encoder.EncodeMeshToBuffer(*draco_mesh, &buffer);

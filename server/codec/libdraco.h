@@ -1,4 +1,4 @@
-// What our own encoder does not cover goes to libdraco; private to this folder.
+// Encodes with libdraco what our own encoder does not support. Private to this folder.
 #pragma once
 
 #include <span>
@@ -7,17 +7,17 @@
 
 namespace isomesh::codec {
 
-// Triangles with the vertices they name, as arrays.
+// Triangles and their vertices, as arrays.
 struct Arrays {
   std::span<const mesh::Vec3> positions;
   VertexData data;
   std::span<const mesh::Triangle> triangles;
 };
 
-// Encodes by edgebreaker, or sequentially: for speed 10, as Draco's own convention has it, and
-// where there is no triangle or one that repeats a vertex. The vertices' data decode to the
-// same bits in every stream. Fills all of the stream but its bounds. Takes one thread, which it
-// never gives back before it is done. Thread safe. Throws Error kInternal when Draco refuses.
+// Encodes by edgebreaker, or sequentially: for speed 10, as Draco does, and if there is no triangle
+// or one that repeats a vertex. Vertex data decode to the same bits in every stream. Fills all of
+// the stream except its bounds. Occupies one thread until it is done. Thread safe. Throws Error
+// kInternal if Draco fails.
 DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int speed);
 
 }  // namespace isomesh::codec

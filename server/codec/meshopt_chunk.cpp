@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint32_t kUnnamed = ~std::uint32_t{0};
 
-// The block's triangles and its vertices in the order in which they are written.
+// The block's triangles and vertices in writing order.
 struct Order {
   Order(const mesh::Mesh& mesh, const Block& block) {
     std::vector<std::uint32_t> corners;
@@ -31,7 +31,7 @@ struct Order {
         }
       }
     }
-    // Triangles of neighbouring layers name vertices of neighbouring layers, so the range is short.
+    // Triangles of neighbouring layers use vertices of neighbouring layers, so the range is short.
     const std::size_t range = std::size_t{highest} - lowest + 1;
     for (std::uint32_t& corner : corners) corner -= lowest;
     std::vector<std::uint32_t> ordered(corners.size());
@@ -49,10 +49,10 @@ struct Order {
   }
 
   std::vector<std::uint32_t> indices;
-  std::vector<std::uint32_t> vertices;  // of the mesh
+  std::vector<std::uint32_t> vertices;  // indices in the mesh
 };
 
-// Appends an array, each element of which is padded to a multiple of four bytes.
+// Appends an array whose elements are padded to multiples of four bytes.
 template <class Element>
 void add_array(MeshoptArray::Kind kind, std::span<const Element> elements, MeshoptChunk& chunk) {
   static_assert(sizeof(Element) % 4 == 0);
@@ -82,7 +82,7 @@ void add_indices(const Order& order, MeshoptChunk& chunk) {
   chunk.arrays.push_back(array);
 }
 
-// A vector's three coordinates and one more.
+// A vector's three coordinates and padding.
 template <class T>
 using Four = std::array<T, 4>;
 

@@ -17,7 +17,7 @@ struct MeshoptArray {
   Kind kind = Kind::kPositions;
   std::size_t begin = 0;  // a multiple of four
   std::size_t bytes = 0;
-  std::size_t stride = 0;  // of an element, decoded
+  std::size_t stride = 0;  // of a decoded element, in bytes
   std::size_t count = 0;
 };
 
@@ -26,17 +26,17 @@ struct MeshoptChunk {
   std::vector<MeshoptArray> arrays;
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
-  mesh::Vec3 low = {0, 0, 0};  // bounds of the positions as they are stored
+  mesh::Vec3 low = {0, 0, 0};  // bounds of the stored positions
   mesh::Vec3 high = {0, 0, 0};
 };
 
-// Positions are steps on the grid, as 16-bit numbers, of grids of up to so many bits, and floats
-// otherwise.
+// Positions are grid steps, as 16-bit numbers, on grids of at most this many bits; otherwise
+// floats.
 inline constexpr int kMostMeshoptBits = 16;
 constexpr bool is_on_steps(const Grid& grid) { return grid.bits <= kMostMeshoptBits; }
 
-// The block's triangles with the vertices they name, in an order that compresses well. `data` is of
-// the mesh's vertices: normals become octahedral ones of 8 bits, distances stay as they are.
+// Encodes the block's triangles and their vertices, in an order that compresses well. `data` is
+// indexed by the mesh's vertices: normals become octahedral with 8 bits, distances stay exact.
 MeshoptChunk encode_with_meshopt(const mesh::Mesh& mesh, const Block& block, const Grid& grid,
                                  const VertexData& data);
 

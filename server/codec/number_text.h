@@ -1,5 +1,5 @@
-// Numbers as text, for the formats that are text; private to this folder. Each function writes one
-// number at `out`, where there is room for it, and returns where it ends.
+// Formats numbers for the text formats. Private to this folder. Each function writes one number at
+// `out`, which must have room for it, and returns its end.
 #pragma once
 
 #include <charconv>
@@ -9,8 +9,8 @@
 
 namespace isomesh::codec {
 
-// Without an exponent, which some readers do not know: a sign, up to 39 digits before the point, or
-// a point and up to 54 digits behind it.
+// Fixed notation, because some readers do not know exponents: a sign, up to 39 digits before the
+// point, or a point and up to 54 digits behind it.
 inline constexpr std::size_t kMostFloatBytes = 64;
 inline constexpr std::size_t kMostIndexBytes = 10;
 

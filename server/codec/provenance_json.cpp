@@ -19,7 +19,7 @@ Json provenance_json(const Provenance& provenance) {
                {"direction", provenance.geometry.direction},
                {"units", "mm"},
                {"space", "LPS"}});
-  // Only where there are some: the meshes of other volumes keep their bytes.
+  // Only if there are notes: the meshes of other volumes keep their bytes.
   for (const Note& note : provenance.notes) {
     json["notes"].push_back({{"code", note.code}, {"detail", note.detail}});
   }

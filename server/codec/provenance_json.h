@@ -1,4 +1,4 @@
-// What files say about where their mesh comes from; private to this folder.
+// The origin of a mesh, as files carry it. Private to this folder.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -7,14 +7,13 @@
 
 namespace isomesh::codec {
 
-// The volume and the parameters, the iso-value that was used (none by labels), the lattice, and
-// units and space of the positions; the volume's notes where there are some.
+// The volume, the parameters, the iso-value used (none by labels), the lattice, units and space of
+// the positions, and the volume's notes, if any.
 nlohmann::ordered_json provenance_json(const Provenance& provenance);
 
-// As text.
 std::string provenance_text(const Provenance& provenance);
 
-// As text without what XML escapes: some readers leave the text of elements as it stands.
+// As text without characters that XML escapes: some readers do not unescape.
 std::string provenance_for_xml(const Provenance& provenance);
 
 }  // namespace isomesh::codec

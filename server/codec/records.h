@@ -1,5 +1,5 @@
-// The records that files of one surface and files of labels are made of; private to this folder.
-// Each function writes one record at `out`, where there is room for it, and returns where it ends.
+// Records of file formats, for one surface and for labels. Private to this folder. Each function
+// writes one record at `out`, which must have room for it, and returns its end.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace isomesh::codec {
 
-// Up to and with "end_header". `of_faces`: lines of the faces' properties behind their vertices.
+// Up to and including "end_header". `of_faces`: lines of further face properties.
 std::string ply_header(Space space, std::size_t vertices, std::size_t faces,
                        std::string_view of_faces);
 

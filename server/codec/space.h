@@ -1,4 +1,4 @@
-// The spaces that files' coordinates are in; private to this folder and those below.
+// Coordinate spaces of files. Private to this folder and its subfolders.
 #pragma once
 
 #include <string_view>
@@ -8,17 +8,17 @@
 
 namespace isomesh::codec {
 
-// As it is in LPS, in the other space, and the other way round: half a turn about z, which keeps
-// the sense of triangles.
+// Converts between LPS and `space`, in either direction: a half turn about z, which keeps the
+// triangles' orientation.
 inline mesh::Vec3 in_space(const mesh::Vec3& position, Space space) {
   if (space == Space::kLps) return position;
-  return {0 - position[0], 0 - position[1], position[2]};  // no negative zeros
+  return {0 - position[0], 0 - position[1], position[2]};  // avoids negative zeros
 }
 
-// For encoders that take whole meshes. As much memory as the mesh.
+// For encoders that take whole meshes. Needs the memory of another mesh.
 mesh::Mesh copy_in_space(const mesh::Mesh& mesh, Space space);
 
-// As files call it.
+// Its name in files.
 constexpr std::string_view letters_of(Space space) { return space == Space::kLps ? "LPS" : "RAS"; }
 
 }  // namespace isomesh::codec

@@ -54,7 +54,7 @@ void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& contex
                 "The surface has more triangles than an STL file can hold. Set \"triangles\" to "
                 "simplify it.");
   }
-  // The header must not start with "solid", or readers take the file for text.
+  // The header must not start with "solid": readers would assume a text file.
   const std::string title =
       "isomesh binary STL, millimetres, SPACE=" + std::string(letters_of(space));
   std::array<std::byte, kHeaderBytes + 4> header = {};

@@ -31,7 +31,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   const std::size_t faces = count_of(runs);
   check_signed_indices(vertices, faces, MeshFormat::kVtk);
   const auto text = [&](const std::string& line) { sink(std::as_bytes(std::span(line))); };
-  // The second line is the title, in which 3D Slicer looks for the space.
+  // 3D Slicer reads the space from the title in the second line.
   text("# vtk DataFile Version 3.0\nisomesh, millimetres, SPACE=" + std::string(letters_of(space)) +
        "\nBINARY\nDATASET POLYDATA\nPOINTS " + std::to_string(vertices) + " float\n");
   BlockWriter writer(context, sink, vertices + faces * (label_type == nullptr ? 1 : 2));

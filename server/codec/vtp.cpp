@@ -16,7 +16,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the VTP written here is little-endian");
 
-// Of a text, which stands as its characters' numbers and a zero.
+// An array of text, stored as the numbers of its characters and a zero.
 std::string text_array(const std::string& name, std::string_view text) {
   std::string array =
       "<Array type=\"String\" Name=\"" + name + "\" NumberOfTuples=\"1\" format=\"ascii\">";
@@ -24,7 +24,7 @@ std::string text_array(const std::string& name, std::string_view text) {
   return array + "0</Array>\n";
 }
 
-// An array in the appended data: its element, and how many bytes it has.
+// An array in the appended data: its element and its size in bytes.
 class Appended {
  public:
   std::string element(std::string_view type, std::string_view name, std::string_view more,
@@ -56,12 +56,12 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n" +
-      text_array("SPACE", letters_of(space)) +  // by which 3D Slicer goes
+      text_array("SPACE", letters_of(space)) +  // read by 3D Slicer
       text_array("isomesh:provenance", provenance_text(provenance)) +
       "</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(vertices) +
       "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
       std::to_string(faces) + "\">\n";
-  // One after the other, as the arrays follow each other.
+  // In the order of the arrays.
   header += "<Points>\n";
   header += appended.element("Float32", "Points", "NumberOfComponents=\"3\" ", point_bytes);
   header += "</Points>\n<Polys>\n";
@@ -97,7 +97,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   };
   begin_array(face_bytes);
   writer.write(faces, sizeof(std::uint32_t), [&](std::size_t t, std::byte* out) {
-    return write_word(static_cast<std::uint32_t>(3 * (t + 1)), out);  // where the face ends
+    return write_word(static_cast<std::uint32_t>(3 * (t + 1)), out);  // the end of the face
   });
   if (label_type != nullptr) {
     begin_array(face_bytes);

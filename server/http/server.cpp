@@ -15,11 +15,11 @@ namespace isomesh::http {
 namespace {
 
 constexpr std::chrono::seconds kLongestWatch{1};
-// How long answers may still be sent when the service ends.
+// Time limit for sending the last responses on shutdown.
 constexpr std::chrono::seconds kLastAnswers{5};
 
-// Hands events of jobs on to requests that wait for them, streams, the log and the metrics, until
-// the service stops.
+// Distributes events of jobs to waiting requests, streams, the log and the metrics, until the
+// service stops.
 void watch_jobs(App& app) {
   std::uint64_t last = app.first_event;
   while (!app.stopping) {

@@ -13,25 +13,25 @@ namespace isomesh::http {
 class Server {
  public:
   Server(const Services& services, const ServerOptions& options);
-  // As stop().
+  // Calls stop().
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // Binds; returns what clients connect to, such as http://127.0.0.1:8080 or unix:/run/iso.sock.
-  // Throws Error kUnavailable when the address cannot be bound.
+  // Binds and returns the address for clients, such as http://127.0.0.1:8080 or unix:/run/iso.sock.
+  // Throws Error kUnavailable if the address cannot be bound.
   std::string bind(const net::Address& address);
 
-  // Serves until stop(); to be called once, after bind. Whatever serving needs is there when it
-  // returns. Throws std::system_error if a thread cannot be started.
+  // Starts serving until stop(). Call once, after bind. When it returns, the service is ready.
+  // Throws std::system_error if a thread cannot be started.
   void start();
 
-  // /readyz answers 503 from now on, so that a load balancer looks elsewhere, and no job is
+  // From now on /readyz answers 503, so that load balancers use other servers, and no job is
   // accepted. Thread safe.
   void begin_drain();
 
-  // Returns when nothing is served any more: no connection is accepted, nobody waits for a job,
-  // uploads and imports are cut off. To be called after the orders have ended.
+  // Stops serving and returns when all has ended: accepts no connections, ends all waiting, aborts
+  // uploads and imports. Call after the orders have ended.
   void stop();
 
  private:

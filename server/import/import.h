@@ -1,5 +1,5 @@
-// Uploaded bytes -> canonical volume. The code of this folder reads untrusted files, so only the
-// program isomesh-import is linked with it, which confines itself before it reads.
+// Uploaded bytes -> canonical volume. This folder reads untrusted files, so only the program
+// isomesh-import links it, and confines itself before it reads.
 #pragma once
 
 #include "proto/types.h"
@@ -8,16 +8,15 @@
 
 namespace isomesh::import {
 
-// Writes the task's target, a canonical file, and returns what else is known of the volume; id and
+// Writes the task's target, a canonical file, and returns the volume's other properties; id and
 // created stay empty. Thread safe.
 //
-// Throws Error kUnsupportedMedia when the file is of no format that is read, kTooLarge when its
-// samples exceed the limits, kUnusableVolume with the reason when it is truncated, corrupt or not a
-// volume of finite scalars on a regular three-dimensional lattice, kInvalidParameter when it is not
-// what the options say. Throws kOutOfSpace and kInternal when the machine fails.
+// Throws Error kUnsupportedMedia for an unknown format, kTooLarge beyond the limits,
+// kUnusableVolume with the reason if the file is truncated, corrupt or not a volume of finite
+// scalars on a regular three-dimensional lattice, kInvalidParameter if it contradicts the options;
+// kOutOfSpace and kInternal if the machine fails.
 //
-// Leaves no file but the target in the scratch folder. The caller removes the target when this
-// throws.
+// Leaves only the target in the scratch folder. The caller removes it if this throws.
 Volume import_volume(const ImportTask& task, const FormatListener& listener = {});
 
 }  // namespace isomesh::import

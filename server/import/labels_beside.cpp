@@ -34,7 +34,7 @@ std::string stem_of(const std::string& name) {
   return base.stem().string();
 }
 
-// Whether a file's name is the stem with more behind it, as "head_labels.txt" is of "head".
+// True if a file's name is the stem plus a separate suffix, like "head_labels.txt" for "head".
 bool begins_with(const std::string& name, const std::string& stem) {
   const auto is_word = [](char letter) {
     return (letter >= 'a' && letter <= 'z') || (letter >= '0' && letter <= '9');
@@ -51,16 +51,16 @@ bool is_text(std::string_view bytes) {
   });
 }
 
-// The labels of a file that is a table; none of any other.
+// The labels of a table file; none of any other file.
 std::vector<LabelEntry> labels_of(const std::filesystem::path& path) {
   const InputFile file(path);
-  // An archive's larger members are there in part only.
+  // Larger members of an archive may be truncated.
   if (file.size() >= kBeginningBytes || !is_text(file.text(0, kSniffBytes))) return {};
   try {
     return label_table(labels_of_text(file.text(0, kBeginningBytes)));
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
-    return {};  // names are an extra; the samples are there without
+    return {};  // labels are optional; the samples are usable without them
   }
 }
 
@@ -74,7 +74,7 @@ std::vector<Table> tables_in(const Companions& companions, const IsWanted& is_wa
   return tables;
 }
 
-// The stems of the other files that are of a format of volumes.
+// The stems of the other volume files.
 std::vector<std::string> stems_of_volumes(const Companions& companions) {
   std::vector<std::string> stems;
   for (const auto& [name, path] : companions.files) {
@@ -83,7 +83,7 @@ std::vector<std::string> stems_of_volumes(const Companions& companions) {
   return stems;
 }
 
-// Those whose names have nothing but suffixes behind the stem, as "head.txt" and "head.nii.txt".
+// The tables with only suffixes after the stem, like "head.txt" and "head.nii.txt".
 std::vector<Table> named_as(const std::string& stem, std::vector<Table> tables) {
   std::erase_if(tables, [&](const Table& table) {
     return stem_of(table.name) != stem && stem_of(stem_of(table.name)) != stem;

@@ -1,4 +1,4 @@
-// The names of labels that came in a file of their own, beside the volume.
+// Names of labels in a separate file beside the volume.
 #pragma once
 
 #include <filesystem>
@@ -8,13 +8,13 @@
 
 namespace isomesh::import {
 
-// Gives a volume whose samples look like labels, and whose own file names none, the labels of a
-// table of text among its companions. A table belongs to the volume whose name it begins with; one
-// that belongs to no volume belongs to all. If several fit, none is taken: no name is better than a
-// wrong one. The note on labels names the table, or those that fit.
+// Adds labels from a text table among the companions to a volume whose samples look like labels and
+// whose own file names none. A table belongs to the volume whose name it begins with; a table
+// without a volume belongs to all. If several tables fit, none is used: no name is better than a
+// wrong one. The note on labels lists the table, or the candidates.
 void take_labels_beside(const Companions& companions, Volume& volume);
 
-// Whether the file is such a table.
+// True if the file is such a table.
 bool is_label_table(const std::filesystem::path& path);
 
 }  // namespace isomesh::import

@@ -1,6 +1,6 @@
-// isomesh-import: a program that reads uploads for the daemon, each in a copy of itself that is
-// made ahead. A copy gives up what no import needs, reads its order from kChildDescriptor, gives up
-// what the order does not need, and writes its answer to the same descriptor.
+// isomesh-import: reads uploads for the daemon, each in a copy of itself that is forked in advance.
+// A copy drops the rights that no import needs, reads its order from kChildDescriptor, drops those
+// that the order does not need, and writes its response to the same descriptor.
 #include <array>
 #include <cstdint>
 #include <cstdlib>
@@ -41,7 +41,7 @@ std::string read_order() {
 void say(std::string_view message) {
   while (!message.empty()) {
     const ssize_t count = ::write(kChildDescriptor, message.data(), message.size());
-    // The daemon has closed its end, because it has given this import up.
+    // The daemon has closed its end: it has cancelled this import.
     if (count < 0) std::_Exit(EXIT_FAILURE);
     message.remove_prefix(static_cast<std::size_t>(count));
   }
@@ -56,7 +56,7 @@ Confinement confinement_of(const AnswerOrder& order) {
 }
 
 Confinement confinement_of(const ImportOrder& order) {
-  // For headers, and for what an archive holds beside the samples.
+  // For headers, and for other members of an archive.
   constexpr std::uint64_t kHeadroom = std::uint64_t{64} << 20;
   return {.readable = order.task.source,
           .writable = order.task.scratch,
@@ -74,7 +74,7 @@ std::string read(const AnswerOrder& order) {
   return answer_message(import::read_answer(order.task.source));
 }
 
-// Every exception becomes a message here, because nothing else leaves this process.
+// Every exception becomes a message, the only output of this process.
 std::string read_as_ordered(const std::string& message) {
   std::uint64_t memory_bytes = 0;
   try {
@@ -94,7 +94,7 @@ std::string read_as_ordered(const std::string& message) {
                           "Reading the file needs more memory than the " +
                               std::to_string(memory_bytes) + " bytes that an import may use."});
   } catch (const std::exception& error) {
-    // Its text comes from a library and may repeat what the file holds, so it must not reach a log.
+    // The text comes from a library and may quote the file, so it must not reach a log.
     return error_message(
         {ErrorCode::kInternal,
          std::string("An import failed with an exception: ") + typeid(error).name() + "."});
@@ -104,7 +104,7 @@ std::string read_as_ordered(const std::string& message) {
 void import_one() {
   confine_ahead();
   const std::string order = read_order();
-  // The daemon has no use for this process any more.
+  // The daemon does not need this process any more.
   if (order.empty()) return;
   say(read_as_ordered(order));
 }

@@ -22,22 +22,21 @@
 namespace isomesh::import {
 namespace {
 
-// So many ignored files are named.
+// Only this many ignored files are listed.
 constexpr std::size_t kMostNamed = 100;
 
-// A member that is of a format that is read.
+// A member of a known format.
 struct FoundVolume {
   ArchiveMember member;
   const Reader* reader = nullptr;
-  std::vector<std::string> doubles = {};  // names of members that are the same
+  std::vector<std::string> doubles = {};  // names of identical members
 };
 
 ArchiveLimits limits_of(const SizeLimits& limits) {
   return {.max_bytes = limits.max_sample_bytes + kHeadroomBytes};
 }
 
-// Slices are needed in any case. Of others it is not known yet whether, and for data files not how
-// many bytes they may have.
+// Slices are always needed. For others this is not known yet; nor is the size of data files.
 std::optional<std::uint64_t> most_of_slice(const std::filesystem::path& beginning,
                                            const ImportTask& task) {
   const InputFile file(beginning);
@@ -46,7 +45,7 @@ std::optional<std::uint64_t> most_of_slice(const std::filesystem::path& beginnin
   return most_bytes_of(*reader, file, task).file;
 }
 
-// The members of an archive, of which large ones are unpacked when they are needed.
+// An archive's members; large ones are unpacked completely only if needed.
 class Members {
  public:
   explicit Members(const Input& input)
@@ -57,11 +56,10 @@ class Members {
 
   const std::vector<ArchiveMember>& all() const { return all_; }
 
-  // The files that hold the samples of a header. Throws Error kUnusableVolume when they are
-  // missing.
+  // The files with a header's samples. Throws Error kUnusableVolume if they are missing.
   std::vector<std::filesystem::path> data_of(const FoundVolume& found) const;
 
-  // Unpacks a volume and its data files whole, up to what its header tells.
+  // Unpacks a volume and its data files completely, up to the sizes in its header.
   void complete(const FoundVolume& found);
 
  private:
@@ -111,8 +109,8 @@ void Members::complete(const FoundVolume& found) {
   }
 }
 
-// Whether a file of a format of volumes lies beside them for another reason: documents of office
-// programs are ZIPs, and VTK's XML holds surfaces too.
+// True for files that only look like volumes: office documents are ZIPs, and VTK's XML may hold
+// surfaces.
 bool is_beside(const Reader& reader, const InputFile& file) {
   return reader.content == Content::kFiles ||
          (reader.sniff == is_vti && !may_hold_image(file.text(0, kSniffBytes)));
@@ -140,8 +138,8 @@ std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& memb
                   " files in the archive is a volume in a supported format.");
 }
 
-// Files that hold the samples of a header among them. A header that is damaged names none here;
-// when its volume is read it is refused with its reason.
+// The data files among the volumes found. A damaged header names none here; it is reported when its
+// volume is read.
 std::set<std::filesystem::path> data_of(const std::vector<FoundVolume>& found,
                                         const Members& members) {
   std::set<std::filesystem::path> all;
@@ -155,7 +153,7 @@ std::set<std::filesystem::path> data_of(const std::vector<FoundVolume>& found,
   return all;
 }
 
-// Whether two volumes have the same bytes, those of their data files too.
+// True if two volumes, including their data files, have the same bytes.
 bool are_same(const FoundVolume& one, const FoundVolume& other, Members& members) {
   try {
     for (const FoundVolume* volume : {&one, &other}) members.complete(*volume);
@@ -165,14 +163,14 @@ bool are_same(const FoundVolume& one, const FoundVolume& other, Members& members
     others.push_back(other.member.path);
     return std::ranges::equal(files, others, same_bytes);
   } catch (const Error& error) {
-    // What cannot be read is refused with its reason, under either name.
+    // Unreadable files are reported later, under either name.
     if (describe(error.code()).status >= 500) throw;
     return false;
   }
 }
 
-// Takes each file once. Files of one size that begin alike are compared with the first of them
-// only, which bounds the work and finds copies where there are some.
+// Removes duplicates. Files of one size with equal beginnings are only compared with the first of
+// them, which bounds the work and suffices to find copies.
 std::vector<FoundVolume> without_doubles(std::vector<FoundVolume> volumes, Members& members) {
   using Likeness = std::pair<std::uint64_t, std::size_t>;  // the size, and a hash of the beginning
   std::vector<FoundVolume> kept;
@@ -190,12 +188,13 @@ std::vector<FoundVolume> without_doubles(std::vector<FoundVolume> volumes, Membe
   return kept;
 }
 
-// What an archive holds: volumes of a file each, with their data files, and one of all slices.
+// An archive's content: volumes in one file each, with their data files, and one volume of all
+// slices.
 struct Contents {
   std::vector<FoundVolume> volumes;
   std::vector<ArchiveMember> slices;
   const Reader* slice_reader = nullptr;
-  // Files that are no volume. They are listed as ignored.
+  // Other files, listed as ignored.
   std::vector<ArchiveMember> others;
 };
 
@@ -232,7 +231,7 @@ Volume read_slices(const Contents& contents, const Input& input) {
   return volume;
 }
 
-// Lists files beside a volume, without tables of the names of its labels.
+// Lists files beside a volume as ignored, except tables of its labels.
 void ignore(const std::vector<ArchiveMember>& others, Volume& volume) {
   for (const ArchiveMember& other : others) {
     if (volume.ignored.size() >= kMostNamed) return;
@@ -259,7 +258,7 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   return volume;
 }
 
-// Leaves it to the client which of several is to be read.
+// Throws with the volumes as choices.
 [[noreturn]] void offer_members(const Contents& contents, const std::string& asked) {
   std::vector<Choice> choices;
   if (!contents.slices.empty()) {

@@ -1,4 +1,4 @@
-// The one volume that an archive holds.
+// Imports the one volume of an archive.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@ namespace isomesh::import {
 
 bool is_archive(std::string_view head);
 
-// Unpacks the archive and reads what it holds: one file of a volume, with the files beside it that
-// its header may name, or any number of DICOM files. Other files, archives among them, are ignored.
-// Throws Error kUnsupportedMedia when it holds no volume, kUnusableVolume when it holds several, or
-// no volume but another archive, and whatever unpacking and reading throw.
+// Unpacks the archive and reads one volume file, with the data files of its header, or any number
+// of DICOM files. Other files, also nested archives, are ignored. Throws Error kUnsupportedMedia if
+// it has no volume; kUnusableVolume if it has several, or only another archive; and all errors of
+// unpacking and reading.
 Volume parse_archive(const Input& input);
 
-// How many bytes a compressed TAR of this size may inflate to.
+// The largest inflated size of a compressed TAR of this size.
 std::uint64_t most_archive_bytes(std::uint64_t compressed_bytes, const SizeLimits& limits);
 
 }  // namespace isomesh::import

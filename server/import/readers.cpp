@@ -17,7 +17,7 @@
 namespace isomesh::import {
 namespace {
 
-// For the formats of which a header describes the samples.
+// For formats with a header.
 template <SourceVolume (*kParse)(const InputFile&, const Companions&, const ImportOptions&)>
 Volume parse_with(const Input& input) {
   const InputFile file(input.path);
@@ -99,7 +99,7 @@ void tell(const Reader& reader, const Input& input) {
   if (input.listener) input.listener(reader.name);
 }
 
-// The beginning of what a compressed file holds, in a file of its own.
+// The inflated beginning of a compressed file, in a file of its own.
 class InflatedBeginning {
  public:
   InflatedBeginning(const InputFile& file, const std::filesystem::path& scratch)
@@ -115,7 +115,7 @@ class InflatedBeginning {
   ScratchFile scratch_;
 };
 
-// How many bytes a compressed file may inflate to, before it is taken for a bomb.
+// The largest inflated size of a compressed file; larger ones are rejected as bombs.
 std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
                                   const ImportTask& task) {
   if (reader.most_bytes == nullptr) return most_archive_bytes(file.size(), task.limits);
@@ -123,7 +123,7 @@ std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
   return reader.most_bytes(beginning.file(), task).file;
 }
 
-// What chooses within files of another kind is a mistake.
+// Rejects selections that the file's kind does not support.
 void check_options(const Reader& reader, const ImportOptions& options) {
   const bool is_volume = reader.content == Content::kVolume;
   if (is_volume && !options.series.empty()) {
@@ -152,7 +152,7 @@ MostBytes most_bytes_of(const Reader& reader, const InputFile& beginning, const 
   if (!is_compressed(beginning)) return reader.most_bytes(beginning, task);
   const InflatedBeginning plain(beginning, task.scratch);
   MostBytes most = reader.most_bytes(plain.file(), task);
-  // Whatever deflate cannot compress it stores, with a few bytes for each block.
+  // Deflate stores incompressible data with a few extra bytes per block.
   constexpr std::uint64_t kStoredShare = 100;
   most.file += most.file / kStoredShare;
   return most;

@@ -19,10 +19,10 @@ namespace isomesh::net {
 namespace {
 
 constexpr int kMostEvents = 128;
-constexpr int kTickMilliseconds = 250;  // how often deadlines are looked at
+constexpr int kTickMilliseconds = 250;  // interval between checks of deadlines
 constexpr int kMostAcceptedAtOnce = 64;
 constexpr std::size_t kBlock = 16 * 1024;
-// What epoll calls the two that are no connections; those have higher numbers.
+// epoll's ids of the two descriptors that are no connections; those have higher ids.
 constexpr std::uint64_t kListening = 0;
 constexpr std::uint64_t kWakeup = 1;
 
@@ -48,7 +48,7 @@ void add(int epoll, int descriptor, std::uint64_t who) {
   ::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event);
 }
 
-// A stream with its place among the connections, which is free when the descriptor is.
+// A stream with its place among the connections, which is released after the descriptor.
 class PlacedStream : public ByteStream {
  public:
   PlacedStream(FairPlaces::Place place, std::unique_ptr<ByteStream> stream)
@@ -102,7 +102,7 @@ void Acceptor::work() {
     for (int i = 0; i < count; ++i) {
       const std::uint64_t who = events.at(static_cast<std::size_t>(i)).data.u64;
       has_new = has_new || who == kListening;
-      const auto pending = by_id_.find(who);  // it may have been closed within this batch
+      const auto pending = by_id_.find(who);  // may have been closed in this batch
       if (pending != by_id_.end()) read_some(pending->second);
     }
     if (has_new) accept_some();
@@ -125,8 +125,8 @@ void Acceptor::accept_some() {
     if (socket >= 0) {
       begin(socket, address_of(peer));
     } else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-      // The oldest pending connection is closed to free its descriptor. Where there is none,
-      // descriptors are held by responses, and some time must go by.
+      // Close the oldest pending connection to free its descriptor. If there is none, responses
+      // hold the descriptors, so wait.
       if (pending_.empty()) {
         log_warning("new connections wait: no file descriptors are left");
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -165,8 +165,8 @@ void Acceptor::begin(int socket, std::string address) {
   read_some(pending);
 }
 
-// Requests that have not come yet make room, of the same party where it has its share. Nothing when
-// all the places are held by others.
+// Connections without a complete request make room: those of the same party if it has its share.
+// Returns empty if others hold all places.
 std::optional<FairPlaces::Place> Acceptor::place_for(const std::string& party) {
   while (true) {
     try {
@@ -178,7 +178,7 @@ std::optional<FairPlaces::Place> Acceptor::place_for(const std::string& party) {
   }
 }
 
-// Of that party, or of all for "". False when there is none.
+// Of that party, or of all for "". Returns false if there is none.
 bool Acceptor::close_oldest_of(const std::string& party) {
   const auto oldest = std::ranges::find_if(
       pending_, [&](const Pending& pending) { return party.empty() || pending.party == party; });
@@ -205,7 +205,7 @@ void Acceptor::read_some(PendingList::iterator pending) {
       if (transfer.state != Transfer::State::kDone) return watch(pending, transfer.state);
       if (is_complete(*pending)) return hand_on(pending);
       if (bytes_ > limits_.most_bytes) {
-        watch(pending, Transfer::State::kWantsRead);  // what is left to read is read later
+        watch(pending, Transfer::State::kWantsRead);  // the rest is read later
         return close_greediest();
       }
     }
@@ -214,8 +214,8 @@ void Acceptor::read_some(PendingList::iterator pending) {
   }
 }
 
-// True when the head and the part of the body that is waited for have come. Throws what is wrong
-// with the request.
+// True if the head, and the body if it is awaited, have arrived. Throws if the request is
+// malformed.
 bool Acceptor::is_complete(Pending& pending) {
   if (!pending.has_head) {
     const auto size = pending.scanner.scan(pending.received);
@@ -226,7 +226,7 @@ bool Acceptor::is_complete(Pending& pending) {
     bytes_ -= *size;
     pending.received.erase(0, *size);
     pending.has_head = true;
-    // A client that asks whether its body is wanted (Expect) waits for the handler's answer.
+    // A client with the header Expect waits for the handler's decision.
     const std::uint64_t length = connection.framing.length.value_or(0);
     const bool asks_first = find_header(connection.head.headers, "Expect") != nullptr;
     pending.wanted = length <= limits_.small_body && !asks_first ? length : 0;
@@ -243,7 +243,7 @@ void Acceptor::watch(PendingList::iterator pending, Transfer::State wanted) {
   if (::epoll_ctl(epoll_, operation, descriptor, &event) != 0) close(pending);
 }
 
-// All have the same time, so the oldest is overdue first.
+// All have the same time limit, so the oldest expires first.
 void Acceptor::close_overdue() {
   const auto now = Clock::now();
   while (!pending_.empty() && now >= pending_.front().deadline) {
@@ -255,7 +255,7 @@ void Acceptor::close_overdue() {
   }
 }
 
-// Whoever holds the most of what has come and waits loses the oldest of it.
+// The party with the most buffered bytes loses its oldest connection.
 void Acceptor::close_greediest() {
   while (bytes_ > limits_.most_bytes) {
     std::map<std::string_view, std::size_t> held;
@@ -287,7 +287,7 @@ void Acceptor::refuse(PendingList::iterator pending, const Error& error) {
   close(pending);
 }
 
-// Closing a stream takes it out of epoll.
+// Closing a stream removes it from epoll.
 void Acceptor::close(PendingList::iterator pending) {
   bytes_ -= pending->received.size();
   by_id_.erase(pending->id);

@@ -1,5 +1,5 @@
-// Accepts connections and keeps each until its request has come, all on one thread, so that a
-// client that is slow or silent holds none.
+// Accepts connections and reads their requests, all on one thread, so that slow or silent clients
+// hold no thread.
 #pragma once
 
 #include <atomic>
@@ -22,58 +22,57 @@
 
 namespace isomesh::net {
 
-// A connection whose request has come: its head and, when it is small, its whole body.
+// A connection whose request has arrived: its head and, if it is small, its whole body.
 struct Connection {
   std::unique_ptr<ByteStream> stream;  // holds the connection's place
-  std::string address;                 // of the other side; empty for a Unix socket
+  std::string address;                 // of the client; empty for a Unix socket
   RequestHead head;
   BodyFraming framing;
-  std::string body;  // what has come of it
+  std::string body;  // the bytes received so far
 };
 
 struct AcceptorLimits {
-  std::size_t most_bytes = std::size_t{32} << 20;  // received and not handed on, of all together
-  std::size_t small_body = 64 * 1024;              // up to here a body is waited for, too
-  std::chrono::milliseconds head_time{10'000};     // from the connection to the whole request
+  std::size_t most_bytes = std::size_t{32} << 20;  // received bytes of all pending connections
+  std::size_t small_body = 64 * 1024;              // largest body that is awaited too
+  std::chrono::milliseconds head_time{10'000};     // from the connection to the complete request
 };
 
 class Acceptor {
  public:
-  // Takes a connection whose request has come. Must not block. Called by the acceptor's thread.
+  // Takes a connection with its request. Must not block. Called on the acceptor's thread.
   using OnRequest = std::function<void(Connection connection)>;
-  // Takes a connection whose request is malformed or too slow, or that there is no place for, to
-  // answer it with the error. Must not block. Called by the acceptor's thread.
+  // Takes a rejected connection, to send the error: its request is malformed or too slow, or there
+  // is no place. Must not block. Called on the acceptor's thread.
   using OnRefused = std::function<void(std::unique_ptr<ByteStream> stream,
                                        const std::string& address, const Error& error)>;
 
-  // `listening` is a listening socket, which stays the caller's and is made non-blocking. A
-  // connection takes one of `places` for as long as its stream lives; where there is none, the
-  // oldest makes room whose request has not come, and else the new one is refused. Begins at once.
+  // `listening` is a listening socket; the caller owns it; it becomes non-blocking. A connection
+  // holds one of `places` while its stream exists. If there is none, the oldest connection without
+  // a complete request is closed, otherwise the new one is rejected. Starts immediately.
   Acceptor(int listening, const AcceptorLimits& limits, FairPlaces& places, StreamOf stream_of,
            OnRequest on_request, OnRefused on_refused);
-  // As stop().
+  // Calls stop().
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
 
-  // Connections whose request has not come yet. Thread safe.
+  // The number of connections without a complete request. Thread safe.
   std::size_t pending() const { return count_; }
 
-  // No connection is accepted any more, and those whose request has not come are closed. Thread
-  // safe.
+  // Stops accepting connections and closes those without a complete request. Thread safe.
   void stop();
 
  private:
   using Clock = std::chrono::steady_clock;
 
   struct Pending {
-    std::uint64_t id = 0;  // to epoll
+    std::uint64_t id = 0;  // epoll's id
     Connection connection;
     std::string party;
     std::string received;
     HeadScanner scanner;
     bool has_head = false;
-    std::size_t wanted = 0;  // bytes of the body that are waited for
+    std::size_t wanted = 0;  // awaited bytes of the body
     Clock::time_point deadline;
     bool is_watched = false;  // by epoll
   };
@@ -102,13 +101,13 @@ class Acceptor {
   const int epoll_;
   Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;
-  std::atomic<std::size_t> count_ = 0;  // of pending_, for other threads
-  // Only the acceptor's thread touches the next four.
+  std::atomic<std::size_t> count_ = 0;  // size of pending_, for other threads
+  // The next four are used on the acceptor's thread only.
   PendingList pending_;  // oldest first
   std::unordered_map<std::uint64_t, PendingList::iterator> by_id_;
   std::uint64_t last_id_ = 0;
   std::size_t bytes_ = 0;
-  std::jthread thread_;  // declared last, so that it ends before what it uses
+  std::jthread thread_;  // last, so that it ends before the members it uses
 };
 
 }  // namespace isomesh::net

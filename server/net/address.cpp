@@ -37,7 +37,7 @@ Address parse_address(const std::string& text) {
   constexpr std::string_view kUnix = "unix:";
   if (text.starts_with(kUnix)) {
     const std::string path = text.substr(kUnix.size());
-    constexpr std::size_t kLongestSocketPath = 107;  // what sockaddr_un holds
+    constexpr std::size_t kLongestSocketPath = 107;  // the size of sockaddr_un's path
     if (path.empty() || path.size() > kLongestSocketPath) {
       throw invalid_parameter("listen", "the path of a socket must have 1 to 107 bytes");
     }

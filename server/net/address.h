@@ -13,16 +13,16 @@ struct Address {
   std::filesystem::path unix_path;  // empty for TCP
 
   bool is_unix() const { return !unix_path.empty(); }
-  // Whether only this machine can reach it. A name other than localhost counts as reachable from
-  // elsewhere, whatever it resolves to.
+  // True if only this machine can connect. Names other than localhost count as reachable from
+  // elsewhere, whatever they resolve to.
   bool is_loopback() const;
 };
 
-// Who shares limits (FairPlaces): whoever has one IPv4 address, or one network of 64 bits of IPv6,
-// which is the least that is given out. `address` is a number; "" for "".
+// The party that shares limits (FairPlaces): an IPv4 address, or an IPv6 network of 64 bits, the
+// smallest that providers assign. `address` is numeric; "" for "".
 std::string party_of(const std::string& address);
 
-// Throws Error kInvalidParameter that says what is wrong.
+// Throws Error kInvalidParameter with the reason.
 Address parse_address(const std::string& text);
 
 }  // namespace isomesh::net

@@ -1,4 +1,4 @@
-// A connection as bytes that come and go, in plain or encrypted.
+// A connection as a stream of bytes, plain or encrypted.
 #pragma once
 
 #include <cstddef>
@@ -12,36 +12,36 @@ namespace isomesh::net {
 
 struct Transfer {
   enum class State {
-    kDone,       // some bytes went over
-    kWantsRead,  // none yet: when the descriptor can be read, there may be some
+    kDone,       // some bytes were transferred
+    kWantsRead,  // none yet: retry when the descriptor is readable
     kWantsWrite,
-    kClosed,  // the other side has ended it, or it broke
+    kClosed,  // closed by the peer, or broken
   };
   State state = State::kClosed;
   std::size_t bytes = 0;
 };
 
-// Never blocks, so that one thread can look after many. An encrypted one shakes hands on the way,
-// within read and write, which then may want the other direction. Not thread safe; one thread after
-// the other may use it.
+// Never blocks, so one thread can serve many. An encrypted stream performs its handshake within
+// read and write, which then may want the other direction. Not thread safe, but may move between
+// threads.
 class ByteStream {
  public:
   virtual ~ByteStream() = default;
 
-  // What to wait on.
+  // The descriptor to poll.
   virtual int descriptor() const = 0;
 
-  // At most as many bytes as there is room for, which is at least one.
+  // Reads at most `target.size()` bytes, which is at least 1.
   virtual Transfer read(std::span<char> target) = 0;
 
-  // The first of `bytes`, which are not empty.
+  // Writes a prefix of `bytes`, which must not be empty.
   virtual Transfer write(std::string_view bytes) = 0;
 
-  // Tells the other side that nothing more will come; what it still sends can be read.
+  // Tells the peer that no more bytes follow; its bytes can still be read.
   virtual void finish_writing() = 0;
 };
 
-// A socket in plain, which it owns and makes non-blocking.
+// A plain socket, which it owns and makes non-blocking.
 class PlainStream : public ByteStream {
  public:
   explicit PlainStream(int socket);
@@ -58,11 +58,11 @@ class PlainStream : public ByteStream {
   const int socket_;
 };
 
-// Makes the stream of an accepted socket, which it owns from then on. Must not block; may throw,
-// and then has closed the socket.
+// Makes the stream of an accepted socket and takes its ownership. Must not block. May throw, and
+// then has closed the socket.
 using StreamOf = std::function<std::unique_ptr<ByteStream>(int socket)>;
 
-// Waits until the transfer may go on. False when `milliseconds` are over.
+// Waits until the transfer may continue. Returns false after `milliseconds`.
 bool wait_for(const ByteStream& stream, Transfer::State wanted, int milliseconds);
 
 }  // namespace isomesh::net

@@ -5,7 +5,7 @@
 namespace isomesh::net {
 namespace {
 
-// The value of a hexadecimal digit; -1 for anything else.
+// The value of a hexadecimal digit; -1 for other characters.
 int digit_of(char c) {
   if (c >= '0' && c <= '9') return c - '0';
   if (c >= 'a' && c <= 'f') return c - 'a' + 10;
@@ -31,7 +31,7 @@ bool ChunkScanner::scan(std::string_view bytes) {
 }
 
 ChunkScanner::State ChunkScanner::after(char c) {
-  constexpr std::size_t kMostDigits = 15;  // so that a size is below 2^60
+  constexpr std::size_t kMostDigits = 15;  // keeps sizes below 2^60
   if (++line_ > kLongestLine && state_ != State::kTrailers) return State::kBroken;
   switch (state_) {
     case State::kSize:
@@ -65,7 +65,7 @@ ChunkScanner::State ChunkScanner::after_size() {
   return size_ == 0 ? State::kTrailers : State::kData;
 }
 
-// An empty line is the end.
+// An empty line ends the trailers.
 ChunkScanner::State ChunkScanner::after_line() {
   constexpr std::size_t kEmpty = 2;
   const bool is_empty = line_ <= kEmpty;

@@ -1,4 +1,4 @@
-// The framing of a chunked body, checked as it passes by (RFC 9112, 7.1).
+// Checks the framing of a chunked body while it passes (RFC 9112, 7.1).
 #pragma once
 
 #include <cstddef>
@@ -7,21 +7,21 @@
 
 namespace isomesh::net {
 
-// A client can spend for ever on what is no data: the digits of a chunk's size, its extensions, the
-// fields after the last chunk. The HTTP library reads each as one line of any length; here each has
-// a bound.
+// A client can send unlimited bytes that are not data: digits of a chunk's size, extensions,
+// trailer fields. The HTTP library reads each as a line of any length; here all are bounded.
 //
-// Plain value; looks at every byte once.
+// A plain value. Looks at each byte once.
 class ChunkScanner {
  public:
   static constexpr std::size_t kLongestLine = 256;
-  static constexpr std::size_t kMostExtensions = 64 * 1024;  // bytes of all together
+  static constexpr std::size_t kMostExtensions = 64 * 1024;  // total bytes
   static constexpr std::size_t kMostTrailers = 8192;
 
-  // Looks at the next bytes of the body. False when they cannot be a chunked body, and ever after.
+  // Checks the next bytes of the body. Returns false, from then on always, if they are not a
+  // chunked body.
   bool scan(std::string_view bytes);
 
-  // Whether the last chunk and what follows it have come.
+  // True after the last chunk and its trailers.
   bool is_over() const { return state_ == State::kOver; }
 
  private:
@@ -32,11 +32,11 @@ class ChunkScanner {
   State after_line();
 
   State state_ = State::kSize;
-  std::uint64_t size_ = 0;  // of the chunk, and then what is left of it
+  std::uint64_t size_ = 0;  // of the chunk, then its remaining bytes
   std::size_t digits_ = 0;  // of the size
-  std::size_t line_ = 0;    // bytes of the line so far
+  std::size_t line_ = 0;    // length of the current line
   std::size_t extensions_ = 0;
-  std::size_t trailers_ = 0;  // bytes of the fields after the last chunk
+  std::size_t trailers_ = 0;  // bytes of trailer fields
 };
 
 }  // namespace isomesh::net

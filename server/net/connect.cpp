@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How often it is looked whether to stop.
+// Interval between checks of `stop`.
 constexpr int kLookMs = 100;
 
 std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses_of(const std::string& host,
@@ -31,7 +31,7 @@ std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses_of(const std::str
   return {found, &::freeaddrinfo};
 }
 
-// Whether it came about.
+// Returns true if the connection was established.
 bool await_connection(const Descriptor& socket, Clock::time_point deadline,
                       const std::stop_token& stop) {
   pollfd waiting = {socket.number(), POLLOUT, 0};

@@ -1,4 +1,4 @@
-// Connections to others.
+// Outgoing connections.
 #pragma once
 
 #include <chrono>
@@ -10,9 +10,8 @@
 
 namespace isomesh::net {
 
-// A connection whose reads and writes wait, and that does not wait for further bytes before it
-// sends (TCP_NODELAY). Throws Error kUnreachable, kRequestTimeout when there is none within that
-// time, and kCancelled when `stop` is requested.
+// Connects a blocking socket without send delay (TCP_NODELAY). Throws Error kUnreachable,
+// kRequestTimeout after `timeout`, and kCancelled if `stop` is requested.
 Descriptor connect_to(const std::string& host, std::uint16_t port, std::chrono::seconds timeout,
                       const std::stop_token& stop);
 

@@ -13,7 +13,7 @@ std::size_t raise_descriptor_limit() {
   rlimit limit = {};
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) throw_system_error("getrlimit", errno);
   const rlimit raised = {limit.rlim_max, limit.rlim_max};
-  // Some systems say that there is no limit, and do not allow that.
+  // Some systems report no limit but reject an unlimited value.
   if (::setrlimit(RLIMIT_NOFILE, &raised) == 0) return limit.rlim_max;
   return limit.rlim_cur;
 }
@@ -22,7 +22,7 @@ std::size_t connections_within(std::size_t descriptors) {
   constexpr std::size_t kReserve = 384;
   constexpr std::size_t kEach = 2;
   constexpr std::size_t kFewest = 8;
-  constexpr std::size_t kMost = 4096;  // each may hold some tens of kilobytes of a response
+  constexpr std::size_t kMost = 4096;  // each may hold tens of kilobytes of a response
   const std::size_t reserve = std::min(kReserve, descriptors / 2);
   return std::clamp((descriptors - reserve) / kEach, kFewest, kMost);
 }

@@ -1,4 +1,4 @@
-// Places that several parties share, so that none of them can take all.
+// Limits that parties share fairly.
 #pragma once
 
 #include <cstddef>
@@ -10,16 +10,16 @@
 
 namespace isomesh::net {
 
-// A number of places, of which a party may take one while it has a share (has_share). Whoever holds
-// a place keeps it.
+// A number of places. A party may take one while it has a share (has_share), and keeps it until it
+// releases it.
 //
-// A party is whatever its name says: an address, an owner; "" is all who come through a proxy.
-// Thread safe; must outlive its places.
+// A party is identified by its name: an address or an owner; "" is all clients of a proxy. Thread
+// safe; must outlive its places.
 class FairPlaces {
  public:
   using Counts = std::map<std::string, std::size_t>;
 
-  // A place, given back when it goes. Thread safe after it was made: it is only given back.
+  // Releases its place on destruction, which is thread safe.
   class Place {
    public:
     Place() = default;  // none
@@ -37,11 +37,10 @@ class FairPlaces {
     Counts::iterator party_;
   };
 
-  // `what` says in refusals what there are places for: "uploads".
+  // `what` names the places in errors: "uploads".
   FairPlaces(std::size_t count, std::string_view what) : count_(count), what_(what) {}
 
-  // Throws Error kTooManyRequests when the party has its share, and kUnavailable when no place is
-  // free.
+  // Throws Error kTooManyRequests if the party has its share, and kUnavailable if no place is free.
   Place take(const std::string& party) ISOMESH_EXCLUDES(mutex_);
 
   std::size_t taken() const ISOMESH_EXCLUDES(mutex_);
@@ -53,7 +52,7 @@ class FairPlaces {
   const std::string what_;
   mutable Mutex mutex_;
   std::size_t taken_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  Counts parties_ ISOMESH_GUARDED_BY(mutex_);  // that hold places
+  Counts parties_ ISOMESH_GUARDED_BY(mutex_);  // with places
 };
 
 }  // namespace isomesh::net

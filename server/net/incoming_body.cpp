@@ -9,7 +9,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kStopMilliseconds = 100;  // how often reading looks whether the service stops
+constexpr int kStopMilliseconds = 100;  // interval between checks whether the service stops
 
 bool asks_first(const RequestHead& head) {
   const std::string* expect = find_header(head.headers, "Expect");
@@ -61,8 +61,8 @@ bool IncomingBody::is_well_formed(std::string_view bytes) {
   return !was_malformed_;
 }
 
-// These few bytes are the first of the connection's other direction, so its buffer has room for
-// them. Were they lost, the client would send its body after a while without having been asked.
+// The first bytes in this direction always fit the socket's buffer. If they were lost, the client
+// would send its body anyway, after a while.
 void IncomingBody::invite() { stream_->write("HTTP/1.1 100 Continue\r\n\r\n"); }
 
 }  // namespace isomesh::net

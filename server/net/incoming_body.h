@@ -1,4 +1,4 @@
-// The body of a request, read from its connection while a handler works.
+// A request's body, read from its connection in the handler.
 #pragma once
 
 #include <atomic>
@@ -18,40 +18,41 @@
 namespace isomesh::net {
 
 struct BodyLimits {
-  // Within each such time IncomingBody::kLeastBytes must come, or all of the rest.
+  // In each period of this length at least IncomingBody::kLeastBytes must arrive, or the whole
+  // rest.
   std::chrono::milliseconds patience{15'000};
 };
 
-// The bytes after a request's head, as they are sent: a chunked body with the sizes of its chunks.
-// Owns the connection. Not thread safe; one thread after the other may use it.
+// The bytes after a request's head, as sent: a chunked body includes the sizes of its chunks. Owns
+// the connection. Not thread safe, but may move between threads.
 class IncomingBody {
  public:
   static constexpr std::size_t kLeastBytes = 64 * 1024;
 
-  // Reading ends when `stopping` becomes true. The head of the connection is not looked at later.
+  // Reading ends when `stopping` becomes true. Does not refer to the connection's head later.
   IncomingBody(Connection& connection, const BodyLimits& limits, const std::atomic<bool>& stopping);
 
-  // Waits for some bytes and returns how many came: 0 when the other side has ended, nothing when
-  // they come too slowly, are no chunks where they should be, or the service stops. Invites the
-  // body of a client that asked whether it is wanted (Expect: 100-continue).
+  // Waits for bytes and returns their number: 0 if the client has closed, empty if they come too
+  // slowly, if chunks are malformed, or if the service stops. Invites the body of a client that
+  // sent Expect: 100-continue.
   std::optional<std::size_t> read(std::span<char> target);
 
-  // Bytes that have come, also those that came with the head.
+  // Bytes received, including those that came with the head.
   std::uint64_t received() const { return received_; }
 
-  // Whether all of it has come; never true for a chunked one, whose end is not looked for here.
+  // True if all bytes have arrived; never for a chunked body, whose end is not checked here.
   bool is_whole() const { return !framing_.chunked && received_ >= framing_.length.value_or(0); }
 
-  // Whether it ended because its chunks are none.
+  // True if reading ended because of malformed chunks.
   bool was_malformed() const { return was_malformed_; }
 
-  // Whether it ended because it came too slowly.
+  // True if reading ended because the body arrived too slowly.
   bool was_too_slow() const { return was_too_slow_; }
 
-  // The descriptor of the connection, until that is taken.
+  // The connection's descriptor, until take_stream().
   int descriptor() const { return stream_->descriptor(); }
 
-  // The connection, for the response; nothing is read any more.
+  // Releases the connection, for the response. Do not read afterwards.
   std::unique_ptr<ByteStream> take_stream() { return std::move(stream_); }
 
  private:
@@ -60,14 +61,14 @@ class IncomingBody {
 
   std::unique_ptr<ByteStream> stream_;
   const BodyFraming framing_;
-  const std::string begin_;  // what came with the head
+  const std::string begin_;  // bytes that came with the head
   const BodyLimits limits_;
   const std::atomic<bool>& stopping_;
   bool waits_for_invitation_ = false;
-  std::size_t begin_read_ = 0;  // of begin_
+  std::size_t begin_read_ = 0;  // bytes of begin_ that were read
   std::uint64_t received_ = 0;
   std::size_t since_deadline_ = 0;
-  std::optional<std::chrono::steady_clock::time_point> deadline_;  // once reading has begun
+  std::optional<std::chrono::steady_clock::time_point> deadline_;  // set by the first read
   bool was_too_slow_ = false;
   ChunkScanner chunks_;
   bool was_malformed_ = false;

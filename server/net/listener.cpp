@@ -20,8 +20,8 @@ void turn(int socket, int level, int option, bool on) {
   ::setsockopt(socket, level, option, &value, sizeof value);
 }
 
-// No descriptor when that address cannot be bound. The queue is as long as the kernel allows: what
-// does not fit into it is dropped, and a client that was dropped tries again a second later.
+// No descriptor if the address cannot be bound. The queue has the kernel's maximum length: a client
+// that does not fit retries after a second.
 Descriptor bound(Descriptor socket, const sockaddr* address, socklen_t size) {
   const bool listens = socket.number() >= 0 && ::bind(socket.number(), address, size) == 0 &&
                        ::listen(socket.number(), SOMAXCONN) == 0;
@@ -29,8 +29,8 @@ Descriptor bound(Descriptor socket, const sockaddr* address, socklen_t size) {
 }
 
 Descriptor listening_at(const std::filesystem::path& path) {
-  // A killed daemon leaves its socket behind. That it is dead is known: the caller holds the lock
-  // of the data folder.
+  // A killed daemon leaves its socket. It is certainly dead: the caller holds the lock of the data
+  // folder.
   std::error_code error;
   if (std::filesystem::is_socket(path, error)) std::filesystem::remove(path, error);
   sockaddr_un address = {};
@@ -39,7 +39,7 @@ Descriptor listening_at(const std::filesystem::path& path) {
   Descriptor socket =
       bound(Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)),
             reinterpret_cast<const sockaddr*>(&address), static_cast<socklen_t>(sizeof address));
-  // For a reverse proxy of the same group.
+  // Lets a reverse proxy of the same group connect.
   if (socket.number() >= 0) ::chmod(path.c_str(), 0660);
   return socket;
 }
@@ -56,7 +56,7 @@ Descriptor listening_at(const std::string& host, int port) {
   for (const addrinfo* each = found; each != nullptr; each = each->ai_next) {
     Descriptor socket(
         ::socket(each->ai_family, each->ai_socktype | SOCK_CLOEXEC, each->ai_protocol));
-    // Not SO_REUSEPORT, with which a second daemon could take half of the connections.
+    // Not SO_REUSEPORT: a second daemon could take half of the connections.
     turn(socket.number(), SOL_SOCKET, SO_REUSEADDR, true);
     turn(socket.number(), IPPROTO_TCP, TCP_NODELAY, true);  // accepted sockets inherit it
     if (each->ai_family == AF_INET6) turn(socket.number(), IPPROTO_IPV6, IPV6_V6ONLY, false);
@@ -88,7 +88,7 @@ Listener::Listener(Address address)
 }
 
 Listener::~Listener() {
-  std::error_code ignored;  // what stays behind is removed by the next start
+  std::error_code ignored;  // the next start removes leftovers
   if (address_.is_unix()) std::filesystem::remove(address_.unix_path, ignored);
 }
 

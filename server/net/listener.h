@@ -1,4 +1,4 @@
-// A socket that connections arrive at.
+// A listening socket.
 #pragma once
 
 #include <string>
@@ -8,11 +8,11 @@
 
 namespace isomesh::net {
 
-// Constant once it is made.
+// Constant after construction.
 class Listener {
  public:
-  // Binds and listens. Connections queue up in the kernel until an Acceptor takes them. Throws
-  // Error kUnavailable when the address cannot be bound.
+  // Binds and listens. Connections wait in the kernel's queue for an Acceptor. Throws Error
+  // kUnavailable if the address cannot be bound.
   explicit Listener(Address address);
   // Removes the file of a Unix socket.
   ~Listener();
@@ -21,7 +21,7 @@ class Listener {
 
   int descriptor() const { return socket_.number(); }
 
-  // Where it listens, with the port that was found for port 0: 127.0.0.1:8080, [::1]:8080 or
+  // The listening address, with the port assigned for port 0: 127.0.0.1:8080, [::1]:8080 or
   // unix:/run/iso.sock.
   std::string authority() const;
 

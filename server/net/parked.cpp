@@ -12,7 +12,7 @@ namespace isomesh::net {
 namespace {
 
 constexpr int kMostEvents = 64;
-constexpr std::uint64_t kWakeup = 0;  // what epoll calls it; requests have higher numbers
+constexpr std::uint64_t kWakeup = 0;  // epoll's id; requests have higher ids
 
 bool watch(int epoll, int descriptor, unsigned events, std::uint64_t who) {
   epoll_event event = {};
@@ -45,14 +45,14 @@ void Parked::park(ParkedRequest request) {
       return request.resume();
     }
     const std::uint64_t id = ++last_id_;
-    // One that cannot be watched waits without that.
+    // An unsupported descriptor is not watched.
     const bool is_watched =
         request.descriptor >= 0 && watch(epoll_, request.descriptor, EPOLLRDHUP, id);
     if (!is_watched) request.descriptor = -1;
     requests_.emplace(id, std::move(request));
   }
   wakeup_.ring();
-  // The job may have ended after its handler looked and before the request was here to be told.
+  // The job may have ended after its handler checked it and before the request was parked.
   if (has_ended_(job)) job_ended(job);
 }
 
@@ -84,7 +84,7 @@ void Parked::resume_if(const Predicate& is_over) {
   for (const ParkedRequest& request : over) request.resume();
 }
 
-// Before anybody else uses the descriptor, or closes it.
+// Call before the descriptor is used elsewhere or closed.
 void Parked::unwatch(ParkedRequest& request) {
   const int descriptor = std::exchange(request.descriptor, -1);
   if (descriptor >= 0) ::epoll_ctl(epoll_, EPOLL_CTL_DEL, descriptor, nullptr);
@@ -103,7 +103,7 @@ void Parked::work() {
   }
 }
 
-// -1, which is for ever, while nobody waits.
+// -1, no timeout, if no request waits.
 int Parked::milliseconds_to_next() {
   const Lock lock(mutex_);
   if (requests_.empty()) return -1;
@@ -120,7 +120,7 @@ void Parked::notice_end(std::uint64_t id) {
   {
     const Lock lock(mutex_);
     const auto found = requests_.find(id);
-    if (found == requests_.end()) return;  // it has just been resumed
+    if (found == requests_.end()) return;  // just resumed
     unwatch(found->second);
     abandoned = std::exchange(found->second.abandoned, nullptr);
     if (!abandoned) {

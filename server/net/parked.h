@@ -1,4 +1,4 @@
-// Requests that wait for the end of a job without holding a thread.
+// Requests that wait for the end of a job without a thread.
 #pragma once
 
 #include <atomic>
@@ -15,35 +15,35 @@
 namespace isomesh::net {
 
 struct ParkedRequest {
-  std::string job;                              // whose end it waits for
-  std::chrono::steady_clock::time_point until;  // when it goes on whether the job has ended or not
+  std::string job;                              // the job to wait for
+  std::chrono::steady_clock::time_point until;  // latest time to resume
   std::function<void()> resume = {};            // called once; must not block
-  // The connection that it came by, open until it is resumed; -1: it is not watched.
+  // Its connection, open until it is resumed; -1: not watched.
   int descriptor = -1;
-  // Called at most once, before resume, when the other side has ended the connection, or its half
-  // of it; must not block. Without it the request is resumed then.
+  // Called at most once, before `resume`, when the client has closed the connection or its sending
+  // direction. Must not block. If it is empty, `resume` is called then.
   std::function<void()> abandoned = {};
 };
 
 // Thread safe.
 class Parked {
  public:
-  // Whether a job has ended, or does not exist.
+  // True if a job has ended or does not exist.
   using HasEnded = std::function<bool(const std::string& job)>;
 
   explicit Parked(HasEnded has_ended);
-  // As close().
+  // Calls close().
   ~Parked();
   Parked(const Parked&) = delete;
   Parked& operator=(const Parked&) = delete;
 
-  // After close() the request is resumed at once. How many wait is bounded by the connections.
+  // After close() the request is resumed immediately. The limit on connections bounds the number of
+  // requests.
   void park(ParkedRequest request) ISOMESH_EXCLUDES(mutex_);
 
-  // Resumes all that wait for that job.
   void job_ended(const std::string& job) ISOMESH_EXCLUDES(mutex_);
 
-  // Resumes all that wait.
+  // Resumes all requests.
   void close() ISOMESH_EXCLUDES(mutex_);
 
  private:
@@ -61,10 +61,10 @@ class Parked {
   Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;
   Mutex mutex_;
-  std::map<std::uint64_t, ParkedRequest> requests_ ISOMESH_GUARDED_BY(mutex_);  // by epoll's name
+  std::map<std::uint64_t, ParkedRequest> requests_ ISOMESH_GUARDED_BY(mutex_);  // by epoll's id
   std::uint64_t last_id_ ISOMESH_GUARDED_BY(mutex_) = 0;
   bool closed_ ISOMESH_GUARDED_BY(mutex_) = false;
-  std::jthread thread_;  // declared last, so that it ends before what it uses
+  std::jthread thread_;  // last, so that it ends before the members it uses
 };
 
 }  // namespace isomesh::net

@@ -19,7 +19,7 @@ bool is_letter_or_digit(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
-// The characters of methods and of headers' names (RFC 9110, 5.6.2).
+// A token: method or header name (RFC 9110, 5.6.2).
 bool is_token(std::string_view text) {
   constexpr std::string_view kOthers = "!#$%&'*+-.^_`|~";
   return !text.empty() && std::ranges::all_of(text, [&](char c) {
@@ -29,7 +29,7 @@ bool is_token(std::string_view text) {
 
 bool is_control(char c) { return (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F; }
 
-// Clients send absolute targets to proxies, and servers must understand them.
+// Absolute targets are for proxies, but servers must accept them.
 std::string path_and_query(std::string_view target) {
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!equal_names(target.substr(0, scheme.size()), scheme)) continue;
@@ -65,7 +65,7 @@ void parse_request_line(std::string_view line, RequestHead& head) {
 void parse_header(std::string_view line, RequestHead& head) {
   const std::size_t colon = line.find(':');
   const std::string_view name = line.substr(0, colon);
-  // A blank before the colon, or a line that continues the one before, is read in different ways.
+  // Parsers differ on a blank before the colon and on continuation lines.
   if (colon == std::string_view::npos || !is_token(name)) {
     throw malformed("a header has no name");
   }
@@ -120,7 +120,7 @@ std::optional<std::size_t> HeadScanner::scan(std::string_view received) {
     const bool is_empty = length == 1;
     line_begin_ = scanned_ + 1;
     if (is_empty && has_request_line_) return ++scanned_;
-    has_request_line_ = has_request_line_ || !is_empty;  // empty lines may come before it
+    has_request_line_ = has_request_line_ || !is_empty;  // empty lines may precede it
   }
   return std::nullopt;
 }

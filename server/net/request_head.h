@@ -1,5 +1,5 @@
-// The head of an HTTP/1 request, read strictly and with bounds (RFC 9112). The HTTP library takes
-// heads of any length, decodes percent signs in headers and forgives malformed ones.
+// A strict and bounded parser of HTTP/1 request heads (RFC 9112). The HTTP library accepts heads of
+// any length, decodes percent signs in headers and tolerates malformed ones.
 #pragma once
 
 #include <cstddef>
@@ -18,10 +18,10 @@ inline constexpr std::size_t kMostHeaders = 100;
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
-// Names of headers are the same in any case.
+// Compares names of headers, which are case-insensitive.
 bool equal_names(std::string_view a, std::string_view b);
 
-// The value of the first header of that name; null without one.
+// The value of the first header of that name; null if missing.
 const std::string* find_header(const Headers& headers, std::string_view name);
 
 struct RequestHead {
@@ -31,12 +31,12 @@ struct RequestHead {
   Headers headers;
 };
 
-// Finds the end of a head that comes piece by piece. Plain value.
+// Finds the end of a head that arrives in pieces. A plain value.
 class HeadScanner {
  public:
-  // Looks at what has come since the last call; `received` is all of it. Returns the size of the
-  // head with its empty line, or nothing when there is more to come. Throws Error kUriTooLong,
-  // kHeadersTooLarge or kInvalidParameter as soon as what has come cannot be the begin of a head.
+  // Continues with `received`, all bytes so far. Returns the size of the head with its empty line,
+  // or empty if it is incomplete. Throws Error kUriTooLong, kHeadersTooLarge or kInvalidParameter
+  // as soon as the bytes cannot start a valid head.
   std::optional<std::size_t> scan(std::string_view received);
 
  private:
@@ -45,18 +45,18 @@ class HeadScanner {
   bool has_request_line_ = false;
 };
 
-// Reads a whole head. An absolute target becomes its path and query. Throws Error kInvalidParameter
-// or kHeadersTooLarge.
+// Parses a whole head. An absolute target becomes its path and query. Throws Error
+// kInvalidParameter or kHeadersTooLarge.
 RequestHead parse_head(std::string_view head);
 
-// How long a request's body is. Two readings of that are how requests are smuggled past a proxy, so
-// there is only one (RFC 9112, 6.3).
+// The length of a request's body. Ambiguous lengths allow request smuggling past a proxy, so only
+// one interpretation is accepted (RFC 9112, 6.3).
 struct BodyFraming {
   bool chunked = false;
   std::optional<std::uint64_t> length;
 };
 
-// Throws Error kInvalidParameter that names the header.
+// Throws Error kInvalidParameter with the header's name.
 BodyFraming framing_of(const RequestHead& head);
 
 }  // namespace isomesh::net

@@ -16,10 +16,11 @@ namespace isomesh::net {
 namespace {
 
 constexpr int kMostEvents = 128;
-constexpr int kTickMilliseconds = 1000;  // how often sources and deadlines are looked at
-constexpr std::size_t kBytesPerTurn = std::size_t{1} << 20;  // then it is the next one's turn
+constexpr int kTickMilliseconds = 1000;  // interval between checks of sources and deadlines
+constexpr std::size_t kBytesPerTurn = std::size_t{1} << 20;  // per response before the next one is
+                                                             // served
 constexpr std::size_t kMostIgnored = std::size_t{64} << 20;
-constexpr std::uint64_t kWakeup = 0;  // what epoll calls it; responses have higher numbers
+constexpr std::uint64_t kWakeup = 0;  // epoll's id; responses have higher ids
 
 // An exception of one source must not end the thread that serves all.
 Source::More next_of(Source& source, std::string& bytes) {
@@ -31,8 +32,8 @@ Source::More next_of(Source& source, std::string& bytes) {
   }
 }
 
-// Writes what the connection takes without waiting, and removes it from the bytes. True when the
-// connection is done with and can be closed.
+// Writes as much as the connection takes without blocking, and removes it from the bytes. Returns
+// true if the connection is complete and can be closed.
 bool is_sent(Response& response, bool request_is_whole) {
   std::string_view left = response.bytes;
   while (!left.empty()) {
@@ -44,14 +45,13 @@ bool is_sent(Response& response, bool request_is_whole) {
   response.bytes.erase(0, response.bytes.size() - left.size());
   if (!left.empty() || response.source || !request_is_whole) return false;
   response.stream->finish_writing();
-  std::array<char, 1> more = {};  // after the request there should be none
+  std::array<char, 1> more = {};  // no bytes may follow the request
   return response.stream->read(more).state != Transfer::State::kDone;
 }
 
 }  // namespace
 
-// Each response has at most one piece that is computed at a time, so the queue needs no bound of
-// its own.
+// Each response has at most one computed piece at a time, so the queue needs no bound.
 Sender::Sender(const SenderLimits& limits)
     : limits_(limits),
       epoll_(new_epoll()),
@@ -73,7 +73,7 @@ void Sender::send(Response response, bool request_is_whole) {
   if (is_sent(response, request_is_whole)) return;
   {
     const Lock lock(mutex_);
-    if (end_ != Clock::time_point::max()) return;  // its stream is closed
+    if (end_ != Clock::time_point::max()) return;  // destroys the stream, which closes it
     held_bytes_ += response.bytes.size();
     arrived_.push_back(std::move(response));
     ++count_;
@@ -122,13 +122,13 @@ void Sender::work() {
 }
 
 void Sender::serve_event(const epoll_event& event) {
-  const std::uint64_t id = event.data.u64;  // the kernel packs events
+  const std::uint64_t id = event.data.u64;  // a copy: the kernel's struct is packed
   if (id == kWakeup) return wakeup_.clear();
-  const auto sending = by_id_.find(id);  // closed within this batch of events, perhaps
+  const auto sending = by_id_.find(id);  // may have been closed in this batch
   if (sending != by_id_.end()) go_on(sending->second, event.events);
 }
 
-// Returns when to end.
+// Returns the time to end.
 Sender::Clock::time_point Sender::take_arrived() {
   std::vector<Response> arrived;
   std::vector<Computed> computed;
@@ -159,7 +159,7 @@ void Sender::begin(Response response) {
   go_on(sending, 0);
 }
 
-// The receiver may be gone, and then the source goes with what it has made.
+// If the receiver has disconnected, the source and its bytes are destroyed.
 void Sender::take_computed(Computed computed) {
   const auto found = by_id_.find(computed.id);
   if (found == by_id_.end()) return;
@@ -174,7 +174,7 @@ void Sender::take_computed(Computed computed) {
 
 void Sender::go_on(SendingList::iterator sending, unsigned events) {
   const bool is_broken = (events & (EPOLLERR | EPOLLHUP)) != 0;
-  const bool reader_is_gone = (events & EPOLLRDHUP) != 0;  // only watched for where it matters
+  const bool reader_is_gone = (events & EPOLLRDHUP) != 0;  // only watched if it matters
   if (is_broken || reader_is_gone) return close(sending);
   if (sending->is_computed) return;
   const bool goes_on =
@@ -182,8 +182,8 @@ void Sender::go_on(SendingList::iterator sending, unsigned events) {
   if (!goes_on || !watch(*sending)) close(sending);
 }
 
-// Sends until the other side takes no more, there is nothing to send, or it is another's turn.
-// False when the connection is to be closed.
+// Sends until the peer takes no more, nothing is left, or its turn is over. Returns false if the
+// connection must be closed.
 bool Sender::send_some(Sending& sending) {
   std::string& bytes = sending.response.bytes;
   for (std::size_t turn = 0; turn < kBytesPerTurn;) {
@@ -208,12 +208,12 @@ bool Sender::send_some(Sending& sending) {
       sending.deadline = Clock::now() + limits_.patience;
     }
   }
-  sending.events = EPOLLOUT;  // it can be written at once, after all others
+  sending.events = EPOLLOUT;  // writable immediately, after all others
   return true;
 }
 
-// The next bytes to send, or what follows when there are none. False when the connection is to be
-// closed.
+// Gets the next bytes to send, or handles the end of the response. Returns false if the connection
+// must be closed.
 bool Sender::refill(Sending& sending) {
   Response& response = sending.response;
   let_go(sending);
@@ -225,14 +225,14 @@ bool Sender::refill(Sending& sending) {
   return go_on_with(sending, next_of(*response.source, response.bytes));
 }
 
-// A response that came whole gives its memory back, though its connection may linger.
+// Frees a complete response's memory, though its connection may linger.
 void Sender::let_go(Sending& sending) {
   held_bytes_ -= std::exchange(sending.held, 0);
   sending.response.bytes.clear();
   if (!sending.response.source) sending.response.bytes.shrink_to_fit();
 }
 
-// What the source has said, which may have made bytes. False as above.
+// Handles the source's result, after its bytes were appended. Returns as above.
 bool Sender::go_on_with(Sending& sending, Source::More more) {
   switch (more) {
     case Source::More::kBytes:
@@ -255,7 +255,7 @@ bool Sender::go_on_with(Sending& sending, Source::More more) {
 bool Sender::have_computed(Sending& sending) {
   sending.is_computed = true;
   Response& response = sending.response;
-  // Tasks are copied, sources are not.
+  // Tasks are copied, but sources cannot be.
   const auto source = std::make_shared<std::unique_ptr<Source>>(std::move(response.source));
   const auto bytes = std::make_shared<std::string>(std::exchange(response.bytes, {}));
   return computing_.try_enqueue(response.party, [this, id = sending.id, source, bytes] {
@@ -272,7 +272,7 @@ void Sender::compute(std::uint64_t id, std::unique_ptr<Source> source, std::stri
   wakeup_.ring();
 }
 
-// Those who have their response, or were refused, make room for others.
+// Connections with a complete response, or rejected, make room for others.
 void Sender::part(Sending& sending) {
   if (sending.is_parting) return;
   sending.is_parting = true;
@@ -280,7 +280,7 @@ void Sender::part(Sending& sending) {
   parting_.splice(parting_.end(), sending_, by_id_.at(sending.id));
 }
 
-// Takes and forgets what the other side still sends. False when it has ended, or has sent enough.
+// Reads and discards the peer's bytes. Returns false if it has closed, or has sent too much.
 bool Sender::ignore_input(Sending& sending) {
   std::array<char, 16 * 1024> ignored;
   for (std::size_t turn = 0; turn < kBytesPerTurn;) {
@@ -324,7 +324,7 @@ bool Sender::watch(Sending& sending) {
   return ::epoll_ctl(epoll_, operation, descriptor, &event) == 0;
 }
 
-// Closing the descriptor takes it out of epoll.
+// Closing the descriptor removes it from epoll.
 void Sender::close(SendingList::iterator sending) {
   by_id_.erase(sending->id);
   let_go(*sending);

@@ -1,4 +1,4 @@
-// Sends responses as fast as their receivers take them, all from one thread.
+// Sends responses at their receivers' pace, all on one thread.
 #pragma once
 
 #include <atomic>
@@ -22,79 +22,78 @@ struct epoll_event;
 
 namespace isomesh::net {
 
-// The rest of a response, made while it is sent. Used by one thread at a time.
+// Produces the rest of a response while it is sent. Used by one thread at a time.
 class Source {
  public:
   enum class More {
-    kBytes,   // some were appended, or it is to be asked again at once, to compute them
-    kLater,   // none at the moment; ask again after Sender::wake or a second
+    kBytes,   // bytes were appended, or call again at once, to compute them
+    kLater,   // none now; call again after Sender::wake or a second
     kEnd,     // the response is complete
-    kBroken,  // it cannot be completed; the connection is cut, so that the receiver knows
+    kBroken,  // failed; the connection is cut to tell the receiver
   };
 
   virtual ~Source() = default;
 
-  // Appends some tens of kilobytes. Must not block for long: all receivers wait, or those of other
-  // sources that compute. What it throws is logged, and taken as kBroken.
+  // Appends tens of kilobytes. Must not block for long: all receivers wait, or all computing
+  // sources. An exception is logged and means kBroken.
   virtual More next(std::string& bytes) = 0;
 
-  // Whether next() does more than to copy what is there. Then it is called by threads of their own,
-  // so that those who receive what is there already do not wait for it.
+  // True if next() does more than copying. Then computing threads call it, so that other receivers
+  // do not wait.
   virtual bool computes() const { return false; }
 
-  // Whether a client that ends its own sending counts as gone. One that waits for events is gone;
-  // one that downloads a file may have sent all that it had to send.
+  // True if a client that closes its sending direction counts as disconnected. This holds for
+  // listeners to events, but a client that downloads a file may have nothing more to send.
   virtual bool ends_with_reader() const { return false; }
 };
 
-// The bytes of a response and the connection that they go to.
+// The bytes of a response and their connection.
 struct Response {
   std::unique_ptr<ByteStream> stream;
-  std::string bytes;               // what is sent first
-  std::unique_ptr<Source> source;  // what follows; may be empty
-  std::string party = {};          // whom it is for, among those that share the computing threads
-  bool is_refusal = false;         // little is lost when the connection is let go of
+  std::string bytes;               // sent first
+  std::unique_ptr<Source> source;  // sent next; may be empty
+  std::string party = {};          // for fair sharing of the computing threads
+  bool is_refusal = false;         // may be closed early with little loss
 };
 
 struct SenderLimits {
-  // Refusals, and connections whose response is written and that linger; with one more the oldest
-  // is closed. Responses on their way are not counted: who holds a place keeps it.
+  // Limit of rejected connections and lingering ones with a complete response; beyond it the oldest
+  // is closed. Responses in transit do not count, because their places are limited.
   std::size_t most_parting = 128;
   std::size_t computing_threads = 4;
-  // Within each such time a receiver must take kLeastBytes or all that there is.
+  // In each period of this length a receiver must take kLeastBytes or all available bytes.
   std::chrono::milliseconds patience{30'000};
-  // How long the other side may go on sending after the response. Closing a connection with bytes
-  // that nobody has read makes the kernel reset it, and the client may lose the response.
+  // Time limit for the peer's bytes after the response. Closing a connection with unread bytes
+  // makes the kernel reset it, and the client may lose the response.
   std::chrono::milliseconds linger{2'000};
 };
 
-// All functions are thread safe.
 class Sender {
  public:
   static constexpr std::size_t kLeastBytes = 32 * 1024;
 
   explicit Sender(const SenderLimits& limits);
-  // As stop() without patience.
+  // Calls stop() with zero patience.
   ~Sender();
   Sender(const Sender&) = delete;
   Sender& operator=(const Sender&) = delete;
 
-  // Writes what the connection takes at once, in the thread that calls, and leaves the rest to the
-  // sender's. `request_is_whole` says that no more of the request is to come, so that a connection
-  // whose response is written can be closed here.
+  // Writes as much as the connection takes at once, on the calling thread, and leaves the rest to
+  // the sender's thread. If `request_is_whole`, no bytes of the request follow, so a complete
+  // connection can be closed here.
   void send(Response response, bool request_is_whole) ISOMESH_EXCLUDES(mutex_);
 
-  // Asks sources again that had nothing: something has happened.
+  // Polls sources that had nothing to send.
   void wake() ISOMESH_EXCLUDES(mutex_);
 
-  // Responses that the sender's thread is busy with.
+  // Responses handled by the sender's thread.
   std::size_t sending() const { return count_; }
 
-  // The memory that those hold, without what sources make on the way.
+  // Their memory, without bytes from sources.
   std::size_t held_bytes() const { return held_bytes_; }
 
-  // Ends when all is sent, or after `patience`; sources that have nothing are cut off. Nothing is
-  // taken any more.
+  // Ends when all is sent, or after `patience`; idle sources are cut off. Takes no further
+  // responses.
   void stop(std::chrono::milliseconds patience) ISOMESH_EXCLUDES(mutex_);
 
  private:
@@ -102,22 +101,22 @@ class Sender {
   enum class Phase { kSending, kLingering };
 
   struct Sending {
-    std::uint64_t id = 0;  // to epoll and to the computing threads
+    std::uint64_t id = 0;  // for epoll and the computing threads
     Response response;
     std::size_t sent = 0;  // of response.bytes
-    std::size_t held = 0;  // of response.bytes as they came, until all are sent
+    std::size_t held = 0;  // initial size of response.bytes, until all are sent
     Phase phase = Phase::kSending;
     bool waits_for_source = false;
-    bool is_computed = false;        // its source is with a computing thread
-    bool is_parting = false;         // in the list of those
+    bool is_computed = false;        // a computing thread has its source
+    bool is_parting = false;         // in parting_
     bool is_watched = false;         // by epoll
-    std::size_t since_deadline = 0;  // bytes that were taken since the deadline was set
-    std::size_t ignored = 0;         // bytes that came after the response
+    std::size_t since_deadline = 0;  // bytes taken since the deadline was set
+    std::size_t ignored = 0;         // bytes received after the response
     Clock::time_point deadline;
-    unsigned events = 0;  // what epoll watches for
+    unsigned events = 0;  // that epoll watches
   };
   using SendingList = std::list<Sending>;
-  // What a computing thread has made, with the source that it gives back.
+  // The bytes from a computing thread, and the source it returns.
   struct Computed {
     std::uint64_t id = 0;
     std::unique_ptr<Source> source;
@@ -155,14 +154,14 @@ class Sender {
   std::vector<Computed> computed_ ISOMESH_GUARDED_BY(mutex_);
   bool woken_ ISOMESH_GUARDED_BY(mutex_) = false;
   Clock::time_point end_ ISOMESH_GUARDED_BY(mutex_) = Clock::time_point::max();
-  // Only the sender's thread touches the next five.
-  SendingList sending_;  // oldest first, as the next
+  // The next five are used on the sender's thread only.
+  SendingList sending_;  // oldest first, like the next
   SendingList parting_;
   std::unordered_map<std::uint64_t, SendingList::iterator> by_id_;
   std::uint64_t last_id_ = 0;
   bool ending_ = false;
   BoundedTaskQueue computing_;
-  std::jthread thread_;  // declared last, so that it ends before what it uses
+  std::jthread thread_;  // last, so that it ends before the members it uses
 };
 
 }  // namespace isomesh::net

@@ -18,7 +18,7 @@ BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity, in
       });
     }
   } catch (...) {
-    shutdown();  // or those that did start would wait for tasks for ever
+    shutdown();  // otherwise started threads would wait for tasks for ever
     throw;
   }
 }
@@ -71,10 +71,10 @@ void BoundedTaskQueue::work() {
     --idle_;
     ++line->running;
     lines_.splice(lines_.end(), lines_, line);
-    if (waiting_ > 0) changed_.notify_one();  // several may have got their share at once
+    if (waiting_ > 0) changed_.notify_one();  // several parties may have become eligible
     lock.unlock();
     task();
-    task = nullptr;  // what it holds goes outside of the lock
+    task = nullptr;  // destroyed without the lock
     lock.lock();
     --line->running;
     ++idle_;
@@ -95,7 +95,7 @@ void BoundedTaskQueue::add(Lines::iterator line, Task&& task) {
   ++waiting_;
 }
 
-// Whose turn it is; the end when nobody with a share of the threads has a task.
+// The next party; end() if no party with a share of the threads has a task.
 BoundedTaskQueue::Lines::iterator BoundedTaskQueue::next() {
   return std::ranges::find_if(lines_, [this](const Line& line) ISOMESH_REQUIRES(mutex_) {
     return !line.tasks.empty() && has_share(line.party, line.running, idle_);

@@ -12,28 +12,25 @@
 
 namespace isomesh::net {
 
-// Some threads and a bounded queue of tasks for them. Several parties (see FairPlaces) share both:
-// each has a share of the queue and of the threads, and their tasks take turns, so that whoever
-// asks for much waits for itself. Thread safe.
+// Threads with a bounded queue of tasks. Parties (see FairPlaces) share both fairly, and their
+// tasks alternate, so that a party with many tasks delays only itself. Thread safe.
 class BoundedTaskQueue {
  public:
   using Task = std::function<void()>;
 
-  // By `niceness` the threads are nicer than the process: of a busy machine they get less than
-  // others.
+  // `niceness` lowers the threads' priority relative to the process.
   BoundedTaskQueue(std::size_t threads, std::size_t capacity, int niceness = 0);
   ~BoundedTaskQueue();
   BoundedTaskQueue(const BoundedTaskQueue&) = delete;
   BoundedTaskQueue& operator=(const BoundedTaskQueue&) = delete;
 
-  // False, and nothing happens, when the queue or the party's share of it is full, or it is shut
-  // down. Never waits.
+  // Returns false if the queue or the party's share of it is full, or after shutdown. Never blocks.
   bool try_enqueue(const std::string& party, Task&& task) ISOMESH_EXCLUDES(mutex_);
 
-  // The same for what goes on that was begun before: it has room always. False after shutdown.
+  // The same for the rest of an accepted task, which always has room. Returns false after shutdown.
   bool enqueue_rest(const std::string& party, Task&& task) ISOMESH_EXCLUDES(mutex_);
 
-  // Tasks that were accepted are still run.
+  // Accepted tasks still run.
   void shutdown() ISOMESH_EXCLUDES(mutex_);
 
  private:
@@ -42,7 +39,8 @@ class BoundedTaskQueue {
     std::deque<Task> tasks;
     std::size_t running = 0;
   };
-  using Lines = std::list<Line>;  // that have tasks or run some; whose turn is next comes first
+  using Lines = std::list<Line>;  // parties with tasks, queued or running; the next to be served
+                                  // first
 
   void work() ISOMESH_EXCLUDES(mutex_);
   Lines::iterator line_of(const std::string& party) ISOMESH_REQUIRES(mutex_);
@@ -56,7 +54,7 @@ class BoundedTaskQueue {
   std::size_t waiting_ ISOMESH_GUARDED_BY(mutex_) = 0;
   std::size_t idle_ ISOMESH_GUARDED_BY(mutex_);
   bool closed_ ISOMESH_GUARDED_BY(mutex_) = false;
-  std::vector<std::jthread> threads_;  // declared last, so that they end before what they use
+  std::vector<std::jthread> threads_;  // last, so that they end before the members they use
 };
 
 }  // namespace isomesh::net

@@ -16,12 +16,12 @@
 namespace isomesh::net {
 namespace {
 
-// Of TLS 1.2, those with forward secrecy and authenticated encryption; 1.3 has no others.
+// For TLS 1.2: suites with forward secrecy and authenticated encryption; 1.3 has no others.
 constexpr const char* kCiphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
 
 class TlsStream : public ByteStream {
  public:
-  // Owns the socket from the beginning, also when this throws.
+  // Owns the socket even if this throws.
   TlsStream(SSL_CTX* context, int socket) : plain_(socket), ssl_(SSL_new(context), &SSL_free) {
     if (!ssl_ || SSL_set_fd(ssl_.get(), socket) != 1) {
       throw Error(ErrorCode::kInternal, "a TLS connection cannot be started");
@@ -41,7 +41,7 @@ class TlsStream : public ByteStream {
     return outcome(SSL_write(ssl_.get(), bytes.data(), length_of(bytes.size())));
   }
 
-  // After an error nothing may be sent, and before the handshake is over there is nothing to end.
+  // Nothing may be sent after an error, and before the handshake there is nothing to end.
   void finish_writing() override {
     ERR_clear_error();
     if (!broken_ && SSL_is_init_finished(ssl_.get()) == 1) SSL_shutdown(ssl_.get());
@@ -73,7 +73,7 @@ class TlsStream : public ByteStream {
   bool broken_ = false;
 };
 
-// A key with a passphrase would otherwise be asked for on the terminal, in the middle of a start.
+// Otherwise OpenSSL would ask for a key's passphrase on the terminal.
 int no_passphrase(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*nothing*/) { return 0; }
 
 void warn_if_readable(const std::filesystem::path& key) {

@@ -12,18 +12,16 @@ using SSL_CTX = struct ssl_ctx_st;  // NOLINT: OpenSSL's name
 
 namespace isomesh::net {
 
-// A certificate (with the chain up to its authority) and its key, from two files in PEM form.
-// Thread safe.
+// A certificate (with its chain) and its key, from two PEM files. Thread safe.
 class TlsFiles {
  public:
-  // Throws Error kInvalidParameter that names the option at fault.
+  // Throws Error kInvalidParameter with the invalid option's name.
   TlsFiles(std::filesystem::path certificate, std::filesystem::path key);
 
-  // Reads the files again, for connections that come from now on. When that throws, everything
-  // stays as it was.
+  // Rereads the files, for future connections. If that throws, nothing changes.
   void reload();
 
-  // The stream of an accepted socket; it shakes hands while it is read. Throws Error kInternal.
+  // The stream of an accepted socket; the handshake happens during reads. Throws Error kInternal.
   std::unique_ptr<ByteStream> accept(int socket) const;
 
  private:

@@ -24,7 +24,7 @@ Wakeup::~Wakeup() { ::close(event_); }
 
 void Wakeup::ring() const {
   const std::uint64_t one = 1;
-  // Fails only when it has been rung 2^64 - 2 times already.
+  // Fails only after 2^64 - 2 unread rings.
   [[maybe_unused]] const auto written = ::write(event_, &one, sizeof one);
 }
 

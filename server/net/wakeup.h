@@ -2,15 +2,15 @@
 
 namespace isomesh::net {
 
-// Wakes a thread that waits for descriptors. Thread safe.
+// Wakes a thread that polls descriptors. Thread safe.
 class Wakeup {
  public:
-  Wakeup();  // throws Error kUnavailable when there are no descriptors
+  Wakeup();  // throws Error kUnavailable without free descriptors
   ~Wakeup();
   Wakeup(const Wakeup&) = delete;
   Wakeup& operator=(const Wakeup&) = delete;
 
-  // Can be read as soon as ring() was called, until clear().
+  // Readable after ring() until clear().
   int descriptor() const { return event_; }
   void ring() const;
   void clear() const;
@@ -19,7 +19,7 @@ class Wakeup {
   const int event_;
 };
 
-// A new epoll instance; throws Error kUnavailable when there are no descriptors.
+// Returns a new epoll instance. Throws Error kUnavailable without free descriptors.
 int new_epoll();
 
 }  // namespace isomesh::net

@@ -27,13 +27,13 @@ void require_spawn(int error, std::string_view call) {
   if (error != 0) throw_system_error(call, error);
 }
 
-// What a started program is given: one socket, nothing else.
+// A started program inherits one socket, nothing else.
 class Inheritance {
  public:
   explicit Inheritance(int socket) {
     require_spawn(::posix_spawn_file_actions_init(&files_), "posix_spawn_file_actions_init");
     require_spawn(::posix_spawnattr_init(&attributes_), "posix_spawnattr_init");
-    // The socket is duplicated first, because the next actions may close its old number.
+    // Duplicate the socket first, because the next actions may close its original number.
     add(::posix_spawn_file_actions_adddup2(&files_, socket, kChildDescriptor));
     for (int standard = 0; standard < kChildDescriptor; ++standard) {
       add(::posix_spawn_file_actions_addopen(&files_, standard, "/dev/null", O_RDWR, 0));
@@ -45,8 +45,8 @@ class Inheritance {
     sigfillset(&all);
     ::posix_spawnattr_setsigmask(&attributes_, &none);
     ::posix_spawnattr_setsigdefault(&attributes_, &all);
-    // A process group of its own: Ctrl-C goes to the terminal's whole group, and how the process
-    // ends then is for the daemon to decide.
+    // A process group of its own: Ctrl-C is sent to the terminal's whole group, but the daemon
+    // decides how the process ends.
     ::posix_spawnattr_setpgroup(&attributes_, 0);
     ::posix_spawnattr_setflags(
         &attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);

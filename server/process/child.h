@@ -1,4 +1,4 @@
-// A process that this one has started and talks to over a socket.
+// A child process with a socket to it.
 #pragma once
 
 #include <chrono>
@@ -15,14 +15,14 @@
 
 namespace isomesh::process {
 
-// The descriptor of the socket in a child; it has no other but those of standard input and output,
-// which lead nowhere.
+// The socket's descriptor in a child. Its only others are standard input, output and error, which
+// are /dev/null.
 inline constexpr int kChildDescriptor = 3;
 
-// How often those who wait for a child look whether they are to stop.
+// Interval at which a thread that waits for a child checks for a stop request.
 inline constexpr std::chrono::milliseconds kLook{100};
 
-// Two ends of a socket, which are closed when a program is started.
+// Two connected sockets, closed when a program is started.
 struct SocketPair {
   Descriptor ours;
   Descriptor theirs;
@@ -31,7 +31,7 @@ struct SocketPair {
 // Throws Error kInternal.
 SocketPair make_socket_pair();
 
-// What a child has said until it closed its end, or until no more was wanted of it.
+// The bytes a child sent until it closed its end, or until reading ended.
 struct Heard {
   enum class Ending { kClosed, kTooLong, kTooMuch, kStopped };
 
@@ -39,8 +39,7 @@ struct Heard {
   std::string text;
 };
 
-// A child of this process, which is killed and waited for at the end of the object's life. Not
-// thread safe.
+// A child process; the destructor kills it and waits for it. Not thread safe.
 class Child {
  public:
   Child(pid_t pid, Descriptor socket) : pid_(pid), socket_(std::move(socket)) {}
@@ -53,28 +52,27 @@ class Child {
   pid_t pid() const { return pid_; }
   const Descriptor& socket() const { return socket_; }
 
-  // Sends all of that. A child that has ended is no error here: it is noticed when it is listened
-  // to.
+  // Sends the whole message. A child that has ended is not an error here; listen() notices it.
   void say(std::string_view message) const;
 
-  // The same, and a descriptor with it, which stays the caller's. Throws Error kInternal or
-  // kUnavailable when that cannot be passed.
+  // The same with a descriptor, which the caller keeps. Throws Error kInternal or kUnavailable if
+  // it cannot be passed.
   void say(std::string_view message, int passed) const;
 
   // As the first, and closes this direction.
   void tell(std::string_view message) const;
 
-  // Everything that it says until it closes its end, at most `most_bytes` (about).
+  // Reads until the child closes its end, at most about `most_bytes`.
   Heard listen(std::size_t most_bytes, std::chrono::steady_clock::time_point deadline,
                const std::stop_token& stop) const;
 
-  // Whether it has ended by itself.
+  // True if it has ended on its own.
   bool has_ended() { return reap(false); }
 
-  // Its status as waitpid gives it, if it ends by itself within that time.
+  // Its waitpid status, if it ends on its own within that time.
   std::optional<int> ended_within(std::chrono::milliseconds longest);
 
-  // Kills it unless it has ended, and returns when it is gone.
+  // Kills it if it still runs, and waits for its end.
   void end();
 
  private:
@@ -86,13 +84,13 @@ class Child {
   bool reaped_ = false;
 };
 
-// "with signal 9 (killed)", "with status 1", "without a response": of a status as waitpid gives it,
-// and of none. Ends a sentence.
+// "with signal 9 (killed)", "with status 1", "without a response": from a waitpid status, or none.
+// Ends a sentence.
 std::string how_it_ended(const std::optional<int>& status);
 
-// Starts a program that inherits nothing of this process but one end of a socket: its environment
-// is empty, its signals have their defaults, and it leads a process group of its own. Safe with
-// threads running. Throws Error kInternal.
+// Starts a program that inherits only one end of a socket: its environment is empty, its signal
+// handlers are the defaults, and it leads a process group of its own. Safe with threads running.
+// Throws Error kInternal.
 Child start_program(const std::filesystem::path& program);
 
 }  // namespace isomesh::process

@@ -60,7 +60,7 @@ bool is_file_name(std::string_view name) {
          std::ranges::all_of(name, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-// Texts are looked at because the process that sent them reads what strangers write.
+// Texts are validated because their sender reads untrusted bytes.
 bool is_harmless(const DimseObject& object) {
   return is_file_name(object.file) && is_ae_title(object.called) && is_ae_title(object.calling) &&
          is_uid(object.study) && is_uid(object.series) && is_uid(object.instance);

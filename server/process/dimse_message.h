@@ -1,7 +1,7 @@
-// The messages between the daemon and isomesh-dimse, which talk over a socket. The daemon passes
-// the connection to a peer and says in one line what is to be done with it. A process that sends an
-// object answers with one line. One that receives tells of each object in a line, is told of each
-// what became of it, and tells how the association ended.
+// The messages between the daemon and isomesh-dimse, over a socket. The daemon passes the
+// connection to a peer and one line with the order. A sending process answers with one line. A
+// receiving one reports each object in a line, gets a verdict on each, and reports the
+// association's end.
 #pragma once
 
 #include <chrono>
@@ -15,49 +15,49 @@
 
 namespace isomesh::process {
 
-// An object that is to be sent over an association of its own.
+// An object to send over an association of its own.
 struct DimseSending {
   std::string calling;  // application entity titles
   std::string called;
   std::filesystem::path file;
   std::string sop_class;
   std::string instance;                     // SOP Instance UID
-  std::chrono::seconds timeout{30};         // without a byte
-  std::chrono::seconds answer_timeout{30};  // until the peer says that it has stored the object
+  std::chrono::seconds timeout{30};         // limit without a byte
+  std::chrono::seconds answer_timeout{30};  // limit for the peer's C-STORE response
 };
 
-// An association that somebody else has begun.
+// An incoming association.
 struct DimseReceiving {
-  std::vector<std::string> called;   // titles that the association may be for
-  std::vector<std::string> calling;  // and those that it may come from
-  std::filesystem::path folder;      // for objects, until the daemon has taken them
+  std::vector<std::string> called;   // accepted called titles
+  std::vector<std::string> calling;  // accepted calling titles
+  std::filesystem::path folder;      // for objects, until the daemon takes them
   std::uint64_t max_object_bytes = 0;
   std::chrono::seconds idle{60};
 };
 
 using DimseOrder = std::variant<DimseSending, DimseReceiving>;
 
-// How the sending of an object ended.
+// The result of sending an object.
 enum class DimseEnd {
-  kAnswered,     // the peer has said what became of the object
-  kRejected,     // the association, such as for a title that it does not know
-  kBusy,         // the association, for now
-  kNotAccepted,  // objects of that class
+  kAnswered,     // the peer responded to the C-STORE
+  kRejected,     // the association, for example because of an unknown title
+  kBusy,         // the association, temporarily
+  kNotAccepted,  // presentation context of the object's class
   kBroken,       // the connection ended
   kTimeout,
-  kUnreadable,  // an answer that is none
+  kUnreadable,  // malformed response
 };
 
 struct DimseSent {
   DimseEnd end = DimseEnd::kBroken;
-  std::uint16_t status = 0;  // of the C-STORE response, where it was answered
+  std::uint16_t status = 0;  // of the C-STORE response, for kAnswered
 
   bool operator==(const DimseSent&) const = default;
 };
 
-// An object that lies in the folder.
+// A received object in the folder.
 struct DimseObject {
-  std::string file;  // its name in the folder
+  std::string file;
   std::string called;
   std::string calling;
   std::string study;
@@ -67,12 +67,12 @@ struct DimseObject {
   bool operator==(const DimseObject&) const = default;
 };
 
-// How an association that was received ended.
+// The result of an incoming association.
 enum class DimseRefusal {
-  kNone,     // it was accepted, however it ended then
-  kCalled,   // rejected: not one of the titles that it may be for
-  kCalling,  // nor come from
-  kOther,    // no association came about
+  kNone,     // accepted, whatever its end
+  kCalled,   // rejected: wrong called title
+  kCalling,  // rejected: wrong calling title
+  kOther,    // no association was established
 };
 
 struct DimseEnded {
@@ -83,19 +83,19 @@ struct DimseEnded {
 
 using DimseReport = std::variant<DimseSent, DimseObject, DimseEnded>;
 
-// What the daemon says of an object, in one byte.
+// The daemon's verdict on an object, one byte.
 enum class DimseVerdict : char { kStored = 's', kNoRoom = 'n' };
 
-// Each is one line, with its line break.
+// Return one line, with its line break.
 std::string to_line(const DimseOrder& order);
 std::string to_line(const DimseReport& report);
 
-// Throw Error kInternal when the line is none of those. UIDs of a report are UIDs, its titles have
-// what titles may have, and its file is a name without a folder.
+// Throw Error kInternal if the line is malformed. A report's UIDs and titles are valid, and its
+// file is a name without a folder.
 DimseOrder dimse_order_from(std::string_view line);
 DimseReport dimse_report_from(std::string_view line);
 
-// Whether a text can be an application entity's title (PS3.5, 6.2, AE): 1 to 16 printable ASCII
+// True if a text is a valid application entity title (PS3.5, 6.2, AE): 1 to 16 printable ASCII
 // characters without a backslash, and no blanks at its ends.
 bool is_ae_title(std::string_view text);
 

@@ -24,11 +24,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Getting ready takes some hundredths of a second, on a busy machine some tenths; one that is
-// started anew instead of being waited for is not ready sooner.
+// Initialisation takes tens of milliseconds, on a busy machine hundreds. Restarting it earlier
+// would not be faster.
 constexpr std::chrono::seconds kLongestAnswer{60};
 
-// None when the other end is closed.
+// Returns none if the peer has closed.
 Descriptor receive_descriptor() {
   std::array<char, 1> byte = {};
   for (;;) {
@@ -38,20 +38,20 @@ Descriptor receive_descriptor() {
   }
 }
 
-// The C library's fork cannot make a sibling. What its own does besides is about other threads,
-// which there are none of.
+// The C library's fork cannot create a sibling. Its additional work concerns other threads, and
+// there are none.
 pid_t fork_sibling() {
   return static_cast<pid_t>(
       ::syscall(SYS_clone, CLONE_PARENT | SIGCHLD, nullptr, nullptr, nullptr, nullptr));
 }
 
-// The answer is the copy's id, or the negative error number.
+// Sends the copy's id, or the negative error number.
 [[nodiscard]] bool answer(std::int32_t number) {
   return ::send(kChildDescriptor, &number, sizeof(number), MSG_NOSIGNAL) == sizeof(number);
 }
 
-// Ends this process with the daemon, which has made the socket. One that is gone already sends no
-// signal, and this process would have another parent by then.
+// Ends this process with the daemon, which made the socket. A daemon that is dead already sends no
+// signal, but this process would have another parent by then.
 void die_with_daemon(int socket) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ucred maker = {};

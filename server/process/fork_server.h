@@ -1,6 +1,6 @@
-// A program that is started once, gets itself ready, and from then on makes copies of itself, which
-// takes a fraction of the time. It does nothing else and reads nobody's bytes, so each copy is as
-// untouched as a program that has just been started.
+// A program that is started and initialised once, and then forks copies of itself, which is much
+// faster. It does nothing else and reads no untrusted bytes, so each copy is as clean as a new
+// process.
 #pragma once
 
 #include <functional>
@@ -10,15 +10,15 @@
 
 namespace isomesh::process {
 
-// The side of the program: serves the socket kChildDescriptor until its other end is closed, and
-// ends the process then. `work` runs in each copy, which ends after it; the copy's
-// kChildDescriptor is a socket of its own, it is nicer by kImportNiceness (base/niceness.h), and it
-// dies with the daemon. Needs a process with one thread, which start_program has started.
+// The program's side: serves the socket kChildDescriptor until its peer closes, then ends the
+// process. `work` runs in each copy, which ends afterwards. The copy has its own socket as
+// kChildDescriptor, has its niceness raised by kImportNiceness (base/niceness.h), and dies with the
+// daemon. Requires a single-threaded process started by start_program.
 [[noreturn]] void serve_copies(const std::function<void()>& work);
 
-// The side of the daemon: a copy, which is a child of this process, not of `server`. The thread
-// that started `server` must outlive the copy, because that dies with it. Throws Error kInternal
-// when the server does not answer, kUnavailable when `stop` is requested.
+// The daemon's side: a copy, which is a child of this process, not of `server`. The thread that
+// started `server` must outlive the copy, which dies with that thread. Throws Error kInternal if
+// the server does not respond, kUnavailable if `stop` is requested.
 Child copy_of(const Child& server, const std::stop_token& stop);
 
 }  // namespace isomesh::process

@@ -73,8 +73,7 @@ constexpr const char* kVolume = "volume";
 constexpr const char* kAnswer = "answer";
 constexpr const char* kError = "error";
 
-// UIDs go into addresses, so they are looked at once more: the process that sent them reads what a
-// stranger wrote.
+// UIDs become parts of URLs, so they are validated again: their sender reads untrusted bytes.
 void check_uids(const PeersAnswer& answer) {
   for (const auto* objects : {&answer.objects, &answer.stored, &answer.failed}) {
     for (const PeersObject& object : *objects) {
@@ -85,8 +84,7 @@ void check_uids(const PeersAnswer& answer) {
   }
 }
 
-// A format's name is checked before it goes into the log, because the process that sent it reads
-// untrusted files.
+// Validates a format's name before it is logged, because its sender reads untrusted files.
 void check_word(const std::string& text) {
   constexpr std::size_t kLongest = 16;
   const bool plain = text.size() <= kLongest && std::ranges::all_of(text, [](char c) {

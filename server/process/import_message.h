@@ -1,6 +1,5 @@
-// The messages between the daemon and isomesh-import, which talk over a socket. The daemon sends
-// one order. The import answers with lines of JSON; the last holds the volume, or the error because
-// of which there is none.
+// The messages between the daemon and isomesh-import, over a socket. The daemon sends one order.
+// The import answers with lines of JSON; the last one has the volume or the error.
 #pragma once
 
 #include <algorithm>
@@ -19,25 +18,25 @@
 
 namespace isomesh::process {
 
-// What a file has to be that a PACS has sent: the answer to a request for one series.
+// The expected content of a file from a PACS: the response to a request for one series.
 struct PeersSeries {
-  std::string content_type;  // of the answer, as it came
+  std::string content_type;  // the response's header
   std::string study;         // UIDs
   std::string series;
-  std::vector<std::string> instances;  // all of them, ascending, each once
+  std::vector<std::string> instances;  // all of them, ascending, unique
 };
 
-// What a request says about the uploaded file.
+// A request's options for the uploaded file.
 struct ImportOptions {
-  std::optional<RawDescription> raw = {};  // empty: the file is of a format that says what it is
-  std::string series = {};                 // UID of the DICOM series to take; empty: the only one
-  // Which of the file's volumes to take, from 0 on; empty: the only one.
+  std::optional<RawDescription> raw = {};  // empty: the file has a header
+  std::string series = {};                 // UID of the DICOM series; empty: the only one
+  // Index of the volume in its file, from 0; empty: the only one.
   std::optional<std::uint32_t> volume = {};
-  // Which of an archive's volumes to take: the name of its member, or kDicomMember for what its
-  // DICOM files make; empty: the only one.
+  // The archive's member to read, or kDicomMember for the volume of its DICOM files; empty: the
+  // only one.
   std::string member = {};
-  std::vector<std::string> accept = {};      // names of notes for which nothing is refused
-  std::optional<NiftiForm> nifti_form = {};  // empty: the sform, where there is one
+  std::vector<std::string> accept = {};      // names of notes whose errors are overridden
+  std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
   std::optional<PeersSeries> peers = {};     // empty: a client's upload
 
   bool accepts(NoteCode code) const {
@@ -45,20 +44,20 @@ struct ImportOptions {
   }
 };
 
-// Stands for all DICOM files of an archive, whose members have other names.
+// All DICOM files of an archive; not a valid member name.
 inline constexpr std::string_view kDicomMember = "*.dcm";
 
 struct ImportTask {
-  std::filesystem::path source;   // what was uploaded
+  std::filesystem::path source;   // the uploaded file
   std::filesystem::path scratch;  // a folder for temporary files
-  std::filesystem::path target;   // the canonical file to be made, within `scratch`
+  std::filesystem::path target;   // the canonical file to write, within `scratch`
   ImportOptions options = {};
   volume::SizeLimits limits = {};
 };
 
-// The memory and time that one import may take.
+// Limits of one import.
 struct ImportBounds {
-  std::uint64_t memory_bytes = std::uint64_t{4} << 30;  // beside the samples, which are mapped
+  std::uint64_t memory_bytes = std::uint64_t{4} << 30;  // without the mapped samples
   std::chrono::seconds time = std::chrono::minutes(10);
 };
 
@@ -67,7 +66,7 @@ struct ImportOrder {
   ImportBounds bounds;
 };
 
-// A file to be read that holds what a PACS has answered, in DICOM JSON (PS3.18, F).
+// Reading a file with a PACS's response in DICOM JSON (PS3.18, F).
 struct AnswerTask {
   std::filesystem::path source;
 };
@@ -77,7 +76,7 @@ struct AnswerOrder {
   ImportBounds bounds;
 };
 
-// One of the objects that a PACS told of; what it did not tell is empty. UIDs are UIDs (is_uid).
+// An object that a PACS reported; missing members are empty. UIDs are valid (is_uid).
 struct PeersObject {
   std::string study = {};
   std::string series = {};
@@ -86,17 +85,17 @@ struct PeersObject {
   std::string modality = {};
   std::string series_description = {};
   std::optional<std::uint32_t> instances = {};  // of the series
-  // Of an instance that was to be stored: the PACS has not, for that reason (PS3.18, I.2.2).
+  // The reason why the PACS did not store an instance (PS3.18, I.2.2).
   std::optional<std::uint16_t> failure = {};
 
   bool operator==(const PeersObject&) const = default;
 };
 
-// What a PACS has answered.
+// A PACS's response.
 struct PeersAnswer {
-  std::vector<PeersObject> objects;  // that it found
-  std::vector<PeersObject> stored;   // that it says it has stored
-  std::vector<PeersObject> failed;   // that it has not
+  std::vector<PeersObject> objects;  // search results
+  std::vector<PeersObject> stored;   // reported as stored
+  std::vector<PeersObject> failed;   // reported as not stored
 
   bool operator==(const PeersAnswer&) const = default;
 };
@@ -104,27 +103,27 @@ struct PeersAnswer {
 std::string to_message(const ImportOrder& order);
 std::string to_message(const AnswerOrder& order);
 
-// Which of the two it is; Throws Error kInternal when the message is none.
+// Returns either order. Throws Error kInternal if the message is malformed.
 std::variant<ImportOrder, AnswerOrder> order_from(std::string_view message);
 
-// Each makes one line, with its line break.
+// Return one line, with its line break.
 std::string begun_message();
 std::string reading_message(std::string_view format);
 std::string volume_message(const Volume& volume);
 std::string answer_message(const PeersAnswer& answer);
 std::string error_message(const Error& error);
 
-// What an importing process has said so far.
+// The messages of an import so far.
 struct ImportReport {
-  bool begun = false;   // it has its order and is about to open the file
-  std::string reading;  // the last format that it named; printable
+  bool begun = false;   // it has its order and will open the file
+  std::string reading;  // the last format it named; printable
   std::optional<Volume> volume;
   std::optional<PeersAnswer> answer;
   std::optional<Error> error;
 };
 
-// Reads whole lines; a last line without its break is passed over. Throws Error kInternal when a
-// line is not of the form that isomesh-import writes.
+// Reads whole lines; ignores an incomplete last line. Throws Error kInternal if a line is
+// malformed.
 ImportReport report_from(std::string_view messages);
 
 }  // namespace isomesh::process

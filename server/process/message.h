@@ -1,5 +1,5 @@
-// Messages between the daemon and its other processes: lines of JSON, {"NAME": value}, where the
-// name says what the line tells. For the sources that know the fields of the messages.
+// Messages between the daemon and its other processes: lines of JSON, {"NAME": value}, where NAME
+// is the kind of the message. For sources that know the messages' fields.
 #pragma once
 
 #include <optional>
@@ -23,12 +23,12 @@ std::string line_of(const char* name, const T& value) {
 
 inline std::string line_of(const char* name, const Error& error) {
   Problem problem = to_problem(error, "");
-  problem.detail = error.what();  // which of an internal error only clients may not see
+  problem.detail = error.what();  // only clients must not see that of an internal error
   return line_of(name, problem);
 }
 
-// A line that was read. Processes read what strangers wrote and may have been taken over by it, so
-// a value has the form and the range of its type or is an error.
+// A received line. Its sender reads untrusted bytes and may be compromised, so each value must have
+// the form and the range of its type.
 class ReadLine {
  public:
   // Throws Error kInternal if the line is not an object.
@@ -39,7 +39,7 @@ class ReadLine {
     });
   }
 
-  // Empty if the line tells something else. Throws Error kInternal if the value is not a T.
+  // Empty if the line is another message. Throws Error kInternal if the value is not a T.
   template <class T>
   std::optional<T> find(const char* name) const {
     const Json* found = json_values::find(tree_.root(), name);

@@ -27,7 +27,7 @@ struct Message {
 }  // namespace
 
 ssize_t send_with(int socket, std::string_view bytes, int passed) {
-  Message message(const_cast<char*>(bytes.data()), bytes.size());  // which is only read
+  Message message(const_cast<char*>(bytes.data()), bytes.size());  // sendmsg only reads it
   cmsghdr* const part = CMSG_FIRSTHDR(&message.header);
   part->cmsg_level = SOL_SOCKET;
   part->cmsg_type = SCM_RIGHTS;

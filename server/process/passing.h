@@ -1,4 +1,4 @@
-// Descriptors that go to another process, over a Unix socket (SCM_RIGHTS).
+// Passes descriptors to another process over a Unix socket (SCM_RIGHTS).
 #pragma once
 
 #include <span>
@@ -10,11 +10,11 @@
 
 namespace isomesh::process {
 
-// Sends the beginning of `bytes`, of which there is one at least, and with it a descriptor, which
-// stays the caller's. Returns how many bytes went; -1 with errno for an error.
+// Sends a prefix of `bytes`, at least one byte, with a descriptor, which the caller keeps. Returns
+// the number of bytes, or -1 with errno.
 ssize_t send_with(int socket, std::string_view bytes, int passed);
 
-// What has come: as recv() returns it, and the descriptor that came with it, if one did.
+// The result of recv(), and the descriptor received, if any.
 struct Received {
   ssize_t count = -1;
   Descriptor passed;

@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Before a start that has failed is repeated; doubles.
+// Back-off before a failed start is repeated; doubles.
 constexpr milliseconds kFirstPause{10};
 constexpr milliseconds kLongestPause{1000};
 
@@ -21,7 +21,7 @@ constexpr milliseconds kLongestPause{1000};
 PreparedProcesses::PreparedProcesses(const std::filesystem::path& program, std::size_t count)
     : program_(program), count_(count), keeper_([this](const std::stop_token& end) {
         keep(stop_.get_token());
-        // Those that were taken would die with this thread.
+        // Keep running: taken children would die with this thread.
         Lock lock(mutex_);
         changed_.wait(lock, end, [] { return false; });
       }) {}
@@ -91,7 +91,7 @@ void PreparedProcesses::prepare_one(const std::stop_token& stop) {
   }
   Child child = copy(generation, stop);
   const Lock lock(mutex_);
-  if (generation != generation_) return;  // the child goes: it is of the program before
+  if (generation != generation_) return;  // discard the child of the previous program
   ready_.push_back(std::move(child));
   changed_.notify_all();
 }

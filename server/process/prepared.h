@@ -1,4 +1,4 @@
-// Processes that are kept started, so that nobody waits for that.
+// A pool of started processes.
 #pragma once
 
 #include <chrono>
@@ -18,24 +18,21 @@ namespace isomesh::process {
 class PreparedProcesses {
  public:
   PreparedProcesses(const std::filesystem::path& program, std::size_t count);
-  // Ends those that are prepared. Those that were taken die with this object too, whoever holds
-  // them.
+  // Ends the prepared processes. Taken ones also die with this object, whoever owns them.
   ~PreparedProcesses();
   PreparedProcesses(const PreparedProcesses&) = delete;
   PreparedProcesses& operator=(const PreparedProcesses&) = delete;
 
-  // One that has been prepared, which another replaces, or waits for one where there is none. Those
-  // that have died meanwhile are passed over. A start that fails is repeated: what a busy machine
-  // refuses now it may allow soon. Throws Error kInternal when there is none by `until`, and
-  // kUnavailable once stopped.
+  // Takes a prepared process, which is then replaced, or waits for one. Skips processes that have
+  // died. Retries failed starts, because a busy machine may recover. Throws Error kInternal if
+  // there is none by `until`, and kUnavailable after stop().
   Child take(std::chrono::steady_clock::time_point until);
 
-  // To be called when one was ended by what it had to read. Copies have their addresses and stack
-  // guards in common; so that nobody finds them out by trying, the next ones are made of a program
-  // that is started anew.
+  // Call after input has crashed a process. Copies share addresses and stack guards. To prevent
+  // guessing them, later copies come from a restarted program.
   void renew();
 
-  // take() is refused from now on.
+  // take() fails from now on.
   void stop();
 
  private:
@@ -48,9 +45,10 @@ class PreparedProcesses {
   Mutex mutex_;
   Condition changed_;
   std::deque<Child> ready_ ISOMESH_GUARDED_BY(mutex_);
-  std::size_t takers_ ISOMESH_GUARDED_BY(mutex_) = 0;        // that wait
-  std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;  // of the program: grows with renew()
-  // Used by the keeper alone.
+  std::size_t takers_ ISOMESH_GUARDED_BY(mutex_) = 0;        // waiting in take()
+  std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;  // of the program; incremented by
+                                                             // renew()
+  // Used on the keeper's thread only.
   std::optional<Child> server_;
   std::uint64_t server_generation_ = 0;
   std::stop_source stop_;

@@ -27,7 +27,7 @@
 namespace isomesh::process {
 namespace {
 
-// Under a sanitizer memory cannot be limited, because it reserves terabytes of addresses.
+// A sanitizer reserves terabytes of addresses, so memory cannot be limited.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ISOMESH_IS_SANITIZED
 constexpr bool kLimitMemory = false;
@@ -72,7 +72,7 @@ void limit_resources(const Confinement& confinement) {
 
 // --- Files (Landlock) ----------------------------------------------------------------------------
 
-// The right to truncate files, which Debian 12's headers do not know yet.
+// The right to truncate files is missing in Debian 12's headers.
 constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;
 
 // The rights that a version of Landlock can restrict.
@@ -98,7 +98,7 @@ void allow(const Descriptor& ruleset, const std::filesystem::path& path, std::ui
       "landlock_add_rule");
 }
 
-// Leaves the file `readable` and all of the folder `writable`, where they are named.
+// Leaves access to the file `readable` and to the folder `writable`, if given.
 void restrict_files(const std::filesystem::path& readable, const std::filesystem::path& writable) {
   const long version = landlock_version();
   if (version < 1) return;
@@ -120,10 +120,10 @@ void restrict_files(const std::filesystem::path& readable, const std::filesystem
 
 // --- System calls (seccomp) ----------------------------------------------------------------------
 
-// All other calls fail with EPERM, which libraries can handle, rather than end the process.
+// All other calls fail with EPERM, which libraries can handle, instead of ending the process.
 constexpr std::array kAllowedCalls = {
 #ifdef ISOMESH_IS_SANITIZED
-    SCMP_SYS(pipe), SCMP_SYS(pipe2),  // sanitizers use them to find out whether memory is readable
+    SCMP_SYS(pipe), SCMP_SYS(pipe2),  // sanitizers test with them whether memory is readable
 #endif
     // files
     SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(write), SCMP_SYS(writev),
@@ -146,13 +146,13 @@ constexpr std::array kAllowedCalls = {
     SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(time),
     SCMP_SYS(restart_syscall)};
 
-// What sockets that are there already are used with.
+// Calls on existing sockets.
 constexpr std::array kTalkingCalls = {
     SCMP_SYS(recvfrom),    SCMP_SYS(sendto),      SCMP_SYS(poll),       SCMP_SYS(ppoll),
     SCMP_SYS(select),      SCMP_SYS(pselect6),    SCMP_SYS(setsockopt), SCMP_SYS(getsockopt),
     SCMP_SYS(getpeername), SCMP_SYS(getsockname), SCMP_SYS(shutdown),   SCMP_SYS(recvmsg)};
 
-// The calls that only confine_to() makes; prlimit64 beside them.
+// Calls, beside prlimit64, that only confine_to() makes.
 constexpr std::array kConfiningCalls = {
     SCMP_SYS(landlock_create_ruleset), SCMP_SYS(landlock_add_rule),
     SCMP_SYS(landlock_restrict_self), SCMP_SYS(setrlimit), SCMP_SYS(seccomp)};
@@ -161,7 +161,7 @@ class Filter {
  public:
   explicit Filter(std::uint32_t otherwise) : context_(::seccomp_init(otherwise)) {
     if (context_ == nullptr) throw Error(ErrorCode::kInternal, "seccomp_init failed.");
-    // confine_ahead() has done that; loading the second filter would not be allowed to.
+    // confine_ahead() has set it already; loading the second filter must not set it again.
     check(::seccomp_attr_set(context_, SCMP_FLTATR_CTL_NNP, 0));
   }
   ~Filter() { ::seccomp_release(context_); }
@@ -192,7 +192,7 @@ scmp_arg_cmp argument_is(unsigned index, std::uint64_t value) {
   return {index, SCMP_CMP_EQ, value, 0};
 }
 
-// What a process does besides reading and writing files.
+// Activities of a process other than reading and writing files.
 enum class Doing { kNothing, kTalk, kThreads };
 
 void filter_calls(Doing doing) {
@@ -201,29 +201,29 @@ void filter_calls(Doing doing) {
     for (const int call : kTalkingCalls) filter.allow(call);
   }
   if (doing == Doing::kThreads) {
-    // A thread, never a process; its newer form cannot be looked into, and the C library goes back
-    // to this one where the kernel seems not to have it.
+    // A thread, never a process. seccomp cannot inspect clone3; without it the C library uses
+    // clone.
     filter.allow(SCMP_SYS(clone), {0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD});
     filter.fail(SCMP_SYS(clone3), ENOSYS);
     filter.allow(SCMP_SYS(sched_setaffinity));
-    filter.allow(SCMP_SYS(recvmsg));  // nothing makes another socket than the one it has
+    filter.allow(SCMP_SYS(recvmsg));  // it has only one socket
     filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_NAME));
   }
   for (const int call : kAllowedCalls) filter.allow(call);
-  // Memory must never be mapped as executable.
+  // Memory must never become executable.
   const scmp_arg_cmp not_executable = {2, SCMP_CMP_MASKED_EQ, PROT_EXEC, 0};
   filter.allow(SCMP_SYS(mmap), not_executable);
   filter.allow(SCMP_SYS(mprotect), not_executable);
-  // What confine_to() needs, and then takes away.
+  // For confine_to(), which then forbids it.
   for (const int call : kConfiningCalls) filter.allow(call);
   filter.allow(SCMP_SYS(prlimit64), argument_is(0, 0));  // the calling process
   // abort() signals its own thread.
   filter.allow(SCMP_SYS(tgkill), argument_is(0, static_cast<std::uint64_t>(::getpid())));
-  filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_VMA));  // malloc's names for its memory
+  filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_VMA));  // malloc names its memory
   filter.load();
 }
 
-// A second filter: what either forbids is forbidden.
+// A second filter: a call must pass both.
 void forbid_confining() {
   Filter filter(SCMP_ACT_ALLOW);
   for (const int call : kConfiningCalls) filter.forbid(call);
@@ -235,7 +235,7 @@ void forbid_confining() {
 
 void become_first_victim() {
   const Descriptor file(::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC));
-  // Where there is no such file, the kernel chooses as usual.
+  // Without that file the kernel chooses as usual.
   if (file.number() >= 0) [[maybe_unused]]
     const auto count = ::write(file.number(), "1000", 4);
 }
@@ -277,7 +277,7 @@ void MemoryLimit::set(std::uint64_t more_bytes) const {
   std::array<char, 256> text = {};
   require(::pread(usage_.number(), text.data(), text.size() - 1, 0) > 0, "pread");
   std::istringstream numbers(text.data());
-  std::uint64_t present = 0;  // in pages; the sixth number is of data and stack
+  std::uint64_t present = 0;  // in pages; the sixth number is data and stack
   for (int number = 0; number < 6; ++number) numbers >> present;
   present *= static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   rlimit bounds = {};

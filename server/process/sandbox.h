@@ -1,5 +1,4 @@
-// Confines the calling process to what reading one untrusted file needs. A confined process cannot
-// undo it.
+// Restricts the calling process to the needs of reading one untrusted file. It cannot be undone.
 #pragma once
 
 #include <chrono>
@@ -11,52 +10,50 @@
 namespace isomesh::process {
 
 struct Confinement {
-  std::filesystem::path readable;  // the one file that may be read
-  std::filesystem::path writable;  // the one folder in which anything may be done
+  std::filesystem::path readable;  // the only readable file
+  std::filesystem::path writable;  // the only folder with full access
   // Private memory only: the canonical file is mapped, and may be larger than the memory.
   std::uint64_t memory_bytes = 0;
-  std::uint64_t file_bytes = 0;  // of any one file, and of those that are mapped together
-  std::chrono::seconds time{0};  // of the processor
+  std::uint64_t file_bytes = 0;  // of each file, and of all mapped files together
+  std::chrono::seconds time{0};  // CPU time
 };
 
-// What can be taken from a process before it is known what it is to read. It cannot gain rights,
-// make core dumps, open many files or sockets, start programs or processes or signal others, and
-// the kernel ends it first when memory runs out. Works without privileges and as root.
+// Drops all rights that are not needed before the process knows its input. It cannot gain
+// privileges, write core dumps, open many files or sockets, start programs or processes or signal
+// others, and the kernel kills it first if memory runs out. Works without privileges and as root.
 //
-// Throws Error kInternal when the kernel refuses any of this. Must be called before a second thread
-// is started, once.
+// Throws Error kInternal if the kernel refuses. Call once, before a second thread is started.
 void confine_ahead();
 
-// The same for a process that also talks over the sockets that it has; it makes none and connects
-// none.
+// The same for a process that also uses its existing sockets; it creates and connects none.
 void confine_ahead_to_talk();
 
-// Takes the rest: limits memory, time and the size of files; Landlock, where the kernel has it,
-// keeps the process from all files but those; nothing of this can be changed any more. Needs
-// one of the two above, once. Throws as that does; a kernel without Landlock is no error.
+// Drops the remaining rights: limits memory, CPU time and file sizes. Landlock, if the kernel has
+// it, denies all other files. None of this can be changed afterwards. Requires one of the two
+// above. Call once. Throws as they do; a kernel without Landlock is not an error.
 void confine_to(const Confinement& confinement);
 
-// Confines a process that works for long, with threads: it may open no file at all and write
-// nothing, and has the calls of confine_ahead() and those that make threads or receive descriptors,
-// which are all that it can read. Throws as that does. Must be called before a second thread is
-// started, once, and instead of those above.
+// Confines a long-running process with threads. It may open no files and write none. It has the
+// calls of confine_ahead(), those that create threads, and those that receive descriptors, its only
+// input. Throws as that does. Call once, before a second thread is started, and instead of the
+// functions above.
 void confine_job();
 
-// Limits the process's private memory (RLIMIT_DATA), again and again. To be made before the process
-// is confined. Not thread safe.
+// Limits the process's private memory (RLIMIT_DATA) repeatedly. Construct it before the process is
+// confined. Not thread safe.
 class MemoryLimit {
  public:
   // Throws Error kInternal, as set() does.
   MemoryLimit();
 
-  // From now on the process has at most so many bytes more than it has.
+  // Allows the process that many bytes more than it uses now.
   void set(std::uint64_t more_bytes) const;
 
  private:
-  Descriptor usage_;  // a confined process could not open it any more
+  Descriptor usage_;  // a confined process could not open it
 };
 
-// Whether the kernel can keep a process from other files. Thread safe.
+// True if the kernel can deny access to other files. Thread safe.
 bool has_landlock();
 
 }  // namespace isomesh::process

@@ -59,13 +59,13 @@ CanonicalHeader from_text(const std::string& text) {
   } catch (const nlohmann::json::exception&) {
     throw_not_canonical("its header cannot be read");
   }
-  // The comparison refuses other versions, further members, another order of members, and sizes
-  // that do not fit into 32 bits.
+  // The comparison rejects other versions, additional members, another order, and sizes beyond 32
+  // bits.
   if (header_text(header) != text) throw_not_canonical("its header is not in canonical form");
   return header;
 }
 
-// Empty when a size is 0 or the bytes are too many to count.
+// Empty if a size is 0 or the number of bytes overflows.
 std::optional<std::size_t> file_bytes(const CanonicalHeader& header) {
   std::uint64_t bytes = bytes_per_sample(header.type);
   for (const std::uint64_t size : header.dims) {
@@ -82,8 +82,7 @@ CanonicalWriter::CanonicalWriter(const std::filesystem::path& path, const Canoni
   if (!size) throw Error(ErrorCode::kInternal, "A canonical volume of impossible size.");
   Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
   if (file.number() < 0) throw_system_error("open", errno);
-  // All blocks are allocated now: a full disk would otherwise raise a signal when the mapping is
-  // written.
+  // Allocate all blocks now: otherwise a full disk would raise a signal on writing to the mapping.
   const int error = ::posix_fallocate(file.number(), 0, static_cast<off_t>(*size));
   if (error != 0) throw_system_error("posix_fallocate", error);
   void* data = ::mmap(nullptr, *size, PROT_READ | PROT_WRITE, MAP_SHARED, file.number(), 0);
@@ -145,7 +144,7 @@ std::span<const std::byte> CanonicalVolume::samples() const {
 }
 
 void CanonicalVolume::preload() const {
-  // An error is no matter, because samples that are not read ahead are read when they are needed.
+  // Errors do not matter: samples that are not preloaded are read on demand.
   ::madvise(const_cast<std::byte*>(data_), size_, MADV_WILLNEED);
 }
 

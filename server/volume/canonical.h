@@ -1,10 +1,10 @@
-// The canonical volume: the one form in which volumes are kept, whatever they came in as.
+// The canonical volume: the only form in which volumes are stored.
 //
 // A canonical file has a header of kHeaderBytes bytes (one JSON object, padded with spaces, ending
-// in a newline), and then the samples, little-endian, x fastest. The header holds only what
-// identifies the volume: version, dims, type, spacing, origin, direction. So the SHA-256 of the
-// file can be the volume's id: the same samples and geometry have the same id in whatever format
-// they came.
+// in a newline), and then the samples, little-endian, x fastest. The header holds only properties
+// that identify the volume: version, dims, type, spacing, origin, direction. So the SHA-256 of the
+// file is the volume's id: equal samples and geometry have the same id, whatever their original
+// format.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct CanonicalHeader {
   }
 };
 
-// A canonical file that is being written. Not thread safe.
+// Writes a canonical file. Not thread safe.
 class CanonicalWriter {
  public:
   // Creates the file at its full size and maps it. Throws Error kOutOfSpace or kInternal.
@@ -40,7 +40,7 @@ class CanonicalWriter {
   CanonicalWriter(const CanonicalWriter&) = delete;
   CanonicalWriter& operator=(const CanonicalWriter&) = delete;
 
-  // Whoever keeps the file brings it to disk.
+  // The caller syncs the file to disk.
   std::span<std::byte> samples();
 
  private:
@@ -49,20 +49,18 @@ class CanonicalWriter {
   int file_ = -1;
 };
 
-// A canonical file whose samples are copied out of it, so that one which is cut meanwhile is an
-// error and no signal: for those who serve others besides. Safe to read from several threads.
+// Reads samples by copying, so that truncation of the file is an error and not a signal. For
+// processes that serve several clients. Safe to read from several threads.
 class CanonicalFile {
  public:
-  // Throws Error kInternal when the file is not a canonical volume of exactly the size that its
-  // header tells.
+  // Throws Error kInternal unless the file is a canonical volume of exactly the size in its header.
   explicit CanonicalFile(const std::filesystem::path& path);
   explicit CanonicalFile(InputFile file);
 
   const CanonicalHeader& header() const { return header_; }
 
-  // Fills `target` with what is `offset` bytes behind the beginning of the samples, all of which is
-  // to lie within them. Throws Error kUnusableVolume when the file has become shorter, kInternal
-  // when the disk fails.
+  // Fills `target` from byte `offset` of the samples; the range must lie within them. Throws Error
+  // kUnusableVolume if the file was truncated, kInternal if reading fails.
   void read(std::uint64_t offset, std::span<std::byte> target) const;
 
  private:
@@ -72,8 +70,8 @@ class CanonicalFile {
   CanonicalHeader header_;
 };
 
-// A canonical file, mapped for reading. Immutable, so safe to read from several threads. A file
-// that is cut meanwhile ends the process with SIGBUS: for processes that do nothing else.
+// A canonical file, mapped for reading. Immutable, so safe to read from several threads. If the
+// file is truncated meanwhile, SIGBUS ends the process: only for processes with a single task.
 class CanonicalVolume {
  public:
   // Throws as CanonicalFile does.
@@ -88,7 +86,7 @@ class CanonicalVolume {
   const CanonicalHeader& header() const { return header_; }
   std::span<const std::byte> samples() const;
 
-  // Brings the samples into memory, so that what follows does not wait for the disk.
+  // Starts reading the samples into memory ahead of their use.
   void preload() const;
 
  private:

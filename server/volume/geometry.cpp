@@ -9,15 +9,15 @@
 namespace isomesh::volume {
 namespace {
 
-// The least determinant of a direction. A tilted gantry makes about 0.85; no scanner shears a
-// lattice to less than this.
+// The smallest determinant of a direction. A tilted gantry gives about 0.85; no scanner shears a
+// lattice below this.
 constexpr double kFlattestDeterminant = 0.01;
 constexpr double kUnitTolerance = 1e-3;
-// Bounds on a spacing in millimetres, between which electron microscopy and geology lie. Beyond
-// them areas and volumes overflow or underflow the numbers that they are computed and sent in.
+// Bounds on a spacing in millimetres; they include electron microscopy and geology. Beyond them
+// areas and volumes overflow or underflow.
 constexpr double kFinestSpacing = 1e-6;
 constexpr double kCoarsestSpacing = 1e6;
-// Of the 24 bits of single precision this leaves 8 for places between two neighbouring samples.
+// Leaves 8 of the 24 bits of single precision for positions between neighbouring samples.
 constexpr double kFinestRelativeSpacing = 0x1p-16;
 
 Vector3 column(const std::array<double, 9>& matrix, int axis) {

@@ -1,4 +1,4 @@
-// Arithmetic with geometries, and the check whether one can be used.
+// Computes and validates geometries.
 #pragma once
 
 #include <array>
@@ -12,23 +12,22 @@ namespace isomesh::volume {
 
 using Vector3 = std::array<double, 3>;
 
-// Makes a geometry of the place of the sample (0,0,0) and the steps between neighbouring samples
-// along i, j and k, all in LPS millimetres. find_fault refuses what a step of length 0 or one that
-// is not finite makes.
+// The geometry with sample (0,0,0) at `origin` and the given steps between neighbouring samples
+// along i, j and k, all in LPS millimetres. find_fault rejects the result for steps that are zero
+// or not finite.
 Geometry geometry_of(const Vector3& origin, const std::array<Vector3, 3>& steps);
 
-// The column of `direction` that belongs to an axis, times its spacing.
+// The axis's column of `direction`, times its spacing.
 Vector3 step_of(const Geometry& geometry, int axis);
 
-// The same lattice with unit vectors for directions: columns that are longer or shorter (by more
-// than 1e-3) give their length to the spacing, all others stay exactly as they are. No number is
-// -0.
+// The same lattice with unit direction vectors: the lengths of columns that deviate from 1 by more
+// than 1e-3 move to the spacing; all others stay exact. No number is -0.
 Geometry normalised(const Geometry& geometry);
 
-// The first thing that makes a geometry unusable, or nothing: numbers that are not finite, spacings
-// that are not positive, a direction whose columns are not unit vectors (to 1e-3) or lie nearly in
-// one plane, coordinates so far out that single precision, in which meshes are written, cannot tell
-// neighbouring samples apart. The field is "spacing", "origin" or "direction".
+// The first reason why a geometry is unusable, or empty. Reasons are: numbers that are not finite;
+// spacings that are not positive; direction columns that are not unit vectors (to 1e-3) or nearly
+// coplanar; coordinates so large that single precision, used in meshes, cannot separate
+// neighbouring samples. The field is "spacing", "origin" or "direction".
 std::optional<FieldError> find_fault(const std::array<std::uint32_t, 3>& dims,
                                      const Geometry& geometry);
 

@@ -1,4 +1,4 @@
-// Samples as eight bits of grey.
+// Converts samples to 8-bit grey.
 #pragma once
 
 #include <array>
@@ -7,12 +7,11 @@
 
 namespace isomesh::volume {
 
-// Black (0) for window[0] and less and for what is no number, white (255) for window[1] and more,
-// and in proportion between them.
+// Black (0) up to window[0] and for NaN, white (255) from window[1] on, linear between them.
 inline std::uint8_t grey(double value, const std::array<double, 2>& window) {
   if (!(value > window[0])) return 0;
   if (value >= window[1]) return 255;
-  // Halves, because the difference of two doubles may be beyond the largest double.
+  // Halved, because the difference of two doubles may overflow.
   const double half_width = window[1] / 2 - window[0] / 2;
   return static_cast<std::uint8_t>(std::lround((value / 2 - window[0] / 2) / half_width * 255));
 }

@@ -12,10 +12,10 @@ namespace {
 
 constexpr std::size_t kMostValues = 65536;
 
-// Halves, because the difference of two doubles may be beyond the largest double.
+// Halved, because the difference of two doubles may overflow.
 double half_width(const std::array<double, 2>& range) { return range[1] / 2 - range[0] / 2; }
 
-// Where the counts' b-th value lies within the range, 0..1.
+// The position in the range, 0..1, of the counts' b-th value.
 double position_of(const ValueCounts& values, std::size_t b) {
   const auto count = static_cast<double>(values.counts.size());
   if (!values.exact) return (static_cast<double>(b) + 0.5) / count;
@@ -34,7 +34,7 @@ ValueCounts no_values(SampleType type, const std::array<double, 2>& range) {
 }
 
 void add_values(std::span<const std::byte> samples, SampleType type, ValueCounts& counts) {
-  // With half a step added on both sides each integer is the middle of its bin.
+  // With half a step on both sides, each integer is at the centre of its bin.
   const double margin = counts.exact ? 0.5 : 0;
   const std::vector<std::uint64_t> more = histogram(
       samples, type, {{counts.range[0] - margin, counts.range[1] + margin}, counts.counts.size()});

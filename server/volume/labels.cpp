@@ -14,18 +14,17 @@ namespace {
 
 constexpr std::size_t kMostLabels = 1024;
 constexpr std::size_t kFewestValues = 3;
-constexpr std::size_t kPieceSamples = std::size_t{1} << 20;  // between counts of the values
-// Of the pairs of neighbours. Regions of five samples along x have a fifth of them at their
-// borders; images of eight bits have hardly any pair of the same values.
+constexpr std::size_t kPieceSamples = std::size_t{1} << 20;  // per count of the values
+// The smallest fraction of equal neighbours. In regions five samples wide along x, a fifth of the
+// pairs is at a border; 8-bit images have hardly any equal pairs.
 constexpr double kFlat = 0.6;
 
-// The distinct values of samples.
 template <class Sample>
 class Values {
  public:
   void add(std::span<const Sample> samples) {
     for (const Sample value : samples) {
-      if (value == last_ && !seen_.empty()) continue;  // as most are
+      if (value == last_ && !seen_.empty()) continue;  // the usual case
       last_ = value;
       seen_.insert(value);
     }
@@ -37,7 +36,7 @@ class Values {
   std::unordered_set<Sample> seen_;
 };
 
-// A mark for each value that there can be.
+// One flag per possible value.
 template <class Sample>
 requires(sizeof(Sample) <= 2) class Values<Sample> {
  public:
@@ -53,13 +52,13 @@ requires(sizeof(Sample) <= 2) class Values<Sample> {
 };
 
 struct Neighbours {
-  std::size_t pairs = 0;  // those that are not both background
-  std::size_t same = 0;   // of these
+  std::size_t pairs = 0;  // not both background
+  std::size_t same = 0;   // equal ones among these
 };
 
 template <class Sample>
 Neighbours neighbours_in(std::span<const Sample> line, Sample background) {
-  // As many as can be counted in a byte, which lets the compiler compare many at once.
+  // Few enough to count in a byte, so that the compiler vectorises the comparison.
   constexpr std::size_t kBlock = 255;
   Neighbours found;
   for (std::size_t begin = 1; begin < line.size(); begin += kBlock) {

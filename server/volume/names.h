@@ -1,4 +1,4 @@
-// Names that people give: of volumes, of labels.
+// Names of volumes and labels.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace isomesh::volume {
 
-// The text in Unicode's normalisation form C, so that names that look the same are the same. What
-// is not UTF-8 stays as it is.
+// Converts a text to Unicode normalisation form C, so that names that look equal are equal. Invalid
+// UTF-8 stays unchanged.
 std::string normalized(std::string_view text);
 
 }  // namespace isomesh::volume

@@ -7,8 +7,8 @@ namespace isomesh::volume {
 namespace {
 
 struct ObjectKind {
-  std::string_view sop_class;  // behind 1.2.840.10008.5.1.4.1.1. (PS3.4, B.5)
-  bool is_family;              // and all classes below it
+  std::string_view sop_class;  // after 1.2.840.10008.5.1.4.1.1. (PS3.4, B.5)
+  bool is_family;              // includes all classes below it
   std::string_view what;
 };
 

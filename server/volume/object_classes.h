@@ -1,4 +1,4 @@
-// Classes of DICOM objects that lie beside images and hold none.
+// Classes of DICOM objects without images.
 #pragma once
 
 #include <optional>
@@ -6,7 +6,7 @@
 
 namespace isomesh::volume {
 
-// What objects of that class are, such as "a report"; empty when they may be images.
+// A description of that class, such as "a report"; empty if its objects may be images.
 std::optional<std::string_view> kind_without_images(std::string_view sop_class);
 
 }  // namespace isomesh::volume

@@ -10,9 +10,9 @@ struct Row {
   double hounsfield;
 };
 
-// Air is -1000 and water 0. Skin lies where air ends. Soft tissue lies midway between fat (about
-// -100) and muscle and organs (about 50), so fat is left out. Bone begins above what contrast agent
-// and calcified tissue commonly reach.
+// Air is -1000 and water 0. Skin is the border of air. Soft tissue is midway between fat (about
+// -100) and muscle and organs (about 50), so fat is excluded. Bone begins above the usual values of
+// contrast agent and calcified tissue.
 constexpr Row kPresets[] = {{kSkinPreset, -300}, {kSoftTissuePreset, -25}, {kBonePreset, 250}};
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Iso-values that suit a kind of volume.
+// Suggested iso-values for kinds of volumes.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace isomesh::volume {
 
-// The presets of a CT in Hounsfield units that lie within the range of the samples. Other
-// modalities have none, nor has a CT whose rescale type (0028,1054) is another unit.
+// The presets of a CT in Hounsfield units that are within the range of the samples. Empty for other
+// modalities, and for a CT with another rescale type (0028,1054).
 std::vector<Preset> presets_for(std::string_view modality, std::string_view rescale_type,
                                 const std::array<double, 2>& range);
 

@@ -65,7 +65,7 @@ std::optional<std::string_view> PreviewNrrd::next() {
   return bytes_;
 }
 
-// Adds rows of one slice, and returns how many samples they have.
+// Adds rows of one slice, and returns their number of samples.
 std::uint64_t PreviewNrrd::add_rows() {
   const CanonicalHeader& header = volume_->header();
   const std::uint64_t width = header.dims[0];
@@ -114,7 +114,7 @@ void PreviewNrrd::add_row(const std::byte* samples, std::size_t row) {
 
 void PreviewNrrd::end_layer() {
   for (std::size_t at = 0; at < sums_.size(); ++at) {
-    // Without a number the mean is none either, and black.
+    // Without any number the mean is NaN, which is black.
     bytes_ += static_cast<char>(grey(sums_[at] / counts_[at], choice_.window));
   }
   std::ranges::fill(sums_, 0);

@@ -1,4 +1,4 @@
-// A whole volume, reduced and in eight bits: what a client can hold and draw at once.
+// A downsampled 8-bit copy of a volume, small enough for a client to hold and draw.
 #pragma once
 
 #include <array>
@@ -16,27 +16,27 @@ namespace isomesh::volume {
 
 struct PreviewChoice {
   std::uint32_t most = 128;           // samples along each axis; at least 1
-  std::array<double, 2> window = {};  // what becomes 0 and what becomes 255
+  std::array<double, 2> window = {};  // mapped to 0 and to 255
 };
 
-// An NRRD file (uint8, raw, space left-posterior-superior) that is made piece by piece, as it is
-// sent. Along each axis the same whole number of samples, the smallest that leaves at most `most`,
-// becomes one: their mean, without those that are no numbers, in eight bits over the window. The
-// last of an axis may be the mean of fewer. A sample's place is the middle of a whole block.
+// An NRRD file (uint8, raw, space left-posterior-superior), generated in pieces while it is sent.
+// Along each axis the same number of samples, the smallest that leaves at most `most`, is averaged,
+// ignoring NaN, and mapped to eight bits by the window. The last block of an axis may be smaller. A
+// sample's position is the centre of a full block.
 //
-// The bytes depend on the volume and the choice alone. Not thread safe.
+// The bytes depend only on the volume and the choice. Not thread safe.
 class PreviewNrrd {
  public:
   PreviewNrrd(std::shared_ptr<const CanonicalFile> volume, const PreviewChoice& choice);
 
-  // Samples that one call of next() reads at most, but for the rest of a row.
+  // Limit of samples read per call of next(), rounded up to a whole row.
   static constexpr std::size_t kSamplesPerPiece = std::size_t{1} << 20;
 
-  // Bytes of the whole file.
+  // The size of the whole file in bytes.
   std::uint64_t size() const;
 
-  // The next bytes of the file; nothing at its end. A piece may be empty. Throws Error
-  // kUnusableVolume when the volume's file has become shorter, kInternal when the disk fails.
+  // Returns the next bytes of the file, possibly none; empty at its end. Throws Error
+  // kUnusableVolume if the volume's file was truncated, kInternal if reading fails.
   std::optional<std::string_view> next();
 
  private:
@@ -48,12 +48,12 @@ class PreviewNrrd {
 
   std::shared_ptr<const CanonicalFile> volume_;
   PreviewChoice choice_;
-  std::array<std::uint32_t, 3> block_ = {};  // samples along each axis that become one
-  std::array<std::uint32_t, 3> dims_ = {};   // what is left
+  std::array<std::uint32_t, 3> block_ = {};  // samples averaged along each axis
+  std::array<std::uint32_t, 3> dims_ = {};   // of the result
   bool has_begun_ = false;
-  std::uint32_t row_ = 0;  // the next to be read
+  std::uint32_t row_ = 0;  // the next to read
   std::uint32_t slice_ = 0;
-  std::vector<double> sums_;  // of the layer that is being made
+  std::vector<double> sums_;  // of the present layer
   std::vector<std::uint32_t> counts_;
   std::vector<std::byte> rows_;  // of the file
   std::string bytes_;

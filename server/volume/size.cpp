@@ -12,7 +12,7 @@
 namespace isomesh::volume {
 namespace {
 
-// Throws for the sizes that a request names, as volume_dims does for those in a file.
+// Checks the sizes of a request, as volume_dims does for a file.
 void check_dims(const RawDescription& description) {
   const std::array<std::uint64_t, 3> sizes = {description.dims[0], description.dims[1],
                                               description.dims[2]};

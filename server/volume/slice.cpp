@@ -15,12 +15,12 @@ namespace isomesh::volume {
 namespace {
 
 constexpr std::size_t kBlockBytes = 64 * 1024;
-// Samples that lie closer together than this are read with what is between them.
+// Samples closer together than this are read with the bytes between them.
 constexpr std::size_t kCloseBytes = 4096;
 constexpr std::size_t kReadBytes = std::size_t{1} << 20;
-constexpr int kCompression = 3;  // higher levels take much longer for a tenth fewer bytes
+constexpr int kCompression = 3;  // higher levels take much longer for 10 % fewer bytes
 
-// Which of the volume's axes run along a picture's columns and rows.
+// The volume's axes along a picture's columns and rows.
 struct Plane {
   std::size_t fixed;
   std::size_t column;
@@ -44,7 +44,7 @@ void append(png_struct* png, png_byte* data, std::size_t size) {
   try {
     bytes->append(reinterpret_cast<const char*>(data), size);
   } catch (...) {
-    png_error(png, "out of memory");  // an exception must not cross the library
+    png_error(png, "out of memory");  // an exception must not pass through the library
   }
 }
 
@@ -56,8 +56,8 @@ void be_silent(png_struct* /*png*/, const char* /*message*/) {}
 
 }  // namespace
 
-// The library's state. libpng reports errors by longjmp, so each function below sets the place to
-// jump to itself, and has no local objects with destructors, which a jump would pass over.
+// The library's state. libpng reports errors by longjmp. So each function below calls setjmp
+// itself, and has no local objects with destructors, which a jump would skip.
 struct SlicePng::Writer {
   explicit Writer(std::string& bytes) {
     png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, jump, be_silent);
@@ -76,7 +76,7 @@ struct SlicePng::Writer {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
     png_set_IHDR(png, info, width, height, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    const double across = 1000 / spacing[0];  // pixels a metre
+    const double across = 1000 / spacing[0];  // pixels per metre
     const double down = 1000 / spacing[1];
     constexpr double kMost = 2147483647;
     if (std::min(across, down) >= 1 && std::max(across, down) <= kMost) {
@@ -151,7 +151,7 @@ std::optional<std::string_view> SlicePng::next() {
   return bytes_;
 }
 
-// Writes the end of the file after the last row.
+// After the last row, writes the end of the file.
 void SlicePng::write_row() {
   if (next_row_ < height_) {
     read_row(next_row_);

@@ -1,4 +1,4 @@
-// One slice of a canonical volume as an 8-bit grey PNG.
+// A slice of a canonical volume as an 8-bit grey PNG.
 #pragma once
 
 #include <array>
@@ -16,23 +16,22 @@ namespace isomesh::volume {
 
 enum class Axis { kX, kY, kZ };
 
-// Empty for a name that is not "x", "y" or "z".
+// Empty unless the name is "x", "y" or "z".
 std::optional<Axis> axis_of(std::string_view name);
 std::string_view to_string(Axis axis);
 
 struct SliceChoice {
-  Axis axis = Axis::kZ;               // which index is fixed
-  std::uint32_t index = 0;            // at which sample; below the volume's size along the axis
-  std::array<double, 2> window = {};  // what becomes black and what becomes white
+  Axis axis = Axis::kZ;               // the fixed index
+  std::uint32_t index = 0;            // less than the volume's size along the axis
+  std::array<double, 2> window = {};  // mapped to black and to white
 };
 
-// A PNG that is encoded piece by piece, as it is sent, and reads only the samples of its slice. The
-// picture's columns run along x (along y for the axis x), its rows along y (along z for the axes x
-// and y); the first row and column are sample 0, and nothing is mirrored. Samples at or below
-// window[0] are black, those at or above window[1] white, and those between are grey in proportion;
-// what is no number is black. The picture tells the size of its pixels (pHYs).
+// A PNG encoded in pieces while it is sent; reads only the samples of its slice. Columns run along
+// x (along y for the axis x), rows along y (along z for the axes x and y), both from sample 0,
+// without mirroring. Samples up to window[0] and NaN are black, from window[1] on white, linear
+// between them. The picture has its pixels' size (pHYs).
 //
-// The bytes depend on the volume and the choice alone. Not thread safe.
+// The bytes depend only on the volume and the choice. Not thread safe.
 class SlicePng {
  public:
   // Throws Error kInternal.
@@ -41,12 +40,11 @@ class SlicePng {
   SlicePng(const SlicePng&) = delete;
   SlicePng& operator=(const SlicePng&) = delete;
 
-  // The samples that one call of next() looks at, but for the last row.
+  // Limit of samples processed per call of next(), rounded up to a whole row.
   static constexpr std::size_t kSamplesPerPiece = std::size_t{1} << 20;
 
-  // The next bytes of the file; nothing at its end. A piece may be empty: what is of one grey
-  // makes few bytes of many samples. Throws Error kInternal, and kUnusableVolume when the file has
-  // become shorter.
+  // Returns the next bytes of the file, possibly none, because uniform areas compress well; empty
+  // at its end. Throws Error kInternal, and kUnusableVolume if the file was truncated.
   std::optional<std::string_view> next();
 
  private:
@@ -64,7 +62,7 @@ class SlicePng {
   std::uint32_t next_row_ = 0;
   std::vector<std::uint8_t> row_;
   std::vector<std::byte> block_;  // of the file
-  std::string bytes_;             // encoded; next() has returned the first taken_ of them
+  std::string bytes_;             // encoded; next() returned the first taken_ of them
   std::size_t taken_ = 0;
   std::unique_ptr<Writer> writer_;
 };

@@ -21,7 +21,7 @@ std::span<const Sample> as(std::span<const std::byte> bytes) {
 template <class Sample>
 std::vector<std::uint64_t> count_samples(std::span<const Sample> samples, const Bins& bins) {
   std::vector<std::uint64_t> counts(bins.count);
-  // Halves, because the difference of two doubles may be beyond the largest double.
+  // Halved, because the difference of two doubles may overflow.
   const double low = bins.range[0] / 2;
   const double width = bins.range[1] / 2 - low;
   for (const Sample sample : samples) {
@@ -98,7 +98,7 @@ Statistics measure_wide(std::span<const Sample> samples) {
 template <class Sample>
 Statistics measure_samples(std::span<const Sample> samples) {
   if constexpr (sizeof(Sample) <= 2) {
-    // A count for each possible value fits into memory, so the range need not be found first.
+    // One count per possible value fits into memory, so the range is not needed first.
     constexpr std::size_t kValues = std::size_t{1} << (8 * sizeof(Sample));
     constexpr std::int64_t kLowest = std::is_signed_v<Sample> ? -std::int64_t{kValues / 2} : 0;
     return from_value_counts(count_values(samples, kLowest, kValues), kLowest);
@@ -152,8 +152,7 @@ double otsu_threshold(std::span<const std::uint64_t> counts, const std::array<do
     last = bin;
   }
 
-  // The threshold lies midway between the middles of the two bins; of a single bin it is the
-  // middle.
+  // The threshold is midway between the centres of the two bins; for a single bin its centre.
   const double at = (static_cast<double>(best_lower + best_upper) + 1) / 2;
   const double half_bin = (range[1] / 2 - range[0] / 2) / static_cast<double>(counts.size());
   return range[0] + half_bin * at + half_bin * at;

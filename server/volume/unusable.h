@@ -1,4 +1,4 @@
-// Refusals of volumes, all as Error kUnusableVolume with a reason that is a sentence.
+// Throws Error kUnusableVolume with a sentence as its reason.
 #pragma once
 
 #include <string>
@@ -11,15 +11,15 @@ namespace isomesh::volume {
 
 [[noreturn]] void throw_unusable(const std::string& reason);
 
-// Of a stored volume whose bytes are not those any more that were stored.
+// For a stored volume whose bytes have changed.
 [[noreturn]] void throw_damaged();
 
-// Throws a refusal that a person may overrule with `accept=` and the name of `code`, which is an
-// acceptable one. Not to be called where the import's options accept it.
+// Throws an error that `accept=` with the name of `code` overrides; `code` must be acceptable. Do
+// not call it if the import's options accept `code`.
 [[noreturn]] void throw_overridable(NoteCode code, const std::string& reason);
 
-// Throws a refusal that lists what to choose from. The reason is to say how many there are and how
-// they differ; the list is cut after some hundreds.
+// Throws an error with choices. The reason states their number and their difference; the list is
+// truncated to a few hundred.
 [[noreturn]] void throw_choice(const std::string& reason, std::vector<Choice> choices);
 
 }  // namespace isomesh::volume

@@ -1,4 +1,4 @@
-// Part of every test program that runs under AddressSanitizer: what LeakSanitizer is told.
+// Linked into every test program under AddressSanitizer: options of LeakSanitizer.
 
 extern "C" {
 // NOLINTBEGIN: the names that it looks for
@@ -7,7 +7,7 @@ const char* __lsan_default_options();
 // NOLINTEND
 }
 
-// Strangers read our files. lib3mf leaves some of libzip's sources to nobody, and ITK's NrrdIO does
-// not free what it has read of a header that it refuses.
+// Leaks of libraries with untrusted files: lib3mf leaks some of libzip's sources, and ITK's NrrdIO
+// leaks rejected headers.
 const char* __lsan_default_suppressions() { return "leak:libzip.so\nleak:libITKNrrdIO\n"; }
 const char* __lsan_default_options() { return "print_suppressions=0"; }

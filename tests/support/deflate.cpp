@@ -8,7 +8,7 @@
 namespace isomesh::test {
 namespace {
 
-// `window_bits` tell zlib what is put around the stream.
+// `window_bits` select the stream's wrapping in zlib.
 std::string deflated(std::string_view bytes, int window_bits) {
   z_stream stream = {};
   if (deflateInit2(&stream, 6, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
@@ -33,7 +33,7 @@ std::string zlib(std::string_view bytes) { return deflated(bytes, MAX_WBITS); }
 std::string raw_deflate(std::string_view bytes) { return deflated(bytes, -MAX_WBITS); }
 
 std::string bzip2(std::string_view bytes) {
-  constexpr std::size_t kMostOverhead = 600;  // beside a hundredth of the bytes
+  constexpr std::size_t kMostOverhead = 600;  // beside 1 % of the bytes
   std::string source(bytes);
   std::string packed(source.size() + source.size() / 100 + kMostOverhead, '\0');
   auto size = static_cast<unsigned>(packed.size());

@@ -1,4 +1,4 @@
-// Bytes as compressed files hold them.
+// Compresses bytes for test files.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace isomesh::test {
 
-// One DEFLATE stream within gzip's header and checksum, within zlib's, and bare. Throw
-// std::runtime_error when zlib has no memory.
+// One DEFLATE stream in gzip's wrapping, in zlib's, and raw. Throw std::runtime_error if zlib has
+// no memory.
 std::string gzip(std::string_view bytes);
 std::string zlib(std::string_view bytes);
 std::string raw_deflate(std::string_view bytes);

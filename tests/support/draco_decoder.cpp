@@ -11,7 +11,7 @@
 namespace isomesh::test {
 namespace {
 
-// Reads values one after the other from binary bytes.
+// Reads consecutive binary values.
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : bytes_(bytes) {}
@@ -31,7 +31,7 @@ class Reader {
   std::string_view bytes_;
 };
 
-// The counts that a header of exactly the properties below tells; the command writes no others.
+// The counts in a header with exactly the properties below; the command writes no others.
 struct Header {
   std::size_t bytes = 0;
   std::size_t vertices = 0;

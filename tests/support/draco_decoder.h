@@ -1,4 +1,4 @@
-// What Debian's draco_decoder makes of a Draco stream.
+// Decodes a Draco stream with Debian's draco_decoder.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@ struct DecodedMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-// Runs the command on the stream. Throws std::runtime_error with its words when it is not there or
-// refuses, or when what it writes is not a mesh.
+// Runs the command on the stream. Throws std::runtime_error with its message if it is missing or
+// fails, or if its output is not a mesh.
 DecodedMesh decode_with_command(std::string_view drc);
 
 }  // namespace isomesh::test

@@ -8,7 +8,7 @@
 
 namespace isomesh::test {
 
-// All names of an enumeration whose values are numbered without gaps, in order.
+// All names of an enumeration with consecutive values, in order.
 template <class Enum>
 std::vector<std::string> names() {
   std::vector<std::string> all;

@@ -1,4 +1,4 @@
-// What tests say about exceptions.
+// Assertions on exceptions.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace isomesh::test {
 
-// The Error that `action` throws; empty when it throws nothing.
+// The Error that `action` throws; empty if it throws nothing.
 inline std::optional<Error> thrown_by(const std::function<void()>& action) {
   try {
     action();
@@ -25,7 +25,7 @@ inline std::optional<ErrorCode> code_thrown_by(const std::function<void()>& acti
   return error ? std::optional(error->code()) : std::nullopt;
 }
 
-// The names of the fields that are at fault.
+// The names of the invalid fields.
 inline std::vector<std::string> fields_of(const Error& error) {
   std::vector<std::string> names;
   for (const FieldError& field : error.fields()) names.push_back(field.field);

@@ -10,7 +10,7 @@
 
 namespace isomesh::test {
 
-// A new, empty folder that is removed with all it holds when it goes.
+// A new, empty folder; the destructor removes it with its content.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -25,17 +25,17 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-// Throw std::runtime_error that names the file.
+// Throw std::runtime_error with the file's name.
 void write_file(const std::filesystem::path& path, std::string_view content);
 std::string read_file(const std::filesystem::path& path);
 
 // All regular files below a folder, as sorted paths relative to it.
 std::vector<std::string> files_below(const std::filesystem::path& folder);
 
-// The blobs of a data folder, in the same form.
+// The same for the blobs of a data folder.
 std::vector<std::string> blobs_below(const std::filesystem::path& data);
 
-// The bytes that an array occupies, and back to text.
+// Converts arrays to bytes, and back to text.
 template <class T>
 std::string bytes_of(const std::vector<T>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};

@@ -1,1 +1,1 @@
-// Nothing but the precompiled header that test programs share is wanted of this library.
+// This library exists only for the precompiled header that test programs share.

@@ -1,4 +1,4 @@
-// What tests ask a store of jobs.
+// Helpers for jobs in stores.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace isomesh::test {
 
-// The job when it is in a final state, or after kLongest without an event of it.
+// The job in its final state, or after kLongest without an event.
 inline Job end_of(const store::JobStore& jobs, const store::Viewer& viewer, const std::string& id) {
   std::uint64_t since = 0;
   while (true) {

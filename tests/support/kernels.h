@@ -1,4 +1,4 @@
-// Short ways for tests to run the kernels.
+// Short forms for running the kernels.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace isomesh::test {
 
-// Counts and extracts, into the memory of `mesh`.
+// Counts and extracts into `mesh`, reusing its memory.
 template <class T>
 void extract_into(mesh::Mesh& mesh, const SampleVolume<T>& volume,
                   const mesh::ExtractOptions& options, const mesh::Context& context = {}) {
@@ -40,8 +40,8 @@ inline mesh::Mesh mesh_of(const std::vector<mesh::Vec3>& positions,
   return mesh;
 }
 
-// Runs the kernels on another number of threads for as long as it lives. Not for tests that run
-// kernels at the same time.
+// Changes the kernels' number of threads during its lifetime. Not for tests that run kernels
+// concurrently.
 class ThreadCount {
  public:
   explicit ThreadCount(int threads) : before_(mesh::thread_count()) {

@@ -62,7 +62,7 @@ class LabelReferenceBuilder {
     return corners;
   }
 
-  // The samples of neither label.
+  // The samples with neither label.
   Group others(const Group& a, const Group& b) const {
     Group others;
     for (const auto& [label, group] : groups_) {
@@ -88,7 +88,7 @@ class LabelReferenceBuilder {
             vertex({a, b, rest[1]})};
   }
 
-  // By the means of the samples, whatever becomes of vertices at the border.
+  // Oriented by the means of the samples, regardless of how border vertices move.
   void turn_to_front(const Group& front, const Group& back, LabelPatch& patch) const {
     const auto spot = [&](std::size_t n) {
       return to_space(reference_.to_space, mean(reference_.vertices[patch.corners[n]].samples));
@@ -97,7 +97,7 @@ class LabelReferenceBuilder {
     const Point to_front = minus(to_space(reference_.to_space, mean(front)),
                                  to_space(reference_.to_space, mean(back)));
     if (dot(normal, to_front) > 0) return;
-    // The first corner stays the first: a cut from it stays the same cut.
+    // Keeps the first corner, so a cut from it stays the same.
     std::reverse(patch.corners.begin() + 1, patch.corners.end());
   }
 
@@ -109,7 +109,7 @@ class LabelReferenceBuilder {
     return place->second;
   }
 
-  // In the volume's own numbers.
+  // In the volume's own indices.
   Point mean(const Group& samples) const {
     Point sum = {0, 0, 0};
     for (const Sample& sample : samples) {
@@ -120,7 +120,7 @@ class LabelReferenceBuilder {
     return sum;
   }
 
-  // Next to a phantom half-way to it, else in the middle of all.
+  // Half-way to an adjacent phantom, otherwise the mean of all.
   Point place_of(const Group& samples) const {
     Group inner;
     Group phantoms;
@@ -171,10 +171,10 @@ class LabelReferenceBuilder {
   std::map<Group, std::uint32_t> numbers_;
 };
 
-// What is not right, or nothing.
+// The error, or empty.
 using Complaint = std::string;
 
-// All places are multiples of a twelfth of the lattice's steps.
+// All positions are multiples of a twelfth of the lattice's steps.
 using Twelfths = std::array<std::int64_t, 3>;
 
 Twelfths twelfths(const Point& at) {
@@ -183,7 +183,7 @@ Twelfths twelfths(const Point& at) {
   return result;
 }
 
-// The reference's vertex of each of the mesh.
+// The reference's vertex for each vertex of the mesh.
 Complaint name_vertices(const mesh::Mesh& mesh, const LabelReference& reference,
                         std::vector<std::uint32_t>& names) {
   std::map<Twelfths, std::uint32_t> places;
@@ -226,7 +226,7 @@ class TriangleBag {
  public:
   void add(const NamedTriangle& triangle) { ++counts_[triangle]; }
 
-  // Takes all of them out, if they are there.
+  // Removes all of them if all are present.
   bool take(const std::vector<NamedTriangle>& triangles) {
     for (const NamedTriangle& triangle : triangles) {
       if (!counts_.contains(triangle)) return false;

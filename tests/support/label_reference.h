@@ -1,6 +1,6 @@
-// The separating surface of labels the slow and obvious way, to hold the kernels against:
-// tetrahedron by tetrahedron over the paper's Table 1, vertices found in a map by the samples that
-// they lie between, winding found from where the labels lie. Shares no code with the kernels.
+// A slow and simple separating surface of labels, as a reference for the kernels: tetrahedron by
+// tetrahedron over the paper's Table 1, vertices found in a map by their adjacent samples, winding
+// from the labels' positions. Shares no code with the kernels.
 #pragma once
 
 #include <array>
@@ -17,19 +17,19 @@
 namespace isomesh::test {
 
 // A vertex of an edge, a face or a tetrahedron, by its two to four samples, in the volume's own
-// numbers plus one layer of phantoms where the surface is closed.
+// indices plus one layer of phantoms if the surface is closed.
 struct LabelVertex {
   std::vector<Sample> samples;
-  Point at;  // in units of the lattice, in the volume's own numbers
+  Point at;  // in lattice units, in the volume's own indices
   bool on_border = false;
 };
 
-// A piece of one wall in one tetrahedron: three or four corners, counter-clockwise from `front`.
+// One wall's polygon in one tetrahedron: three or four corners, counter-clockwise from `front`.
 struct LabelPatch {
   std::vector<std::uint32_t> corners;
   mesh::WallSides sides;
   std::uint32_t layer = 0;      // k of its cell
-  bool only_first_cut = false;  // between the first and the third corner, and not the other way
+  bool only_first_cut = false;  // between the first and the third corner, not the other diagonal
 };
 
 struct LabelReference {
@@ -45,9 +45,9 @@ template <class T>
 LabelReference label_reference(const mesh::Lattice<T>& lattice,
                                const mesh::SeparateOptions& options);
 
-// The same surface: every vertex is the reference's, one to one, in its place and its layer; every
-// patch is there between the same labels with the same winding and in its layer, and nothing else
-// is; on_line and on_border are right.
+// True if the surfaces are equal: vertices correspond one to one, in position and layer; exactly
+// the reference's patches exist, with their labels, winding and layer; on_line and on_border are
+// right.
 testing::AssertionResult matches(const mesh::SeparatingSurface& surface,
                                  const LabelReference& reference);
 

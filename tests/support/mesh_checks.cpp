@@ -21,7 +21,7 @@ Point cross(const Point& a, const Point& b) {
 
 double length(const Point& a) { return std::sqrt(dot(a, a)); }
 
-// Groups of elements that were joined directly or over others.
+// Disjoint sets of elements (union-find).
 class Groups {
  public:
   explicit Groups(std::size_t count) : parent_(count) {
@@ -41,7 +41,7 @@ class Groups {
   std::vector<std::uint32_t> parent_;
 };
 
-// One list per vertex, held end to end.
+// One list per vertex, stored contiguously.
 template <class T>
 class Lists {
  public:
@@ -79,7 +79,7 @@ Lists<LinkEdge> links_of(const Surface& surface) {
   return links;
 }
 
-// Whether the edges of a link form one path or one cycle when followed in their direction.
+// True if the edges of a link, in their direction, form one path or one cycle.
 bool is_one_fan(std::span<const LinkEdge> link) {
   const auto leaving = [&](std::uint32_t v) {
     return std::find_if(link.begin(), link.end(), [&](const LinkEdge& e) { return e[0] == v; });
@@ -207,7 +207,7 @@ ExtentFacts extent_of(const Surface& surface, const Point& apex) {
     const Point pa = minus(surface.points[a], apex);
     const Point pb = minus(surface.points[b], apex);
     const Point pc = minus(surface.points[c], apex);
-    // Differences of the points themselves: those of floats are exact in double.
+    // Differences of the points: exact in double for floats.
     const Point ab = minus(surface.points[b], surface.points[a]);
     const Point ac = minus(surface.points[c], surface.points[a]);
     const double area = length(cross(ab, ac)) / 2;

@@ -1,4 +1,4 @@
-// The checks must find what they look for, or every test that uses them proves nothing.
+// Tests of the checks themselves: they must detect errors.
 #include "tests/support/mesh_checks.h"
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// The corner of a cube that is cut off at 1, 2 and 3: six times its volume is 6.
+// A cube's corner, cut off at 1, 2 and 3: six times its volume is 6.
 Surface tetrahedron() {
   return {{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}},
           {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};

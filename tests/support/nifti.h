@@ -13,9 +13,9 @@ inline constexpr double kBrainIso = 60;
 // 116 regions of that brain, each a label.
 inline constexpr const char* kAtlasFile = "/usr/share/mricron/templates/aal.nii.gz";
 
-// The samples of a gzipped little-endian NIfTI-1 file of uint8 with three dimensions, with the
-// identity as geometry whatever the file says. Throws std::runtime_error that names the file when
-// it is missing or anything else.
+// The samples of a gzipped little-endian NIfTI-1 file of uint8 with three dimensions; the geometry
+// is always the identity. Throws std::runtime_error with the file's name if it is missing or of
+// another kind.
 SampleVolume<std::uint8_t> read_nifti_samples(const std::filesystem::path& path);
 
 }  // namespace isomesh::test

@@ -8,7 +8,7 @@
 namespace isomesh::test {
 namespace {
 
-// The length of a chunk is before its name, its data after it.
+// A chunk's length precedes its name, its data follows it.
 std::uint32_t number_at(const std::string& bytes, std::size_t at) {
   std::uint32_t number = 0;
   for (std::size_t i = at; i < at + 4; ++i) {

@@ -14,7 +14,7 @@ namespace {
 // "nobody" and its group on Debian.
 constexpr uid_t kNobody = 65534;
 
-// Debian has a folder for each version, and no links to what only servers need.
+// Debian has a folder per version, and no links to programs of servers.
 std::filesystem::path programs() {
   std::filesystem::path newest;
   std::error_code absent;
@@ -42,7 +42,7 @@ Postgres::Postgres(Disk disk) : disk_(disk) {
   give_folder();
   run_program("initdb", {"--pgdata", folder_ / "data", "--username", "isomesh", "--auth", "trust",
                          "--encoding", "UTF8", "--locale", "C", "--no-sync", "--no-instructions"});
-  // All others are trusted.
+  // All other roles are trusted.
   const std::filesystem::path rules = folder_ / "data/pg_hba.conf";
   write_file(rules, "local all guarded scram-sha-256\n" + read_file(rules));
   start();
@@ -67,7 +67,7 @@ void Postgres::run_program(const std::string& program,
 
 Postgres::~Postgres() { stop_at_once(); }
 
-// It ends with the test, whatever ends that.
+// The server ends with the test's process, however that ends.
 std::vector<std::string> Postgres::command(const std::string& program,
                                            const std::vector<std::string>& arguments) const {
   std::vector<std::string> words = {"setpriv", "--pdeathsig", "QUIT"};
@@ -84,7 +84,7 @@ void Postgres::start() {
   std::vector<std::string> arguments = {"-D", folder_ / "data", "-k", folder_.path().string()};
   std::vector<std::string> settings = {"listen_addresses=", "shared_buffers=32MB",
                                        "max_connections=300", "jit=off",
-                                       // It would hold back events for as long as it counts rows.
+                                       // It would delay events while it counts rows.
                                        "autovacuum=off", "log_min_messages=fatal"};
   if (disk_ == Disk::kReplicated) settings.emplace_back("synchronous_standby_names=*");
   if (disk_ == Disk::kFast) {

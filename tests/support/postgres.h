@@ -1,5 +1,5 @@
-// A PostgreSQL of the test's own: a new cluster in a temporary folder, reached by a socket there
-// and by nothing else, run by an unprivileged user where root runs the tests.
+// A PostgreSQL cluster of the test, in a temporary folder, reachable only by a socket there. It
+// runs as an unprivileged user if root runs the tests.
 #pragma once
 
 #include <filesystem>
@@ -14,15 +14,15 @@ namespace isomesh::test {
 
 class Postgres {
  public:
-  // Whether its programs are installed; what needs them is skipped aloud otherwise.
+  // True if its programs are installed; otherwise tests report that they are skipped.
   static bool is_here();
 
-  // One for all tests of this program, started when it is asked for first. Without fsync: nobody
-  // cuts its power.
+  // Shared by all tests of this program, started on first use. Without fsync: it needs no crash
+  // safety.
   static Postgres& shared();
 
-  // kReplicated: nothing is committed before a standby has it, too.
-  // A role `guarded`, once it is created, needs its password; all others are trusted.
+  // kReplicated: commits wait for a standby. A role `guarded`, if created, needs its password; all
+  // others are trusted.
   enum class Disk { kFast, kDurable, kReplicated };
   explicit Postgres(Disk disk = Disk::kFast);
   struct StandbyOf {
@@ -33,26 +33,26 @@ class Postgres {
   Postgres(const Postgres&) = delete;
   Postgres& operator=(const Postgres&) = delete;
 
-  // A new place for tables that nobody else uses, as a URL for --store.
+  // A new, unused place for tables, as a URL for --store.
   std::string new_place();
 
-  // The same place on whichever of the two takes writes.
+  // The same place on whichever of the two accepts writes.
   std::string or_on(const Postgres& other, const std::string& place) const;
 
-  // Runs SQL there; the first column of the last row, empty without one. Throws
+  // Runs SQL; returns the first column of the last row, empty if there is none. Throws
   // std::runtime_error.
   static std::string ask(const std::string& url, const std::string& sql);
 
-  // As `pg_ctl -m immediate`: at once, and what was not on the disk is recovered from the log.
+  // As `pg_ctl -m immediate`: stops at once; the next start recovers from the log.
   void stop_at_once();
   void start();
-  // All of its processes stop, but their connections stay.
+  // Suspends all processes; connections stay open.
   void stand_still();
   void go_on();
 
-  // One that was stopped starts anew as the standby of that one.
+  // Starts a stopped cluster as the standby of `primary`.
   void follow(const Postgres& primary);
-  // The standby takes writes from now on.
+  // Makes the standby accept writes.
   void promote();
 
  private:
@@ -60,7 +60,7 @@ class Postgres {
   std::vector<std::string> command(const std::string& program,
                                    const std::vector<std::string>& arguments) const;
   std::string url_of(const std::string& options) const;
-  // Runs one of PostgreSQL's programs. Throws std::runtime_error when it fails.
+  // Runs one of PostgreSQL's programs. Throws std::runtime_error if it fails.
   void run_program(const std::string& program, const std::vector<std::string>& arguments) const;
   void give_folder() const;
 

@@ -30,7 +30,7 @@ std::vector<char*> pointers_to(std::vector<std::string>& words) {
   return pointers;
 }
 
-// Where a child's standard streams go.
+// The files of a child's standard streams.
 class Streams {
  public:
   explicit Streams(const TemporaryFolder& folder) {
@@ -76,7 +76,7 @@ Process::~Process() {
 std::string Process::first_line() {
   std::string text;
   const bool came = eventually([&] {
-    const bool ended = has_ended();  // looked at first, or a last line could be missed
+    const bool ended = has_ended();  // checked first, otherwise a last line could be missed
     text = output();
     return ended || text.find('\n') != std::string::npos;
   });
@@ -122,7 +122,7 @@ struct Status {
   pid_t parent = 0;
 };
 
-// Empty when the process has ended, whether it has been waited for or not.
+// Empty if the process has ended, even if it was not waited for.
 std::optional<Status> status_of(const std::string& process) {
   std::ifstream file("/proc/" + process + "/stat");
   std::string line;

@@ -1,4 +1,4 @@
-// Programs that tests start. Nothing of the caller's ISOMESH_... environment reaches them.
+// Runs programs for tests. They do not inherit ISOMESH_... variables.
 #pragma once
 
 #include <chrono>
@@ -14,22 +14,22 @@
 
 namespace isomesh::test {
 
-// Far beyond what anything takes, also under a sanitizer on a busy machine.
+// Far above any real duration, also under a sanitizer on a busy machine.
 inline constexpr std::chrono::seconds kLongest{120};
 
 class Process {
  public:
-  // Starts the command; a first word without a slash is looked for in PATH. `environment` holds
-  // NAME=VALUE. Throws std::runtime_error when it cannot be started.
+  // Starts the command; a first word without a slash is searched for in PATH. `environment` holds
+  // NAME=VALUE. Throws std::runtime_error if it cannot be started.
   explicit Process(const std::vector<std::string>& command,
                    const std::vector<std::string>& environment = {});
-  // Kills it when it still runs.
+  // Kills it if it still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // The first line of its standard output, as soon as there is one; what there is of it when it
-  // ends before. Throws std::runtime_error after kLongest.
+  // Waits for the first line of its standard output; returns an incomplete one if it ends before.
+  // Throws std::runtime_error after kLongest.
   std::string first_line();
 
   pid_t id() const { return pid_; }
@@ -37,11 +37,11 @@ class Process {
   void send_signal(int number) const;
   pid_t pid() const { return pid_; }
 
-  // Its exit status; 128 and the signal's number when a signal ended it. Throws std::runtime_error
+  // Its exit status, or 128 plus the number of the signal that ended it. Throws std::runtime_error
   // after kLongest.
   int wait();
 
-  // Whether it ends within that time.
+  // True if it ends within that time.
   bool ends_within(std::chrono::seconds longest);
 
   std::string output() const;
@@ -65,13 +65,13 @@ struct Finished {
 Finished run(const std::vector<std::string>& command,
              const std::vector<std::string>& environment = {});
 
-// The processes whose parent is `parent` and that have not ended.
+// The running processes whose parent is `parent`.
 std::set<pid_t> children_of(pid_t parent);
 
-// The name of a process's program, at most 15 letters of it; empty when the process has ended.
+// The name of a process's program, at most 15 letters; empty if it has ended.
 std::string program_of(pid_t process);
 
-// Calls `condition` until it is true; false when it is not within that time.
+// Calls `condition` until it is true; returns false if that takes too long.
 bool eventually(const std::function<bool()>& condition, std::chrono::seconds longest = kLongest);
 
 }  // namespace isomesh::test

@@ -1,4 +1,4 @@
-// A receiver of callbacks: keeps what comes and answers as it is told.
+// A receiver of callbacks that records requests and sends configured responses.
 #pragma once
 
 #include <cstddef>
@@ -15,11 +15,11 @@ struct Received {
   std::map<std::string, std::string> headers;  // names in lower case
 };
 
-// Listens on a free port of loopback until it goes. Thread safe.
+// Listens on a free port of loopback during its lifetime. Thread safe.
 class Receiver {
  public:
-  // Answers with those statuses, one after the other, and with the last for ever; 0 is no answer
-  // until the receiver goes.
+  // Responds with the statuses in order, and then always with the last; 0 is no response until the
+  // receiver is destroyed.
   explicit Receiver(std::vector<int> statuses = {204});
   ~Receiver();
   Receiver(const Receiver&) = delete;
@@ -32,10 +32,10 @@ class Receiver {
 
   std::vector<Received> received() const;
 
-  // What it answers from now on.
+  // Sets the status of all later responses.
   void answer_with(int status);
 
-  // Whether so many requests come in time.
+  // Returns true if that many requests arrive in time.
   bool gets(std::size_t count) const;
 
  private:

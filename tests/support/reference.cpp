@@ -54,7 +54,7 @@ class ReferenceBuilder {
                  std::uint32_t layer) {
     std::vector<std::pair<Sample, Sample>> edges;
     if (inside.size() == 2) {
-      // Round the tetrahedron: neighbours share a sample.
+      // Around the tetrahedron: consecutive edges share a sample.
       edges = {{inside[0], outside[0]},
                {inside[0], outside[1]},
                {inside[1], outside[1]},
@@ -70,7 +70,7 @@ class ReferenceBuilder {
     mesh_.patches.push_back(std::move(patch));
   }
 
-  // Moving vertices along their edges never turns a patch over, so the middles tell for all.
+  // Moving vertices along their edges never flips a patch, so the midpoints suffice.
   bool faces_outside(const std::vector<std::pair<Sample, Sample>>& edges,
                      const std::vector<Sample>& inside, const std::vector<Sample>& outside) const {
     const auto middle = [&](std::size_t n) {
@@ -102,7 +102,7 @@ class ReferenceBuilder {
     return (std::uint64_t{s[2]} * mesh_.dims.y + s[1]) * mesh_.dims.x + s[0];
   }
 
-  // The difference of two large doubles does not overflow a long double.
+  // long double: the difference of two large doubles does not overflow.
   long double value(const Sample& s) const {
     if (mesh_.is_phantom(s)) return -std::numeric_limits<long double>::infinity();
     const mesh::Dims& dims = lattice_.dims;

@@ -1,4 +1,4 @@
-// The comparison of a mesh with the reference.
+// Compares a mesh with the reference.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,7 +14,7 @@
 namespace isomesh::test {
 namespace {
 
-// How much of a lattice unit the rounding of a position to float can be.
+// The largest error of rounding a position to float, in lattice units.
 double rounding_of(const ReferenceMesh& reference) {
   double largest = 0;
   const mesh::Dims& d = reference.dims;
@@ -29,7 +29,7 @@ double rounding_of(const ReferenceMesh& reference) {
   return 2e-6 + 0x1p-22 * largest / step;
 }
 
-// Vertices of the reference by where they are, in bins of the lattice.
+// The reference's vertices by position, in bins of the lattice.
 class VertexBins {
  public:
   explicit VertexBins(const ReferenceMesh& reference) {
@@ -39,7 +39,7 @@ class VertexBins {
     }
   }
 
-  // Calls visit(vertex) for all that may lie within `radius`, and some more.
+  // Calls visit(vertex) for all vertices within `radius`, and some others.
   template <class Visit>
   void for_each_near(const Point& p, double radius, const Visit& visit) const {
     for (std::int64_t z = bin(p[2] - radius); z <= bin(p[2] + radius); ++z) {
@@ -65,8 +65,8 @@ class VertexBins {
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> bins_;
 };
 
-// Where a point lies by an edge: the share of the way along it, and the distance from it, which
-// counts the ends: past them no point belongs to the edge.
+// A point relative to an edge: the fraction along it, and the distance from it. Points beyond the
+// ends have a distance too.
 struct EdgeCoordinates {
   double fraction;
   double distance;
@@ -80,7 +80,7 @@ EdgeCoordinates along_edge(const Point& p, const ReferenceVertex& vertex) {
   return {fraction, length(minus(p, nearest))};
 }
 
-// Between the exact fraction and the one that is kept off the ends, ends of that range included.
+// True between the exact fraction and the one clamped away from the ends, inclusive.
 bool fraction_is_right(double fraction, double exact, double rounding) {
   const double kept_off = std::clamp(exact, kEndMargin, 1 - kEndMargin);
   return fraction >= std::min(exact, kept_off) - rounding &&
@@ -94,7 +94,7 @@ std::string describe(const Point& p) {
 }
 
 // The reference's vertex for each of the mesh's, in `names`. Several can be close together, around
-// a sample that has the iso-value; the edge that runs through the point tells which it is.
+// a sample with the iso-value; then the edge through the point decides.
 testing::AssertionResult match_vertices(const Surface& surface, const ReferenceMesh& reference,
                                         std::vector<std::uint32_t>& names) {
   const double rounding = rounding_of(reference);
@@ -126,9 +126,8 @@ testing::AssertionResult match_vertices(const Surface& surface, const ReferenceM
   return testing::AssertionSuccess();
 }
 
-// A closed surface's vertices are near each other on the edges of the box, so they are told apart
-// by their order: that of the samples that own their edges, and at one sample that of the
-// directions.
+// On the edges of the box, vertices of a closed surface are close together and identified by their
+// order: by the sample that owns their edge, then by direction.
 std::vector<std::uint32_t> in_order_of_owners(const ReferenceMesh& reference) {
   const auto key = [&](std::uint32_t v) {
     const auto& [inside, outside, fraction] = reference.vertices[v];
@@ -145,8 +144,8 @@ std::vector<std::uint32_t> in_order_of_owners(const ReferenceMesh& reference) {
   return names;
 }
 
-// On the way from the inside sample to the border sample that the phantom is next to; across the
-// other faces of the box that the edge lies in it may have given way by up to a fifth.
+// Between the inside sample and the border sample adjacent to the phantom; along the normals of the
+// box's other faces it may have moved by up to a fifth.
 bool cap_place_is_right(const Point& p, const ReferenceVertex& vertex,
                         const ReferenceMesh& reference, double rounding) {
   const std::array counts = {reference.dims.x, reference.dims.y, reference.dims.z};
@@ -190,13 +189,13 @@ testing::AssertionResult match_closed_vertices(const mesh::Mesh& mesh,
 
 using NamedTriangle = std::array<std::uint32_t, 3>;
 
-// Rotated so that the smallest vertex is first: the winding stays.
+// Rotated so that the smallest vertex is first, which keeps the winding.
 NamedTriangle canonical(NamedTriangle t) {
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
   return t;
 }
 
-// Which patch a triangle can belong to, cut along which of the two diagonals, and on which side.
+// A possible place of a triangle: its patch, the diagonal of the cut, and the side.
 struct TriangleRole {
   std::size_t patch;
   std::size_t diagonal;
@@ -217,7 +216,7 @@ std::map<NamedTriangle, TriangleRole> roles_of(const ReferenceMesh& reference) {
   return roles;
 }
 
-// How often each triangle of a patch was found, by diagonal and side.
+// The number of each patch's triangles found, by diagonal and side.
 using PatchTally = std::array<std::array<unsigned, 2>, 2>;
 
 bool is_complete(const PatchTally& tally, std::size_t corners) {

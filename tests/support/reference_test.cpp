@@ -1,4 +1,4 @@
-// The comparison with the reference must notice every way in which a mesh can differ from it.
+// The comparison must detect every kind of difference from the reference.
 #include "tests/support/reference.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ SampleVolume<std::int16_t> noisy_samples() {
   return noise<std::int16_t>({-9, -2, 1, 5}, {6, 5, 4}, 1);
 }
 
-// A mesh as the kernels would make it, from the reference itself.
+// A mesh from the reference in the form of the kernels.
 mesh::Mesh mesh_of(const ReferenceMesh& reference) {
   const Surface surface = reference.surface();
   std::vector<std::uint32_t> order(surface.points.size());
@@ -120,9 +120,9 @@ TEST_F(Matches, RefusesTheOtherInterpolation) {
   EXPECT_FALSE(matches(copy, reference_surface(samples.lattice(), midpoint)));
 }
 
-// Worked out by hand: corner 0 of one cell is inside. In the five-way split it is in four
-// tetrahedra, crossed on three edges and three diagonals of faces; in the six-way split in all six,
-// and on the diagonal of the cell as well.
+// Derived by hand: corner 0 of one cell is inside. In the five-way split it is in four tetrahedra,
+// crossed on three edges and three face diagonals; in the six-way split in all six, and also on the
+// cell's diagonal.
 TEST(ReferenceSurface, OfOneCorner) {
   auto corner = constant<std::uint8_t>(0, {2, 2, 2});
   corner.samples[0] = 4;
@@ -133,13 +133,13 @@ TEST(ReferenceSurface, OfOneCorner) {
   EXPECT_EQ(six.vertices.size(), 7U);
   EXPECT_EQ(six.triangles(), 6U);
   for (const ReferenceVertex& vertex : six.vertices) EXPECT_EQ(vertex.fraction, 0.75);
-  // Outside is where the corner is not.
+  // The outside is opposite of the corner.
   EXPECT_GT(extent_of(six.surface()).volume, 0);
   EXPECT_GT(extent_of(five.surface()).volume, 0);
 }
 
-// The second cell along x is odd, so mirrored: the sample at its corner 1 is in four tetrahedra as
-// corner 0 of an even cell is, and the one at its corner 2 is the tip of a single tetrahedron.
+// The second cell along x is odd, so mirrored: the sample at its corner 1 is in four tetrahedra,
+// like corner 0 of an even cell, and the sample at its corner 2 is the tip of a single tetrahedron.
 TEST(ReferenceSurface, OfOneCornerOfAMirroredCell) {
   const mesh::ExtractOptions five = {1, Scheme::kFive, Interpolation::kLinear};
   auto shared = constant<std::uint8_t>(0, {3, 2, 2});

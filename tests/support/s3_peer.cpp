@@ -8,7 +8,7 @@
 namespace isomesh::test {
 namespace {
 
-// Debian's, which has its packages.
+// Debian's Python, which has Debian's packages.
 constexpr const char* kPython = "/usr/bin/python3";
 
 std::vector<std::string> lines_of(const std::string& text) {

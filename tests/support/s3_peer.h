@@ -1,5 +1,5 @@
-// A small S3 service on loopback that fails as it is told to, and that checks every signature and
-// every digest by an implementation that is not ours (s3_peer.py).
+// A small S3 service on loopback with configurable failures. It checks every signature and digest
+// with an independent implementation (s3_peer.py).
 #pragma once
 
 #include <chrono>
@@ -11,10 +11,10 @@
 
 namespace isomesh::test {
 
-// With one bucket that is empty. Thread safe. Needs python3-botocore.
+// Has one empty bucket. Thread safe. Needs python3-botocore.
 class S3Peer {
  public:
-  // Why there can be none on this machine; empty when there can.
+  // The reason why it cannot run on this machine; empty if it can.
   static std::string missing();
 
   S3Peer();
@@ -23,28 +23,28 @@ class S3Peer {
   std::string url(const std::string& prefix = "") const;
   const std::string& endpoint() const { return endpoint_; }
 
-  // A file for --blob-credentials; with a wrong key it is refused.
+  // A file for --blob-credentials; a wrong key is rejected.
   static std::string credentials(bool right = true);
 
-  // See s3_peer.py for the kinds. Of requests of the method whose target holds the part, the next
-  // `count`, or all from now on when it is 0.
+  // Injects a failure; s3_peer.py lists the kinds. Applies to the next `count` requests, or to all
+  // if it is 0, with that method and with `part` in their target.
   void fail(const std::string& what, int count = 0, const std::string& method = "",
             const std::string& part = "");
   void recover() { fail("nothing"); }
-  // As it was at the beginning.
+  // Restores the initial state.
   void reset() { tell("/-/reset"); }
 
-  // Puts an object there as if somebody else had.
+  // Stores an object as if another client had.
   void put(const std::string& key, std::string_view bytes);
-  // As if it had been written so long before.
+  // Makes an object older.
   void age(const std::string& key, std::chrono::seconds by);
   void list_in_pages_of(int objects);
   void forget_conditions();
 
   std::vector<std::string> keys();
-  // How many such requests have come so far.
+  // The number of such requests so far.
   int count(const std::string& method, const std::string& part = "");
-  // Uploads in parts that were begun and neither completed nor given up.
+  // Multipart uploads that are neither completed nor aborted.
   int open_uploads();
 
  private:

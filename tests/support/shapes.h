@@ -1,5 +1,5 @@
-// Volumes that tests make up: fields sampled on a lattice, noise, and single cells. Everything is
-// deterministic: the same arguments give the same samples on every machine.
+// Synthetic volumes: fields sampled on a lattice, noise, and single cells. Deterministic: equal
+// arguments give equal samples on every machine.
 #pragma once
 
 #include <array>
@@ -15,21 +15,21 @@ namespace isomesh::test {
 
 using Point = std::array<double, 3>;
 
-// The map of a geometry, written down a second time so that the kernels' own is not trusted.
+// The map of a geometry, implemented independently of the kernels.
 mesh::LatticeToSpace space_of(const Geometry& geometry);
 
-// A point in lattice units as millimetres, and back. `map` must not be degenerate.
+// Converts a point from lattice units to millimetres, and back. `map` must not be degenerate.
 Point to_space(const mesh::LatticeToSpace& map, const Point& lattice_point);
 Point to_lattice(const mesh::LatticeToSpace& map, const Point& space_point);
 
-// Samples with their owner. Instantiated, as everything below, for the eight types of SampleType.
+// Owned samples. Instantiated, like everything below, for the eight types of SampleType.
 template <class T>
 struct SampleVolume {
   std::vector<T> samples;  // x fastest
   mesh::Dims dims;
   Geometry geometry;
 
-  // A view that is valid for as long as this volume is neither moved nor changed.
+  // A view, valid until this volume is moved or changed.
   mesh::Lattice<T> lattice() const { return {samples.data(), dims, space_of(geometry)}; }
 
   T& at(std::uint64_t i, std::uint64_t j, std::uint64_t k) {
@@ -54,7 +54,7 @@ Field tangle_cube(double scale);
 // gain * field + offset.
 Field scaled(const Field& field, double gain, double offset);
 
-// The field at every sample. For integer types rounded to the nearest and saturated.
+// The field at every sample, rounded to the nearest and saturated for integers.
 template <class T>
 SampleVolume<T> sample(const Field& field, const mesh::Dims& dims, const Geometry& geometry = {});
 
@@ -62,43 +62,43 @@ SampleVolume<T> sample(const Field& field, const mesh::Dims& dims, const Geometr
 mesh::Dims unit_cube_dims(std::uint32_t n);
 Geometry unit_cube_geometry(std::uint32_t n);
 
-// Each sample one of `values`, all equally likely.
+// Each sample is one of `values`, uniformly distributed.
 template <class T>
 SampleVolume<T> noise(const std::vector<T>& values, const mesh::Dims& dims, std::uint64_t seed,
                       const Geometry& geometry = {});
 
-// Each sample from [low, high], all equally likely.
+// Each sample is uniformly distributed in [low, high].
 template <class T>
 SampleVolume<T> noise_between(double low, double high, const mesh::Dims& dims, std::uint64_t seed);
 
 template <class T>
 SampleVolume<T> constant(T value, const mesh::Dims& dims);
 
-// `even` where i+j+k is even, `odd` elsewhere: every axis edge is crossed.
+// `even` if i+j+k is even, otherwise `odd`: every axis edge is crossed.
 template <class T>
 SampleVolume<T> checkerboard(T even, T odd, const mesh::Dims& dims);
 
-// Sets all samples on the six faces of the lattice, so that a surface inside is closed.
+// Sets all samples on the lattice's six faces, so that a surface inside is closed.
 template <class T>
 void set_border(SampleVolume<T>& volume, T value);
 
 enum class Parity { kEven, kOdd };          // of i+j+k
-enum class Surround { kOutside, kInside };  // what all samples around a cell are
+enum class Surround { kOutside, kInside };  // the samples around a cell
 
-// One cell whose corner c (the paper's numbering) is inside where bit c of `pattern` is set, at a
-// place of the given parity, with a layer of other samples on every side. All corners have
-// different values, and corner 0, when it is inside, has the iso-value itself.
+// One cell of the given parity, with a layer of other samples around it. Its corner c (the paper's
+// numbering) is inside if bit c of `pattern` is set. All corners have different values, and corner
+// 0, if inside, has the iso-value itself.
 inline constexpr double kPatternIso = 100;
 template <class T>
 SampleVolume<T> sign_pattern(unsigned pattern, Parity parity, Surround surround);
 
-// Geometries as scanners make them.
+// Typical geometries of scanners.
 Geometry anisotropic_geometry();
 Geometry oblique_geometry();
-Geometry left_handed_geometry();          // axis aligned, one axis reversed
-Geometry oblique_left_handed_geometry();  // turned, anisotropic and reversed
-Geometry tilted_geometry();  // sheared: slices of a CT whose gantry is tilted by 20 degrees
-Geometry far_geometry();     // fine samples more than a metre from the origin
+Geometry left_handed_geometry();          // axis-aligned, one axis reversed
+Geometry oblique_left_handed_geometry();  // rotated, anisotropic and reversed
+Geometry tilted_geometry();               // sheared: CT slices with a gantry tilt of 20 degrees
+Geometry far_geometry();                  // fine samples more than a metre from the origin
 Geometry oblique_far_geometry();
 
 struct NamedGeometry {

@@ -1,4 +1,4 @@
-// The paper's Table 1, written down a second time so that the kernels' own is not trusted.
+// The paper's Table 1, implemented independently of the kernels.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@ struct Tetrahedron {
   std::uint32_t layer = 0;  // k of its cell
 };
 
-// Visits the tetrahedra of all cells, of which those of odd i+j+k are mirrored in scheme 5: by the
-// volume's own numbers, which are `margin` smaller.
+// Visits the tetrahedra of all cells. In scheme 5, cells of odd i+j+k are mirrored, by the volume's
+// own indices, which are smaller by `margin`.
 template <class Visit>
 void for_each_tetrahedron(const mesh::Dims& dims, Scheme scheme, std::uint32_t margin,
                           Visit visit) {

@@ -1,9 +1,9 @@
-// Part of every test program that runs under ThreadSanitizer.
+// Linked into every test program under ThreadSanitizer.
 
-// Debian's libcpp-httplib is not instrumented: ThreadSanitizer sees what its threads copy, but not
-// that a function's static variable (the set of methods that it knows) was made before anybody
-// reads it. OpenSSL 3.5, of Debian 13, is not either, and hands its tables on by locks of its own.
-// What these libraries do with memory of their own is not judged; what our handlers do is.
+// Debian's libcpp-httplib is not instrumented: ThreadSanitizer sees the copies of its threads, but
+// not the initialisation of a function's static variable (its set of methods) before their reads.
+// OpenSSL 3.5 (Debian 13) is not either, and synchronises its tables with locks of its own. Reports
+// on these libraries' own memory are suppressed, those on our handlers are not.
 extern "C" const char* __tsan_default_suppressions();  // NOLINT: the name that it looks for
 
 const char* __tsan_default_suppressions() {

@@ -1,7 +1,6 @@
-// Bytes of a file that rounds coordinates -> mesh, as another program reads it: by the formats' own
-// libraries, and never from the arrays that the file was made of. For measuring what was written;
-// only the program that makes meshes has it. All other formats hold the mesh itself
-// (codec/encode.h, `rounds`).
+// Decodes a file that rounds coordinates into a mesh as other programs read it: with the format's
+// own library, never from the encoder's arrays. For measuring the written file. Only the program
+// that makes meshes links it. All other formats hold the mesh itself (codec/encode.h, `rounds`).
 #pragma once
 
 #include <cstddef>
@@ -16,7 +15,7 @@
 
 namespace isomesh::codec {
 
-// Millimetres in LPS; in no layers. In GLB, vertices on the seam of two blocks are there twice.
+// In LPS millimetres, without layers. GLB duplicates vertices on the seams of its blocks.
 struct DecodedSurface {
   mesh::Buffer<mesh::Vec3> positions;
   mesh::Buffer<mesh::Triangle> triangles;
@@ -24,17 +23,16 @@ struct DecodedSurface {
   mesh::SurfaceView view() const { return {positions.span(), triangles.span()}; }
 };
 
-// What libdraco's decoder makes of a file of the format drc or glb, or meshoptimizer's of a packed
-// glb; of glb the finest level of the default scene, its blocks joined. `space` is that of the
-// file's coordinates. Positions are finite and triangles name vertices that are there. The same for
-// any number of threads. Takes what the surface takes, and as much again for blocks that are
-// joined. Thread safe. Throws Error kInternal if the file is not as our encoders write it, or of
-// another format; kTooLarge as join does; and kCancelled.
+// Decodes drc and glb with libdraco, packed glb with meshoptimizer; of glb the finest level of the
+// default scene, its blocks joined. `space` is the space of the file's coordinates. Positions are
+// finite and vertex indices valid. The result does not depend on the number of threads. Needs the
+// memory of the surface, twice if blocks are joined. Thread safe. Throws Error kInternal if the
+// file is not as our encoders write it or has another format; kTooLarge as join does; kCancelled.
 DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
                       const mesh::Context& context);
 
-// All parts as one surface, in their order; takes their memory. Throws Error kTooLarge if 32 bits
-// cannot number the vertices, and kCancelled.
+// Joins all parts in order; consumes them. Throws Error kTooLarge if 32 bits cannot number the
+// vertices, and kCancelled.
 DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& context);
 
 }  // namespace isomesh::codec

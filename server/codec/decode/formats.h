@@ -1,5 +1,5 @@
-// The decoder of each format, which decode.h tells of, and what they share; private to this folder.
-// None of them looks whether positions are finite and vertices are there: decode does.
+// The decoders behind decode.h, and shared helpers. Private to this folder. The decoders do not
+// check that positions are finite and vertex indices valid: decode does.
 #pragma once
 
 #include <string>
@@ -13,8 +13,8 @@ using Bytes = std::span<const std::byte>;
 DecodedSurface decode_drc(Bytes file);
 DecodedSurface decode_glb(Bytes file, const mesh::Context& context);
 
-// One Draco stream; of several attributes the positions are that of the id, or the first of
-// positions where it is negative.
+// Decodes one Draco stream. `position_id` selects the attribute of positions; if negative, the
+// first one.
 DecodedSurface decode_draco_stream(Bytes stream, int position_id);
 
 // Throws Error kInternal: "the glb file that was written cannot be read: ...".

@@ -15,14 +15,14 @@ namespace {
 
 using Json = nlohmann::json;
 
-// The little-endian number at an offset; the caller has checked that it is there.
+// Reads a little-endian number; the caller has checked the bounds.
 std::uint32_t word_at(Bytes bytes, std::size_t offset) {
   std::uint32_t value = 0;
   std::memcpy(&value, bytes.data() + offset, sizeof value);
   return value;
 }
 
-// Of glTF's specification, section 4.4.
+// glTF 2.0, section 4.4.
 constexpr std::uint32_t kMagic = 0x46546C67;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;
@@ -61,7 +61,7 @@ Chunks chunks_of(Bytes file) {
   return chunks;
 }
 
-// Rows, for columns of homogeneous coordinates.
+// Row-major, for column vectors of homogeneous coordinates.
 using Matrix = std::array<std::array<double, 4>, 4>;
 
 constexpr Matrix kIdentity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
@@ -94,7 +94,7 @@ Matrix transformation_of(const Json& node) {
   return matrix;
 }
 
-// An array of EXT_meshopt_compression.
+// A compressed array of EXT_meshopt_compression.
 struct Packed {
   Bytes bytes;
   std::size_t stride = 0;
@@ -102,7 +102,7 @@ struct Packed {
 };
 
 struct Primitive {
-  Bytes stream;  // Draco's; empty where the arrays are there
+  Bytes stream;  // of Draco; empty if the arrays are uncompressed
   int position_id = 0;
   Packed positions;
   Packed indices;
@@ -111,8 +111,8 @@ struct Primitive {
   std::size_t triangles = 0;
 };
 
-// The primitives that show when the default scene is drawn as it stands: levels of detail are nodes
-// that none of its nodes has as a child.
+// The visible primitives of the default scene. Coarser levels of detail are nodes that are no
+// node's child.
 class Scene {
  public:
   Scene(const Json& gltf, Bytes binary) : gltf_(gltf), binary_(binary) {
@@ -133,7 +133,7 @@ class Scene {
            gltf_.at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives")) {
         Primitive& primitive = primitives_.emplace_back(primitive_of(json));
         primitive.to_patient = matrix;
-        // What Draco decodes to is looked at as it is.
+        // Draco positions are used without a transformation.
         if (!primitive.stream.empty()) expect_identity(matrix);
       }
     }
@@ -242,7 +242,7 @@ void unpack_positions(const Primitive& primitive, DecodedSurface& surface) {
 DecodedSurface unpack(const Primitive& primitive) {
   using Steps = std::array<std::uint16_t, 4>;
   const std::size_t stride = primitive.positions.stride;
-  constexpr std::size_t kMostPerByte = 4096;  // far more than the codec packs into one
+  constexpr std::size_t kMostPerByte = 4096;  // far above the codec's best compression
   if (primitive.positions.count != primitive.vertices ||
       primitive.indices.count != 3 * primitive.triangles || primitive.indices.stride != 4 ||
       (stride != sizeof(Steps) && stride != sizeof(mesh::Vec3)) ||

@@ -1,4 +1,4 @@
-// Writing of bits; private to this folder.
+// Bit output. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -7,17 +7,17 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// Puts bits one after the other, the lowest first. Not thread safe.
+// Writes bits in order, lowest first. Not thread safe.
 class BitWriter {
  public:
   static std::size_t bytes_of(std::uint64_t bits) {
     return static_cast<std::size_t>((bits + 7) / 8);
   }
 
-  // `out` has room for bytes_of all bits that are put.
+  // `out` has room for bytes_of all bits.
   explicit BitWriter(std::byte* out) : out_(out) {}
 
-  // The lowest `bits` of the value, which has no others; at most 32.
+  // Writes the lowest `bits` bits, at most 32; the others must be zero.
   void put(std::uint32_t value, std::uint32_t bits) {
     word_ |= std::uint64_t{value} << used_;
     used_ += bits;
@@ -29,7 +29,7 @@ class BitWriter {
     }
   }
 
-  // Writes what is left.
+  // Writes the remaining bits.
   void finish() { std::memcpy(out_, &word_, bytes_of(used_)); }
 
  private:

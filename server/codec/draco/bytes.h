@@ -1,4 +1,4 @@
-// Writing of a stream's bytes; private to this folder.
+// Byte output of a stream. Private to this folder.
 #pragma once
 
 #include <bit>
@@ -13,7 +13,7 @@ namespace isomesh::codec::edgebreaker {
 
 static_assert(std::endian::native == std::endian::little, "Draco's streams are little-endian");
 
-// Appends to bytes that it owns. Not thread safe.
+// Appends to a buffer that it owns. Not thread safe.
 class ByteWriter {
  public:
   void byte(std::uint32_t value) { bytes_.push_back(static_cast<std::byte>(value)); }
@@ -23,7 +23,7 @@ class ByteWriter {
     append(std::as_bytes(std::span(&value, 1)));
   }
 
-  // Seven bits a byte, the lowest first; all but the last have the highest bit set.
+  // Seven bits per byte, lowest first; all bytes but the last have the highest bit set.
   void varint(std::uint64_t value) {
     for (; value >= 0x80; value >>= 7) byte(static_cast<std::uint32_t>(value & 0x7F) | 0x80U);
     byte(static_cast<std::uint32_t>(value));
@@ -33,13 +33,13 @@ class ByteWriter {
     if (!bytes.empty()) std::memcpy(extend(bytes.size()), bytes.data(), bytes.size());
   }
 
-  // Zeros, for the caller to write over before it appends more.
+  // Appends zeros, which the caller overwrites before it appends more.
   std::byte* extend(std::size_t count) {
     bytes_.resize(bytes_.size() + count);
     return bytes_.data() + bytes_.size() - count;
   }
 
-  // With their number before them.
+  // Appends the bytes after their number.
   void counted(std::span<const std::byte> bytes) {
     varint(bytes.size());
     append(bytes);

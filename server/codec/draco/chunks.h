@@ -1,4 +1,4 @@
-// Work that one thread brings and whoever is free does; private to this folder.
+// Work that one thread produces and any free thread consumes. Private to this folder.
 #pragma once
 
 #include <algorithm>
@@ -7,19 +7,18 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// Items 0, 1, 2, ... in order, which one thread says are there and which are taken in chunks by it
-// and by another. Nobody waits for a thread that has not come: the one that brings them takes what
-// nobody took.
+// Items 0, 1, 2, ... in order. One thread publishes them; it and a helper process them in chunks.
+// Nobody waits for a helper that never starts: the producer processes the remaining items.
 class Chunks {
  public:
-  // While nobody uses it.
+  // Not while another thread uses it.
   void reset() {
     there_.store(0, std::memory_order_relaxed);
     taken_.store(0, std::memory_order_relaxed);
     helped_.store(false, std::memory_order_relaxed);
   }
 
-  // The items below `count` are there. Does them, unless somebody helps.
+  // Publishes the items below `count`. Processes them unless a helper does.
   template <class Work>
   void bring(std::uint32_t count, Work work) {
     there_.store(count, std::memory_order_release);
@@ -31,7 +30,7 @@ class Chunks {
     }
   }
 
-  // No more items come. Does those that are left.
+  // No more items follow. Processes the remaining ones.
   template <class Work>
   void end(Work work) {
     there_.fetch_or(kAll, std::memory_order_release);
@@ -40,7 +39,7 @@ class Chunks {
     }
   }
 
-  // Does what comes until the end; only for a thread that knows that the one which brings is at it.
+  // Processes items until the end. Only call it once the producer runs.
   template <class Work>
   void help(Work work) {
     helped_.store(true, std::memory_order_relaxed);
@@ -56,7 +55,7 @@ class Chunks {
   static constexpr std::uint32_t kAll = 1U << 31;
   static constexpr std::uint32_t kMostAtOnce = 1024;
 
-  // work(begin, end) for the next items. False when there are none.
+  // Calls work(begin, end) for the next items. Returns false if there are none.
   template <class Work>
   bool take(Work& work) {
     std::uint32_t begin = taken_.load(std::memory_order_relaxed);

@@ -1,5 +1,4 @@
-// How the encoder names the corners of triangles and what lies across their edges; private to this
-// folder.
+// Corners of triangles and their opposites across edges. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +10,7 @@
 namespace isomesh::codec::edgebreaker {
 
 // Corner i of face f is 4 f + i, i = 0, 1, 2: a face has four words in the table of opposite
-// corners, and the fourth repeats the first.
+// corners; the fourth repeats the first.
 using Corner = std::uint32_t;
 using Face = std::uint32_t;
 using Vertex = std::uint32_t;
@@ -34,8 +33,8 @@ constexpr Corner previous(Corner corner) {
   return (corner & ~3U) | ((0b010010U >> (index_of(corner) * 2)) & 3U);
 }
 
-// The vertex at a corner of these triangles: triangles[face_of(corner)][index_of(corner)], whose
-// address is 12 * face + 4 * index = 3 * corner + index bytes on.
+// triangles[face_of(corner)][index_of(corner)], whose byte offset is 12 * face + 4 * index = 3 *
+// corner + index.
 inline Vertex vertex_at(const mesh::Triangle* triangles, Corner corner) {
   Vertex vertex;
   std::memcpy(
@@ -45,18 +44,17 @@ inline Vertex vertex_at(const mesh::Triangle* triangles, Corner corner) {
   return vertex;
 }
 
-// A surface as the traversals see it: read only, shared by threads. Opposite of a corner is the
-// corner across its edge, in the face on the other side, or `none` where the edge is the
-// boundary's.
+// A surface for the traversals: read only, shared by threads. The opposite of a corner is the
+// corner across its edge in the adjacent face, or `none` at a boundary edge.
 struct Connectivity {
   const std::uint32_t* words = nullptr;  // word 4 f + i: the corner opposite of corner next(i)
   const mesh::Triangle* triangles = nullptr;
   Face faces = 0;
   Vertex vertices = 0;
-  Corner none = 0;  // 4 * faces; its own words say none
+  Corner none = 0;  // 4 * faces; its own words are none too
 
-  // Opposite of the next corner of the face, and of the previous one: where edgebreaker goes on,
-  // seen from the corner at the tip of a face.
+  // The opposites of the next and of the previous corner: where edgebreaker continues from the
+  // corner at the tip of a face.
   Corner right(Corner corner) const { return words[corner]; }
   Corner left(Corner corner) const { return words[corner + 1]; }
   Corner opposite(Corner corner) const { return words[previous(corner)]; }

@@ -11,10 +11,10 @@ constexpr std::uint64_t key_of(Vertex lower, Vertex upper) {
   return std::uint64_t{lower} << 32 | upper;
 }
 
-// Four at a time: what GCC and Clang make of it on every processor.
+// Four lanes: GCC and Clang compile them for every processor.
 using Lanes = std::uint32_t __attribute__((vector_size(16)));
 
-// Bit i tells whether slots[i] == value.
+// Bit i is set if slots[i] == value.
 std::uint32_t equal_slots(const std::array<std::uint32_t, 8>& slots, std::uint32_t value) {
   Lanes low;
   Lanes high;
@@ -34,7 +34,7 @@ void EdgeRows::begin(const Range& range, std::uint32_t* words) {
   clash_ = false;
   waiting_.clear();
   crowded_.clear();
-  // A ring, where that is smaller than a row for each vertex.
+  // A ring if it is smaller than one row per vertex.
   const std::uint64_t ring = std::bit_ceil(std::max<std::uint64_t>(1, range.window));
   const std::uint64_t rows = std::min<std::uint64_t>(ring, std::max<Vertex>(1, range.owned));
   mask_ = rows == ring ? static_cast<std::uint32_t>(ring - 1) : ~std::uint32_t{0};
@@ -56,7 +56,7 @@ void EdgeRows::add(const mesh::Triangle* triangles, Face begin, Face end) {
 }
 
 std::size_t EdgeRows::scatter(const mesh::Triangle* triangles, Face begin, Face end) {
-  // Copies, because what is written here are bytes, which could be anything's for the compiler.
+  // Local copies: the compiler assumes that byte stores may alias the members.
   const Vertex first = range_.first;
   const Vertex owned = range_.owned;
   const std::uint32_t mask = mask_;
@@ -66,14 +66,14 @@ std::size_t EdgeRows::scatter(const mesh::Triangle* triangles, Face begin, Face 
   Down* down = downs_.data();
   bool degenerate = false;
   const auto edge = [&](Vertex from, Vertex to, Corner corner) {
-    // All ones for a half-edge that goes up. That is as good as random, and written without a
-    // comparison it stays a number, where compilers would make branches of it.
+    // All ones for an ascending half-edge. The direction is unpredictable, so arithmetic replaces a
+    // comparison, which compilers would turn into a branch.
     const auto up = static_cast<std::uint32_t>((std::uint64_t{from} - to) >> 32);
     const Vertex lower = to ^ ((from ^ to) & up);
     const Vertex upper = from ^ to ^ lower;
     const Vertex own = lower - first;
     if (own >= owned) [[unlikely]] {
-      return;  // another slab's
+      return;  // of another slab
     }
     const std::uint32_t row = spare ^ (((own & mask) ^ spare) & up);
     const std::uint32_t slot = used[row];
@@ -112,13 +112,13 @@ std::size_t EdgeRows::match(const Down* downs, std::size_t count, Down* rest) {
     const std::uint32_t row = (down.lower - first) & mask;
     const std::uint32_t equal = equal_slots(rows[row].upper, down.upper) & ((1U << used[row]) - 1);
     const std::uint32_t one = equal & (0U - equal);
-    // Two in the same sense, or one whose partner came before.
+    // Two in the same direction, or a partner that was already matched.
     clash |= (equal ^ one) | (found[row] & one);
     found[row] = static_cast<std::uint8_t>(found[row] | one);
     const auto slot = static_cast<std::uint32_t>(std::countr_zero(one | 1U << (kSlots - 1)));
     const Corner partner = rows[row].corner[slot];
     words[previous(down.corner)] = partner;
-    // 1 if there is one; again no comparison.
+    // 1 if there is one; again without a comparison.
     const std::uint32_t met = (0U - one) >> 31;
     words[spare ^ ((previous(partner) ^ spare) & (0U - met))] = down.corner;
     *alone = down;

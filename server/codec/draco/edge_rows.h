@@ -1,5 +1,4 @@
-// The edges of two layers of vertices while their second triangles are looked for; private to this
-// folder.
+// Matches the half-edges of two layers of vertices. Private to this folder.
 #pragma once
 
 #include <array>
@@ -12,16 +11,16 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// In an oriented manifold an edge has one half-edge that goes up in the numbers of vertices and one
-// that goes down. Those that go up are put into the row of their lower vertex; those that go down
-// look there, a block of triangles later, while all of it is still in the nearest cache. What does
-// not find its partner asks again when the layer is done. Nothing in these loops branches on what
-// cannot be foreseen. Not thread safe.
+// In an oriented manifold an edge has one half-edge that ascends in the numbers of vertices and one
+// that descends. Ascending ones are stored in the row of their lower vertex. Descending ones are
+// looked up one block of triangles later, while the rows are still in the first-level cache. Those
+// without a partner are looked up again at the end of the layer. The loops have no unpredictable
+// branches. Not thread safe.
 class EdgeRows {
  public:
-  // Which half-edges are taken: those whose lower vertex is one of `owned` from `first` on. Up to
-  // `window` vertices, consecutive ones, are open at a time. `words` is the table of the opposite
-  // corners, which is filled, and of which `spare_word` may be written over at any time.
+  // The half-edges to take: their lower vertex is one of `owned` vertices from `first` on. At most
+  // `window` consecutive vertices are open at a time. `words` is the table of opposite corners to
+  // fill; `spare_word` in it may be overwritten at any time.
   struct Range {
     Vertex first = 0;
     Vertex owned = 0;
@@ -30,26 +29,26 @@ class EdgeRows {
   };
   void begin(const Range& range, std::uint32_t* words);
 
-  // Takes the half-edges of these consecutive faces.
+  // Adds the half-edges of consecutive faces.
   void add(const mesh::Triangle* triangles, Face begin, Face end);
 
-  // No more triangles name the vertices [begin, end), all of them owned: half-edges of theirs that
-  // are alone are the boundary's. The ranges follow each other.
+  // No later triangle has the vertices [begin, end), all owned: their unmatched half-edges are
+  // boundary edges. Calls have consecutive ranges.
   void finish(Vertex begin, Vertex end, Corner none, std::vector<Corner>& boundary);
 
-  // Whether every edge had at most one half-edge in each sense, and no face repeated a vertex.
-  // Once all is finished.
+  // True if every edge had at most one half-edge in each direction, and no face repeated a vertex.
+  // Valid once all is finished.
   bool is_manifold() const { return !clash_ && waiting_.empty() && crowded_.empty(); }
 
  private:
-  static constexpr std::uint32_t kSlots = 8;  // few vertices have more edges that go up
+  static constexpr std::uint32_t kSlots = 8;  // few vertices have more ascending edges
   static constexpr Face kBlock = 512;
 
   struct alignas(64) Row {
-    std::array<std::uint32_t, kSlots> upper;  // the edges' other vertices
+    std::array<std::uint32_t, kSlots> upper;  // the upper vertices of the edges
     std::array<Corner, kSlots> corner;
   };
-  // A half-edge that goes down, by the corner on its other side.
+  // A descending half-edge, by the opposite corner.
   struct Down {
     Corner corner;
     Vertex lower;
@@ -65,14 +64,14 @@ class EdgeRows {
   Range range_;
   std::uint32_t* words_ = nullptr;
   std::uint32_t mask_ = 0;
-  std::uint32_t spare_ = 0;  // the row for what is not taken
+  std::uint32_t spare_ = 0;  // the row for half-edges of others
   bool clash_ = false;
   Scratch<Row> rows_;
-  Scratch<std::uint8_t> used_;   // slots of each row
-  Scratch<std::uint8_t> found_;  // a bit for each of them that has its partner
-  Scratch<Down> downs_;          // of one block
-  std::vector<Down> waiting_;    // that found nothing yet
-  std::unordered_map<std::uint64_t, Corner> crowded_;  // what goes up and found its row full
+  Scratch<std::uint8_t> used_;                         // slots of each row
+  Scratch<std::uint8_t> found_;                        // one bit per slot: its partner was found
+  Scratch<Down> downs_;                                // of one block
+  std::vector<Down> waiting_;                          // without a partner yet
+  std::unordered_map<std::uint64_t, Corner> crowded_;  // ascending half-edges whose row was full
 };
 
 }  // namespace isomesh::codec::edgebreaker

@@ -43,7 +43,7 @@ bool has_layers(const Surface& surface) {
          lead_to(surface.layer_triangles, surface.triangles.size());
 }
 
-// parallel_for, or for one thread a loop.
+// parallel_for, or a loop for one thread.
 template <class Body>
 void run(Threads threads, const mesh::Context& context, std::size_t tasks, Body body) {
   if (threads == Threads::kAll) {
@@ -55,7 +55,7 @@ void run(Threads threads, const mesh::Context& context, std::size_t tasks, Body 
 
 }  // namespace
 
-// What is done one after the other and side by side, with its memory.
+// The stages, sequential and parallel, with their memory.
 class Encoder::Stages {
  public:
   explicit Stages(std::size_t least_to_look_ahead) : traversal_(least_to_look_ahead) {}
@@ -72,7 +72,7 @@ class Encoder::Stages {
   void put_in_order();
   std::vector<std::byte> stream_of(const Grid& grid, bool has_normals);
 
-  // Predicts some values, and counts into a histogram of the caller's own.
+  // Predicts values and counts them in a histogram per caller.
   auto predictor(std::size_t histogram) {
     return [this, histogram](std::uint32_t begin, std::uint32_t end) {
       residuals_.predict(order_.corners(), begin, end, histograms_[histogram]);
@@ -127,7 +127,7 @@ bool Encoder::Stages::connect(const Surface& surface, Threads threads,
   return true;
 }
 
-// Quantises, and clears what the walks mark.
+// Quantises positions and clears the marks of the traversals.
 bool Encoder::Stages::prepare(const Surface& surface, const Grid& grid, Threads threads,
                               const mesh::Context& context) {
   const std::span<const mesh::Vec3> positions = surface.positions;
@@ -159,8 +159,8 @@ bool Encoder::Stages::prepare(const Surface& surface, const Grid& grid, Threads 
   return true;
 }
 
-// Two walks over the surface, of which the second follows the first where it can. Whoever comes
-// first takes the first one, which waits for nobody, so this ends on any number of threads.
+// Two traversals; the second follows the first if it can. The first thread to arrive takes the
+// first traversal, which waits for nothing, so this ends with any number of threads.
 bool Encoder::Stages::walk(Threads threads, const mesh::Context& context) {
   std::atomic<int> come = 0;
   std::atomic<bool> covered = false;
@@ -177,7 +177,7 @@ bool Encoder::Stages::walk(Threads threads, const mesh::Context& context) {
 
 bool Encoder::Stages::traverse(const mesh::Context& context) {
   const struct Close {
-    ~Close() { starts.close(); }  // also when the traversal was cancelled
+    ~Close() { starts.close(); }  // also if the traversal was cancelled
     Starts& starts;
   } close{starts_};
   return traversal_.run(fans_, starts_, context);

@@ -12,7 +12,7 @@ void Fans::separate(const std::vector<std::vector<Corner>>& boundary, Connectivi
   };
   for (const std::vector<Corner>& corners : boundary) {
     for (const Corner corner : corners) {
-      // Each open fan begins with one of the boundary's edges.
+      // Each open fan begins at a boundary edge.
       const Vertex vertex = surface.vertex(next(corner));
       if (on_boundary(vertex)) {
         copy_vertex(next(corner), surface);
@@ -29,7 +29,7 @@ void Fans::separate(const std::vector<std::vector<Corner>>& boundary, Connectivi
   }
 }
 
-// Gives the fan from this corner on a vertex of its own.
+// Duplicates the vertex for the fan that starts at this corner.
 void Fans::copy_vertex(Corner first, Connectivity& surface) {
   const Vertex original = surface.vertex(first);
   if (originals_.empty()) {

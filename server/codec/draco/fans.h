@@ -1,4 +1,4 @@
-// Vertices whose triangles are not one fan; private to this folder.
+// Splits vertices with several fans of triangles. Private to this folder.
 #pragma once
 
 #include <bit>
@@ -9,19 +9,19 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// A cut through a surface can leave several open fans at one vertex. Draco has no such vertices:
-// each fan gets one of its own, at the same place. Not thread safe.
+// A cut through a surface can leave several open fans at one vertex, which Draco does not support.
+// Each fan gets its own copy of the vertex, at the same position. Not thread safe.
 class Fans {
  public:
-  // `boundary` are the corners without an opposite. On return the connectivity's vertices are
-  // numbered with the copies, and its triangles are the surface's or, where there are copies, a
-  // version of them that lives here. Closed fans are not looked for.
+  // `boundary` holds the corners without an opposite. On return the connectivity's vertices include
+  // the copies. Its triangles are the surface's, or a modified copy owned by this object if a
+  // vertex was duplicated. Closed fans are not checked.
   void separate(const std::vector<std::vector<Corner>>& boundary, Connectivity& surface);
 
-  // Of the vertices from the surface's last on, which one each is a copy of.
+  // The original of each copy; copies are numbered after the surface's vertices.
   const std::vector<Vertex>& originals() const { return originals_; }
 
-  // Whether a boundary runs through the vertex. The bits are those of all vertices.
+  // True if a boundary runs through the vertex.
   bool on_boundary(Vertex vertex) const {
     return (on_boundary_[vertex / 64] >> (vertex % 64) & 1) != 0;
   }

@@ -9,8 +9,8 @@
 namespace isomesh::codec {
 namespace {
 
-// libdraco keeps its options as text with six decimals: what it quantises with is what that reads
-// as, and our own encoder uses the same.
+// libdraco keeps its options as text with six decimals, and quantises with the value read back from
+// it. Our encoder uses the same value.
 constexpr float kOptionStep = 1e-6F;
 
 float as_draco_keeps(float value) { return std::stof(std::to_string(value)); }
@@ -29,7 +29,7 @@ Grid grid_of(const mesh::Mesh& mesh, int bits) {
   if (mesh.positions.size() == 0) return grid;
   mesh::Vec3 low = mesh.positions[0];
   mesh::Vec3 high = low;
-  float zero = 0;  // not, once something that is not finite was multiplied by it
+  float zero = 0;  // becomes NaN if multiplied by a non-finite value
   for (const mesh::Vec3& position : mesh.positions) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       low[axis] = std::min(low[axis], position[axis]);
@@ -39,7 +39,7 @@ Grid grid_of(const mesh::Mesh& mesh, int bits) {
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     grid.low[axis] = as_draco_keeps(low[axis]);
-    // A little more, or the highest vertex could lie outside by a rounding error.
+    // Add one step: rounding could put the highest vertex outside.
     grid.side = std::max(grid.side, as_draco_keeps(high[axis] - grid.low[axis] + kOptionStep));
   }
   if (zero != 0 || !std::isfinite(grid.side)) {

@@ -1,4 +1,4 @@
-// The grid that positions are quantised on.
+// The grid for the quantisation of positions.
 #pragma once
 
 #include <cstddef>
@@ -7,19 +7,20 @@
 
 namespace isomesh::codec {
 
-// A cube, in millimetres: a mesh's lowest corner and its longest side, in 2^bits - 1 steps along
-// each axis. A position on it decodes to the same bits in every stream that uses the grid.
+// A cube, in millimetres: a mesh's lowest corner and its longest side, divided into 2^bits - 1
+// steps along each axis. A position decodes to the same bits in every stream that uses the same
+// grid.
 struct Grid {
   mesh::Vec3 low = {0, 0, 0};
   float side = 0;
   int bits = 14;  // 1..30
 
-  // What a coordinate along an axis becomes by encoding and decoding.
+  // The coordinate after encoding and decoding.
   float decoded(float coordinate, std::size_t axis) const;
 };
 
-// Covers the mesh, to a millionth of a millimetre; of an empty one, the point 0. Throws Error
-// kUnusableVolume where a position is not a finite number, or the mesh is too large for one.
+// The grid that covers the mesh, to a millionth of a millimetre; the point 0 for an empty mesh.
+// Throws Error kUnusableVolume if a position is not finite, or the mesh is too large for a grid.
 Grid grid_of(const mesh::Mesh& mesh, int bits);
 
 }  // namespace isomesh::codec

@@ -23,8 +23,8 @@ LookAhead::Seen LookAhead::from(Corner corner, std::optional<Face> first) {
   return {in_pocket_ ? end : std::nullopt, end && !in_pocket_, reached_};
 }
 
-// As the traversal does it, at most so many faces. Ends early with what ends_at(left, right) says
-// at a split that has none before it.
+// Traverses at most `most` faces in the encoder's order. Ends early with the result of
+// ends_at(left, right) at the first split.
 template <class EndsAt>
 std::optional<Corner> LookAhead::walk(Corner corner, std::size_t most, EndsAt ends_at) {
   const std::size_t most_faces = faces_.size() + most;
@@ -64,8 +64,9 @@ std::optional<Corner> LookAhead::walk(Corner corner, std::size_t most, EndsAt en
   }
 }
 
-// Where a walk ends that takes what a split leaves to its left before what is to its right; if it
-// ends soon, without a way round to the right, and at a face that does not hang by its gate alone.
+// The end of a traversal that visits the left side of a split before the right one. Empty if it is
+// too long, reaches the right side another way, or ends at a face that is attached by its gate
+// alone.
 std::optional<Corner> LookAhead::end_of_pocket(Corner left, Corner right) {
   const std::size_t faces = faces_.size();
   const std::size_t vertices = vertices_.size();
@@ -92,7 +93,7 @@ void LookAhead::take_vertex(Vertex vertex) {
   vertices_.push_back(vertex);
 }
 
-// All but so many.
+// Removes the marks of all but the first `faces` and `vertices`.
 void LookAhead::take_back(std::size_t faces, std::size_t vertices) {
   for (; faces_.size() > faces; faces_.pop_back()) face_marks_[faces_.back()] = 0;
   for (; vertices_.size() > vertices; vertices_.pop_back()) vertex_marks_[vertices_.back()] = 0;

@@ -1,4 +1,4 @@
-// Where a traversal will end, before it has begun; private to this folder.
+// Predicts the end of a traversal. Private to this folder.
 #pragma once
 
 #include <cstdint>
@@ -9,24 +9,24 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// The decoder orders values from where the traversal of a component ended, so whoever makes that
-// order would have to wait. But what the first split leaves aside is come to last, and if that is a
-// pocket that ends by itself, its end is the whole traversal's. So some thousand faces are walked
-// through ahead, until there is such a split, and then everything is taken back. Not thread safe.
+// The decoder orders values from the end of a component's traversal, so the ordering would have to
+// wait for it. But the branch that the first split postpones is visited last. If it is a closed
+// pocket, its end is the end of the whole traversal. So a few thousand faces are traversed ahead
+// until such a split is found, and then all marks are removed. Not thread safe.
 class LookAhead {
  public:
-  // The marks of the traversal: for each face and each vertex 0, or not where it was there.
+  // The traversal's marks per face and vertex: 0, or nonzero if visited.
   LookAhead(const Connectivity& surface, std::uint8_t* faces, std::uint8_t* vertices)
       : surface_(surface), face_marks_(faces), vertex_marks_(vertices) {}
 
   struct Seen {
-    std::optional<Corner> end;  // the corner at which the traversal will end, if that is known
-    bool all = false;           // what there is was walked through
-    Face reached = 0;           // a face farther on
+    std::optional<Corner> end;  // the corner at which the traversal will end, if known
+    bool all = false;           // everything was traversed
+    Face reached = 0;           // a face farther along
   };
 
-  // What a traversal will do that goes on from this corner, with its first face, if it has one
-  // inside, done.
+  // Predicts a traversal that continues from this corner, after its `first` face, if it has one
+  // inside.
   Seen from(Corner corner, std::optional<Face> first);
 
  private:
@@ -40,10 +40,10 @@ class LookAhead {
   const Connectivity& surface_;
   std::uint8_t* face_marks_;
   std::uint8_t* vertex_marks_;
-  std::vector<Face> faces_;  // marked here
+  std::vector<Face> faces_;  // marked by this object
   std::vector<Vertex> vertices_;
   Face reached_ = 0;
-  bool in_pocket_ = false;  // the end that was found is a pocket's
+  bool in_pocket_ = false;  // the end found is that of a pocket
 };
 
 }  // namespace isomesh::codec::edgebreaker

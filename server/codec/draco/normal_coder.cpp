@@ -17,14 +17,14 @@ constexpr std::uint32_t kSymbols = 1U << kNormalBits;
 using Transform =
     draco::PredictionSchemeNormalOctahedronCanonicalizedEncodingTransform<std::int32_t>;
 
-// As std::floor, which is a function of a library on processors that are not known to have it.
+// std::floor, which is a library call without SSE4.1.
 std::int32_t rounded_down(double x) {
   const auto whole = static_cast<std::int32_t>(x);
   return whole - (x < whole ? 1 : 0);
 }
 
-// Where the octahedron is met whose corners are `center` from its middle. The same to the bit as
-// libdraco's FloatVectorToQuantizedOctahedralCoords.
+// Projects a normal onto the octahedron with half-diagonal `center`. Bit-identical to libdraco's
+// FloatVectorToQuantizedOctahedralCoords.
 std::array<std::int32_t, 3> on_octahedron(const mesh::Vec3& normal, std::int32_t center) {
   const double x = normal[0];
   const double y = normal[1];
@@ -34,7 +34,7 @@ std::array<std::int32_t, 3> on_octahedron(const mesh::Vec3& normal, std::int32_t
   const double scale = 1.0 / sum;
   const std::int32_t a = rounded_down(x * scale * center + 0.5);
   const std::int32_t b = rounded_down(y * scale * center + 0.5);
-  // Rounding may have made the first two too long together.
+  // Rounding may have made the first two too long.
   const std::int32_t c = center - std::abs(a) - std::abs(b);
   if (c < 0) return {a, b > 0 ? b + c : b - c, 0};
   return {a, b, z * scale < 0 ? -c : c};
@@ -60,7 +60,7 @@ CodedNormals NormalCoder::code(const Connectivity& surface, const ValueOrder& or
   std::vector<std::uint64_t> counts(kSymbols);
   const Transform transform(static_cast<std::int32_t>(kSymbols) - 1);
   std::array<std::int32_t, 2> before = {0, 0};
-  // The decoder goes through components from the last to the first.
+  // The decoder visits components from last to first.
   for (auto component = order.components().rbegin(); component != order.components().rend();
        ++component) {
     for (std::uint32_t i = component->begin; i < component->end; ++i) {

@@ -8,10 +8,10 @@
 namespace isomesh::codec::edgebreaker {
 namespace {
 
-// Behind the table, a cache line for each slab.
+// After the table, one cache line per slab.
 constexpr std::size_t kSpareWords = 16;
 
-// Whether all of the triangles' vertices are of [begin, end).
+// True if all vertices of the triangles are in [begin, end).
 bool all_within(std::span<const mesh::Triangle> triangles, Vertex begin, Vertex end) {
   const Vertex count = end - begin;
   std::uint32_t outside = 0;
@@ -22,7 +22,7 @@ bool all_within(std::span<const mesh::Triangle> triangles, Vertex begin, Vertex 
   return outside == 0;
 }
 
-// Where vertices begin whose layers are `layer` and higher, as a number of the vertices'.
+// The first vertex whose layer is `layer` or higher.
 Vertex vertices_below(const Surface& surface, std::size_t layer) {
   return static_cast<Vertex>(surface.layer_vertices[std::min(layer, surface.layers())]);
 }
@@ -36,7 +36,7 @@ std::uint64_t most_vertices_of_two_layers(const Surface& surface) {
   return most;
 }
 
-// The first layer that has this share of the triangles below it.
+// The first layer with this share of the triangles below it.
 std::size_t cut_at(const Surface& surface, std::size_t slab, std::size_t slabs) {
   const std::uint64_t below = surface.triangles.size() * slab / slabs;
   const auto cut = std::ranges::lower_bound(surface.layer_triangles, below);
@@ -66,7 +66,8 @@ bool Opposites::find(const Surface& surface, std::size_t slabs, const mesh::Cont
     mesh::parallel_for(context, slabs, find_slab);
   }
   if (!manifold) return false;
-  // Both sides of a cut wrote to the faces of the layer below it, and none looked after the last.
+  // Repeat the first words of the layer below each cut, which both slabs wrote to, and of the last
+  // layer.
   for (std::size_t slab = 1; slab <= slabs; ++slab) {
     const std::size_t layer = slab == slabs ? surface.layers() : cut_at(surface, slab, slabs);
     if (layer == 0) continue;
@@ -88,7 +89,7 @@ bool Opposites::find_in(const Surface& surface, Layers layers, std::uint32_t spa
               .window = most_vertices_of_two_layers(surface),
               .spare_word = spare_word},
              words_.data());
-  // The triangles of the layer below name vertices of the first layer too.
+  // The triangles of the layer below also have vertices of the first layer.
   for (std::size_t layer = layers.begin - (layers.begin > 0 ? 1 : 0); layer < layers.end; ++layer) {
     context.throw_if_stopped();
     const std::uint64_t begin = surface.layer_triangles[layer];

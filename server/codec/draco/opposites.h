@@ -1,4 +1,4 @@
-// Which corners lie opposite of each other; private to this folder.
+// Computes opposite corners. Private to this folder.
 #pragma once
 
 #include <deque>
@@ -13,21 +13,20 @@
 namespace isomesh::codec::edgebreaker {
 
 // Finds the opposite corners of a surface whose triangles are ordered in layers, without a table of
-// all its edges: an edge of a lower vertex in layer k is complete after the triangles of layer k,
-// so two layers of vertices are all that is looked at at a time. Not thread safe.
+// all its edges: an edge whose lower vertex is in layer k is complete after the triangles of layer
+// k, so two layers of vertices suffice at a time. Not thread safe.
 class Opposites {
  public:
-  // Fills words() and boundary(). `slabs` runs of layers are worked on side by side; what is found
-  // does not depend on it, but for the order of boundary(). Returns false where the surface is not
-  // what corners.h describes: a triangle that repeats a vertex or names one that is not of its
-  // layers, an edge that more than two triangles share, or two in the same sense. Throws Error
-  // kCancelled, looked at before each layer.
+  // Fills words() and boundary(). `slabs` runs of layers are processed in parallel; only the order
+  // of boundary() depends on their number. Returns false if the surface violates corners.h: a
+  // triangle repeats a vertex or has one of other layers, or an edge has more than two triangles or
+  // two in the same direction. Throws Error kCancelled, checked before each layer.
   bool find(const Surface& surface, std::size_t slabs, const mesh::Context& context);
 
-  // As Connectivity has them, for 4 * triangles + 4 words.
+  // Connectivity::words, 4 * triangles + 4 of them.
   const std::uint32_t* words() const { return words_.data(); }
 
-  // The corners that have no opposite, run by run.
+  // The corners without an opposite, per run.
   const std::vector<std::vector<Corner>>& boundary() const { return boundary_; }
 
  private:
@@ -42,7 +41,7 @@ class Opposites {
 
   Scratch<std::uint32_t> words_;
   std::vector<std::vector<Corner>> boundary_;
-  std::deque<EdgeRows> rows_;  // one a slab
+  std::deque<EdgeRows> rows_;  // one per slab
 };
 
 }  // namespace isomesh::codec::edgebreaker

@@ -18,7 +18,7 @@ mesh::PartTopology part_topology(const Connectivity& surface,
   });
   for (const std::vector<Corner>& corners : boundary) {
     for (const Corner outer : corners) {
-      // Each open fan begins with one of the boundary's edges.
+      // Each open fan begins at a boundary edge.
       for (Corner corner = next(outer);;) {
         part.rim.push_back({original(surface.vertex(corner)),
                             original(surface.vertex(next(corner))),

@@ -1,4 +1,4 @@
-// What the encoder has found out about a surface as a surface; private to this folder.
+// The topology that the encoder found. Private to this folder.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,8 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// Of a surface whose traversal is done and all of whose vertices are named by a triangle;
-// `boundary` are the corners without an opposite. Vertices are numbered as before fans were
-// separated.
+// For a surface after its traversal, with every vertex in a triangle. `boundary` holds the corners
+// without an opposite. Vertices are numbered as before Fans::separate.
 mesh::PartTopology part_topology(const Connectivity& surface,
                                  const std::vector<std::vector<Corner>>& boundary, const Fans& fans,
                                  const Traversal& traversal);

@@ -1,4 +1,4 @@
-// Hints for what memory comes next; private to this folder.
+// Prefetch hints. Private to this folder.
 #pragma once
 
 #include <array>
@@ -7,15 +7,14 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// A depth-first walk turns right for as long as it meets new vertices: the face left of it is one
-// of the walk's next round. That face, and some steps later its own neighbours, are asked for
-// ahead.
+// A depth-first traversal turns right as long as it meets new vertices. The face on the left then
+// belongs to its next round. Prefetches that face, and some steps later its neighbours.
 class NextRound {
  public:
   explicit NextRound(const Connectivity& surface)
       : words_(surface.words), triangles_(reinterpret_cast<std::uintptr_t>(surface.triangles)) {}
 
-  // `left` is the corner left of where the walk is.
+  // `left` is the corner left of the present one.
   void passed(Corner left) {
     fetch(left);
     const Corner earlier = earlier_[at_];
@@ -28,7 +27,8 @@ class NextRound {
  private:
   void fetch(Corner corner) const {
     __builtin_prefetch(words_ + (corner & ~3U));
-    // At `none` that is an address behind the triangles, which is no matter: it is not read.
+    // For `none` the address lies behind the triangles. That is harmless: a prefetch does not read
+    // it.
     __builtin_prefetch(
         reinterpret_cast<const void*>(triangles_ + sizeof(mesh::Triangle) * face_of(corner)));
   }

@@ -5,7 +5,7 @@
 namespace isomesh::codec::edgebreaker {
 namespace {
 
-// Four at a time: what GCC and Clang make of it on every processor.
+// Four lanes: GCC and Clang compile them for every processor.
 using Floats = float __attribute__((vector_size(16)));
 using Ints = std::int32_t __attribute__((vector_size(16)));
 
@@ -29,7 +29,7 @@ bool quantise(std::span<const mesh::Vec3> positions, const Grid& grid, GridPoint
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const auto& [x, y, z] = positions[i];
     const Floats scaled = (Floats{x, y, z, x} - low) * scale + 0.5F;
-    // Also not for what is not a number. What is not negative is rounded down by the conversion.
+    // Also false for NaN. Conversion rounds nonnegative values down.
     const Ints inside = (scaled >= 0) & (scaled < steps + 1);
     outside |= ~inside;
     const Ints on_grid = __builtin_convertvector(inside ? scaled : Floats{}, Ints);

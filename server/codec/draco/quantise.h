@@ -1,4 +1,4 @@
-// Positions as numbers of steps on the grid; private to this folder.
+// Quantisation of positions on the grid. Private to this folder.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// A position on the grid. The fourth value is zero: rows of eight bytes are read at once.
+// A position on the grid. The fourth value is zero, so that eight bytes can be read at once.
 struct alignas(8) GridPoint {
   std::uint16_t x, y, z, zero;
 };
 
-// The least and the greatest coordinate on any axis.
+// The smallest and the largest coordinate over all axes.
 struct Extent {
   std::int32_t least = 0;
   std::int32_t greatest = 0;
@@ -22,8 +22,8 @@ struct Extent {
   void cover(const Extent& other);
 };
 
-// Writes one point for each position; as libdraco rounds them. Returns false where one is not on
-// the grid, or is not a number. `points` has room for all.
+// Writes one point per position, rounded as libdraco does. Returns false if a position is NaN or
+// off the grid. `points` has room for all.
 bool quantise(std::span<const mesh::Vec3> positions, const Grid& grid, GridPoint* points,
               Extent& extent);
 

@@ -8,17 +8,17 @@
 namespace isomesh::codec::edgebreaker {
 namespace {
 
-// The state is kept within [4, 1024) * 2^precision.
+// The state stays within [4, 1024) * 2^precision.
 constexpr std::uint32_t kLeastState = 4;
 constexpr std::uint32_t kMostStateBits = 10;
 
-// Two bits of a table's byte tell how many bytes follow it, or that it counts zeros.
+// Two bits of a table's byte hold the number of bytes that follow, or mark a run of zeros.
 constexpr std::uint32_t kZeros = 3;
 constexpr std::uint32_t kMostZeros = 63;
 
 int extra_bytes(std::uint32_t parts) { return parts < (1U << 6) ? 0 : parts < (1U << 14) ? 1 : 2; }
 
-// A number whose first two bits tell how many bytes it has, of at most 30 bits.
+// A number of at most 30 bits; its first two bits hold its number of bytes.
 std::byte* write_state(std::uint32_t state, std::byte* out) {
   const int bytes = state < (1U << 6) ? 1 : state < (1U << 14) ? 2 : state < (1U << 22) ? 3 : 4;
   state |= static_cast<std::uint32_t>(bytes - 1) << (8 * bytes - 2);
@@ -26,10 +26,10 @@ std::byte* write_state(std::uint32_t state, std::byte* out) {
   return out + bytes;
 }
 
-// Takes parts away from the most probable symbols, so that they sum up to `sum` - `excess`.
+// Reduces the most probable symbols' parts so that their sum becomes `sum` - `excess`.
 void take_away(std::vector<std::uint32_t>& parts, std::int64_t sum, std::int64_t excess) {
   if (excess == 0) return;
-  // Most symbols of a large alphabet have one part, which they keep.
+  // Most symbols of a large alphabet have only one part, which they keep.
   std::vector<std::uint32_t> order;
   for (std::uint32_t symbol = 0; symbol < parts.size(); ++symbol) {
     if (parts[symbol] > 1) order.push_back(symbol);
@@ -95,7 +95,7 @@ void Probabilities::write(ByteWriter& out) const {
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::uint32_t part = parts[i];
     if (part == 0) {
-      std::uint32_t more = 0;  // zeros; the last part is none
+      std::uint32_t more = 0;  // zeros; the last part is never zero
       while (more < kMostZeros && parts[i + more + 1] == 0) ++more;
       out.byte(more << 2 | kZeros);
       i += more;
@@ -118,7 +118,7 @@ RansEncoder::RansEncoder(const Probabilities& probabilities, std::byte* out)
   }
 }
 
-// Symbol coding is state -> state / parts * 2^precision + below + state % parts, which is
+// Coding a symbol is state -> state / parts * 2^precision + below + state % parts, which equals
 // state + bias + quotient * (2^precision - parts).
 RansEncoder::Step RansEncoder::step_of(std::uint32_t parts, std::uint32_t below, int precision) {
   const std::uint32_t whole = 1U << precision;
@@ -140,7 +140,7 @@ RansEncoder::Step RansEncoder::step_of(std::uint32_t parts, std::uint32_t below,
   return step;
 }
 
-// Which bytes leave is as good as random: no branches.
+// The number of bytes to write is unpredictable, so there are no branches.
 template <int kMostBytes>
 void RansEncoder::put_all(const std::uint16_t* begin, const std::uint16_t* end) {
   const Step* const steps = steps_.data();

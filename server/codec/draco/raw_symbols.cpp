@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::uint32_t kRawSymbols = 1;
 
-// The precision of the probabilities goes with a number which the stream calls the bits of the
-// number of different values. Any does; the finest that is worth its table is taken.
+// The stream stores the precision as the bit length of the number of distinct values. Every length
+// is valid; the best trade-off between precision and table size is taken.
 constexpr int kMostLengthBits = 18;
 constexpr int kLengthsTried = 3;
 constexpr int kLeastPrecision = 12;

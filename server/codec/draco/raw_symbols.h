@@ -1,4 +1,4 @@
-// Symbols that are coded whole; private to this folder.
+// Draco's coding of whole symbols ("raw"). Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// How symbols that occur that often are coded in the fewest bits.
+// The smallest coding for the counts of symbols.
 struct RawCoding {
   int length_bits = 0;
   double data_bits = 0;
@@ -20,10 +20,10 @@ struct RawCoding {
   double all_bits() const { return data_bits + table_bits; }
 };
 
-// At least one count is not 0.
+// At least one count is nonzero.
 RawCoding best_coding(std::span<const std::uint64_t> counts);
 
-// What stands before so many bytes of coded symbols.
+// The header of `bytes` bytes of coded symbols.
 std::vector<std::byte> head_of(const RawCoding& coding, std::size_t bytes);
 
 }  // namespace isomesh::codec::edgebreaker

@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint32_t kTaggedSymbols = 0;
 constexpr int kTagPrecision = 12;
 
-// The bits of a vertex's largest residual, one at least.
+// The bit length of a vertex's largest residual, at least one.
 std::uint32_t bits_of(const std::uint16_t* symbols) {
   return static_cast<std::uint32_t>(
       std::bit_width(static_cast<std::uint32_t>(symbols[0] | symbols[1] | symbols[2] | 1)));
@@ -23,7 +23,7 @@ std::uint32_t bits_of(const std::uint16_t* symbols) {
 
 using TagCounts = std::array<std::uint64_t, 18>;
 
-// What tagged values take, in bits, as some of the vertices tell.
+// The size of tagged values, in bits, estimated from a sample of the vertices.
 double tagged_bits(const Residuals& residuals, std::uint32_t vertices) {
   constexpr std::uint32_t kLookedAt = 1 << 16;
   const std::uint32_t step = std::max(1U, vertices / kLookedAt);
@@ -55,7 +55,7 @@ CodedResiduals ResidualCoder::code(const Residuals& residuals, const ValueOrder&
   }
   coded_.reserve(RansEncoder::most_bytes(coding.data_bits, 3 * std::uint64_t{order.count()}));
   RansEncoder encoder(coding.probabilities, coded_.data());
-  // The decoder goes through components from the last to the first.
+  // The decoder visits components from last to first.
   for (const ValueRange& component : order.components()) {
     encoder.put_backwards(residuals.symbols() + 3 * std::size_t{component.begin},
                           residuals.symbols() + 3 * std::size_t{component.end});

@@ -11,14 +11,14 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// How residuals are coded, and what they are coded to, which lives in the coder.
+// Encoded residuals; the coder owns the data.
 struct CodedResiduals {
   std::vector<std::byte> head;
   std::span<const std::byte> data;
 };
 
-// Codes the residuals of all components, in whichever of Draco's two forms is smaller: every value
-// by rANS ("raw"), or, where values are few for their table, only the number of bits of each vertex
+// Codes the residuals of all components in the smaller of Draco's two forms: every value by rANS
+// ("raw"), or, if the values are too few for their table, only each vertex's number of bits
 // ("tagged"). Keeps its memory. Not thread safe.
 class ResidualCoder {
  public:
@@ -29,7 +29,7 @@ class ResidualCoder {
   CodedResiduals code_tagged(const Residuals& residuals, const ValueOrder& order);
 
   Scratch<std::byte> coded_;
-  Scratch<std::uint16_t> bits_;  // of each vertex, where they are tagged
+  Scratch<std::uint16_t> bits_;  // per vertex, if tagged
 };
 
 }  // namespace isomesh::codec::edgebreaker

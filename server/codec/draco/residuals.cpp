@@ -3,8 +3,8 @@
 namespace isomesh::codec::edgebreaker {
 namespace {
 
-// Writes residuals and counts them. Holds copies of what it needs, because what it writes could be
-// theirs for the compiler.
+// Writes residuals and counts them. Copies its parameters, because the compiler assumes that its
+// stores may alias them.
 class SymbolWriter {
  public:
   SymbolWriter(const Wrap& wrap, std::uint16_t* symbols, Histogram& histogram)

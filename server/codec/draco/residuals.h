@@ -1,4 +1,4 @@
-// What predictions leave of the values; private to this folder.
+// Differences between values and their predictions. Private to this folder.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// Three coordinates, and a lane that is not used.
+// Three coordinates and an unused lane.
 using Lanes = std::int32_t __attribute__((vector_size(16)));
 
 inline Lanes lanes_of(const GridPoint& point) {
@@ -36,7 +36,7 @@ class Wrap {
     predicted = predicted < extent_.least ? extent_.least - Lanes{} : predicted;
     predicted = predicted > extent_.greatest ? extent_.greatest - Lanes{} : predicted;
     Lanes difference = value - predicted;
-    // Comparisons are all ones where they hold.
+    // Comparisons yield all ones if true.
     difference += (difference < least_) & span_;
     difference -= (difference > most_) & span_;
     return (difference + difference) ^ (difference >> 31);
@@ -52,8 +52,8 @@ class Wrap {
   std::int32_t least_;
 };
 
-// How often each symbol occurs. One an axis, so that a thread that counts the same symbol again
-// does not wait for its own store.
+// Counts symbols. One histogram per axis, so that counting the same symbol again does not wait for
+// the previous store.
 class Histogram {
  public:
   void reset(std::uint32_t symbols) {
@@ -68,17 +68,18 @@ class Histogram {
   std::array<std::vector<std::uint32_t>, 3> counts_;
 };
 
-// The residuals of a surface's values, in their order, three a vertex. A thread may predict some
-// values while another predicts others. Keeps its memory from surface to surface.
+// The residuals of a surface's values, in order, three per vertex. Threads may predict disjoint
+// ranges. Keeps its memory between surfaces.
 class Residuals {
  public:
   void prepare(const Connectivity& surface, const GridPoint* points, const Extent& extent);
 
-  // The values [begin, end) of the order, but for first ones: from the parallelogram across.
+  // Predicts the values [begin, end) of the order from the opposite parallelogram, except first
+  // values.
   void predict(const std::uint32_t* order, std::uint32_t begin, std::uint32_t end,
                Histogram& histogram);
 
-  // First values are predicted by the value before them in the stream.
+  // Predicts first values from the preceding value in the stream.
   void predict_firsts(const ValueOrder& order, Histogram& histogram);
 
   const Wrap& wrap() const { return wrap_; }

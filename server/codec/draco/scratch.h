@@ -1,4 +1,4 @@
-// Memory that a stage fills and keeps from mesh to mesh; private to this folder.
+// Memory that a stage keeps between meshes. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -7,17 +7,15 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// An array whose elements are indeterminate until they are written. Not thread
-// safe; disjoint elements may be written from several threads.
+// An array with uninitialised elements. Not thread safe, but threads may write disjoint elements.
 template <class T>
 class Scratch {
  public:
-  // At least `count` elements, indeterminate if they are more than there were. Throws
-  // std::bad_alloc.
+  // Returns at least `count` elements, uninitialised after growth. Throws std::bad_alloc.
   T* reserve(std::size_t count) {
     if (count <= capacity_) return data_.get();
     capacity_ = 0;
-    data_.reset();  // give the old block back before asking for the larger one
+    data_.reset();  // free the old block before allocating the larger one
     data_ = mesh::allocate_for_overwrite<T>(count);
     capacity_ = count;
     return data_.get();

@@ -1,5 +1,5 @@
-// Where the order of values starts, handed from the traversal to whoever makes the order; private
-// to this folder.
+// Starts of the value order, passed from the traversal to the thread that orders values. Private to
+// this folder.
 #pragma once
 
 #include <atomic>
@@ -14,10 +14,11 @@ namespace isomesh::codec::edgebreaker {
 // A corner from which the decoder orders values. A component can need several.
 struct Start {
   Corner corner = 0;
-  bool continues = false;  // the component of the start before
+  bool continues = false;  // belongs to the preceding start's component
 };
 
-// A queue with one writer and one reader, which may be on two threads; reset while neither is.
+// A queue with one writer and one reader, possibly on two threads. Reset it only while neither uses
+// it.
 class Starts {
  public:
   // There are at most `most` starts.
@@ -33,13 +34,13 @@ class Starts {
     state_.notify_one();
   }
 
-  // Nothing comes any more.
+  // No starts follow.
   void close() {
     state_.fetch_or(kClosed, std::memory_order_release);
     state_.notify_one();
   }
 
-  // The start of that index; waits for it. None when the queue was closed before it came.
+  // Waits for the start of that index. Returns empty if the queue was closed before.
   std::optional<Start> get(std::uint32_t index) {
     for (;;) {
       const std::uint32_t state = state_.load(std::memory_order_acquire);
@@ -52,8 +53,9 @@ class Starts {
   }
 
  private:
-  static constexpr std::uint32_t kContinues = 1U << 31;  // of a start
-  static constexpr std::uint32_t kClosed = 1U << 31;     // of the state, which else counts them
+  static constexpr std::uint32_t kContinues = 1U << 31;  // flag of a start
+  static constexpr std::uint32_t kClosed = 1U << 31;     // flag of the state, whose other bits are
+                                                         // their number
 
   Scratch<std::uint32_t> starts_;
   std::atomic<std::uint32_t> state_ = 0;

@@ -11,7 +11,7 @@
 namespace isomesh::codec::edgebreaker {
 namespace {
 
-// Of the bitstream's specification.
+// From the bitstream's specification.
 constexpr std::string_view kMagic = "DRACO";
 constexpr std::uint32_t kMajorVersion = 2;
 constexpr std::uint32_t kMinorVersion = 2;
@@ -49,21 +49,20 @@ void write_events(const std::vector<SplitEvent>& events, ByteWriter& out) {
   }
 }
 
-// Three bits a symbol, one for C.
+// Three bits per symbol, one for C.
 void write_symbols(std::span<const std::uint8_t> symbols, ByteWriter& out) {
   std::size_t bits = 0;
   for (const std::uint8_t symbol : symbols) bits += 1 + 2 * (symbol & 1U);
   const std::size_t bytes = BitWriter::bytes_of(bits);
   out.varint(bytes);
   BitWriter writer(out.extend(bytes));
-  // The decoder goes through them backwards.
+  // The decoder reads the symbols backwards.
   for (std::size_t i = symbols.size(); i-- > 0;) {
     writer.put(symbols[i], 1 + 2 * (symbols[i] & 1U));
   }
   writer.finish();
 }
 
-// Three floats.
 void write_attribute(std::uint32_t kind, std::uint32_t id, ByteWriter& out) {
   for (const std::uint32_t byte : {kind, kFloat32, 3U, 0U}) out.byte(byte);
   out.varint(id);

@@ -1,4 +1,4 @@
-// The parts of a Draco stream as bytes, and their order; private to this folder.
+// Assembles the parts of a Draco stream. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -14,19 +14,18 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// What a stream is made of.
 struct StreamParts {
   const Traversal& traversal;
   std::uint32_t faces = 0;
-  std::uint32_t vertices = 0;  // that faces name
+  std::uint32_t vertices = 0;  // in faces
   CodedResiduals residuals;
   std::optional<CodedNormals> normals;
   Extent extent;
   const Grid& grid;
 };
 
-// The whole stream: Draco's bitstream 2.2, a triangle mesh by edgebreaker with positions and, where
-// there are some, normals as attributes of its vertices.
+// Returns a stream of Draco's bitstream 2.2: a triangle mesh by edgebreaker with positions and, if
+// given, normals as vertex attributes.
 std::vector<std::byte> assemble(const StreamParts& parts);
 
 }  // namespace isomesh::codec::edgebreaker

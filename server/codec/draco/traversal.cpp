@@ -27,8 +27,8 @@ bool Traversal::run(const Fans& fans, Starts& starts, const mesh::Context& conte
       return false;
     }
   }
-  // Draco's decoder takes at most four faces for three symbols, as tetrahedra have. Two triangles
-  // back to back have one symbol.
+  // Draco's decoder accepts at most four faces per three symbols, the ratio of a tetrahedron. Two
+  // triangles back to back have one symbol.
   if (surface_.faces > count_ + count_ / 3) return false;
   resolve_events();
   return true;
@@ -51,9 +51,9 @@ void Traversal::prepare(const Connectivity& surface, const Fans& fans) {
   count_ = 0;
 }
 
-// Where the walk over the face's component begins: at an edge of its boundary if the face is at
-// one, so that the edge is the gate, or else behind the face itself. None where the boundary cannot
-// be come to, because the vertex on it has another fan, which is closed.
+// The start of the traversal of the face's component. At a boundary edge of the face, that edge is
+// the gate; otherwise the traversal starts behind the face. Empty if the boundary is unreachable,
+// because its vertex has another fan, which is closed.
 std::optional<Traversal::Entrance> Traversal::entrance_of(Face face, const Fans& fans) const {
   for (Corner corner = corner_of(face, 0); index_of(corner) < 3; ++corner) {
     if (surface_.opposite(corner) == surface_.none) return Entrance{corner, std::nullopt};
@@ -69,8 +69,8 @@ std::optional<Traversal::Entrance> Traversal::entrance_of(Face face, const Fans&
   return Entrance{surface_.opposite(corner_of(face, 1)), face};
 }
 
-// While much is left, looks for an entrance to the same component from which it is known where the
-// traversal ends. Returns that corner, or none where the search was given up.
+// While many faces remain, searches an entrance to the same component with a predictable end of the
+// traversal. Returns that end, or empty if the search was given up.
 std::optional<Corner> Traversal::choose_entrance(Entrance& entrance, const Fans& fans) {
   constexpr int kMostLooks = 24;
   if (surface_.faces - count_ - inner_first_faces_.size() < least_to_look_ahead_) {
@@ -87,7 +87,7 @@ std::optional<Corner> Traversal::choose_entrance(Entrance& entrance, const Fans&
   return std::nullopt;
 }
 
-// Takes the first face of a component, which is inside.
+// Visits the first face of a component, if it is inside.
 bool Traversal::take_first(Face face) {
   face_state_[face] = kGone;
   for (std::uint32_t i = 0; i < 3; ++i) {
@@ -98,7 +98,7 @@ bool Traversal::take_first(Face face) {
   return true;
 }
 
-// A component's first edge, of which neither vertex need ever be a tip.
+// A component's first edge; its vertices need never be a tip.
 void Traversal::take_gate(Corner corner) {
   for (const Corner end : {next(corner), previous(corner)}) {
     if (known_[surface_.vertex(end)] == kRim) take_rim(surface_.vertex(end));
@@ -110,10 +110,10 @@ void Traversal::take_rim(Vertex vertex) {
   rim_.push_back({vertex, components() - 1});
 }
 
-// From a corner until all that hangs together with it is done.
+// Traverses from a corner until its connected component is done.
 bool Traversal::walk(Corner corner, const mesh::Context& context) {
   constexpr std::uint32_t kSymbolsBetweenLooks = 1 << 18;
-  // Copies, because what is written here are bytes, which could be anything's for the compiler.
+  // Local copies: the compiler assumes that byte stores may alias the members.
   const Connectivity surface = surface_;
   std::uint8_t* const state = face_state_.data();
   std::uint8_t* const known = known_.data();
@@ -175,8 +175,8 @@ bool Traversal::walk(Corner corner, const mesh::Context& context) {
   }
 }
 
-// Whether around the tip of a split there is a face that is gone, or the boundary. If not, this is
-// the first face of a fan whose vertex is known from another one.
+// True if a visited face or the boundary is at the tip of a split. Otherwise this is the first face
+// of a fan whose vertex is known from another fan.
 bool Traversal::is_of_open_fan(Corner corner) const {
   Corner at = corner;
   for (;;) {
@@ -188,9 +188,9 @@ bool Traversal::is_of_open_fan(Corner corner) const {
   }
 }
 
-// The decoder's order of values starts from the last face, and again from each that it has not come
-// to then, backwards. From the last one it comes to all, unless that face hangs by its gate alone:
-// then it is all that there is behind it, and the one before is next.
+// The decoder orders values from the last face, and again, backwards, from each face not reached by
+// then. It reaches all from the last face, unless that face is attached by its gate alone. Then it
+// reaches nothing else, and the previous one is next.
 void Traversal::put_starts(std::uint32_t first_symbol, Starts& starts) {
   std::size_t end = ends_.size() - 1;
   Corner tip = ends_[end];
@@ -202,17 +202,17 @@ void Traversal::put_starts(std::uint32_t first_symbol, Starts& starts) {
   }
 }
 
-// The tip of the symbol before this one: across the gate, unless that symbol is an E, which are
-// listed; `end` is the one looked at last.
+// The tip of the preceding symbol: across the gate, unless that symbol is an E. Those are listed;
+// `end` is the index of the last one used.
 Corner Traversal::tip_before(Corner corner, std::uint32_t symbol, std::size_t& end) const {
   const std::uint8_t before = symbols_[symbol - 1];
   if (before == kE) return ends_[--end];
   const Corner across = surface_.opposite(corner);
-  // After an R the walk turned left, and after all others right.
+  // After R the traversal turned left, otherwise right.
   return before == kR ? next(across) : previous(across);
 }
 
-// Events name splits by their faces until all splits are known. Each has one event at most.
+// Events store splits by face until all splits are known. Each split has at most one event.
 void Traversal::resolve_events() {
   std::unordered_map<Face, std::size_t> event_at;
   for (std::size_t i = 0; i < events_.size(); ++i) event_at.emplace(events_[i].split, i);

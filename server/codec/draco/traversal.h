@@ -1,4 +1,4 @@
-// Edgebreaker: the surface face by face as symbols; private to this folder.
+// Edgebreaker: encodes a surface's connectivity face by face as symbols. Private to this folder.
 #pragma once
 
 #include <cstdint>
@@ -13,42 +13,42 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// How a face lies to those before it, by its tip, which is the vertex opposite of the edge through
-// which it was entered: C is a new vertex. Else the faces to the left and right of the tip are gone
-// (their bits are set) or not.
+// The position of a face relative to the visited ones, by its tip, the vertex opposite the edge of
+// entry. C: the tip is new. Otherwise bits are set if the faces on the left and right of the tip
+// are visited.
 enum Symbol : std::uint8_t { kC = 0, kS = 1, kL = 3, kR = 5, kE = 7 };
 
-// A face closes against the one to its left (side 0) or right (side 1) which is an S whose left
-// side waited for it. Both by the numbers of their symbols.
+// A face closes against its left (side 0) or right (side 1) neighbour, an S whose left side was
+// postponed. Both are symbol numbers.
 struct SplitEvent {
   std::uint32_t source = 0;
   std::uint32_t split = 0;
   std::uint8_t side = 0;
 };
 
-// Walks depth-first over all faces, as Rossignac's Edgebreaker in the form that Draco's bitstream
-// has. Keeps its memory from surface to surface. Not thread safe.
+// Visits all faces depth-first: Rossignac's Edgebreaker in the form of Draco's bitstream. Keeps its
+// memory between surfaces. Not thread safe.
 class Traversal {
  public:
-  // While at least this many faces are left, the entrance to a component is chosen so that its end
-  // is known.
+  // While at least this many faces remain, the entrance to a component is chosen so that the end of
+  // its traversal is known.
   explicit Traversal(std::size_t least_to_look_ahead) : least_to_look_ahead_(least_to_look_ahead) {}
 
   void prepare(const Connectivity& surface, const Fans& fans);
 
-  // Once after prepare. Fills what is below, and `starts` on the way, which it leaves open. Returns
-  // false where a vertex has a second closed fan, which Draco has no code for, and where too many
-  // triangles lie back to back for its decoder. Throws Error kCancelled.
+  // Call once after prepare. Fills the results below and `starts`, which stays open. Returns false
+  // if a vertex has a second closed fan, which Draco cannot represent, or if too many triangles lie
+  // back to back for its decoder. Throws Error kCancelled.
   bool run(const Fans& fans, Starts& starts, const mesh::Context& context);
 
   std::span<const std::uint8_t> symbols() const { return {symbols_.data(), count_}; }
   const std::vector<SplitEvent>& events() const { return events_; }
   std::size_t splits() const { return all_splits_.size(); }
-  // For each component, whether it starts with a face inside: one that has no symbol.
+  // Per component: true if it starts with a face inside, which has no symbol.
   const std::vector<bool>& inner_first_faces() const { return inner_first_faces_; }
 
   std::uint32_t components() const { return static_cast<std::uint32_t>(inner_first_faces_.size()); }
-  // The vertices on the boundary, each with its component.
+  // A vertex on the boundary and its component.
   struct RimVertex {
     Vertex vertex = 0;
     std::uint32_t component = 0;
@@ -56,21 +56,21 @@ class Traversal {
   const std::vector<RimVertex>& rim() const { return rim_; }
 
  private:
-  // Of a vertex that the decoder has, and of one on the boundary that it is taken to have already.
+  // States of a vertex: known to the decoder, or on the boundary and therefore treated as known.
   static constexpr std::uint8_t kKnown = 1;
   static constexpr std::uint8_t kRim = 2;
 
-  // Of a face: gone, also an S, also looked at for a start.
+  // States of a face, cumulative: visited, a split, checked for a start.
   enum FaceState : std::uint8_t { kLeft = 0, kGone = 1, kSplit = 2, kListed = 4 };
 
-  // A face that is an S, and the number of its symbol.
+  // A face with symbol S, and the number of its symbol.
   struct Split {
     Face face = 0;
     std::uint32_t symbol = 0;
   };
   struct Entrance {
     Corner corner = 0;
-    std::optional<Face> inner;  // the component's first face, if it is inside: it has no symbol
+    std::optional<Face> inner;  // the component's first face if it is inside, without a symbol
   };
 
   std::optional<Entrance> entrance_of(Face face, const Fans& fans) const;
@@ -88,11 +88,11 @@ class Traversal {
   const std::size_t least_to_look_ahead_;
   Connectivity surface_;
   Scratch<std::uint8_t> face_state_;
-  Scratch<std::uint8_t> known_;  // a byte a vertex: 0, kKnown, or kRim
+  Scratch<std::uint8_t> known_;  // per vertex: 0, kKnown or kRim
   Scratch<std::uint8_t> symbols_;
   std::vector<Corner> waiting_;  // the left sides of splits
   std::vector<Split> all_splits_;
-  std::vector<Corner> ends_;  // the tips of those symbols that are an E
+  std::vector<Corner> ends_;  // the tips of the E symbols
   std::vector<SplitEvent> events_;
   std::vector<bool> inner_first_faces_;
   std::vector<RimVertex> rim_;

@@ -18,7 +18,7 @@ void ValueOrder::prepare(const Connectivity& surface, const Fans& fans) {
   count_ = 0;
 }
 
-// Whether the vertices of the face across the corner's edge all have their values.
+// True if all vertices of the face across the corner's edge have values.
 bool ValueOrder::is_predicted(Corner corner) const {
   const Corner across = surface_.opposite(corner);
   if (across == surface_.none) return false;
@@ -28,7 +28,7 @@ bool ValueOrder::is_predicted(Corner corner) const {
   return true;
 }
 
-// Gives the vertex its place, if it has none.
+// Appends the vertex unless it has a place.
 void ValueOrder::put(Corner corner) {
   std::uint8_t& state = vertex_state_[surface_.vertex(corner)];
   if ((state & kPlaced) != 0) return;

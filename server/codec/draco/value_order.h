@@ -1,4 +1,4 @@
-// The order in which the decoder takes the vertices' values; private to this folder.
+// The order of vertex values in the decoder. Private to this folder.
 #pragma once
 
 #include <atomic>
@@ -13,40 +13,39 @@
 
 namespace isomesh::codec::edgebreaker {
 
-// A value is named by the corner at which the order comes to its vertex: across that corner's edge
-// lies the face whose vertices predict it. Where there is none yet, the value is a first one.
+// A value is identified by the corner at which the order reaches its vertex. The face across that
+// corner's edge predicts the value. Without such a face the value is a first value.
 inline constexpr std::uint32_t kFirstValue = 1U << 31;
 
-// The values of one component, as a range of the order. In the stream, components come from the
-// last to the first.
+// A component's values, as a range of the order. The stream has components from last to first.
 struct ValueRange {
   std::uint32_t begin = 0;
   std::uint32_t end = 0;
 };
 
-// Draco's depth-first traversal of vertices. Keeps its memory from surface to surface. Not thread
-// safe, but for what says so.
+// Draco's depth-first traversal of vertices. Keeps its memory between surfaces. Not thread safe,
+// except where noted.
 class ValueOrder {
  public:
   void prepare(const Connectivity& surface, const Fans& fans);
 
-  // Goes on from a start. Calls more(count) whenever some more values are in order, so that they
-  // are worked on while they are in the nearest cache.
+  // Continues from a start. Calls more(count) after every few values, so that they are processed
+  // while they are in the first-level cache.
   template <class More>
   void add(Start start, More more);
 
-  // The corners, some with kFirstValue. Those before a count that more() was called with may be
-  // read by another thread that learns that count from it.
+  // The corners, some with kFirstValue. Another thread may read the corners before a count that it
+  // received through more().
   const std::uint32_t* corners() const { return order_.data(); }
   std::uint32_t count() const { return count_; }
   const std::vector<ValueRange>& components() const { return components_; }
-  // Where in the order values are first ones, ascending.
+  // The positions of first values in the order, ascending.
   const std::vector<std::uint32_t>& firsts() const { return firsts_; }
 
  private:
   static constexpr std::uint32_t kValuesAtOnce = 256;
 
-  // Of a vertex: has its place in the order, is on the boundary.
+  // Flags of a vertex: it has its place in the order; it is on the boundary.
   enum VertexState : std::uint8_t { kPlaced = 1, kBoundary = 2 };
 
   bool is_predicted(Corner corner) const;

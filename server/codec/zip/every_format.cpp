@@ -1,5 +1,5 @@
-// The encoder of each format. They are told here, in the one folder that knows them all: some
-// formats are ZIPs, and only what makes meshes links the library that writes those.
+// Calls each format's encoder. It is in the one folder that knows them all: some formats are ZIPs,
+// and only the program that makes meshes links the ZIP library.
 #include "proto/error.h"
 #include "server/codec/encode.h"
 #include "server/codec/encode_labels.h"

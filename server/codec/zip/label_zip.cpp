@@ -18,12 +18,11 @@
 namespace isomesh::codec {
 namespace {
 
-// Labels are encoded side by side, some at a time, until they have so many triangles together.
+// Labels are encoded in parallel, in batches of about this many triangles.
 constexpr std::size_t kTrianglesAtOnce = 1'000'000;
 constexpr std::size_t kLabelsAtOnce = 256;
 
-// What a file is called: no path, nothing that a system has a use for, and no two alike, whether or
-// not capitals count.
+// Names for files: without a path, valid on all systems, unique regardless of case.
 class FileNames {
  public:
   std::string of(const LabelSummary& label) {
@@ -45,11 +44,10 @@ class FileNames {
   }
 
  private:
-  // So that no file's name, with its suffix and what tells it from others, is too long for a
-  // system.
+  // Leaves room for the suffix and a distinguishing number.
   static constexpr std::size_t kMostBytes = 200;
 
-  // Whether Windows takes it for a device, whatever follows a dot.
+  // True for names that are devices on Windows, with or without a suffix.
   static bool is_device(const std::string& name) {
     const std::string stem = lowered(name.substr(0, name.find('.')));
     const bool is_numbered = (stem.starts_with("com") || stem.starts_with("lpt")) &&
@@ -72,7 +70,7 @@ struct Encoded {
   std::string sha256;
 };
 
-// Of all labels' Draco streams.
+// For all labels' Draco streams.
 Grid shared_grid(const mesh::Mesh& walls, const MeshParameters& parameters) {
   const Space space = space_of(MeshFormat::kDrc, parameters);
   const int bits = parameters.draco.position_bits;

@@ -67,12 +67,12 @@ std::string hex_color(const std::array<double, 3>& color) {
 
 struct Object {
   std::string name;
-  std::string part_number;  // none where it is empty
+  std::string part_number;  // none if empty
   std::size_t material = 0;
   bool is_solid = false;
 };
 
-// The package with its one model, from its beginning to its end.
+// Streams the package with its one model.
 class Package {
  public:
   struct Size {
@@ -137,7 +137,7 @@ class Package {
   static constexpr auto kDeflated = ZipWriter::Compression::kDeflated;
   static constexpr std::size_t kMaterialsId = 1;
 
-  // Some readers do not know ZIPs of larger files, so it is one of those only if it may be large.
+  // Some readers do not support ZIP64, so it is used only if the package may be large.
   static ZipWriter::Sizes sizes_of(const Size& most) {
     const std::uint64_t most_bytes =
         most.vertices * kMostVertexBytes + most.triangles * kMostTriangleBytes;
@@ -188,7 +188,7 @@ void encode_labels_3mf(const LabelledSurface& surface, const Provenance& provena
                        const mesh::Context& context, const Sink& sink) {
   const mesh::Context quiet = {context.stop, nullptr};
   const std::size_t labels = surface.labels.size();
-  // Every wall is in the surfaces of two labels, or of one.
+  // Every wall belongs to one or two labels.
   const std::uint64_t walls = surface.walls.mesh.triangles.size();
   Package package(sink, {2 * walls, 2 * 3 * walls},
                   space_of(MeshFormat::k3mf, provenance.parameters));

@@ -25,10 +25,10 @@ class ZipWriter::Library {
     check(archive_write_open(archive_.get(), this, nullptr, take, nullptr));
   }
 
-  // The library closes what is still open, which writes.
+  // Freeing the archive may still write; discard that.
   ~Library() { is_over_ = true; }
 
-  // Returns where the bytes of the file begin.
+  // Returns the offset of the file's bytes.
   std::uint64_t begin(const std::string& name, std::optional<std::size_t> bytes) {
     const std::unique_ptr<archive_entry, Free> entry(archive_entry_new());
     check(entry ? ARCHIVE_OK : ARCHIVE_FATAL);
@@ -56,8 +56,8 @@ class ZipWriter::Library {
     void operator()(archive_entry* entry) const { archive_entry_free(entry); }
   };
 
-  // An exception may not pass through the library; told of a failure, the library would leak what
-  // it writes with.
+  // An exception must not pass through the library. It reports success even after a failure,
+  // because libarchive would otherwise leak its writer.
   static la_ssize_t take(archive* /*all*/, void* self, const void* bytes, std::size_t count) {
     auto& library = *static_cast<Library*>(self);
     try {
@@ -83,7 +83,7 @@ class ZipWriter::Library {
   std::uint64_t written_ = 0;
   std::exception_ptr failure_;
   bool is_over_ = false;
-  std::unique_ptr<archive, Free> archive_;  // the first to end, which may still write
+  std::unique_ptr<archive, Free> archive_;  // destroyed first; may still write
 };
 
 ZipWriter::ZipWriter(const Sink& sink, Compression compression, Sizes sizes)

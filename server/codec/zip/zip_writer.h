@@ -1,4 +1,4 @@
-// ZIPs whose bytes go to a sink as they are made; private to this folder.
+// Streams a ZIP to a sink. Private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -11,16 +11,16 @@
 
 namespace isomesh::codec {
 
-// Files without times, so that the same files make the same bytes. Not thread safe. Its functions
-// throw what the sink throws, and Error kInternal when the library that writes ZIPs refuses. One
-// that is not finished tells the sink nothing more when it ends.
+// Files have no times, so equal files give equal bytes. Not thread safe. Its functions rethrow the
+// sink's exceptions, and throw Error kInternal if the ZIP library fails. The destructor writes
+// nothing if the ZIP is not finished.
 class ZipWriter {
  public:
   enum class Compression {
-    kStored,    // as they are, so that each file is a range of the ZIP's bytes
+    kStored,    // uncompressed: each file is a byte range of the ZIP
     kDeflated,  // at the fastest level
   };
-  // Readers that know ZIPs of old alone read those whose files have less than 4 GiB each.
+  // Old readers without ZIP64 support require files below 4 GiB.
   enum class Sizes { kBelow4GiB, kAny };
 
   ZipWriter(const Sink& sink, Compression compression, Sizes sizes = Sizes::kAny);
@@ -28,10 +28,10 @@ class ZipWriter {
   ZipWriter(const ZipWriter&) = delete;
   ZipWriter& operator=(const ZipWriter&) = delete;
 
-  // Returns where in the ZIP the file's bytes begin.
+  // Returns the offset of the file's bytes in the ZIP.
   std::uint64_t add(const std::string& name, std::span<const std::byte> bytes);
 
-  // A file of unknown size: its bytes follow, up to the next file or the end.
+  // Begins a file of unknown size: its bytes follow, up to the next file or the end.
   void begin(const std::string& name);
   void write(std::span<const std::byte> bytes);
 

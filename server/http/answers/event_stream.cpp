@@ -9,7 +9,7 @@ namespace isomesh::http {
 namespace {
 
 constexpr std::chrono::seconds kPing{15};
-// After how many milliseconds a browser whose connection broke comes back.
+// Browsers reconnect after this many milliseconds.
 constexpr const char* kRetry = "retry: 2000\n\n";
 
 std::string_view name_of(store::EventKind kind) {
@@ -28,18 +28,18 @@ std::string json_of(const store::Event& event) {
   return to_json(JobEvent{event.state, event.stage, event.progress});
 }
 
-// What streams of events have in common: how they begin, and what is sent while nothing happens.
+// Common part of all event streams: their first bytes, and comments while there are no events.
 class TalkingSource : public net::Source {
  public:
   bool ends_with_reader() const override { return true; }
 
  protected:
-  // To be called before the first event is told.
+  // Call before writing the first event.
   void begin(std::string& bytes) {
     if (!std::exchange(has_begun_, true)) bytes += kRetry;
   }
 
-  // To be called when there is no event to tell any more.
+  // Call after writing the available events.
   More sent(std::string& bytes) {
     const auto now = std::chrono::steady_clock::now();
     if (bytes.empty() && now - last_told_ >= kPing) bytes += ": ping\n\n";
@@ -59,7 +59,7 @@ class EventSource : public TalkingSource {
     std::ranges::reverse(stream_.past);
   }
 
-  // The job that is over has to be read and written as JSON.
+  // The end of a job needs its record, as JSON.
   bool computes() const override { return end_.has_value(); }
 
   More next(std::string& bytes) override {
@@ -89,8 +89,8 @@ class EventSource : public TalkingSource {
 
   void tell(const store::Event& event, std::string& bytes) {
     is_over_ = event.kind == store::EventKind::kDone;
-    // An event may be both in the past and in the mailbox. The last event is sent even to a client
-    // that claims to have seen a later one.
+    // An event may be both in the past and in the mailbox. The last event is sent even if the
+    // client claims to have seen a later one.
     if (event.id <= stream_.last && !is_over_) return;
     stream_.last = event.id;
     bytes.append("id: ").append(std::to_string(event.id));
@@ -99,8 +99,8 @@ class EventSource : public TalkingSource {
     bytes.append("\n\n");
   }
 
-  EventStream stream_;               // the past in reverse
-  std::optional<store::Event> end_;  // the last event, which is to be told next
+  EventStream stream_;               // `past` is reversed
+  std::optional<store::Event> end_;  // the job's last event, to be sent next
   bool is_over_ = false;
 };
 
@@ -114,7 +114,7 @@ class AllEventsSource : public TalkingSource {
     begin(bytes);
     while (const auto event = mailbox_->take()) {
       bytes.append("event: ").append(name_of(event->kind));
-      // An id has nothing that JSON would have to escape.
+      // Ids contain nothing that JSON escapes.
       bytes.append("\ndata: {\"id\":\"").append(event->job).append("\",");
       bytes.append(json_of(*event).substr(1)).append("\n\n");
     }

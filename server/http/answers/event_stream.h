@@ -1,4 +1,4 @@
-// Events of jobs, sent to clients that follow them (Server-Sent Events).
+// Sends events of jobs to clients (Server-Sent Events).
 #pragma once
 
 #include <chrono>
@@ -18,19 +18,19 @@
 
 namespace isomesh::http {
 
-// Hands events on to the listeners of their jobs. Thread safe.
+// Distributes events to the listeners of their jobs. Thread safe.
 class Broadcaster {
  public:
-  // One listener's events. A job's progress that nobody has read is replaced by its newer one, so
-  // it is never long while somebody reads.
+  // One listener's events. New progress of a job replaces its unread progress, so the mailbox stays
+  // short while it is read.
   class Mailbox {
    public:
-    // More than these are not kept for whoever does not read.
+    // Limit of unread events; further ones are lost.
     static constexpr std::size_t kMostUnread = 4096;
 
     void put(const store::Event& event) ISOMESH_EXCLUDES(mutex_);
     std::optional<store::Event> take() ISOMESH_EXCLUDES(mutex_);
-    // Whether events were lost because too many were unread.
+    // True if events were lost because too many were unread.
     bool has_lost_some() ISOMESH_EXCLUDES(mutex_);
 
    private:
@@ -39,43 +39,42 @@ class Broadcaster {
     bool has_lost_some_ ISOMESH_GUARDED_BY(mutex_) = false;
   };
 
-  // The mailbox gets the job's events from now on, until its last owner is gone.
+  // Returns a mailbox that gets the job's events from now on, until its last owner releases it.
   std::shared_ptr<Mailbox> listen_to(const std::string& job);
-  // The same for all jobs that the viewer sees.
+  // The same for all jobs visible to the viewer.
   std::shared_ptr<Mailbox> listen_to_all(const store::Viewer& viewer);
 
-  // Puts the event into the mailboxes of its job; false when there are none.
+  // Puts the event into the mailboxes of its job. Returns false if there are none.
   bool publish(const store::Event& event);
 
  private:
   struct Listener {
     std::weak_ptr<Mailbox> mailbox;
-    store::Viewer viewer;  // of those to all jobs
+    store::Viewer viewer;  // for listeners to all jobs
   };
 
   std::shared_ptr<Mailbox> add(const std::string& job, const store::Viewer& viewer);
 
   Mutex mutex_;
-  // By their jobs; those to all stand at "".
+  // By job; listeners to all jobs are at "".
   std::multimap<std::string, Listener> listeners_ ISOMESH_GUARDED_BY(mutex_);
 };
 
-// What a stream of events is made of.
 struct EventStream {
   std::shared_ptr<Broadcaster::Mailbox> mailbox;
-  std::vector<store::Event> past;       // what the listener has missed
+  std::vector<store::Event> past;       // missed events
   std::uint64_t last = 0;               // the last event that the listener has seen
-  std::function<std::string()> result;  // the job that is over, as JSON
-  net::FairPlaces::Place place;         // among the streams
+  std::function<std::string()> result;  // the ended job, as JSON
+  net::FairPlaces::Place place;         // one of the limited streams
 };
 
-// Ends with the event of the job's end. Sends at least a comment every 15 seconds, so that a client
-// that is gone is noticed.
+// Ends with the job's last event. Sends at least a comment every 15 seconds, to detect a lost
+// client.
 std::unique_ptr<net::Source> event_source(EventStream stream);
 
-// What happens to all jobs of a mailbox, from now on, with the job's id in each event and without
-// the finished job at its end. Ends when the listener has lost events, so that it asks how its jobs
-// are and comes back. Comments as above.
+// All future events of a mailbox, each with its job's id, but without the finished job at the end.
+// Ends if events were lost, so that the client queries its jobs and reconnects. Sends comments as
+// above.
 std::unique_ptr<net::Source> event_source(std::shared_ptr<Broadcaster::Mailbox> mailbox,
                                           net::FairPlaces::Place place);
 

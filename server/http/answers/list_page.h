@@ -1,4 +1,4 @@
-// Lists, some rows at a time.
+// Pages of lists, written a few rows at a time.
 #pragma once
 
 #include <algorithm>
@@ -14,32 +14,31 @@
 
 namespace isomesh::http {
 
-// What of which list a client asks for. `Row` has a to_json of its own and of its vectors.
+// The part of a list that a client requests. `Row` and vectors of it have a to_json.
 template <class Row>
 struct ListRequest {
-  std::string kind;       // of the list's cursors
-  std::string after;      // the place behind which the first row is; empty: the list's beginning
-  std::size_t limit = 0;  // of rows, at least 1
-  // The rows behind that place, at most so many.
+  std::string kind;       // in the list's cursors
+  std::string after;      // the place before the first row; empty: the list's beginning
+  std::size_t limit = 0;  // maximum number of rows, at least 1
+  // Returns at most `count` rows after that place.
   std::function<std::vector<Row>(const std::string& after, std::size_t count)> read;
   std::function<std::string(const Row& row)> place_of;
 };
 
-// One page of a list as JSON, in pieces of some rows, so that others have their turns in between
-// and that few rows are in memory. What is added to the list meanwhile may be in it or not. Not
-// thread safe.
+// One page of a list as JSON, in pieces of a few rows, so that other requests are served in between
+// and memory stays small. Concurrent additions may or may not appear. Not thread safe.
 template <class Row>
 class ListPage {
  public:
-  // So many rows make a piece: a page of the usual length is one.
+  // A page of the default length is one piece.
   static constexpr std::size_t kRowsPerPiece = 100;
 
   explicit ListPage(ListRequest<Row> list) : list_(std::move(list)) {}
 
-  // The next bytes; nothing at the end. Throws what reading rows does.
+  // Returns the next bytes; empty at the end. Throws as reading rows does.
   std::optional<std::string> next() {
     if (is_over_) return std::nullopt;
-    // One row more than are written tells whether there are more.
+    // One extra row tells whether more follow.
     const std::size_t count = std::min(list_.limit, kRowsPerPiece);
     std::vector<Row> rows = list_.read(list_.after, count + 1);
     const bool has_more = rows.size() > count;
@@ -54,13 +53,13 @@ class ListPage {
     return text;
   }
 
-  // Whether the last piece was the last one.
+  // True once the last piece was returned.
   bool is_over() const { return is_over_; }
 
  private:
   static constexpr const char* kNoRows = "[]";
 
-  // An empty page, whose rows would stand within the brackets.
+  // An empty page up to the opening bracket of its rows.
   static std::string opening() {
     const std::string empty = to_json(std::vector<Row>());
     return empty.substr(0, empty.find(kNoRows) + 1);
@@ -71,7 +70,7 @@ class ListPage {
     return empty.substr(empty.find(kNoRows) + 1);
   }
 
-  ListRequest<Row> list_;  // what is left of it
+  ListRequest<Row> list_;  // the remaining part
   const char* separator_ = "";
   bool has_begun_ = false;
   bool is_over_ = false;

@@ -1,4 +1,4 @@
-// The files of the web page, which are part of the program.
+// The files of the web page, compiled into the program.
 #pragma once
 
 #include <span>
@@ -7,15 +7,15 @@
 namespace isomesh::http {
 
 struct PageFile {
-  std::string_view path;  // as it is asked for: /, /assets/index-1a2b3c4d.js
+  std::string_view path;  // in requests: /, /assets/index-1a2b3c4d.js
   std::string_view type;
   std::string_view etag;  // without quotes
-  bool immutable;         // its name holds its digest, so that it never changes
+  bool immutable;         // its name contains its digest, so it never changes
   std::string_view bytes;
-  std::string_view gzip;  // the same compressed; empty when that does not pay
+  std::string_view gzip;  // compressed; empty if that saves nothing
 };
 
-// All of them; a build without the page has one that says so at /. Thread safe.
+// All files; a build without the page has only / with a message. Thread safe.
 std::span<const PageFile> page_files();
 
 }  // namespace isomesh::http

@@ -1,4 +1,4 @@
-// What is served in a build without the page (ISOMESH_WEB=OFF).
+// The page in a build without it (ISOMESH_WEB=OFF).
 #include <array>
 
 #include "server/http/answers/page.h"

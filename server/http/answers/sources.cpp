@@ -68,7 +68,7 @@ class ComputedSource : public net::Source {
     if (!in_chunks_) {
       bytes.append(piece.value_or(""));
     } else if (is_over_ || !piece->empty()) {
-      append_chunk(piece.value_or(""), bytes);  // an empty one is the last
+      append_chunk(piece.value_or(""), bytes);  // an empty chunk is the last
     }
     return More::kBytes;
   }

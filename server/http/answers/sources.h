@@ -1,4 +1,4 @@
-// Bodies that are made while they are sent.
+// Bodies that are produced while they are sent.
 #pragma once
 
 #include <functional>
@@ -17,16 +17,16 @@ namespace isomesh::http {
 std::unique_ptr<net::Source> blob_source(std::unique_ptr<store::BlobReader> blob,
                                          const ByteRange& part);
 
-// A text that stays where it is for as long as the process runs.
+// The text must live as long as the process.
 std::unique_ptr<net::Source> text_source(std::string_view text);
-// One that several answers share.
+// A text shared by several responses.
 std::unique_ptr<net::Source> text_source(std::shared_ptr<const std::string> text);
 
-// The next bytes of a body, none at its end. Some may be empty. What it throws cuts the body off.
+// Returns the next bytes of a body, which may be empty; nothing at its end. An exception truncates
+// the body.
 using NextPiece = std::function<std::optional<std::string>()>;
 
-// A body that is computed in pieces. In chunks (RFC 9112, 7.1), or bare for receivers that know
-// only the connection's end.
+// A body computed in pieces; in chunks (RFC 9112, 7.1), or delimited by the end of the connection.
 std::unique_ptr<net::Source> computed_source(NextPiece next, bool in_chunks);
 
 }  // namespace isomesh::http

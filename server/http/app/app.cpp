@@ -52,11 +52,11 @@ bool has_ended(const Services& services, const std::string& id) {
   try {
     return is_final(services.jobs.get(std::nullopt, id).state);
   } catch (const Error&) {
-    return true;  // it is not there any more
+    return true;  // it was deleted
   }
 }
 
-// Why the service takes no work at the moment.
+// The reason why the service accepts no work; empty if it does.
 std::string unready_reason(const Services& services) {
   if (!services.jobs.answers()) return "the database does not respond";
   if (services.jobs.is_full()) return "the queue is full";
@@ -66,8 +66,8 @@ std::string unready_reason(const Services& services) {
   return has_waiting ? "jobs are waiting for disk space" : "";
 }
 
-// Refuses requests that are malformed for every route. The HTTP library would wait for a body whose
-// length is not given.
+// Rejects requests that are malformed for every route. The HTTP library would wait for a body of
+// unknown length.
 void check_request(const Request& request) {
   if (request.path.size() > kLongestPath || request.target.size() > kLongestTarget) {
     throw Error(ErrorCode::kUriTooLong, "the request's path or query is too long");
@@ -81,7 +81,8 @@ void check_request(const Request& request) {
   }
 }
 
-// The route at the request's path, whose parameters the request gets. Throws Error kNotFound.
+// Finds the route of the request's path and sets the request's path parameters. Throws Error
+// kNotFound.
 const Route& route_of(const Router& router, Request& request) {
   auto [route, parameters] = router.find(request.path);
   if (route == nullptr) throw Error(ErrorCode::kNotFound, "there is nothing at this path");
@@ -90,7 +91,7 @@ const Route& route_of(const Router& router, Request& request) {
   return *route;
 }
 
-// Throws Error kMethodNotAllowed, and then says in the response which methods are.
+// Throws Error kMethodNotAllowed, with the allowed methods in the response.
 const Handler& handler_of_method(const Route& route, const Request& request, Response& response) {
   const auto found = route.handlers().find(request.method);
   if (found != route.handlers().end()) return found->second;

@@ -1,4 +1,4 @@
-// What requests are answered with, and the way of each from its guards to its route.
+// Handles a request from its guards to its route.
 #pragma once
 
 #include <atomic>
@@ -18,32 +18,32 @@
 
 namespace isomesh::http {
 
-// What all routes share. Thread safe once the routes are added.
+// State shared by all routes. Thread safe once the routes are added.
 struct App {
   App(const Services& the_services, const ServerOptions& the_options);
 
   Services services;
   ServerOptions options;
-  const Tokens* tokens = services.tokens;  // null: everybody may do everything
+  const Tokens* tokens = services.tokens;  // null: no authentication
   Metrics& metrics = services.metrics;
   net::FairPlaces uploads;
   KeptUploads kept;
   net::FairPlaces streams;  // of events
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
-  // What came before was told by another life.
+  // Earlier events belong to a previous process.
   const std::uint64_t first_event = services.jobs.last_event();
-  std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
-  std::atomic<bool> stopping = false;  // nobody is waited for any more
+  std::atomic<bool> draining = false;  // finish running jobs, accept no new ones
+  std::atomic<bool> stopping = false;  // end all waiting
   Router router;
   Readiness readiness;
   Connections connections;
 };
 
-// One request from its guards to its route. Does not throw.
+// Passes a request through its guards to its route. Does not throw.
 std::optional<Continuation> answer(App& app, Request& request, Response& response);
 
-// Makes a problem of what `run` throws. Only an Error's own words reach a client.
+// Converts exceptions of `run` to a problem. Clients see the text of an Error only.
 std::optional<Continuation> guarded(const Request& request, Response& response,
                                     const std::function<std::optional<Continuation>()>& run);
 

@@ -17,7 +17,7 @@ void log_ended(const store::JobAccount& account) {
     line.add(name + "_ms", milliseconds);
   });
   if (job.mesh) line.add("triangles", job.mesh->triangles);
-  // The code alone: a detail may quote what stands in a volume's header.
+  // Only the code: a detail may quote a volume's header.
   if (job.error) line.add("reason", describe(to_error(*job.error).code()).name);
 }
 
@@ -29,7 +29,7 @@ void report_ended(App& app, const std::string& id) {
     account = app.services.jobs.account(id);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kGone && error.code() != ErrorCode::kNotFound) throw;
-    return app.services.callbacks.wake();  // it may have had one
+    return app.services.callbacks.wake();  // the job may have a callback
   }
   if (account.job.parameters.callback) app.services.callbacks.wake();
   app.metrics.count_ended(account.job);

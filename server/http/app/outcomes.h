@@ -1,5 +1,4 @@
-// What the log and the metrics say beside requests: jobs that end, volumes that are refused,
-// callbacks.
+// Logs and metrics of events outside of requests: ended jobs, rejected volumes, callbacks.
 #pragma once
 
 #include <functional>
@@ -14,14 +13,14 @@
 
 namespace isomesh::http {
 
-// Logs and counts a job that has just ended, and has its callback sent. A job that was deleted
-// since is neither logged nor counted.
+// Logs and counts a job that has just ended, and triggers its callback. Does neither for a job
+// deleted meanwhile.
 void report_ended(App& app, const std::string& job);
 
-// Logs and counts an upload, or a part of it, that became no volume.
+// Logs and counts an upload, or a part of it, that was rejected.
 void report_import_refused(App& app, const Request& request, const Error& error);
 
-// Calls `add`, which makes volumes of an upload, and reports the Error that it throws.
+// Calls `add`, which imports an upload, and reports its Error.
 template <class Add>
 auto counting_refusals(App& app, const Request& request, const Add& add) {
   try {
@@ -32,7 +31,7 @@ auto counting_refusals(App& app, const Request& request, const Add& add) {
   }
 }
 
-// An observer that logs and counts attempts to call back. The metrics must outlive it.
+// An observer that logs and counts callback attempts. The metrics must outlive it.
 callbacks::CallbackObserver callback_reporter(Metrics& metrics);
 
 }  // namespace isomesh::http

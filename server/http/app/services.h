@@ -1,4 +1,4 @@
-// How the service is set, and what its routes call.
+// The service's configuration, and the components that its routes call.
 #pragma once
 
 #include <chrono>
@@ -25,24 +25,24 @@
 namespace isomesh::http {
 
 struct ServerOptions {
-  // Of each of these, and of event_streams, one owner or address has a share (net::FairPlaces).
+  // One owner or address has a fair share of each of these and of event_streams (net::FairPlaces).
   std::size_t connections = 2048;
-  std::size_t threads = 32;        // requests that are worked on at once
-  std::size_t backlog = 512;       // requests that wait for a thread
-  std::size_t upload_places = 16;  // of the threads, how many may hold uploads
-  // How long a connection may take to send its request, up to a small body.
+  std::size_t threads = 32;        // requests processed concurrently
+  std::size_t backlog = 512;       // requests waiting for a thread
+  std::size_t upload_places = 16;  // threads that may hold uploads
+  // Time limit for a connection to send its request, up to a small body.
   std::chrono::milliseconds request_time{10'000};
   std::size_t event_streams = 512;
   UploadLimits upload;
-  // That uploads which come in parts may take together; 0: a quarter of the disk.
+  // Total size of incomplete resumable uploads; 0: a quarter of the disk.
   std::uint64_t part_bytes = 0;
-  std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
+  std::vector<std::string> cors_origins;  // origins of pages that may use the service; `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
-  bool blob_redirect = false;             // downloads may be sent to where the bytes are
-  const net::TlsFiles* tls = nullptr;     // null: connections are plain
+  bool blob_redirect = false;             // downloads may be redirected to the blob store
+  const net::TlsFiles* tls = nullptr;     // null: no TLS
 };
 
-// What the routes call.
+// The components that the routes call.
 struct Services {
   const store::DataFolder& folder;
   const store::BlobStore& blobs;

@@ -27,7 +27,7 @@ Request request_of(net::Connection& connection) {
 
 }  // namespace
 
-// A request, what has been read of it, and its response.
+// A request, its body, and its response.
 struct Connections::Exchange {
   Exchange(net::Connection connection, const net::BodyLimits& limits,
            const std::atomic<bool>& stopping)
@@ -35,9 +35,9 @@ struct Connections::Exchange {
         body(connection, limits, stopping),
         request(request_of(connection)) {}
 
-  // Whether nobody is there any more who would read the answer, which changes nothing and has had
-  // to wait. A client may end its own sending and still read, so one that has not waited is
-  // answered.
+  // True if the client has disconnected and the request is a read that has waited for at least
+  // `patience`. A client may close its sending direction and still read, so requests that did not
+  // wait are answered.
   bool is_abandoned(std::chrono::milliseconds patience) const {
     const bool only_reads = request.method == "GET" || request.method == "HEAD";
     if (!only_reads || std::chrono::steady_clock::now() - arrived < patience) return false;
@@ -161,7 +161,7 @@ void Connections::park(const std::shared_ptr<Exchange>& exchange,
   parked_->park(std::move(parked));
 }
 
-// Those that are told apart by their address so far may be by their owner now.
+// A client is identified by its owner from here on, before only by its address.
 void Connections::compute(const std::shared_ptr<Exchange>& exchange,
                           const Continuation& continuation) {
   exchange->party = *continuation.computing_for;
@@ -171,7 +171,7 @@ void Connections::compute(const std::shared_ptr<Exchange>& exchange,
   if (!is_accepted) refuse_one_of_many(*exchange);
 }
 
-// The library sees the request once more, to write the response.
+// Enters the library once more to write the response.
 void Connections::answer_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
   serve(exchange, [&resume](Exchange& waited) {
     resume(waited.request, waited.response);
@@ -179,7 +179,7 @@ void Connections::answer_by(const std::shared_ptr<Exchange>& exchange, const Res
   });
 }
 
-// A request that was accepted has its turn however many wait, unless the service ends.
+// An accepted request is queued regardless of the backlog, unless the service stops.
 void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
   const bool has_turn = tasks_->enqueue_rest(
       exchange->party, [this, exchange, resume] { answer_by(exchange, resume); });

@@ -1,6 +1,6 @@
-// Connections from their acceptance to the last byte of their response. A thread is held only while
-// a handler works: not by clients that are slow or silent, not by requests that wait for a job, and
-// not by responses on their way.
+// Connections from acceptance to the last byte of the response. A thread is held only while a
+// handler works: not by slow or silent clients, not by requests that wait for a job, and not by
+// responses in transit.
 #pragma once
 
 #include <atomic>
@@ -24,21 +24,19 @@
 namespace isomesh::http {
 
 struct ConnectionOptions {
-  // Connections that are open, from their acceptance to the end of their response. An address has
-  // its share of them (net::FairPlaces), as of the next two.
+  // Open connections, from acceptance to the end of the response. An address has a fair share
+  // (net::FairPlaces), as of the next two.
   std::size_t connections = 2048;
-  std::size_t threads = 32;   // requests that are worked on at once
-  std::size_t backlog = 512;  // requests that wait for a thread
-  // Of those that are computed (Continuation::computing_for), how many at once; as many as the
-  // others may wait.
+  std::size_t threads = 32;   // requests processed concurrently
+  std::size_t backlog = 512;  // requests waiting for a thread
+  // Requests computed concurrently (Continuation::computing_for); their backlog is the same.
   std::size_t computing_threads = 12;
-  // Of answers that are on their way to slow receivers: with more, requests are refused until they
-  // have gone.
+  // Bytes of responses in transit to slow receivers. Beyond it, requests are rejected until the
+  // bytes are sent.
   std::size_t most_answer_bytes = std::size_t{256} << 20;
-  // Paths that orchestrators ask whether the service lives. They have a thread of their own, which
-  // waits for no other request.
+  // Paths of health probes. They have their own thread, which no other request blocks.
   std::vector<std::string> probes = {};
-  // A client that ends its own sending is waited with for so long; then it is taken for gone.
+  // A client that has closed its sending direction is considered lost after this time.
   std::chrono::milliseconds client_patience{1'000};
   net::AcceptorLimits acceptor;
   net::BodyLimits body;
@@ -48,46 +46,45 @@ struct ConnectionOptions {
 
 struct BodySizes {
   std::uint64_t received = 0;  // bytes of the request's body
-  std::uint64_t sent = 0;      // bytes of the response's
+  std::uint64_t sent = 0;      // bytes of the response's body
 };
 
-// What connections need to know. All functions are called by several threads at once.
+// Callbacks of connections. All are called concurrently.
 struct ConnectionHandlers {
-  // Answers a request. Must not throw, nor must the continuation's.
+  // Answers a request. Neither it nor its continuation may throw.
   std::function<std::optional<Continuation>(Request& request, Response& response)> answer;
-  // Whether a job has ended, or does not exist.
+  // True if a job has ended or does not exist.
   net::Parked::HasEnded has_ended;
-  // Told of every request that was answered, before its response is sent. May be empty.
+  // Called for every answered request, before its response is sent. May be empty.
   std::function<void(const Request& request, const Response& response, const BodySizes& sizes)>
       on_answered;
-  // Told of every connection that was refused without calling `answer`. May be empty.
+  // Called for every connection rejected without calling `answer`. May be empty.
   std::function<void(const std::string& address, const Error& error)> on_refused;
 };
 
 class Connections {
  public:
   Connections(ConnectionOptions options, ConnectionHandlers handlers);
-  // As close() without patience.
+  // As close() with zero patience.
   ~Connections();
   Connections(const Connections&) = delete;
   Connections& operator=(const Connections&) = delete;
 
-  // Begins to serve connections to that listening socket, which stays the caller's; once.
+  // Starts serving connections of the listening socket, which the caller owns. Call once.
   void open(int listening);
 
-  // Requests that wait for that job are answered. Thread safe while it is open, as the next four.
+  // Resumes the requests that wait for the job. Thread safe while open, like the next four.
   void job_ended(const std::string& job);
-  // Sources that had nothing to send are asked again.
+  // Polls sources that had nothing to send.
   void wake_sources();
 
-  // Connections that are open; of those, whose request has not come yet, and responses on their
-  // way.
+  // Open connections; connections whose request is incomplete; responses in transit.
   std::size_t open_connections() const { return places_.taken(); }
   std::size_t pending() const { return acceptor_->pending(); }
   std::size_t sending() const { return sender_->sending(); }
 
-  // No connection is accepted any more, bodies are not read on, nobody waits any more, and
-  // responses are sent within `patience`. Returns when all threads have ended.
+  // Stops accepting connections and reading bodies, resumes all waiting requests, and sends
+  // responses within `patience`. Returns when all threads have ended.
   void close(std::chrono::milliseconds patience);
 
  private:
@@ -109,7 +106,7 @@ class Connections {
   const ConnectionOptions options_;
   const ConnectionHandlers handlers_;
   std::atomic<bool> stopping_ = false;
-  // Each uses those before it, so they end from the last to the first.
+  // Each member uses the previous ones, so the order of destruction matters.
   net::FairPlaces places_;
   std::optional<net::Sender> sender_;
   std::optional<net::Parked> parked_;

@@ -11,7 +11,7 @@
 namespace isomesh::http {
 namespace {
 
-// The library refuses a second question mark, which is an ordinary character of a query.
+// The library rejects a second question mark, which is an ordinary character of a query.
 std::string with_one_question_mark(const std::string& target) {
   std::string result;
   for (std::size_t at = 0, query = target.find('?'); at < target.size(); ++at) {
@@ -24,8 +24,8 @@ std::string with_one_question_mark(const std::string& target) {
   return result;
 }
 
-// Headers that the library must not see: those that it adds to a request by itself and then takes
-// for its own, and Expect, which it would answer before a handler knows whether it wants the body.
+// Headers hidden from the library: those that it adds to requests and then trusts, and Expect,
+// which it would answer before the handler knows whether it wants the body.
 bool is_withheld(std::string_view name) {
   constexpr std::array<std::string_view, 5> kWithheld = {"REMOTE_ADDR", "REMOTE_PORT", "LOCAL_ADDR",
                                                          "LOCAL_PORT", "Expect"};
@@ -33,8 +33,8 @@ bool is_withheld(std::string_view name) {
       kWithheld, [&](std::string_view withheld) { return net::equal_names(withheld, name); });
 }
 
-// What the library takes for a connection. It reads a head without headers, because it decodes
-// percent signs in headers and forgives too much, and then the body. What it writes is kept.
+// The library's view of a connection. It reads a head without headers, because it decodes percent
+// signs in headers and is too lenient, and then the body. Its output is collected.
 class LibraryStream : public httplib::Stream {
  public:
   LibraryStream(const std::string& target, net::IncomingBody& body)
@@ -61,13 +61,13 @@ class LibraryStream : public httplib::Stream {
   bool is_writable() const override { return true; }
   void get_remote_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
   void get_local_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
-  // Never a descriptor: the library refuses those that select() cannot take.
+  // Never a descriptor: the library rejects descriptors too large for select().
   socket_t socket() const override { return 0; }
 
   std::string take_written() { return std::move(written_); }
 
  private:
-  // The library reads a body in pieces that are too small to ask the system for each.
+  // Buffers the body: the library reads in pieces too small for system calls.
   bool read_ahead() {
     constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
     ahead_.resize(kPieceBytes);
@@ -79,7 +79,7 @@ class LibraryStream : public httplib::Stream {
 
   const std::string head_;
   std::size_t head_read_ = 0;
-  std::string ahead_;  // of the body
+  std::string ahead_;  // buffered bytes of the body
   std::size_t ahead_read_ = 0;
   net::IncomingBody& body_;
   std::string written_;
@@ -111,21 +111,20 @@ class LibraryBodyReader : public BodyReader {
   const net::IncomingBody& body_;
 };
 
-// The library's server for one request: its callbacks have no argument by which several requests
-// could share one.
+// The library's server for one request: its callbacks have no argument to distinguish requests.
 class LibraryServer : public httplib::Server {
  public:
   LibraryServer(Request& request, net::IncomingBody& body, Response& response,
                 const std::function<void()>& answer)
       : request_(request), body_(body), response_(response), answer_(answer) {
     set_payload_max_length(
-        std::numeric_limits<std::size_t>::max());  // handlers count by themselves
+        std::numeric_limits<std::size_t>::max());  // handlers enforce their own limits
     set_pre_routing_handler([this](const httplib::Request& /*in*/, httplib::Response& out) {
       if (takes_body()) return HandlerResponse::Unhandled;
       answer_into(out);
       return HandlerResponse::Handled;
     });
-    // Bodies can be read by handlers of this kind alone.
+    // The library lets only such handlers read bodies.
     if (takes_body()) {
       const auto read = [this](const httplib::Request& /*in*/, httplib::Response& out,
                                const httplib::ContentReader& reader) {
@@ -148,8 +147,8 @@ class LibraryServer : public httplib::Server {
   void run(LibraryStream& stream) { process(*this, stream); }
 
  private:
-  // The protected process_request is the library's only door that is not a socket. Its arguments
-  // have changed between 0.11 (Debian 12) and 0.18 (Debian 13).
+  // The protected process_request is the library's only entry point without a socket. Its arguments
+  // changed between 0.11 (Debian 12) and 0.18 (Debian 13).
   template <class Self>
   static void process(Self& self, httplib::Stream& stream) {
     const std::function<void(httplib::Request&)> prepare = [&](httplib::Request& in) {
@@ -165,7 +164,7 @@ class LibraryServer : public httplib::Server {
 
   bool takes_body() const { return request_.method == "POST" || request_.method == "PATCH"; }
 
-  // Takes what the library has decoded, and gives it the rest of the head.
+  // Takes the decoded path and query from the library, and gives it the other headers.
   void exchange_heads(httplib::Request& in) {
     request_.path = std::move(in.path);
     request_.query.assign(in.params.begin(), in.params.end());
@@ -195,8 +194,8 @@ class LibraryServer : public httplib::Server {
     }
   }
 
-  // The library writes the head, asks for the body, and is told that there is none for it to write:
-  // the sender does that, at the receiver's pace.
+  // The library writes the head and requests the body. It gets none: the sender sends the body at
+  // the receiver's pace.
   static void announce(const StreamedBody& body, httplib::Response& out) {
     const auto nothing = [](std::size_t, httplib::DataSink&) { return false; };
     switch (body.framing) {

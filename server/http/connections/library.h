@@ -1,6 +1,6 @@
-// The one place where cpp-httplib is used. It decodes paths and queries, reads chunked bodies and
-// forms, and compresses and writes responses. It neither listens nor reads heads, and knows one
-// route: which request is whose is for Router to say.
+// The only user of cpp-httplib. It decodes paths and queries, reads chunked bodies and forms, and
+// compresses and writes responses. It does not listen or read heads, and knows one route; Router
+// finds the request's route.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,14 @@
 namespace isomesh::http {
 
 struct WrittenResponse {
-  std::string bytes;  // all but what the response's stream makes
-  std::uint64_t body_bytes =
-      0;  // of the whole body, also of the stream's where its length is known
+  std::string bytes;             // without the body of the response's stream
+  std::uint64_t body_bytes = 0;  // of the whole body, including a stream of known length
 };
 
-// Fills in the path and the query of the request, whose other members are given; calls `answer`,
-// during which request.body can be read, and which fills in the response; and writes that. A target
-// that the library refuses is answered with kInvalidParameter, without calling `answer`, which must
-// not throw. Thread safe.
+// Sets the request's path and query from its other members. Calls `answer`, which may read
+// request.body and fills in the response, and writes the response. If the library rejects the
+// target, the response is kInvalidParameter and `answer` is not called. `answer` must not throw.
+// Thread safe.
 WrittenResponse pass_through_library(Request& request, net::IncomingBody& body, Response& response,
                                      const std::function<void()>& answer);
 

@@ -14,8 +14,8 @@ bool is_below(std::string_view path, std::string_view folder) {
   return path == folder || (path.starts_with(folder) && path[folder.size()] == '/');
 }
 
-// Throws the same for a missing, a malformed and an unknown token, so that the answer does not help
-// with guessing.
+// Throws the same error for missing, malformed and unknown tokens, to give attackers no
+// information.
 Caller caller_of(const Tokens& tokens, const Request& request) {
   std::optional<Caller> caller;
   if (request.count_headers("Authorization") == 1) {
@@ -55,7 +55,7 @@ void begin_request(const Tokens* tokens, Request& request, Response& response) {
   if (tokens == nullptr) return;
   context.caller = {"", Role::kUser};
   const bool is_metrics = request.path == "/metrics";
-  // Browsers ask what they may send (OPTIONS) without the token.
+  // Browsers send preflight requests (OPTIONS) without the token.
   if (request.method == "OPTIONS" || (!is_metrics && !is_below(request.path, "/v1"))) return;
   try {
     context.caller = caller_of(*tokens, request);

@@ -1,5 +1,5 @@
-// What every request goes through before and after its route: the check of its token, its line of
-// the log, its counters. Private to server/http.
+// Checks before and after each route: authentication, the request's log line, its counters. Private
+// to server/http.
 #pragma once
 
 #include <string>
@@ -13,22 +13,22 @@
 
 namespace isomesh::http {
 
-// The owner of what this request makes; "" where no tokens are configured.
+// The owner of this request's results; "" without tokens.
 const std::string& owner_of(const Request& request);
 
-// Whose things this request may see: its owner's, or everybody's for an administrator.
+// The request's view of volumes and jobs: its owner's, or all for an administrator.
 store::Viewer viewer_of(const Request& request);
 
-// Who shares limits (net::FairPlaces) with this request: its owner, or its address where there are
-// no tokens; "" for what comes through a Unix socket without them.
+// The party that shares limits (net::FairPlaces) with this request: its owner, or its address
+// without tokens; "" for a Unix socket without tokens.
 std::string party_of(const Request& request);
 
-// Gives the request its trace, which X-Request-Id tells the client, and finds out who sends it.
-// `tokens` is null where none are configured. To be called before the route is looked for. Throws
-// Error kUnauthorized, and kForbidden when the caller's role does not allow the route.
+// Assigns the request's trace, returned as X-Request-Id, and authenticates it. `tokens` is null if
+// none are configured. Call before routing. Throws Error kUnauthorized, and kForbidden if the
+// caller's role does not permit the route.
 void begin_request(const Tokens* tokens, Request& request, Response& response);
 
-// Writes the request's line of the log and counts it.
+// Logs and counts the request.
 void end_request(Metrics& metrics, const Request& request, const Response& response,
                  const BodySizes& sizes);
 

@@ -21,7 +21,7 @@ using Hash = std::array<std::uint8_t, Sha256::kBytes>;
 constexpr std::size_t kTokenBytes = 32;
 constexpr std::size_t kLongestName = 64;
 constexpr std::string_view kTokenPrefix =
-    "isomesh_";  // by which scanners for leaked secrets know it
+    "isomesh_";  // lets secret scanners recognise leaked tokens
 
 Hash hash_of(std::string_view token) {
   Sha256 digest;
@@ -51,7 +51,7 @@ std::optional<Hash> hash_from(std::string_view hex) {
 
 Error at_fault(const std::string& what) { return invalid_parameter("tokens", what); }
 
-// Reading the hashes helps nobody; whoever writes to the file becomes an administrator.
+// The hashes are harmless to read, but a writer of the file can become an administrator.
 void check_only_owner_writes(const std::filesystem::path& file, ReadBy reader) {
   struct stat status = {};
   if (::stat(file.c_str(), &status) != 0) throw at_fault("the file cannot be read");
@@ -139,7 +139,7 @@ Tokens::Entries Tokens::read() const {
     }
     entries.push_back({{name, *role}, *hash});
   }
-  // A daemon that was told to ask for tokens and knows none would refuse everybody.
+  // With authentication and no tokens the daemon would reject everybody.
   if (entries.empty()) throw at_fault("the file contains no token");
   return entries;
 }

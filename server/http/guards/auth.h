@@ -1,4 +1,4 @@
-// Who may ask what: bearer tokens from a file that holds their hashes.
+// Authentication: bearer tokens from a file of their hashes.
 #pragma once
 
 #include <array>
@@ -20,28 +20,28 @@ namespace isomesh::http {
 std::string_view to_string(Role role);
 std::optional<Role> role_from(std::string_view name);
 
-// Who reads a file of tokens: the service, or somebody who looks after it and may be root, while
-// the service runs as another user, to whom the file may belong.
+// The reader of a file of tokens: the service, or an administrator, who may be root while the
+// service runs as the user who owns the file.
 enum class ReadBy { kService, kAdministrator };
 
-// The tokens of a file, one a line: NAME ROLE HASH. Blank lines and those that begin with # are
-// skipped; several lines of one name and one role are several tokens of one owner, so that a token
-// can be replaced without a gap. HASH is the token's SHA-256 in hexadecimal: a token has 256 random
-// bits, which no dictionary holds and nobody can try through, so a slow hash would add nothing.
+// The tokens of a file, one per line: NAME ROLE HASH. Blank lines and lines that begin with # are
+// skipped. Several lines with the same name and role are several tokens of one owner, so a token
+// can be replaced without interruption. HASH is the token's SHA-256 in hexadecimal. A token has 256
+// random bits, which no dictionary or brute force finds, so a slow hash would add nothing.
 //
 // Thread safe.
 class Tokens {
  public:
-  // Throws Error kInvalidParameter that names the line at fault (never its text), or says that
-  // somebody else than the owner may write to the file.
+  // Throws Error kInvalidParameter with the number of the invalid line (never its text), or if
+  // users other than the owner may write to the file.
   explicit Tokens(const std::filesystem::path& file, ReadBy reader = ReadBy::kService);
 
-  // Reads the file again. When that throws, the tokens stay as they were.
+  // Rereads the file. If that throws, the tokens stay unchanged.
   void reload();
 
   std::size_t count() const;
 
-  // Whose token that is. Takes the same time for every token of one length: all entries are
+  // Returns the token's owner. Its time depends on the token's length only: all entries are
   // compared, each in constant time.
   std::optional<Caller> find(std::string_view token) const;
 
@@ -60,16 +60,16 @@ class Tokens {
   std::shared_ptr<const Entries> entries_ ISOMESH_GUARDED_BY(mutex_);
 };
 
-// Whether a file of tokens may belong to that user: to root, or to whom the service runs as. The
-// owner of a file can write to it, and makes an administrator of whomever it likes.
+// True if `owner` may own a file of tokens: root, or the service's user. The owner can write to the
+// file, and so appoint administrators.
 bool may_own_tokens(uid_t owner, uid_t service);
 
-// The token of an Authorization header; empty when there is none of the scheme Bearer.
+// The token of an Authorization header; empty unless its scheme is Bearer.
 std::optional<std::string> bearer_of(std::string_view authorization);
 
-// A new token, and the line that a file of tokens needs to know it.
+// Returns a new token; token_line() makes its line for the file.
 std::string make_token();
-// Throws Error kInvalidParameter for a name that is not 1 to 64 of A-Z a-z 0-9 . _ -
+// Throws Error kInvalidParameter unless the name is 1 to 64 of A-Z a-z 0-9 . _ -
 std::string token_line(const std::string& name, Role role, std::string_view token);
 
 }  // namespace isomesh::http

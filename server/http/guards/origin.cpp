@@ -26,7 +26,7 @@ bool is_allowed(const OriginRules& rules, std::string_view origin) {
   });
 }
 
-// The page came from this server. Its scheme may differ: a proxy may have added TLS.
+// True if the page came from this server. Schemes may differ: a proxy may have added TLS.
 bool is_same(std::string_view origin, std::string_view host) {
   const std::size_t authority = origin.find("://");
   return authority != std::string_view::npos && lower(origin.substr(authority + 3)) == lower(host);

@@ -54,7 +54,7 @@ Labels label(const std::string& name, std::string_view value) {
   return {{name, std::string(value)}};
 }
 
-// A line's number, such as the 4711 of "VmRSS: 4711 kB".
+// The number in a line such as "VmRSS: 4711 kB".
 std::uint64_t process_status(std::string_view name) {
   std::ifstream file("/proc/self/status");
   for (std::string line; std::getline(file, line);) {
@@ -167,7 +167,7 @@ Metrics::Metrics() : state_(std::make_unique<State>()) {
   state_->gauge("isomesh_build_info", "Running version as a label; always 1")
       .Add({{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}})
       .Set(1);
-  // What has not happened yet is 0, not missing: rates need a beginning.
+  // Register counters at 0, because rates need a first sample.
   for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));
   const Timing none;
   visit(none, [&](const char* stage, double /*milliseconds*/) {

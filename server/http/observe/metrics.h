@@ -1,7 +1,7 @@
-// What the service counts, in the text form that Prometheus reads (OpenMetrics 1.0).
+// The service's metrics in Prometheus's text format (OpenMetrics 1.0).
 //
-// Every label has few values, known beforehand: routes are patterns, refusals are error codes. No
-// label ever holds what a client sent.
+// Every label has few values, known in advance: routes are patterns, rejections are error codes. No
+// label ever holds data of a client.
 #pragma once
 
 #include <array>
@@ -18,14 +18,14 @@
 
 namespace isomesh::http {
 
-// One request that was answered.
+// An answered request.
 struct AnsweredRequest {
   std::string_view method;
   std::string_view route;  // its pattern, or kNoRoute
   int status = 0;
   double seconds = 0;
   std::uint64_t bytes_in = 0;   // of its body
-  std::uint64_t bytes_out = 0;  // of the answer's
+  std::uint64_t bytes_out = 0;  // of the response's body
 };
 
 std::string_view name_of(callbacks::CallbackOutcome outcome);
@@ -43,12 +43,12 @@ struct MeasuredFamily {
   std::vector<Value> values = {};
 };
 
-// What is measured when somebody asks.
+// Values measured on each scrape.
 struct Levels {
   std::array<std::uint64_t, 3> queued = {};  // by Priority
   std::uint64_t running = 0;
   std::uint64_t uploads = 0;    // in progress
-  std::uint64_t callbacks = 0;  // that wait to be delivered
+  std::uint64_t callbacks = 0;  // waiting for delivery
   std::uint64_t disk_used_bytes = 0;
   std::uint64_t disk_free_bytes = 0;
   std::vector<MeasuredFamily> others = {};
@@ -65,11 +65,11 @@ class Metrics {
   void count(const AnsweredRequest& request);
   // A job in a final state.
   void count_ended(const Job& job);
-  // A volume that was refused.
+  // A rejected volume.
   void count_refused(ErrorCode reason);
   void count(callbacks::CallbackOutcome outcome);
 
-  // Everything that was counted, those levels, and the process's own memory, threads and files.
+  // All metrics, including `levels` and the process's memory, threads and files.
   std::string text(const Levels& levels) const;
 
   static constexpr std::string_view kMediaType =

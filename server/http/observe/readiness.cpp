@@ -24,7 +24,7 @@ std::string Readiness::reason() {
   const std::uint64_t wanted = begun_ + 1;
   asked_ = wanted;
   changed_.notify_all();
-  // Nobody waits behind a check that has taken too long already.
+  // Do not wait for a check that is already late.
   if (!is_slow) {
     changed_.wait_until(lock, now + limits_.patience,
                         [&]() ISOMESH_REQUIRES(mutex_) { return ended_ >= wanted; });

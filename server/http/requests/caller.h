@@ -1,4 +1,4 @@
-// Who sent a request, and what they may do.
+// The authenticated sender of a request and its role.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@ namespace isomesh::http {
 
 enum class Role {
   kUser,     // its own volumes and jobs
-  kAdmin,    // everybody's, and the metrics
-  kMonitor,  // the metrics and nothing else
+  kAdmin,    // all volumes and jobs, and the metrics
+  kMonitor,  // only the metrics
 };
 
-// Who sent a request. Where no tokens are configured everybody is an administrator without a name.
+// Without tokens every caller is an unnamed administrator.
 struct Caller {
   std::string name;
   Role role = Role::kAdmin;

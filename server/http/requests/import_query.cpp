@@ -17,7 +17,7 @@ const std::set<std::string>& raw_parameters() {
   return names;
 }
 
-// Those that choose within a file, of which raw samples have nothing to choose.
+// Parameters that select within a file; raw samples have nothing to select.
 const std::set<std::string>& file_parameters() {
   static const std::set<std::string> names = {"series", "member", "volume", "accept", "nifti_form"};
   return names;
@@ -97,8 +97,7 @@ void refuse_choice_in_raw(const Request& request) {
   }
 }
 
-// The value of a parameter such as `filename="a b.nii"`, of which `text` is what follows the name
-// and the equals sign.
+// The value of a parameter such as `filename="a b.nii"`; `text` follows the equals sign.
 std::string unquoted(std::string_view text) {
   text = trimmed(text);
   if (!text.starts_with('"')) return std::string(text.substr(0, text.find(';')));
@@ -123,7 +122,7 @@ std::string percent_decoded(std::string_view text) {
   return value;
 }
 
-// What follows `name=` in the header; empty without it.
+// The text after `name=` in the header; empty if missing.
 std::string_view disposition_parameter(std::string_view header, std::string_view name) {
   const std::string folded = lower(header);
   for (std::size_t at = folded.find(';'); at != std::string::npos; at = folded.find(';', at + 1)) {

@@ -1,5 +1,5 @@
-// What a query says about a body that is a volume. Free functions, thread safe; what is malformed
-// or unknown throws Error kInvalidParameter that names the parameter.
+// The query of a request whose body is a volume. Free functions, thread safe. They throw Error
+// kInvalidParameter with the parameter's name for malformed or unknown values.
 #pragma once
 
 #include <optional>
@@ -13,20 +13,21 @@
 
 namespace isomesh::http {
 
-// Raw samples' description from `dims`, `type` and the rest; empty without `dims`.
+// The description of raw samples from `dims`, `type` and others; empty without `dims`.
 std::optional<RawDescription> raw_description_of(const Request& request);
 
-// Raw samples' description, what to take of several series, members or volumes, what to accept.
+// The description of raw samples, the selection among several series, members or volumes, and
+// accepted ambiguities.
 process::ImportOptions import_options_of(const Request& request);
 
 // The names of the parameters that import_options_of reads.
 const std::set<std::string>& import_parameters();
 
-// What a Content-Disposition header (RFC 6266) calls a file, in UTF-8, without folders and control
-// characters and not longer than a name may be; empty where it tells none.
+// The file name in a Content-Disposition header (RFC 6266), in UTF-8, without folders and control
+// characters, truncated to the limit; empty if missing.
 std::string file_name_of(std::string_view content_disposition);
 
-// The same of a name that stands by itself.
+// The same for a plain name.
 std::string plain_file_name(std::string_view name);
 
 }  // namespace isomesh::http

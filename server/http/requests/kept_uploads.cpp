@@ -202,11 +202,11 @@ void KeptUploads::run(const std::stop_token& stop) {
   Lock lock(mutex_);
   while (!stop.stop_requested()) {
     const Clock::time_point now = now_();
-    // Whatever comes meanwhile stays for longer than that.
+    // Later entries expire after that.
     Clock::time_point next = now + std::min(limits_.time, limits_.part_time);
     for (auto entry = kept_.begin(); entry != kept_.end();) {
       const auto after = std::next(entry);
-      // One that somebody sends just now is not waited for.
+      // Skip uploads that a client is sending.
       if (entry->partial && !entry->is_idle())
         entry->until = std::max(entry->until, end_of(*entry));
       if (entry->until <= now) {

@@ -1,5 +1,5 @@
-// Uploads that stay for a while: those that have not come whole yet, and those that were refused
-// and whose client asked that they stay, until a person has chosen what of them to read.
+// Uploads kept for a limited time: incomplete resumable uploads, and rejected ones that their
+// client asked to keep until a person has selected what to read.
 #pragma once
 
 #include <chrono>
@@ -19,70 +19,69 @@
 namespace isomesh::http {
 
 struct KeptLimits {
-  std::chrono::milliseconds time = std::chrono::minutes(15);  // from when one was last asked for
-  // Of each owner, and of all: the one that was not asked for the longest gives way.
+  std::chrono::milliseconds time = std::chrono::minutes(15);  // since its last use
+  // Per owner, and in total. Beyond that the least recently used one is deleted.
   std::size_t each = 2;
   std::size_t all = 16;
 
-  // Of uploads that come in parts: how long one waits for the next, and how many there may be and
-  // how much they may take together, beside those that somebody sends just now. Then the one that
-  // was not asked for the longest of the owner who has most gives way.
+  // For resumable uploads: how long one waits for its next part, and the number and total size of
+  // idle ones. Beyond that, the least recently used one of the owner with the most is deleted.
   std::chrono::milliseconds part_time = std::chrono::hours(1);
   std::size_t parts = 64;
   std::uint64_t part_bytes = std::uint64_t{16} << 30;
 };
 
-// Thread safe. A file goes with the last one that reads it. Uploads that come in parts outlive the
-// process, in `folder`.
+// Thread safe. Files are deleted after their last reader. Resumable uploads survive the process, in
+// `folder`.
 class KeptUploads {
  public:
   using Kept = std::shared_ptr<const ReceivedBody>;
   using Partial = std::shared_ptr<PartialUpload>;
   using Clock = std::chrono::steady_clock;
 
-  // Finds what an earlier process has left in the folder, which is made when it is needed; "": no
-  // upload can come in parts.
+  // Loads the uploads of an earlier process from the folder, which is created on demand; ""
+  // disables resumable uploads.
   explicit KeptUploads(const KeptLimits& limits = {}, std::filesystem::path folder = {},
                        std::function<Clock::time_point()> now = Clock::now);
 
   const KeptLimits& limits() const { return limits_; }
 
-  // Returns the name by which the owner finds it.
+  // Returns the name of the upload for its owner.
   std::string keep(const std::string& owner, Kept upload) ISOMESH_EXCLUDES(mutex_);
 
-  // Throws Error kGone when there is none of that name, or it is another owner's, or it has become
-  // a volume, and kNotReady when it has not come whole.
+  // Throws Error kGone if there is none of that name, if it belongs to another owner, or if it has
+  // become a volume; kNotReady if it is incomplete.
   Kept find(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
-  // Begins an upload that comes in parts. Nobody else makes it give way while its caller has it.
+  // Begins a resumable upload. It is not deleted for lack of room while the caller holds it.
   Partial begin(PartialNote note) ISOMESH_EXCLUDES(mutex_);
 
-  // Throws Error kGone as find does, and for one that has come at once.
+  // Throws Error kGone as find does, and for uploads in one request.
   Partial find_partial(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
-  // The volume, as JSON, that an upload in parts has become; empty for all others.
+  // The volume, as JSON, that a resumable upload has become; empty for all others.
   std::string became(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
-  // An upload has been read: one that came at once is let go; of one that came in parts, only what
-  // it has become is kept, or all where that are several volumes ("").
+  // Call after an upload was read. Deletes one that came in one request. Of a resumable upload
+  // keeps only its resulting volume, or all of it for several volumes ("").
   void settle(const std::string& owner, const std::string& name, const std::string& volume)
       ISOMESH_EXCLUDES(mutex_);
 
-  // One that is not there is no error.
+  // A missing one is not an error.
   void let_go(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
-  // For want of room: all that nobody reads or sends just now.
+  // Deletes all uploads that no client is sending, for lack of room.
   void let_all_go() ISOMESH_EXCLUDES(mutex_);
 
-  // Looks at what is over: for those who set the clock.
+  // Checks for expired uploads; for tests with their own clock.
   void wake() ISOMESH_EXCLUDES(mutex_);
 
  private:
   struct Entry {
     std::string owner;
     std::string name;
-    Kept upload;      // null: it comes in parts
-    Partial partial;  // null: it has come at once
+    Kept upload;      // null: resumable
+    Partial partial;  // null: in one request
     Clock::time_point until;
 
     bool is_idle() const { return partial && partial.use_count() == 1; }
@@ -93,7 +92,7 @@ class KeptUploads {
   Clock::time_point end_of(const Entry& entry) const;
   Entries::iterator look_up(const std::string& owner, const std::string& name)
       ISOMESH_REQUIRES(mutex_);
-  // The same, and it stays longer. Throws Error kGone where there is none.
+  // Finds an upload and renews its time. Throws Error kGone if there is none.
   Entries::iterator found(const std::string& owner, const std::string& name)
       ISOMESH_REQUIRES(mutex_);
   void make_room() ISOMESH_REQUIRES(mutex_);
@@ -108,8 +107,8 @@ class KeptUploads {
   Mutex mutex_;
   Condition changed_;
   bool is_woken_ ISOMESH_GUARDED_BY(mutex_) = false;
-  Entries kept_ ISOMESH_GUARDED_BY(mutex_);  // the one that goes first in front
-  std::jthread thread_;                      // the last member: it uses the others
+  Entries kept_ ISOMESH_GUARDED_BY(mutex_);  // the next to be deleted first
+  std::jthread thread_;                      // last, because it uses the other members
 };
 
 }  // namespace isomesh::http

@@ -19,7 +19,7 @@ using nlohmann::json;
 
 constexpr const char* kNoteSuffix = ".json";
 
-// Names the time since the machine was started; empty where the system does not tell.
+// The id of this boot; empty if the system has none.
 const std::string& this_boot() {
   static const std::string boot = [] {
     std::string text;
@@ -41,7 +41,7 @@ std::string text_of(const PartialNote& note) {
 PartialNote note_from(const std::filesystem::path& path) {
   try {
     const json text = json::parse(read_whole(path));
-    // Bytes that had not reached the disk are gone, whatever the file's length says.
+    // Bytes not yet on disk are lost, regardless of the file's length.
     if (this_boot().empty() || text.at("boot") != this_boot()) {
       throw Error(ErrorCode::kGone, "the machine was restarted since");
     }
@@ -67,7 +67,7 @@ Descriptor opened(const std::filesystem::path& path, int flags) {
 }  // namespace
 
 PartialUpload::File::~File() {
-  std::error_code ignored;  // what stays is found when the daemon starts next, and expires then
+  std::error_code ignored;  // leftovers are found at the next start and expire then
   if (goes) std::filesystem::remove(body.path, ignored);
 }
 
@@ -89,7 +89,7 @@ PartialUpload::PartialUpload(const std::filesystem::path& folder, std::string na
   note_ = note_from(note_path_);
   bytes_file_->body.name = note_.file_name;
   if (!note_.volume.empty()) {
-    bytes_file_->goes = true;  // a kill may have left it
+    bytes_file_->goes = true;  // may remain after a kill
     bytes_file_.reset();
     return;
   }
@@ -158,7 +158,7 @@ void PartialUpload::write(const Turn& turn, std::span<const std::byte> bytes) {
   try {
     write_all(file_, bytes);
   } catch (const Error&) {
-    // A full disk takes some of them, which are not counted.
+    // A full disk may have taken some of them; discard those.
     cut(bytes_);
     throw;
   }

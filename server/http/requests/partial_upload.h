@@ -1,4 +1,4 @@
-// A body that comes in several requests, in a file that outlives the process.
+// A resumable upload: a body sent in several requests, in a file that survives the process.
 #pragma once
 
 #include <atomic>
@@ -17,38 +17,38 @@
 
 namespace isomesh::http {
 
-// What is known of such a body beside its bytes.
+// The properties of such a body.
 struct PartialNote {
   std::string owner;
-  Parameters query;       // of the request that began it
-  std::string file_name;  // as Upload's
-  std::string sha256;     // that all of it must have, in hex; empty: none was told
+  Parameters query;       // of its first request
+  std::string file_name;  // see Upload
+  std::string sha256;     // expected hash of all bytes, in hex; empty if unknown
   std::optional<std::uint64_t> length = {};
   bool is_complete = false;
-  std::string volume = {};  // that it has become, as JSON; its bytes are gone then
+  std::string volume = {};  // the resulting volume as JSON; then the bytes are deleted
 
   bool operator==(const PartialNote&) const = default;
 };
 
-// To whom it falls to append.
+// The lease to append.
 struct PartialTurn {
   std::uint64_t number = 0;
-  std::uint64_t offset = 0;  // bytes that were there when it began
+  std::uint64_t offset = 0;  // number of bytes when it began
 };
 
-// Two files in the folder: the bytes, and beside them the note, which is written before the first
-// of these. Both stay for a process that comes after this one, unless let_go() was called. A kill
-// takes nothing that write() has written; when the machine starts anew nothing is believed.
+// Two files in the folder: the bytes, and the note, which is written first. Both stay for a later
+// process, unless let_go() was called. A kill loses nothing that write() has written; after a
+// reboot uploads are invalid.
 //
-// Thread safe. Bytes are written by whoever has the latest turn, and how many there are is told to
-// nobody without ending it, so that what was told stays true.
+// Thread safe. Only the latest lease may write. Reporting the number of bytes ends the lease, so a
+// reported number stays true.
 class PartialUpload {
  public:
   using Turn = PartialTurn;
 
-  // Begins one. Throws Error kOutOfSpace or kInternal.
+  // Begins an upload. Throws Error kOutOfSpace or kInternal.
   PartialUpload(const std::filesystem::path& folder, std::string name, PartialNote note);
-  // Goes on with one that an earlier process began. Throws Error kGone where it cannot be believed.
+  // Resumes the upload of an earlier process. Throws Error kGone if it is invalid.
   PartialUpload(const std::filesystem::path& folder, std::string name);
   ~PartialUpload();
   PartialUpload(const PartialUpload&) = delete;
@@ -56,36 +56,37 @@ class PartialUpload {
 
   const std::string& name() const { return name_; }
   PartialNote note() const ISOMESH_EXCLUDES(mutex_);
-  // What is to be read, once it is complete; its file stays for as long as somebody has this. Null
-  // when it has become a volume.
+  // The complete body; its file exists as long as the returned object. Null if it has become a
+  // volume.
   std::shared_ptr<const ReceivedBody> body() const ISOMESH_EXCLUDES(mutex_);
 
-  // Its bytes so far, for those who count what all take.
+  // The number of bytes so far, for the total over all uploads.
   std::uint64_t bytes() const ISOMESH_EXCLUDES(mutex_);
-  // When something was written last, by this process or an earlier one.
+  // The time of the last write, by this process or an earlier one.
   std::filesystem::file_time_type written_at() const;
 
-  // Ends whatever turn there is, and says how many bytes are there.
+  // Ends any lease and returns the number of bytes.
   std::uint64_t end_turns() ISOMESH_EXCLUDES(mutex_);
-  // A turn to append, which ends the one before. Nothing where there are other than so many bytes.
+  // Begins a lease to append, which ends the previous one. Empty unless there are exactly `offset`
+  // bytes.
   std::optional<Turn> begin_turn(std::uint64_t offset) ISOMESH_EXCLUDES(mutex_);
 
-  // Each throws Error kUnavailable when another turn has begun, kInvalidParameter when the upload
-  // is complete or its length, once it is told, is another one; write() also as write_all does.
+  // All throw Error kUnavailable if another lease has begun, kInvalidParameter if the upload is
+  // complete or `length` contradicts an earlier one; write() also throws as write_all does.
   void tell_length(const Turn& turn, std::uint64_t length) ISOMESH_EXCLUDES(mutex_);
   void write(const Turn& turn, std::span<const std::byte> bytes) ISOMESH_EXCLUDES(mutex_);
-  // Goes back to where the turn began.
+  // Truncates to the start of the lease.
   void take_back(const Turn& turn) ISOMESH_EXCLUDES(mutex_);
   void complete(const Turn& turn) ISOMESH_EXCLUDES(mutex_);
 
-  // It has become a volume: its bytes go, and what it became stays known.
+  // Records the resulting volume and deletes the bytes.
   void become(const std::string& volume) ISOMESH_EXCLUDES(mutex_);
 
-  // Both files go when this does.
+  // Deletes both files with this object.
   void let_go() ISOMESH_EXCLUDES(mutex_);
 
  private:
-  // The file of the bytes; removed with the last who has it once it is to go.
+  // The file of the bytes; its last owner removes it if `goes` is set.
   struct File {
     explicit File(std::filesystem::path path) : body{.path = std::move(path), .name = {}} {}
     ~File();
@@ -109,7 +110,7 @@ class PartialUpload {
   PartialNote note_ ISOMESH_GUARDED_BY(mutex_);
   Descriptor file_ ISOMESH_GUARDED_BY(mutex_);
   std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  std::uint64_t turn_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the number of the latest
+  std::uint64_t turn_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the latest number
   bool is_let_go_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 

@@ -1,4 +1,4 @@
-// A request as its handler sees it, whatever HTTP library has read it.
+// A request for handlers, independent of the HTTP library.
 #pragma once
 
 #include <chrono>
@@ -17,20 +17,20 @@
 
 namespace isomesh::http {
 
-// The route of a request that none was found for, in logs and metrics.
+// The route of unrouted requests in logs and metrics.
 inline constexpr std::string_view kNoRoute = "none";
 
-// What the server knows of a request beside what the client has sent.
+// The server's data about a request.
 struct RequestContext {
   std::chrono::steady_clock::time_point began =
-      std::chrono::steady_clock::now();  // its head is read
+      std::chrono::steady_clock::now();  // when its head was read
   Trace trace;
   Caller caller;
-  std::string_view route = kNoRoute;  // the pattern of its route, which lives as long as the router
+  std::string_view route = kNoRoute;  // the pattern of its route; lives as long as the router
 };
 
-// Reads a body, once, while its handler works. The functions that take the pieces must not throw;
-// one that returns false ends the reading.
+// Reads a body, once, in its handler. Callbacks must not throw; one that returns false ends the
+// reading.
 class BodyReader {
  public:
   using TakePiece = std::function<bool(std::string_view piece)>;
@@ -38,16 +38,15 @@ class BodyReader {
 
   virtual ~BodyReader() = default;
 
-  // Both return false when the body did not come whole or a function has ended the reading. A form
-  // (Request::is_form) has to be read by read_form, which calls `begin` before the pieces of each
-  // field.
+  // Both return false if the body was incomplete or a callback ended the reading. Read a form
+  // (Request::is_form) with read_form, which calls `begin` before the pieces of each field.
   virtual bool read(const TakePiece& take) = 0;
   virtual bool read_form(const BeginField& begin, const TakePiece& take) = 0;
 
-  // Whether the whole body is here already, so that reading it does not wait. False for a chunked
-  // one, whose end is not known before.
+  // True if the whole body has arrived, so that reading does not block. False for a chunked one,
+  // whose end is unknown.
   virtual bool is_whole() const = 0;
-  // Whether reading has ended because the body came too slowly, or its chunks are none.
+  // True if reading ended because the body arrived too slowly, or because its chunks are malformed.
   virtual bool was_too_slow() const = 0;
   virtual bool was_malformed() const = 0;
 };
@@ -56,31 +55,31 @@ using Parameters = std::vector<std::pair<std::string, std::string>>;
 
 struct Request {
   std::string method;
-  std::string target;   // path and query as they were sent
+  std::string target;   // path and query as sent
   std::string version;  // HTTP/1.0 or HTTP/1.1
-  std::string path;     // percent signs decoded, as in the next two
+  std::string path;     // percent-decoded, like the next two
   Parameters path_parameters;
   Parameters query;
   net::Headers headers;
   std::optional<std::uint64_t> content_length;
   std::string remote_address;  // empty for a Unix socket
-  BodyReader* body = nullptr;  // of a POST or PATCH only
+  BodyReader* body = nullptr;  // only for POST and PATCH
   RequestContext context;
 
   bool has_header(std::string_view name) const;
-  // The value of the first header of that name; empty without one.
+  // The value of the first header of that name; empty if missing.
   std::string_view header(std::string_view name) const;
   std::size_t count_headers(std::string_view name) const;
 
-  // The same for the parameters of the query, whose names have their case.
+  // The same for query parameters, whose names are case-sensitive.
   bool has_parameter(std::string_view name) const;
   std::string_view parameter(std::string_view name) const;
   std::size_t count_parameters(std::string_view name) const;
 
-  // The part of the path that the route's pattern has {name} for.
+  // The part of the path at {name} in the route's pattern.
   std::string path_parameter(std::string_view name) const;
 
-  // Whether the body is a form with fields (multipart/form-data).
+  // True for a form with fields (multipart/form-data).
   bool is_form() const;
 };
 

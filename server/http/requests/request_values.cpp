@@ -17,13 +17,12 @@ namespace {
 
 constexpr int kLongestWaitSeconds = 30;
 
-// Numbers of headers and queries have no sign "+", which base/text lets pass.
+// Numbers in headers and queries have no sign "+", which base/text allows.
 std::optional<double> number_of(std::string_view text) {
   return text.starts_with('+') ? std::nullopt : parse_double(text);
 }
 
-// The value of a preference (RFC 7240), among others in the header and before what may describe it;
-// "" for one without a value.
+// The value of a preference (RFC 7240) in the header, without parameters; "" if it has no value.
 std::optional<std::string_view> preference_in(std::string_view header, std::string_view wanted) {
   for (const std::string_view preference : split(header, ',')) {
     const std::size_t equals = preference.find('=');
@@ -47,7 +46,7 @@ std::string hex_of_base64(std::string_view text, const std::string& header) {
   return to_hex(*digest);
 }
 
-// A member of a digest header: an algorithm's name and bytes in base64 between colons (RFC 9530).
+// A member of a digest header: an algorithm and bytes in base64 between colons (RFC 9530).
 std::pair<std::string_view, std::string_view> digest_member(std::string_view member,
                                                             const std::string& header) {
   const std::size_t equals = member.find('=');
@@ -64,8 +63,7 @@ std::pair<std::string_view, std::string_view> digest_member(std::string_view mem
   return {name, value.substr(1, value.size() - 2)};
 }
 
-// Weak tags are for caches: what they name has the same meaning, not the same bytes (RFC 9110,
-// 8.8.3.2).
+// Weak tags are for caches: they mark equivalent, not identical bytes (RFC 9110, 8.8.3.2).
 enum class Comparison { kStrong, kWeak };
 
 bool names_etag(std::string_view header, std::string_view etag, Comparison comparison) {
@@ -105,7 +103,7 @@ void check_known(const Request& request, const std::set<std::string>& known) {
   for (const auto& [name, unused] : request.query) {
     constexpr std::size_t kLongestName = 64;
     const std::string shown = name.substr(0, kLongestName);
-    if (!errors.empty() && errors.back().field == shown) continue;  // said already
+    if (!errors.empty() && errors.back().field == shown) continue;  // already reported
     if (!known.contains(name)) {
       errors.push_back({shown, "is not a parameter of this request"});
     } else if (request.count_parameters(name) > 1) {
@@ -201,7 +199,7 @@ std::optional<ByteRange> range_of(const Request& request, std::uint64_t size) {
   const auto last = whole_number(after);
   if ((!before.empty() && !first) || (!after.empty() && !last) || (!first && !last) ||
       (first && last && *last < *first)) {
-    return std::nullopt;  // several ranges or bad syntax
+    return std::nullopt;  // several ranges or invalid syntax
   }
   const std::uint64_t begin = first ? *first : size - std::min(size, *last);
   const std::uint64_t end = first && last ? std::min(size - 1, *last) : size - 1;
@@ -257,7 +255,7 @@ std::optional<std::uint64_t> last_event_id(const Request& request) {
   const auto number = whole_number(request.header("Last-Event-ID"));
   if (!number)
     throw invalid_parameter("Last-Event-ID", "must be the id of an event of this stream");
-  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();  // the store's
+  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();  // the store's limit
   return std::min(*number, kLargest);
 }
 

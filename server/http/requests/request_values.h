@@ -1,5 +1,5 @@
-// What requests say in their headers and queries, parsed and bounded. Free functions, thread safe;
-// what is malformed throws Error kInvalidParameter that names the header or parameter.
+// Parses and bounds values of headers and queries. Free functions, thread safe. They throw Error
+// kInvalidParameter with the name of the malformed header or parameter.
 #pragma once
 
 #include <array>
@@ -17,32 +17,32 @@
 
 namespace isomesh::http {
 
-// Refuses parameters that are not among `known`.
+// Rejects parameters that are not in `known`.
 void check_known(const Request& request, const std::set<std::string>& known);
 
-// Whether the client asks for that by `Prefer` (RFC 7240), whatever it says of it.
+// True if the client has that preference in `Prefer` (RFC 7240), with any value.
 bool prefers(const Request& request, std::string_view preference);
 
-// How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds; more than 30 are 30.
+// The longest time until the response: `?wait=N` or `Prefer: wait=N` in seconds, at most 30.
 std::chrono::milliseconds wait_of(const Request& request);
 
-// The Idempotency-Key header, as it is; empty without one. At most 255 printable characters.
+// The Idempotency-Key header; empty if missing. At most 255 printable characters.
 std::string idempotency_key_of(const Request& request);
 
-// The SHA-256 that a header such as Content-Digest names (RFC 9530), as hex; empty when it names
-// none, but only other algorithms.
+// The SHA-256 in a header such as Content-Digest (RFC 9530), as hex; empty if the header is missing
+// or has only other algorithms.
 std::optional<std::string> sha256_of_digest(const Request& request, const std::string& header);
 inline std::optional<std::string> sha256_of_content_digest(const Request& request) {
   return sha256_of_digest(request, "Content-Digest");
 }
 
-// What Repr-Digest holds for that SHA-256 in hex.
+// The value of Repr-Digest for a SHA-256 in hex.
 std::string digest_header(std::string_view sha256);
 
-// A number without a sign; empty for anything else.
+// An unsigned number; empty for anything else.
 std::optional<std::uint64_t> whole_number(std::string_view text);
 
-// So many numbers, of which some may be infinite or none, with commas between.
+// `count` numbers, separated by commas, possibly infinite or NaN.
 std::vector<double> numbers_of(const std::string& name, std::string_view text, std::size_t count);
 
 struct WholeNumbers {
@@ -50,15 +50,15 @@ struct WholeNumbers {
   std::uint64_t high = 0;
 };
 
-// The parameter's value, which must be among those; `otherwise` without the parameter.
+// The parameter's value, which must be in `among`; `otherwise` if missing.
 std::uint64_t whole_number_of(const Request& request, const std::string& name,
                               const WholeNumbers& among, std::uint64_t otherwise);
 
-// The same of any that 64 bits hold.
+// The same for any number of 64 bits.
 std::int64_t whole_number_of(const Request& request, const std::string& name,
                              std::int64_t otherwise);
 
-// Two finite numbers of which the second is greater; empty without the parameter.
+// Two finite ascending numbers; empty without the parameter.
 std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name);
 
 struct ByteRange {
@@ -66,31 +66,30 @@ struct ByteRange {
   std::uint64_t length = 0;
 };
 
-// One range of a file of `size` bytes. Empty when there is no Range header, or one that RFC 9110
-// lets a server ignore: other units, several ranges, bad syntax. Throws Error kRangeNotSatisfiable
-// when the range lies outside of the file.
+// One range of a file of `size` bytes. Empty without a Range header, and for one that RFC 9110
+// permits to ignore: other units, several ranges, invalid syntax. Throws Error kRangeNotSatisfiable
+// if the range is outside of the file.
 std::optional<ByteRange> range_of(const Request& request, std::uint64_t size);
 
-// True when the client takes answers compressed with gzip (RFC 9110, 12.5.3).
+// True if the client accepts gzip (RFC 9110, 12.5.3).
 bool accepts_gzip(const Request& request);
 
-// True when If-None-Match names the entity tag (quotes included).
+// True if If-None-Match has the entity tag (with quotes).
 bool matches_etag(const Request& request, std::string_view etag);
 
-// Throws Error kPreconditionFailed when there is an If-Match that does not name the entity tag.
+// Throws Error kPreconditionFailed for an If-Match without the entity tag.
 void check_if_match(const Request& request, std::string_view etag);
 
-// The text by which a client asks for what follows that id in a list (the parameter `cursor`). A
-// list of another kind refuses it.
+// The parameter `cursor` for the entries after that id in a list. Other kinds of lists reject it.
 std::string cursor_after(std::string_view kind, std::string_view id);
 
-// The `id` in the parameter `cursor`, printable ASCII; empty without one.
+// The `id` in the parameter `cursor`, printable ASCII; empty if missing.
 std::string id_after(const Request& request, std::string_view kind);
 
-// The error of a cursor that cursor_after has not made for this list.
+// The error for a cursor of another list.
 Error wrong_cursor();
 
-// The last event that a client has seen before it came back to a stream; empty without one.
+// The last event that a reconnecting client has seen; empty if missing.
 std::optional<std::uint64_t> last_event_id(const Request& request);
 
 }  // namespace isomesh::http

@@ -1,4 +1,4 @@
-// What a handler answers.
+// A handler's response.
 #pragma once
 
 #include <chrono>
@@ -15,57 +15,57 @@
 
 namespace isomesh::http {
 
-// How a receiver finds the end of a body that a source makes.
+// How the end of a streamed body is marked.
 enum class Framing {
   kLength,  // by Content-Length
-  kChunks,  // the source makes chunks (RFC 9112, 7.1)
+  kChunks,  // the source writes chunks (RFC 9112, 7.1)
   kUntilConnectionEnds,
 };
 
-// A body that is made while it is sent.
+// A body that is produced while it is sent.
 struct StreamedBody {
   std::unique_ptr<net::Source> source;
   std::string media_type;
   Framing framing = Framing::kLength;
-  std::uint64_t length = 0;  // with kLength: what the source makes, not 0
+  std::uint64_t length = 0;  // with kLength: the source's bytes, not 0
 };
 
 struct Response {
   int status = 200;
   net::Headers headers;
   std::string media_type;
-  std::string body;                    // compressed on its way when the client takes that
-  std::optional<StreamedBody> stream;  // instead of `body`; sent as it is
+  std::string body;                    // compressed if the client accepts that
+  std::optional<StreamedBody> stream;  // instead of `body`; never compressed
 
   bool has_header(std::string_view name) const;
-  // Replaces the headers of that name.
+  // Replaces all headers of that name.
   void set_header(std::string_view name, std::string_view value);
-  // Adds one more, for names that may come several times, such as Vary.
+  // Adds a header; for names that may occur several times, such as Vary.
   void add_header(std::string_view name, std::string_view value);
   void set_body(std::string text, std::string_view type);
 };
 
-// What a handler leaves to be done instead of answering: `resume` answers when the job has ended,
-// or at `until` whatever has become of the job. No thread is held until then. With `computing_for`
-// there is no job: `resume` answers on a thread that computes, when it is that party's turn.
+// A deferred response: `resume` answers when the job has ended, or at `until` in any case. No
+// thread is held until then. With `computing_for` there is no job: `resume` runs on a computing
+// thread, in fair order between parties.
 struct Continuation {
   std::string job = {};
   std::chrono::steady_clock::time_point until = {};
   std::function<void(const Request& request, Response& response)> resume;
-  // Called once, before `resume`, when the client has gone meanwhile. Without it `resume` is, since
-  // there is nobody to wait for.
+  // Called once, before `resume`, as soon as the client has disconnected. If it is empty, `resume`
+  // is called then.
   std::function<void(const Request& request)> abandoned = {};
   std::optional<std::string> computing_for = {};
 };
 
-// Answers, or leaves that to a continuation. May throw: Error becomes the problem that it names,
-// anything else is logged and becomes kInternal. Called by several threads at once.
+// Answers now or by a continuation. May throw: an Error becomes its problem; all others are logged
+// and become kInternal. Called concurrently.
 using Handler = std::function<std::optional<Continuation>(const Request&, Response&)>;
 
-// Makes the response the problem (RFC 9457) that the error is.
+// Sets the response to the error's problem (RFC 9457).
 void answer_problem(const Request& request, Response& response, const Error& error);
 
-// The whole response, as bytes, to a connection whose request could not be taken.
+// The bytes of a response to a connection whose request was not read.
 std::string refusal(const Error& error);
 
 }  // namespace isomesh::http

@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::size_t kLongestParameter = 100;
 
-// Not trimmed, unlike base/text's split: white space in a path is a part of it.
+// Not trimmed, unlike base/text's split: white space is part of a path.
 std::vector<std::string_view> segments_of(std::string_view path) {
   std::vector<std::string_view> segments;
   for (std::size_t begin = 0; begin <= path.size();) {

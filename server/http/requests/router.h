@@ -1,4 +1,4 @@
-// Which handler answers which path and method.
+// Finds the handler of a path and a method.
 #pragma once
 
 #include <deque>
@@ -16,7 +16,7 @@
 
 namespace isomesh::http {
 
-// Makes a handler of a function that always answers at once.
+// A handler from a function that always answers immediately.
 template <class Run>
 Handler handler_of(Run run) {
   using Result = std::invoke_result_t<Run, const Request&, Response&>;
@@ -30,27 +30,27 @@ Handler handler_of(Run run) {
   }
 }
 
-// A path such as /v1/jobs/{id}/mesh.{format}. A segment has at most one parameter, which stands for
-// 1 to 100 letters, digits, dots, underscores and hyphens.
+// A path such as /v1/jobs/{id}/mesh.{format}. A segment has at most one parameter, which matches 1
+// to 100 letters, digits, dots, underscores and hyphens.
 class Route {
  public:
   explicit Route(std::string pattern);
 
-  // Also what the route is called in logs and metrics.
+  // Also the route's name in logs and metrics.
   const std::string& pattern() const { return pattern_; }
-  // The handlers by their methods, in alphabetical order.
+  // Handlers by method, in alphabetical order.
   const std::map<std::string, Handler>& handlers() const { return handlers_; }
-  // The methods with commas between, as in the header Allow.
+  // The methods, separated by commas, as in the header Allow.
   std::string methods() const;
 
   void add(const std::string& method, Handler handler);
 
-  // The parameters of a path that the pattern matches; nothing for another path.
+  // The parameters of a matching path; empty for other paths.
   std::optional<Parameters> match(const std::vector<std::string_view>& segments) const;
 
  private:
   struct Segment {
-    std::string before;  // all of it when there is no parameter
+    std::string before;  // everything if there is no parameter
     std::string parameter;
     std::string after;
   };
@@ -65,14 +65,14 @@ class Router {
  public:
   void add(const std::string& method, const std::string& pattern, Handler handler);
 
-  // The first route that matches, in the order in which their patterns were added, and the path's
-  // parameters. Null without one.
+  // The first matching route, in the order of `add`, and the path's parameters. Null if there is
+  // none.
   std::pair<const Route*, Parameters> find(std::string_view path) const;
 
   const std::deque<Route>& routes() const { return routes_; }
 
  private:
-  std::deque<Route> routes_;  // stay where they are, as requests refer to their patterns
+  std::deque<Route> routes_;  // stable addresses: requests refer to their patterns
 };
 
 }  // namespace isomesh::http

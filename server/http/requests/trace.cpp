@@ -19,7 +19,7 @@ bool is_zero(std::string_view text) {
   return std::ranges::all_of(text, [](char c) { return c == '0'; });
 }
 
-// VERSION-TRACE-PARENT-FLAGS (W3C Trace Context, 3.2). A later version may have more behind that.
+// VERSION-TRACE-PARENT-FLAGS (W3C Trace Context, 3.2). Later versions may append more.
 bool is_valid(std::string_view header) {
   constexpr std::size_t kLength = 2 + 1 + kTraceDigits + 1 + kSpanDigits + 1 + 2;
   if (header.size() < kLength) return false;

@@ -1,4 +1,4 @@
-// The name of one request, by which its line of the log is found again.
+// Identifies a request in the log.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace isomesh::http {
 
-// The trace that a W3C `traceparent` header names, or a new one where there is none or it is
-// malformed; and this request's own part of it, which is always new.
+// The trace of a W3C `traceparent` header, or a new one if it is missing or malformed, and a new
+// span for this request.
 struct Trace {
   std::string trace_id;  // 32 hexadecimal digits
   std::string span_id;   // 16
@@ -15,7 +15,7 @@ struct Trace {
   std::string request_id() const { return trace_id + '-' + span_id; }
 };
 
-// Throws Error kInternal when the system has no random bytes.
+// Throws Error kInternal if the system has no random bytes.
 Trace continue_trace(std::string_view traceparent);
 
 }  // namespace isomesh::http

@@ -16,7 +16,7 @@
 namespace isomesh::http {
 namespace {
 
-// The library would inflate an encoded body past every limit.
+// The library would inflate an encoded body beyond all limits.
 void refuse_encoded(const Request& request) {
   const std::string_view encoding = request.header("Content-Encoding");
   if (!encoding.empty() && encoding != "identity") {
@@ -48,7 +48,7 @@ Error incomplete(const BodyReader& body) {
   return {ErrorCode::kInvalidParameter, "the body ended before its length"};
 }
 
-// Refuses a body that is longer than the free room before any of it is written.
+// Rejects a body larger than the free space before writing any of it.
 void check_room(const store::DataFolder& folder, const Request& request) {
   folder.reserve().check_room();
   if (!request.content_length) return;
@@ -59,13 +59,13 @@ void check_room(const store::DataFolder& folder, const Request& request) {
   }
 }
 
-// Takes the pieces of a body. They come from the HTTP library, which an exception must not go
-// through, so that it is kept and ends the reading.
+// Takes the pieces of a body. Exceptions must not pass through the HTTP library, so they are kept
+// and end the reading.
 class Receiver {
  public:
   using Write = std::function<void(std::span<const std::byte> piece)>;
 
-  // With `offset` bytes that were there before.
+  // `offset`: bytes already written.
   Receiver(Write write, store::Reserve& reserve, const UploadLimits& limits,
            const std::atomic<bool>& stopping, bool is_digested, std::uint64_t offset = 0)
       : write_(std::move(write)),
@@ -94,7 +94,7 @@ class Receiver {
     }
   }
 
-  // A form may hold one file and nothing else.
+  // A form must hold exactly one file.
   bool begin_field(const std::string& name, const std::string& file_name) {
     file_name_ = plain_file_name(file_name);
     if (name != "file" || ++fields_ > 1) {
@@ -105,7 +105,7 @@ class Receiver {
     return true;
   }
 
-  // Writes the last of it. Throws what ended the reading.
+  // Writes the last bytes. Throws the error that ended the reading.
   void finish(const BodyReader& body, bool complete, bool is_form) {
     if (failure_) std::rethrow_exception(failure_);
     if (!complete && stopping_)
@@ -118,7 +118,7 @@ class Receiver {
     write_held();
   }
 
-  // The same of a part, of which what has come stays.
+  // The same for a part; the bytes received so far stay.
   void finish_part(const BodyReader& body, bool complete) {
     if (!failure_) write_held();
     if (failure_ || !complete) finish(body, complete, false);
@@ -144,7 +144,7 @@ class Receiver {
   const std::atomic<bool>& stopping_;
   const bool is_digested_;
   std::uint64_t bytes_;
-  std::string held_;  // what is not written yet
+  std::string held_;  // not written yet
   const std::chrono::steady_clock::time_point deadline_ =
       std::chrono::steady_clock::now() + limits_.max_time;
   Sha256 digest_;

@@ -1,4 +1,4 @@
-// Bodies of requests, bounded: in a file or in memory.
+// Bounded bodies of requests, in a file or in memory.
 #pragma once
 
 #include <atomic>
@@ -15,24 +15,24 @@ namespace isomesh::http {
 
 struct UploadLimits {
   std::uint64_t max_bytes = std::uint64_t{8} << 30;
-  std::chrono::seconds max_time = std::chrono::hours(1);  // in all; each read has its own limit
+  std::chrono::seconds max_time = std::chrono::hours(1);  // in total; each read has its own limit
 };
 
-// A body that has come whole.
+// A complete body.
 struct ReceivedBody {
   std::filesystem::path path;
-  // What the client calls the file, without folders: the name in the form, or in the header
+  // The client's name of the file, without folders, from the form or the header
   // Content-Disposition. May be empty, and may name a patient.
   std::string name;
 };
 
-// A request's body in a file: written as it comes, counted, checked against its Content-Digest. The
-// destructor removes the file. Not thread safe.
+// A request's body in a file: written as it arrives, counted, checked against its Content-Digest.
+// The destructor removes the file. Not thread safe.
 class Upload {
  public:
-  // Receives the body, or the one field `file` of a form. Throws Error kTooLarge, kDigestMismatch,
-  // kUnsupportedMedia for an encoded body, kInvalidParameter for a broken or empty one,
-  // kRequestTimeout, kOutOfSpace, and kUnavailable once `stopping` is true.
+  // Receives the body, or the single field `file` of a form. Throws Error kTooLarge,
+  // kDigestMismatch, kUnsupportedMedia for an encoded body, kInvalidParameter for a malformed or
+  // empty one, kRequestTimeout, kOutOfSpace, and kUnavailable once `stopping` is true.
   Upload(const store::DataFolder& folder, const UploadLimits& limits,
          const std::atomic<bool>& stopping, const Request& request);
 
@@ -46,14 +46,14 @@ class Upload {
 class PartialUpload;
 struct PartialTurn;
 
-// Appends the request's body. What came stays, also where the rest does not, unless it is not what
-// Content-Digest says. Throws as Upload does but for an empty body, and as PartialUpload's
-// functions do.
+// Appends the request's body. Received bytes stay even if the rest is missing, unless they
+// contradict Content-Digest. Throws as Upload does, except for an empty body, and as
+// PartialUpload's functions do.
 void receive_part(PartialUpload& upload, const PartialTurn& turn, const store::DataFolder& folder,
                   const UploadLimits& limits, const std::atomic<bool>& stopping,
                   const Request& request);
 
-// A small body, whole in memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,
+// Reads a small body into memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,
 // kInvalidParameter, kRequestTimeout.
 std::string read_text(const Request& request, std::size_t max_bytes);
 

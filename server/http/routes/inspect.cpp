@@ -1,4 +1,4 @@
-// What a person looks at before starting a job: histograms, labels, slices, previews, estimates.
+// Routes for exploring a volume before a job: histograms, labels, slices, previews, estimates.
 #include <memory>
 #include <utility>
 
@@ -18,7 +18,7 @@ constexpr std::uint64_t kUsualBins = 256;
 constexpr std::uint64_t kMostPreviewSize = 256;
 constexpr std::uint64_t kUsualPreviewSize = 128;
 
-// A volume never changes under its id, so neither does what is made of it.
+// A volume's id determines its content, so derived data never changes.
 constexpr const char* kForever = "private, max-age=31536000, immutable";
 
 void histogram(App& app, const Request& request, Response& response) {
@@ -85,7 +85,7 @@ void preview(App& app, const Request& request, Response& response) {
                      .length = reduced->size()};
 }
 
-// Names come and go with the volume's record, so the list is not for ever.
+// Names are in the volume's record, which may change, so the list is not immutable.
 void labels(App& app, const Request& request, Response& response) {
   check_known(request, {"background"});
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));

@@ -33,7 +33,7 @@ std::optional<Continuation> submit(App& app, const Request& request, Response& r
   if (callback) app.services.callback_targets.check(callback->url);
   if (!spec.idempotency_key.empty()) spec.request_digest = sha256_of(body);
   {
-    // The first time the volume's labels are counted, which takes as long as reading it.
+    // The first count of the volume's labels reads all of it.
     const auto place =
         spec.parameters.labels ? place_for_upload(app, request) : net::FairPlaces::Place();
     spec.parameters = settled(app, request, spec.parameters);
@@ -56,7 +56,7 @@ std::optional<Continuation> get(App& app, const Request& request, Response& resp
                        });
 }
 
-// Without what is said of each label, which may be much.
+// Omits the jobs' labels, which may be many.
 std::vector<Job> rows_of(std::vector<Job> jobs) {
   for (Job& job : jobs) {
     if (job.mesh) job.mesh->labels.clear();
@@ -96,7 +96,7 @@ void cancel(App& app, const Request& request, Response& response) {
   answer_json(response, 200, to_json(app.services.jobs.cancel(viewer_of(request), id)));
 }
 
-// The events of the job after `last`, without progress that later progress has replaced.
+// The events of the job after `last`, without superseded progress.
 std::vector<store::Event> past_of(const App& app, const store::Viewer& viewer,
                                   const std::string& job, std::uint64_t last) {
   std::vector<store::Event> past;
@@ -116,7 +116,7 @@ std::vector<store::Event> past_of(const App& app, const store::Viewer& viewer,
 void answer_events(Response& response, std::unique_ptr<net::Source> source) {
   response.status = 200;
   response.set_header("Cache-Control", "no-store");
-  response.set_header("X-Accel-Buffering", "no");  // nginx would collect them
+  response.set_header("X-Accel-Buffering", "no");  // nginx would buffer them
   response.stream = {.source = std::move(source),
                      .media_type = "text/event-stream",
                      .framing = Framing::kUntilConnectionEnds};
@@ -127,17 +127,17 @@ void events(App& app, const Request& request, Response& response) {
   const std::string id = request.path_parameter("id");
   const std::uint64_t last = last_event_id(request).value_or(0);
   auto place = app.streams.take(party_of(request));
-  // The mailbox is there before the past is read, so that no event is missed. One that happens in
-  // between is in both, and the source sends it once.
+  // The mailbox exists before the past is read, so no event is missed. The source removes
+  // duplicates.
   auto mailbox = app.events.listen_to(id);
   const Job job = app.services.jobs.get(viewer_of(request), id);
   auto past = past_of(app, viewer_of(request), id, last);
   if (is_final(job.state) && past.empty()) {
     if (last > 0) {
-      response.status = 204;  // tells a browser not to come back
+      response.status = 204;  // tells a browser not to reconnect
       return;
     }
-    // The job is kept for longer than its events.
+    // The job outlives its events.
     past.push_back({1, "", id, store::EventKind::kDone, job.state, job.stage, job.progress});
   }
   answer_events(response,

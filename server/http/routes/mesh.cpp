@@ -35,7 +35,7 @@ std::string server_timing(const Timing& timing) {
   return text;
 }
 
-// The part that a GET asks for. When it is outside of the file the response says how long that is.
+// The range that a GET requests. If it is outside of the file, the response has the file's length.
 std::optional<ByteRange> part_of(const Request& request, Response& response,
                                  const std::string& etag, std::uint64_t size) {
   if (request.method != "GET") return std::nullopt;
@@ -53,7 +53,7 @@ std::optional<ByteRange> part_of(const Request& request, Response& response,
 // Submits the job of a request whose body is the volume.
 Job submit_with_volume(App& app, const Request& request, Response& response) {
   std::vector<std::pair<std::string, std::string>> job_query;
-  std::set<std::string> names;  // all, as so far only being given once is checked
+  std::set<std::string> names;  // all names: this only checks for duplicates
   for (const auto& parameter : request.query) {
     names.insert(parameter.first);
     if (!import_parameters().contains(parameter.first)) job_query.push_back(parameter);
@@ -77,14 +77,14 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
     return app.services.library.add(owner_of(request), file.body().path, options, file.body().name);
   };
   parameters.volume = counting_refusals(app, request, add).first.id;
-  // A key belongs to one request: the same volume (by its id), the same parameters and, as "mesh"
-  // says, this route.
+  // A key belongs to one request: the same volume (by its id), the same parameters and this route
+  // ("mesh").
   const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
   return submitted(app, {owner_of(request), settled(app, request, parameters), key, digest},
                    response);
 }
 
-// One request whose body is the volume and whose response is the mesh.
+// The request's body is the volume, the response the mesh.
 std::optional<Continuation> mesh_in_one(App& app, const Request& request, Response& response) {
   const auto answer = [&app](const Request& asked, Response& out, const Job& job) {
     out.set_header("Location", "/v1/jobs/" + job.id);
@@ -95,7 +95,7 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
   };
   const Job job = submit_with_volume(app, request, response);
   auto continuation = answer_at_end(app, request, response, job, kLongestJob, answer);
-  // Nobody else knows of the job, unless the client has a key by which it can come back for it.
+  // Without an idempotency key the client cannot return for the job.
   if (continuation && idempotency_key_of(request).empty()) {
     continuation->abandoned = [&app, id = job.id](const Request& asked) {
       app.services.jobs.cancel(viewer_of(asked), id);
@@ -104,16 +104,16 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
   return continuation;
 }
 
-// The bytes of a file: a blob, or a part of one.
+// A file's bytes: a blob or a part of one.
 struct Stored {
   std::string blob;
   std::uint64_t begin = 0;
   std::uint64_t bytes = 0;
   std::string sha256;
-  std::string name;  // for those who save it
+  std::string name;  // for downloads
 };
 
-// Has a damaged blob made again, and says what becomes of that.
+// Has a damaged blob made again, and throws with its state.
 void check_intact(const App& app, const Job& job, const std::string& blob) {
   if (store::is_there_and_intact(app.services.blobs, blob, {})) return;
   log_error("the stored mesh of job {} is damaged", job.id);
@@ -148,7 +148,7 @@ LabelSummary label_of(const jobs::JobLabels& labels, const WhichMesh& which) {
   return *found;
 }
 
-// Whether each label has a file of that format.
+// True if each label has a file of that format.
 bool is_zipped(const jobs::JobLabels& labels, MeshFormat format) {
   return labels.count() > 0 && labels.after(std::nullopt).front().files.contains(format);
 }
@@ -174,13 +174,13 @@ Stored stored_mesh(const App& app, const Job& job, const WhichMesh& which) {
                                         (which.label ? " for each label" : ""));
 }
 
-// Where the whole of a blob can be had without this daemon, for a client that asks for that.
+// The URL of a whole blob outside of this daemon, if the client asks for a redirect.
 std::optional<std::string> link_to(const App& app, const Request& request, const Stored& file,
                                    MeshFormat format) {
   if (!app.options.blob_redirect || request.method != "GET" || !prefers(request, "redirect")) {
     return std::nullopt;
   }
-  // Neither a part of a blob nor one that has to be made again.
+  // Not for a part of a blob, or one that must be made again.
   if (app.services.blobs.size(file.blob) != file.bytes) return std::nullopt;
   return app.services.blobs.link(
       file.blob,

@@ -15,7 +15,7 @@ Levels levels_of(const App& app) {
   levels.uploads = app.uploads.taken();
   levels.callbacks = app.services.outbox.count();
   levels.disk_used_bytes = app.services.retention.named_bytes();
-  std::error_code unknown;  // then 0 is told
+  std::error_code unknown;  // then 0 is reported
   const auto space = std::filesystem::space(app.services.folder.blobs(), unknown);
   if (!unknown) levels.disk_free_bytes = space.available;
   if (app.services.hospital != nullptr) levels.others = app.services.hospital->measure();

@@ -9,8 +9,8 @@
 namespace isomesh::http {
 namespace {
 
-// Nothing from elsewhere, no inline script or style, no frame around it. WebAssembly is the mesh
-// decoder; blob: images are slices that the page has fetched with its token.
+// No foreign resources, no inline script or style, no framing. WebAssembly is the mesh decoder;
+// blob: images are slices fetched with the token.
 constexpr const char* kContentSecurityPolicy =
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; "
     "style-src 'self'; img-src 'self' blob:; connect-src 'self'; base-uri 'none'; "
@@ -40,7 +40,7 @@ void answer_file(const Request& request, Response& response) {
   }
   if (zipped) response.set_header("Content-Encoding", "gzip");
   const std::string_view bytes = zipped ? file->gzip : file->bytes;
-  // Streamed, because a body would be compressed once more.
+  // Streamed, because a plain body would be compressed again.
   response.stream = {.source = text_source(bytes),
                      .media_type = std::string(file->type),
                      .framing = Framing::kLength,

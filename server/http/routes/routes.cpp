@@ -15,8 +15,7 @@
 namespace isomesh::http {
 namespace {
 
-// Browsers let pages of other origins send plain text without asking the server first, but not what
-// is declared as JSON.
+// Browsers let foreign pages send plain text without a preflight, but not JSON.
 void check_is_json(const Request& request) {
   const std::string_view type = split(request.header("Content-Type"), ';').front();
   if (type.empty() || lower(type) == "application/json") return;

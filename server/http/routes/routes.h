@@ -1,4 +1,4 @@
-// How routes are written and answered; private to server/http.
+// Helpers for routes. Private to server/http.
 #pragma once
 
 #include <chrono>
@@ -17,12 +17,13 @@
 
 namespace isomesh::http {
 
-// `run` is a Handler, or a function of the same arguments that returns nothing.
+// `run` is a Handler, or a function with the same arguments that returns nothing.
 template <class Run>
 void add_get(App& app, const std::string& pattern, const Run& run) {
   for (const char* method : {"GET", "HEAD"}) app.router.add(method, pattern, handler_of(run));
 }
-// The same for what is computed: `run` is called by threads for that, in turn with those of others.
+// The same for expensive responses: `run` is called on computing threads, in fair order between
+// parties.
 template <class Run>
 void add_computed_get(App& app, const std::string& pattern, const Run& run) {
   add_get(app, pattern, [run](const Request& request, Response& /*response*/) {
@@ -44,11 +45,11 @@ void add_delete(App& app, const std::string& pattern, const Run& run) {
 
 void answer_json(Response& response, int status, const std::string& json);
 
-// Answers 200 with a body that is computed in pieces.
+// Answers 200 with a body computed in pieces.
 void answer_pieces(const Request& request, Response& response, const char* media_type,
                    NextPiece next);
 
-// Answers with a page of a list: what is one piece of it as any JSON, else in pieces.
+// Answers with a page of a list, as plain JSON if it is a single piece, otherwise in pieces.
 template <class Row>
 void answer_list(const Request& request, Response& response, ListRequest<Row> list) {
   const auto page = std::make_shared<ListPage<Row>>(std::move(list));
@@ -60,47 +61,47 @@ void answer_list(const Request& request, Response& response, ListRequest<Row> li
   });
 }
 
-// The entity tag of what is represented by that text.
+// The entity tag of a representation.
 std::string etag_of(const std::string& text);
-// What may change: the client keeps it, and asks each time whether it is the same.
+// For mutable content: the client caches and revalidates it.
 inline constexpr const char* kAskEachTime = "private, no-cache";
-// Sets the headers of what is kept under that tag. True when the client has it already: then the
+// Sets the headers of cacheable content. Returns true if the client has it already; then the
 // response is complete. Throws Error kPreconditionFailed.
 bool is_known(const Request& request, Response& response, const std::string& etag,
               const char* cache_control);
-// Answers 200, or 304 when the client has the same already. Throws Error kPreconditionFailed.
+// Answers 200, or 304 if the client has the content already. Throws Error kPreconditionFailed.
 void answer_tagged_json(const Request& request, Response& response, const std::string& json);
-// How many entries of a list one response may have.
+// The allowed numbers of entries in one response, and the default.
 inline constexpr WholeNumbers kListLengths = {1, 1000};
 inline constexpr std::uint64_t kUsualListLength = 100;
 
-// Throws Error kUnavailable when all places are taken, or nothing is accepted any more, and
-// kTooManyRequests when whoever sends the request has its share of them.
+// Throws Error kUnavailable if all places are taken or the service stops, and kTooManyRequests if
+// the sender has its fair share.
 net::FairPlaces::Place place_for_upload(App& app, const Request& request);
 
-// The request's small body, which is JSON. One that is not here yet may come slowly, so reading it
-// takes one of the places of uploads. Throws as place_for_upload and read_text do.
+// Reads a small JSON body. A body that has not arrived yet may be slow, so reading it takes one of
+// the places for uploads. Throws as place_for_upload and read_text do.
 std::string json_body(App& app, const Request& request);
 
-// The parameters with what they leave to their volume: see jobs::settle_labels. Throws what that
-// does, and Error kNotFound without the volume.
+// Completes the parameters from their volume; see jobs::settle_labels. Throws as that does, and
+// Error kNotFound without the volume.
 JobParameters settled(const App& app, const Request& request, JobParameters parameters);
 
-// Submits a job. Throws what store::job_of throws, and then says in `response` when to come again.
+// Submits a job. Throws as store::job_of does, with a Retry-After in `response`.
 Job submitted(App& app, const store::JobSpec& spec, Response& response);
 
 using JobAnswer = std::function<void(const Request&, Response&, const Job&)>;
 
-// Has `answer` called with the job as it is when it has ended or `wait` is over: now, or by a
+// Calls `answer` with the job's state when it has ended or `wait` is over: now, or by a
 // continuation.
 std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
                                           const Job& job, std::chrono::milliseconds wait,
                                           const JobAnswer& answer);
 
-// Which file of a finished job.
+// A file of a finished job.
 struct WhichMesh {
   MeshFormat format = MeshFormat::kDrc;
-  std::optional<std::int64_t> label = {};  // one label's own
+  std::optional<std::int64_t> label = {};  // one label's own file
 };
 
 // Answers with a finished job's mesh file: entity tag, one range, timings.

@@ -1,4 +1,4 @@
-// Uploads that come in parts: "Resumable Uploads for HTTP" (draft-ietf-httpbis-resumable-upload).
+// Resumable uploads: "Resumable Uploads for HTTP" (draft-ietf-httpbis-resumable-upload).
 #include "server/http/routes/uploads.h"
 
 #include <algorithm>
@@ -41,7 +41,7 @@ void tell_limits(const App& app, Response& response) {
                                           ", max-age=" + std::to_string(age.count()));
 }
 
-// How far it has come, which ends the turn of whoever sends.
+// Reports the offset, which ends the lease of the present sender.
 void tell_state(const App& app, Response& response, PartialUpload& upload) {
   response.set_header(kOffset, std::to_string(upload.end_turns()));
   const PartialNote note = upload.note();
@@ -51,7 +51,7 @@ void tell_state(const App& app, Response& response, PartialUpload& upload) {
   tell_limits(app, response);
 }
 
-// The type of this problem is the draft's, by which any client of it knows what to do.
+// The problem's type is the draft's, so that any client of the draft understands it.
 void answer_other_offset(const App& app, const Request& request, Response& response,
                          PartialUpload& upload) {
   tell_state(app, response, upload);
@@ -74,7 +74,7 @@ void check_length(const App& app, std::optional<std::uint64_t> length, Response&
               "the upload exceeds " + std::to_string(app.options.upload.max_bytes) + " bytes");
 }
 
-// One part of the body, which may be the first and may be empty.
+// Receives one part of the body, which may be the first and may be empty.
 void receive(App& app, const Request& request, PartialUpload& upload, const PartialTurn& turn) {
   if (const auto length = number_in(request, kLength)) upload.tell_length(turn, *length);
   if (request.content_length && boolean_in(request, kComplete).value_or(false)) {
@@ -168,7 +168,7 @@ void begin_upload(App& app, const Request& request, Response& response) {
   try {
     receive(app, request, *upload, *upload->begin_turn(0));
   } catch (...) {
-    // The client has not been told of it.
+    // The client does not know its name.
     app.kept.let_go(owner_of(request), upload->name());
     throw;
   }

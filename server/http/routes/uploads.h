@@ -1,4 +1,4 @@
-// What the routes of volumes and those of uploads in parts share; private to these.
+// Shared by the routes of volumes and of resumable uploads. Private to them.
 #pragma once
 
 #include <cstdint>
@@ -9,27 +9,27 @@
 
 namespace isomesh::http {
 
-// A body that is here, and the name by which it is kept already; empty without one.
+// A received body, and its name if it is already kept.
 struct KeptBody {
   KeptUploads::Kept file;
   std::string name;
 };
 
-// Answers with the volumes that the body becomes when it is read as the request's query says.
+// Answers with the volumes read from the body as the query says.
 void answer_volumes(App& app, const Request& request, Response& response, const KeptBody& body);
 
-// Whether the request says that its body is the beginning of one. Throws Error kInvalidParameter if
-// its header Upload-Complete is no boolean.
+// True if the body is the first part of an upload. Throws Error kInvalidParameter if the header
+// Upload-Complete is not a boolean.
 bool begins_upload(const Request& request);
 
-// Throws Error kInvalidParameter if a request that says that its body is a whole upload tells
-// another length of it than `bytes`; empty: not known yet.
+// Throws Error kInvalidParameter if a request with a complete upload declares a length other than
+// `bytes`; empty: unknown.
 void check_told_length(const Request& request, std::optional<std::uint64_t> bytes);
 
-// Answers it with the place where the rest is to go. The query must have been looked at.
+// Answers with the URL for the rest. The query must be checked before.
 void begin_upload(App& app, const Request& request, Response& response);
 
-// Lets go of what is kept where there is not so much room besides.
+// Deletes kept uploads unless there are `bytes` of free space.
 void make_room_for(App& app, std::uint64_t bytes);
 
 }  // namespace isomesh::http

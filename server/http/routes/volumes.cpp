@@ -14,7 +14,7 @@ namespace {
 const std::string kVolumes = "/v1/volumes";
 constexpr const char* kVolumeCursor = "volumes";
 
-// Names a refused upload that is kept; the request's parameter of that name names it in turn.
+// The name of a rejected upload that is kept; clients send it as the request's parameter `upload`.
 constexpr const char* kUploadHeader = "Isomesh-Upload";
 
 bool is_to_be_kept(const Request& request) {
@@ -25,7 +25,7 @@ bool is_to_be_kept(const Request& request) {
   return keep == "true";
 }
 
-// The request's body, or one that came before and is kept.
+// The request's body, or a kept upload.
 KeptBody body_of(App& app, const Request& request) {
   if (request.has_parameter("upload")) {
     if (request.content_length.value_or(1) != 0) {
@@ -44,8 +44,7 @@ KeptBody body_of(App& app, const Request& request) {
   return {{upload, &upload->body()}, {}};
 }
 
-// What another request can have read otherwise: it leaves something to be chosen, or raw samples to
-// be described.
+// True if another request may succeed: with a selection, or with a description of raw samples.
 bool may_be_helped(const Error& error) {
   return error.code() == ErrorCode::kUnsupportedMedia || error.remedy() != Remedy();
 }
@@ -85,7 +84,7 @@ std::set<std::string> upload_parameters() {
   return names;
 }
 
-// Whoever did not hear the answer to the last part of an upload asks by its name.
+// A client that missed the response to the last part asks by the upload's name.
 bool answer_what_it_became(App& app, const Request& request, Response& response) {
   if (!request.has_parameter("upload")) return false;
   const std::string volume =
@@ -106,7 +105,7 @@ void upload(App& app, const Request& request, Response& response) {
   answer_volumes(app, request, response, body_of(app, request));
 }
 
-// Whether that has the form of what store::cursor_of makes: a time, a space and an id.
+// True for the form of store::cursor_of: a time, a space and an id.
 bool is_place(const std::string& text) {
   constexpr std::size_t kTime = std::string_view("2026-11-20T07:00:00.000").size();
   const std::size_t space = text.find(' ');
@@ -132,7 +131,7 @@ void list(App& app, const Request& request, Response& response) {
   const auto read = [&volumes = app.services.volumes, viewer = viewer_of(request), order](
                         const std::string& from, std::size_t count) {
     std::vector<Volume> rows = volumes.list(viewer, from, count, order);
-    // Lists leave out the identifiers of slices, of which one volume may have thousands.
+    // Lists omit the identifiers of slices; one volume may have thousands.
     for (Volume& row : rows) row.dicom.reset();
     return rows;
   };
@@ -150,7 +149,7 @@ void get(App& app, const Request& request, Response& response) {
   answer_tagged_json(request, response, to_json(volume));
 }
 
-// What a volume is called is all of it that can change.
+// Only a volume's name can change.
 void rename(App& app, const Request& request, Response& response) {
   check_known(request, {});
   const std::string id = request.path_parameter("id");
@@ -183,7 +182,7 @@ void answer_volumes(App& app, const Request& request, Response& response, const 
   const std::vector<UploadedVolume> volumes = imported(app, request, response, body);
   const UploadedVolume& only = volumes.front();
   const bool is_one = volumes.size() == 1 && only.volume;
-  // Of an archive of several volumes another one may be wanted.
+  // Another volume of the archive may be requested later.
   if (only.volume && !body.name.empty() && !request.has_parameter("member")) {
     app.kept.settle(owner_of(request), body.name, is_one ? to_json(*only.volume) : std::string());
   }

@@ -23,8 +23,8 @@ namespace {
 
 constexpr std::size_t kTarBlock = 512;
 
-// Deflate makes at most a thousand bytes of one. An empty volume compresses nearly as far, so that
-// archives that unpack to less than a gigabyte are never taken for bombs.
+// Deflate compresses at most a thousandfold, and empty volumes come close to that. So archives that
+// unpack to less than a gigabyte are never rejected as bombs.
 constexpr std::uint64_t kMostUnpackedPerByte = 200;
 constexpr std::uint64_t kNeverABomb = std::uint64_t{1} << 30;
 
@@ -45,8 +45,8 @@ std::uint64_t octal(std::string_view text) {
   return value;
 }
 
-// Whether the member or a folder that it is in is hidden, as those of version control are, or holds
-// what macOS adds to an archive.
+// True for members that are hidden or in a hidden folder, such as those of version control, and for
+// the files that macOS adds to archives.
 bool is_hidden(std::string_view name) {
   while (!name.empty()) {
     const std::string_view part = name.substr(0, name.find('/'));
@@ -56,7 +56,7 @@ bool is_hidden(std::string_view name) {
   return false;
 }
 
-// The part of a member's name that is safe to use in a path of ours.
+// A file name made from the safe characters of a member's name.
 std::string plain_name(std::string_view name) {
   constexpr std::size_t kLongest = 100;
   std::string plain(base_of(name).substr(0, kLongest));
@@ -74,7 +74,7 @@ class Reader {
  public:
   explicit Reader(const InputFile& file) : file_(file), archive_(::archive_read_new()) {
     if (!archive_) throw Error(ErrorCode::kInternal, "archive_read_new failed.");
-    // A ZIP is read by its central directory, because that shows whether members are missing.
+    // Read a ZIP by its central directory, which shows whether members are missing.
     ::archive_read_support_format_zip_seekable(archive_.get());
     ::archive_read_support_format_tar(archive_.get());
     constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
@@ -83,9 +83,9 @@ class Reader {
     }
   }
 
-  // The next member; null after the last.
+  // Returns the next member; null after the last.
   archive_entry* next() {
-    // Where the rest of the last member is missing, the archive was cut.
+    // If the rest of the last member is missing, the archive was truncated.
     if (in_member_ && ::archive_read_data_skip(archive_.get()) != ARCHIVE_OK) {
       throw_damaged(archive_.get());
     }
@@ -94,7 +94,7 @@ class Reader {
     const int status = ::archive_read_next_header(archive_.get(), &entry);
     in_member_ = false;
     if (status == ARCHIVE_EOF) return nullptr;
-    // The library warns of names that the locale cannot represent, which does no harm.
+    // The library warns of names that the locale cannot represent, which is harmless.
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) throw_damaged(archive_.get());
     in_member_ = true;
     return entry;
@@ -102,18 +102,18 @@ class Reader {
 
   std::size_t read(std::span<std::byte> target) {
     const la_ssize_t count = ::archive_read_data(archive_.get(), target.data(), target.size());
-    // Here a warning is an error: the library warns of wrong checksums.
+    // Warnings are errors here: the library warns of wrong checksums.
     if (count < 0) throw_damaged(archive_.get());
     return static_cast<std::size_t>(count);
   }
 
-  // Known once the first member is.
+  // Valid after the first member was read.
   bool is_tar() const {
     return (::archive_format(archive_.get()) & ARCHIVE_FORMAT_BASE_MASK) == ARCHIVE_FORMAT_TAR;
   }
 
   // A TAR ends with at least two blocks of zeros and nothing else. The library does not require
-  // them, but an archive that lacks them may have been cut between two members.
+  // them, but without them the archive may have been truncated between two members.
   void require_end() const {
     if (!is_tar()) return;
     std::uint64_t at = (before_next_ + kTarBlock - 1) / kTarBlock * kTarBlock;
@@ -211,7 +211,7 @@ class Unpacker {
     }
   }
 
-  // False for an empty one.
+  // Returns false for an empty member.
   bool unpack_one(ArchiveMember& member, const MemberBound& bound) {
     const Descriptor target(
         ::open(member.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
@@ -227,7 +227,7 @@ class Unpacker {
     return true;
   }
 
-  // Writes what follows `bytes` of a member. Returns how many it has.
+  // Writes a member from byte `bytes` on. Returns its total size.
   std::uint64_t write_rest(const std::string& name, const Descriptor& target, std::uint64_t bytes,
                            std::uint64_t most) {
     while (const std::size_t count = write_piece(target, buffer_.size())) {
@@ -254,7 +254,7 @@ class Unpacker {
                                             std::to_string(limits_.max_bytes) +
                                             " bytes that are accepted.");
     }
-    // A TAR compresses nothing, but it can hold files of which only parts are written.
+    // A TAR is not compressed, but its files can be sparse.
     if (reader_.is_tar() && total_ + further > file_.size()) {
       throw_unusable("The archive contains sparse files, which are not accepted.");
     }
@@ -278,8 +278,7 @@ bool is_zip(std::string_view head) {
   return head.starts_with("PK\x03\x04") || head.starts_with("PK\x05\x06");
 }
 
-// A TAR is known by the checksum of its first member's header. The sum counts its own digits as
-// spaces.
+// A TAR is recognised by the checksum of its first header. The sum counts its own digits as spaces.
 bool is_tar(std::string_view head) {
   constexpr std::size_t kChecksumAt = 148;
   constexpr std::size_t kChecksumBytes = 8;

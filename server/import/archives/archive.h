@@ -16,7 +16,7 @@ namespace isomesh::import {
 bool is_zip(std::string_view head);
 bool is_tar(std::string_view head);
 
-// How many bytes an archive of this size may unpack to, before it is taken for a bomb.
+// The largest unpacked size of an archive of this size; larger ones are rejected as bombs.
 std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes);
 
 struct ArchiveLimits {
@@ -25,34 +25,33 @@ struct ArchiveLimits {
 };
 
 struct ArchiveMember {
-  std::string name;  // as the archive has it, with its folders; never used as a path
-  std::filesystem::path
-      path;                 // where it was unpacked to: ends with its name as far as that is plain
-  bool is_whole = true;     // otherwise only its first kBeginningBytes are there
-  std::uint64_t bytes = 0;  // of all of it; 0 for one that is not whole and does not tell
+  std::string name;            // as in the archive, with folders; never used as a path
+  std::filesystem::path path;  // of the unpacked file; its file name is the member's, sanitised
+  bool is_whole = true;        // otherwise truncated to kBeginningBytes
+  std::uint64_t bytes = 0;     // of the whole member; 0 if truncated and unknown
 };
 
-// How many bytes a member of more than kBeginningBytes may have, of which the path holds so many;
-// empty to leave it at those.
+// Returns the largest acceptable size of a member of more than kBeginningBytes, whose beginning is
+// at the path; empty to unpack only the beginning.
 using MemberBound = std::function<std::optional<std::uint64_t>(const std::filesystem::path&)>;
 
-// Unpacks the regular files of a ZIP or a plain TAR, large ones as far as `bound` says. Each gets a
-// folder of its own below `folder`, which exists and is empty. Links, devices, empty and hidden
-// files, and those in hidden folders are passed over. Throws Error kUnusableVolume when the archive
-// is damaged, truncated or encrypted, when anything follows its end, when two members have one
-// name, and when a member has more bytes than its bound or all tell more than most_unpacked_bytes;
-// kTooLarge beyond the limits.
+// Unpacks the regular files of a ZIP or a plain TAR, large ones as far as `bound` permits. Each
+// gets its own folder below `folder`, which must exist and be empty. Skips links, devices, empty
+// files, hidden files and files in hidden folders. Throws Error kUnusableVolume if the archive is
+// damaged, truncated or encrypted, if bytes follow its end, if two members have one name, if a
+// member exceeds its bound, or if all together exceed most_unpacked_bytes; kTooLarge beyond the
+// limits.
 std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
                                   const std::filesystem::path& folder, const ArchiveLimits& limits,
                                   const MemberBound& bound);
 
-// Unpacks members of that archive whole, to their paths: those whose paths `most` holds, up to so
-// many bytes each. Throws as unpack does.
+// Unpacks members of the archive completely, to their paths: those in `most`, up to the given
+// number of bytes. Throws as unpack does.
 void unpack_whole(const std::filesystem::path& archive, const std::vector<ArchiveMember>& members,
                   const std::map<std::filesystem::path, std::uint64_t>& most,
                   const ArchiveLimits& limits);
 
-// The part of a member's name before and with the last "/", and the part behind it.
+// The part of a member's name up to and including the last "/", and the part after it.
 std::string_view folder_of(std::string_view name);
 std::string_view base_of(std::string_view name);
 

@@ -23,7 +23,7 @@ namespace isomesh::import {
 namespace dicom {
 namespace {
 
-// Keeps the file of the last slice open, because the next slice is often in it, too.
+// Keeps the file of the last slice open, because it often holds the next slice too.
 class OpenFile {
  public:
   OpenFile(std::span<const Source> sources, std::filesystem::path scratch,
@@ -74,7 +74,7 @@ void read_slice(const Stack& stack, std::size_t place, OpenFile& file,
   }
 }
 
-// False when a sample does not fit into the type.
+// Returns false if a sample does not fit into the type.
 bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
                    std::span<std::byte> target) {
   std::vector<std::byte> stored;
@@ -90,7 +90,7 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
   return true;
 }
 
-// Tells in the volume what its samples tell of labels.
+// Adds the labels found in the samples to the volume.
 bool write_stack(const Stack& stack, OpenFile& file, std::span<std::byte> target, Volume& volume) {
   if (!are_labels(stack)) return write_samples(stack, volume.type, file, target);
   return write_labels(
@@ -102,7 +102,8 @@ bool write_stack(const Stack& stack, OpenFile& file, std::span<std::byte> target
 }
 
 Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const ImportTask& task) {
-  // What cannot be decoded takes no room on the disk: a small stream may tell any number of rows.
+  // Decode one slice before the disk space is allocated: a small stream may declare any number of
+  // rows.
   std::vector<std::byte> first(stack.slices.front().image->layout.frame_bytes());
   read_slice(stack, 0, file, first);
   const std::vector<SampleType> types =
@@ -129,7 +130,7 @@ Volume describe_volume(const Stack& stack) {
   return volume;
 }
 
-// What is known to suit the volume, and may be better than what its samples suggest.
+// Preset iso-values for the volume, which may be better than one derived from its samples.
 void suggest(const Stack& stack, Volume& volume) {
   const Image& image = *stack.slices.front().image;
   volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
@@ -145,7 +146,7 @@ DicomIdentity identify(const Stack& stack, std::span<const Source> sources, cons
   for (const Slice& slice : stack.slices) {
     if (!seen[slice.file]) identity.instances.push_back(sources[slice.file].instance);
     seen[slice.file] = true;
-    // One that not all slices have is that of none.
+    // The volume has one only if all slices share it.
     if (slice.image->frame_of_reference_uid != stack.slices.front().image->frame_of_reference_uid) {
       identity.frame_of_reference_uid.clear();
     }

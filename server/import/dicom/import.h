@@ -11,28 +11,26 @@
 
 namespace isomesh::import {
 
-// True for bytes that begin a DICOM file, with a preamble (PS3.10) or without.
+// True for the beginning of a DICOM file, with a preamble (PS3.10) or without.
 bool is_dicom(std::string_view head);
 
-// The one volume that the images among `files` make: of slices in a file each, or of several frames
-// in one. The task's options choose one of several series and volumes, and what is accepted; the
-// task's source is not looked at.
-// Files that are no images, and localisers, are left out and named in the volume's `ignored`. Of
-// several files the client is told the names, without folders, that they have here, which are those
-// of its upload.
+// Imports the one volume among the images of `files`: single-frame slices, or frames of one file.
+// The task's options select one of several series and volumes, and accept ambiguities; the task's
+// source is not used. Other files and localisers are skipped and listed in the volume's `ignored`.
+// With several files, messages name them by the file names given here, without folders.
 //
-// Samples are what the modality means: rescaled by slope and intercept, MONOCHROME1 as it is stored
-// (no inversion), padding too. Integers stay integers where slopes and intercepts are integers.
+// Samples are modality values: rescaled by slope and intercept. MONOCHROME1 is not inverted, and
+// padding is included. Integers stay integers if slopes and intercepts are integers.
 //
-// Throws Error kUnusableVolume with the reason, naming slices, when the images do not make one
-// trustworthy volume, with choices when there are several and none was chosen; kTooLarge,
-// kOutOfSpace, kInternal. Thread safe.
+// Throws Error kUnusableVolume with the reason, naming slices, if the images are not one consistent
+// volume, with choices if there are several and none was selected; kTooLarge, kOutOfSpace,
+// kInternal. Thread safe.
 Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task);
 
-// As most_file_bytes of dataset.h.
+// See most_file_bytes in dataset.h.
 MostBytes most_dicom_bytes(const InputFile& beginning, const ImportTask& task);
 
-// The volume of one file. Throws as import_dicom does.
+// Imports a single file. Throws as import_dicom does.
 Volume parse_dicom(const Input& input);
 
 }  // namespace isomesh::import

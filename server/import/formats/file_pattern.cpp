@@ -18,7 +18,7 @@ constexpr std::size_t kWidestNumber = 9;
                  ", which is not a pattern such as \"slice%03d.raw 1 93 1\".");
 }
 
-// The text around the number, and how its digits are written.
+// The text around the number, and the format of its digits.
 struct Pattern {
   std::string_view before;
   std::string_view after;

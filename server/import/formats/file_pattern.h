@@ -1,4 +1,4 @@
-// Patterns by which a header names its data files.
+// Patterns for a header's data files.
 #pragma once
 
 #include <string>
@@ -9,10 +9,9 @@ namespace isomesh::import {
 
 bool is_file_pattern(std::string_view said);
 
-// The names that "slice%03d.raw 1 93 2" stands for. The words are a name with one place for a whole
-// number, as C's printf writes it, then the first number, the last and the step, which is 1 where
-// it is missing and may be negative. NRRD's fifth word, the dimension of each file, is passed over,
-// because every file holds the same share of the samples whatever it says. Throws Error
+// Expands "slice%03d.raw 1 93 2": a name with one integer conversion of C's printf, the first
+// number, the last, and the step, which defaults to 1 and may be negative. NRRD's fifth word, the
+// dimension of each file, is ignored: all files hold equal parts of the samples. Throws Error
 // kUnusableVolume for anything else.
 std::vector<std::string> expand_file_pattern(std::string_view said);
 

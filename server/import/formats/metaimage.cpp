@@ -27,7 +27,7 @@ struct Header {
   std::uint64_t bytes = 0;  // including its last line
 };
 
-// A MetaImage may begin with any of these keys. The "=" tells them from other text.
+// A MetaImage may begin with any of these keys. The "=" distinguishes them from other text.
 bool is_header_line(std::string_view line) {
   static constexpr std::string_view kKeys[] = {"ObjectType", "ObjectSubType", "Comment",
                                                "NDims",      "DimSize",       "ElementType"};
@@ -91,7 +91,7 @@ bool flag(const Fields& fields, std::string_view name, bool otherwise) {
 
 bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)) != "local"; }
 
-// The names of the data files. "LIST" means that they follow the header, one on each line.
+// The names of the data files. After "LIST" they follow the header, one per line.
 std::vector<std::string> data_names(const InputFile& file, const Header& header) {
   const std::string_view said = optional(header.fields, kLastKey);
   if (is_file_pattern(said)) return expand_file_pattern(said);
@@ -160,7 +160,7 @@ void check_samples_are_plain(const Fields& fields) {
   }
 }
 
-// What the standard calls the function from elements to intensities, which few programs apply.
+// The standard's function from elements to intensities; few programs apply it.
 std::optional<Rescale> rescale_of(const Fields& fields) {
   const auto number = [&](std::string_view name, double otherwise) {
     const std::string_view text = optional(fields, name);
@@ -222,7 +222,7 @@ void check_numbers(const Fields& fields, std::string_view name, std::size_t coun
                  " finite numbers.");
 }
 
-// The value of a field that has several names. Throws where they contradict each other.
+// The value of a field with several names. Throws if they contradict each other.
 std::string_view one_of(const Fields& fields, std::initializer_list<std::string_view> names,
                         std::size_t count) {
   std::string_view result;
@@ -239,7 +239,7 @@ std::string_view one_of(const Fields& fields, std::initializer_list<std::string_
   return result;
 }
 
-// The numbers of a field that has been checked; none of one that is missing.
+// The numbers of a checked field; empty if missing.
 std::vector<double> numbers_of(std::string_view value) {
   std::vector<double> numbers;
   for (const std::string_view word : words(value)) {
@@ -248,14 +248,12 @@ std::vector<double> numbers_of(std::string_view value) {
   return numbers;
 }
 
-// MetaImage's space is LPS, as all programs that write it have it. Axes beyond the third are left
-// out.
+// MetaImage's space is LPS, as in all programs that write it. Axes beyond the third are omitted.
 Geometry geometry_of(const Fields& fields, std::size_t axes) {
   const auto matrix =
       numbers_of(one_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes));
   const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, axes));
-  // ElementSize is the extent of a sample. It is taken for the distance between samples only where
-  // ElementSpacing is missing.
+  // ElementSize is the extent of a sample. It replaces a missing ElementSpacing.
   check_numbers(fields, "ElementSize", axes);
   const std::string_view distances = one_of(fields, {"ElementSpacing"}, axes);
   const auto spacing = numbers_of(distances.empty() ? optional(fields, "ElementSize") : distances);
@@ -263,7 +261,7 @@ Geometry geometry_of(const Fields& fields, std::size_t axes) {
   const std::size_t used = std::min<std::size_t>(axes, 3);
   std::copy_n(origin.begin(), std::min(used, origin.size()), geometry.origin.begin());
   std::copy_n(spacing.begin(), std::min(used, spacing.size()), geometry.spacing.begin());
-  // The matrix has a row for each axis, a geometry a column.
+  // The matrix has a row per axis, a geometry a column.
   for (std::size_t axis = 0; axis < used && !matrix.empty(); ++axis) {
     for (std::size_t row = 0; row < used; ++row) {
       geometry.direction[row * 3 + axis] = matrix[axis * axes + row];
@@ -272,8 +270,7 @@ Geometry geometry_of(const Fields& fields, std::size_t axes) {
   return geometry;
 }
 
-// When a frame was taken, as the trackers of PLUS and Slicer's sequences write it; empty where that
-// is not told.
+// A frame's timestamp, as the trackers of PLUS and Slicer's sequences write it; empty if missing.
 std::string timestamp_of(const Fields& fields, std::uint64_t frame) {
   std::string number = std::to_string(frame);
   number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
@@ -281,8 +278,8 @@ std::string timestamp_of(const Fields& fields, std::uint64_t frame) {
   return seconds ? "time " + to_text(*seconds) + " s" : std::string();
 }
 
-// Where a volume lies along the axes beyond the third, of which the fourth runs fastest; its number
-// where the header tells neither an origin nor a distance along a single such axis.
+// A volume's position along the axes beyond the third, of which the fourth runs fastest. Its index
+// if the header has neither an origin nor a spacing for a single such axis.
 std::string place_of(const Fields& fields, std::span<const std::uint64_t> sizes,
                      std::uint64_t index) {
   const auto spacing = numbers_of(one_of(fields, {"ElementSpacing"}, sizes.size()));
@@ -315,7 +312,7 @@ Difference difference_of(const Fields& fields, const std::vector<std::uint64_t>&
           .title = [&](std::uint64_t index) { return place_of(fields, sizes, index); }};
 }
 
-// Their dims, type and encoding, and which of several volumes they are.
+// Sets dims, type and encoding, and selects one of several volumes.
 SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes,
                         const ImportOptions& options) {
   SourceVolume volume;

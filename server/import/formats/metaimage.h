@@ -1,5 +1,4 @@
-// MetaImage headers (https://itk.org/Wiki/ITK/MetaIO/Documentation), attached to their samples or
-// in files of their own.
+// MetaImage headers (https://itk.org/Wiki/ITK/MetaIO/Documentation), attached or detached.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +14,18 @@ namespace isomesh::import {
 
 bool is_metaimage(std::string_view head);
 
-// Reads the header. Its space is taken for LPS, as all programs that write MetaImage have it.
-// AnatomicalOrientation and CenterOfRotation, which say the same once more or nothing of the
-// samples' places, are passed over. Throws Error kUnusableVolume.
-// A slope and offset of the samples are applied, with a note. The options choose one of several
-// volumes.
+// Reads the header. The space is LPS, as in all programs that write MetaImage. Ignores
+// AnatomicalOrientation and CenterOfRotation, which do not affect the samples' positions. Applies
+// the samples' slope and offset, with a note. The options select one of several volumes. Throws
+// Error kUnusableVolume.
 SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
                              const ImportOptions& options);
 
-// The data files that a header without samples names.
+// The data files of a detached header.
 std::vector<std::string> metaimage_data_names(const InputFile& file, const Companions& companions);
 
-// As the header in its beginning tells. Throws as parse_metaimage does, and Error kTooLarge beyond
-// the limits.
+// By the header at its beginning. Throws as parse_metaimage does, and Error kTooLarge beyond the
+// limits.
 MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -31,7 +31,7 @@ std::vector<std::uint64_t> sizes_of(const NiftiHeader& header) {
   return sizes;
 }
 
-// Of an index along the axes beyond the third, of which the fourth is time and runs fastest.
+// For an index along the axes beyond the third; the fourth is time and runs fastest.
 std::string title_of(const NiftiHeader& header, std::uint64_t index) {
   const auto instants = static_cast<std::uint64_t>(std::max<std::int64_t>(header.dim[4], 1));
   const double step = header.pixdim[4];
@@ -103,7 +103,7 @@ StoredType type_of(const NiftiHeader& header) {
   throw_unusable("The NIfTI header's datatype " + std::to_string(header.datatype) + " is unknown.");
 }
 
-// The standard writes a slope of 0 where there is none; several programs write NaN.
+// A slope of 0 means none; several programs write NaN.
 std::optional<Rescale> rescale_of(const NiftiHeader& header) {
   if (header.slope == 0 || std::isnan(header.slope)) return std::nullopt;
   if (!std::isfinite(header.slope) || !std::isfinite(header.intercept)) {
@@ -132,7 +132,7 @@ double millimetres_per_unit(const NiftiHeader& header) {
 
 bool is_length(double size) { return std::isfinite(size) && size > 0; }
 
-// Along an axis of a single sample there is no distance, and some programs write 0.
+// An axis with a single sample needs no spacing, and some programs write 0.
 Vector3 spacing_of(const NiftiHeader& header, const std::array<std::uint32_t, 3>& dims) {
   Vector3 spacing;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -145,7 +145,7 @@ Vector3 spacing_of(const NiftiHeader& header, const std::array<std::uint32_t, 3>
   return spacing;
 }
 
-// Where the samples lie, in RAS and in the file's unit.
+// Origin and steps in RAS and in the file's unit.
 struct Placement {
   Vector3 origin = {};
   std::array<Vector3, 3> steps = {};
@@ -172,7 +172,7 @@ bool is_rotation(const NiftiHeader& header) {
   return squares_of(header) <= 1 + kRounding;
 }
 
-// The quaternion has length 1 and its real part is never negative, so that part is not stored.
+// The quaternion has length 1 and a nonnegative real part, which is therefore not stored.
 Placement qform_of(const NiftiHeader& header, const Vector3& spacing) {
   if (!is_rotation(header)) {
     throw_unusable("The quaternion of the NIfTI header's qform is not a rotation.");
@@ -197,7 +197,7 @@ Placement qform_of(const NiftiHeader& header, const Vector3& spacing) {
   return placement;
 }
 
-// The sample (i,j,k).
+// The position of sample (i,j,k).
 Vector3 point_of(const Placement& placement, const std::array<double, 3>& index) {
   Vector3 point = placement.origin;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -208,7 +208,7 @@ Vector3 point_of(const Placement& placement, const std::array<double, 3>& index)
   return point;
 }
 
-// How far apart the two place a sample at most, which is one of the corners.
+// The largest distance between the two positions of a sample, which is at a corner.
 double distance_of(const Placement& one, const Placement& other,
                    const std::array<std::uint32_t, 3>& dims) {
   double most = 0;
@@ -232,7 +232,7 @@ double shortest_step(const Placement& placement) {
   return shortest;
 }
 
-// Compares the steps of the sform that is taken with the voxel sizes.
+// Compares the steps of the chosen sform with the voxel sizes.
 void note_other_pixdim(const NiftiHeader& header, const Placement& sform, SourceVolume& volume) {
   constexpr double kTolerance = 0.01;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -252,15 +252,15 @@ void note_other_pixdim(const NiftiHeader& header, const Placement& sform, Source
 
 Placement without_forms(const Vector3& spacing) {
   Placement placement;
-  // The axes of LPS, written in RAS.
+  // The LPS axes, in RAS.
   placement.steps[0][0] = -spacing[0];
   placement.steps[1][1] = -spacing[1];
   placement.steps[2][2] = spacing[2];
   return placement;
 }
 
-// Analyze's standard axes run to the left, to the front and up; its images lie around the middle,
-// as programs that read them have it.
+// Analyze's axes run left, front and up, and its images are centred, as programs that read them
+// assume.
 Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
   volume.notes.push_back(
       note_of(NoteCode::kSpaceAssumed,
@@ -276,7 +276,7 @@ Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
   return placement;
 }
 
-// Where both forms are there, tells how far apart they are.
+// If both forms are present, notes their difference.
 void note_other_form(const NiftiHeader& header, const Placement& taken, const Placement& other,
                      const std::string& name_of_taken, SourceVolume& volume) {
   constexpr double kVoxels = 0.01;
@@ -338,7 +338,7 @@ Geometry lps_geometry(const NiftiHeader& header, const ImportOptions& options,
 }
 
 std::uint64_t payload_offset(const NiftiHeader& header) {
-  // Header extensions are small; a larger offset is damage.
+  // Header extensions are small; a larger offset is corrupt.
   constexpr double kMost = 64 << 20;
   const double least = header.is_detached ? 0 : static_cast<double>(header.bytes);
   if (!(header.vox_offset >= least && header.vox_offset <= kMost) ||
@@ -349,7 +349,7 @@ std::uint64_t payload_offset(const NiftiHeader& header) {
   return static_cast<std::uint64_t>(header.vox_offset);
 }
 
-// All but where the samples are.
+// Everything except the location of the samples.
 SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   SourceVolume volume;
   const std::vector<std::uint64_t> sizes = sizes_of(header);
@@ -361,7 +361,7 @@ SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   return volume;
 }
 
-// The file of a pair that holds the samples has the header's name with another suffix.
+// The image file of a pair has the header's name with another suffix.
 std::string image_name(const Companions& companions) {
   std::string_view own = companions.name;
   if (lower(own).ends_with(".gz")) own.remove_suffix(3);
@@ -382,7 +382,7 @@ bool is_nifti(std::string_view head) { return begins_as_nifti(head); }
 SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
                          const ImportOptions& options) {
   const NiftiHeader header = read_nifti_header(file.text(0, kNiftiHeaderBytes));
-  // A pair's samples are looked for first: without them nothing else that is wrong can be helped.
+  // A missing image file is reported before all other errors.
   const std::string image = header.is_detached ? image_name(companions) : "";
   SourceVolume volume = describe(header, options);
   const std::uint64_t end = header.is_detached ? file.size() : payload_offset(header);

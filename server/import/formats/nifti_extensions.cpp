@@ -11,9 +11,9 @@
 namespace isomesh::import {
 namespace {
 
-// Room for 65 535 labels with long names; what lies behind is passed over.
+// Room for 65 535 labels with long names; the rest is ignored.
 constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
-constexpr std::size_t kFlagBytes = 4;  // of which the first says whether there are extensions
+constexpr std::size_t kFlagBytes = 4;  // the first tells whether there are extensions
 constexpr std::size_t kHeadBytes = 8;  // size and code
 
 std::uint32_t number_at(std::string_view bytes, std::size_t at, bool big_endian) {
@@ -45,12 +45,13 @@ std::vector<LabelEntry> nifti_labels(const InputFile& file, const NiftiHeader& h
   while (rest.size() >= kHeadBytes) {
     const std::uint32_t size = number_at(rest, 0, header.big_endian);
     if (size < kHeadBytes || size > rest.size()) break;
-    // By what it says rather than by its code: some write Caret's as a comment, or with none.
+    // Recognised by content, not by code: some programs write Caret's as a comment, or without a
+    // code.
     const std::string_view text = text_of(rest.substr(kHeadBytes, size - kHeadBytes));
     if (may_have_labels(text)) {
       for (LabelEntry& entry : labels_of_xml(text, volume)) entries.push_back(std::move(entry));
     }
-    // Else many extensions of many labels would be held at once.
+    // Bounds memory for many extensions with many labels.
     if (entries.size() > Volume::kMostLabels) break;
     rest.remove_prefix(size);
   }

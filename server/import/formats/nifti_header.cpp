@@ -47,8 +47,8 @@ struct Kind {
   bool is_analyze = false;
 };
 
-// Analyze has no magic, so that more is asked of its header than of others: its fields "extents"
-// and "regular" as its manual has them, a known datatype with its bits, sizes of one to seven axes.
+// Analyze has no magic number, so its header is checked more strictly: "extents" and "regular" as
+// in its manual, a known datatype with its bits, and sizes of one to seven axes.
 bool is_analyze(const Fields& fields) {
   struct Row {
     int datatype;
@@ -121,7 +121,7 @@ NiftiHeader read_nifti2(const Fields& fields) {
   return header;
 }
 
-// What Analyze's header has in the place of NIfTI's fields means something else.
+// Analyze has fields with other meanings in place of NIfTI's.
 void forget_what_is_no_analyze(NiftiHeader& header) {
   constexpr int kUint16OfSpm = 132;
   constexpr int kUint16 = 512;

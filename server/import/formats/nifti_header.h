@@ -1,4 +1,4 @@
-// The fields of NIfTI-1, NIfTI-2 and Analyze 7.5 headers that a volume needs. Internal to the
+// The header fields of NIfTI-1, NIfTI-2 and Analyze 7.5 that a volume needs. Internal to the
 // reader.
 #pragma once
 
@@ -10,14 +10,14 @@
 
 namespace isomesh::import {
 
-// As many leading bytes hold the header of any version.
+// Enough leading bytes for the header of any version.
 inline constexpr std::size_t kNiftiHeaderBytes = 540;
 
 // In this machine's byte order.
 struct NiftiHeader {
   bool big_endian = false;
-  bool is_analyze = false;   // an Analyze header, which knows no place in space
-  bool is_detached = false;  // the samples are in a file of their own
+  bool is_analyze = false;   // an Analyze header, without a position in space
+  bool is_detached = false;  // the samples are in another file
   std::int64_t bytes = 0;    // of the header
   std::array<std::int64_t, 8> dim = {};
   std::array<double, 8> pixdim = {};
@@ -34,8 +34,8 @@ struct NiftiHeader {
   std::array<double, 12> srow = {};  // row-major, 3 x 4
 };
 
-// Whether a file of one of the three begins so. Analyze's header has no magic: the size of a
-// header, and fields that have few possible values, tell it.
+// True if a file of one of the three begins so. Analyze's header, without a magic number, is
+// recognised by its size field and by fields with few possible values.
 bool begins_as_nifti(std::string_view head);
 
 // Throws Error kUnusableVolume.

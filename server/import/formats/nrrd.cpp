@@ -26,7 +26,7 @@ using Fields = NrrdFields;
 
 struct Header {
   Fields fields;
-  std::uint64_t bytes = 0;  // including the empty line that ends it
+  std::uint64_t bytes = 0;  // including the final empty line
 };
 
 std::string field_name(std::string_view text) {
@@ -41,7 +41,7 @@ void add_field(Fields& fields, std::string_view line) {
   if (colon == std::string_view::npos) {
     throw_unusable("The NRRD header has a line that is not a field: " + in_quotes(line) + ".");
   }
-  // "key:=value" is a program's own, whose names may be those of fields.
+  // "key:=value" is private to a program; its key may equal a field's name.
   if (line.substr(colon).starts_with(":=")) {
     fields.emplace(own_key(line.substr(0, colon)), trimmed(line.substr(colon + 2)));
     return;
@@ -56,7 +56,7 @@ void add_field(Fields& fields, std::string_view line) {
   }
 }
 
-// True when the rest of the header is names of data files.
+// True if the rest of the header lists data files.
 bool names_list(const Fields& fields) {
   const auto found = fields.find(kDataFile);
   return found != fields.end() && found->second.starts_with("LIST");
@@ -67,7 +67,7 @@ Header read_header(const std::string& text) {
   std::size_t next = 0;
   for (bool first = true;; first = false) {
     const std::size_t end = text.find('\n', next);
-    // Only a header without samples may end with its file.
+    // Only a detached header may end with its file.
     if (end == std::string::npos || names_list(header.fields)) {
       header.bytes = next;
       if (header.fields.contains(kDataFile)) return header;
@@ -189,7 +189,7 @@ bool is_stream(const SourceVolume& volume) {
   return volume.encoding == Encoding::kDeflate || volume.encoding == Encoding::kBzip2;
 }
 
-// The bytes that are to be skipped; empty where the samples end with their file.
+// The number of bytes to skip; empty if the samples are at the end of their file.
 Skip byte_skip(const Fields& fields, const SourceVolume& volume) {
   const std::int64_t bytes = skip_field(fields, "byteskip");
   const bool can_end = is_stream(volume) || volume.encoding == Encoding::kRaw;
@@ -217,7 +217,7 @@ std::uint64_t payload_offset(const InputFile& file, const Header& header, Source
   return offset;
 }
 
-// The names of the data files. "LIST" means that they follow the header, one on each line.
+// The names of the data files. After "LIST" they follow the header, one per line.
 std::vector<std::string> data_names(const InputFile& file, const Header& header) {
   const std::string_view said = value_of(header.fields, kDataFile);
   if (!names_list(header.fields)) {
@@ -229,7 +229,7 @@ std::vector<std::string> data_names(const InputFile& file, const Header& header)
   return {names.begin(), names.end()};
 }
 
-// A NIfTI file that serves as data begins with a header of its own, which some headers forget.
+// A NIfTI file used as data begins with its own header, which some headers ignore.
 bool has_own_header(const std::string& name, const Companions& companions) {
   const std::string head = InputFile(companion(name, companions)).text(0, kSniffBytes);
   const auto bytes = std::as_bytes(std::span(head));
@@ -252,7 +252,7 @@ std::vector<DataFile> data_files(const InputFile& file, const Header& header,
   return data_files_of(names, companions, skip, volume);
 }
 
-// Their dims, type and encoding, and which of several volumes they are.
+// Sets dims, type and encoding, and selects one of several volumes.
 SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
                         const ImportOptions& options) {
   SourceVolume volume;

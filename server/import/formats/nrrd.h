@@ -14,17 +14,15 @@ namespace isomesh::import {
 
 bool is_nrrd(std::string_view head);
 
-// Reads the header, attached to its samples or in a file of its own; nrrd_space.h says where the
-// samples lie. The options choose one of several volumes along a list or time. Throws Error
-// kUnusableVolume.
+// Reads the header, attached or detached; nrrd_space.h reads the geometry. The options select one
+// of several volumes along a list or time. Throws Error kUnusableVolume.
 SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
                         const ImportOptions& options);
 
-// The data files that a header without samples names.
+// The data files of a detached header.
 std::vector<std::string> nrrd_data_names(const InputFile& file, const Companions& companions);
 
-// As the header in its beginning tells. Throws as parse_nrrd does, and Error kTooLarge beyond the
-// limits.
+// By the header at its beginning. Throws as parse_nrrd does, and Error kTooLarge beyond the limits.
 MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::string_view kSpaces = " \t";
 
-// A number as the format's own library reads it: whatever holds "nan" is unknown, and what stands
-// behind a number is passed over. Empty when there is none.
+// Parses a number as the format's own library does: any word with "nan" is unknown, and text after
+// a number is ignored. Empty if there is no number.
 std::optional<double> number_of(std::string_view word) {
   const std::string text = lower(word);
   if (text.find("nan") != std::string::npos) return kUnknown;
@@ -24,7 +24,7 @@ std::optional<double> number_of(std::string_view word) {
   return number;
 }
 
-// The numbers of a vector, all of them known or none.
+// The numbers of a vector; all are known or none.
 std::optional<std::vector<double>> parse_vector(std::string_view inside, std::size_t size) {
   std::vector<double> numbers;
   std::size_t known = 0;

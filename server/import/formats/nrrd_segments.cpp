@@ -15,10 +15,10 @@ namespace {
 struct Segment {
   std::uint64_t layer = 0;
   std::int64_t value = 1;
-  LabelEntry entry;  // its label is none yet
+  LabelEntry entry;  // its label is not set yet
 };
 
-// Empty where the header does not have it.
+// Returns an empty text if the header does not have it.
 std::string_view own_value(const NrrdFields& fields, std::size_t segment, std::string_view key) {
   return value_of(fields, own_key("Segment" + std::to_string(segment) + '_' + std::string(key)));
 }
@@ -51,8 +51,8 @@ std::optional<std::string> color_of(std::string_view text) {
   return label_color(color);
 }
 
-// Layers and values of segments that do not tell them are those of old versions: one segment a
-// layer, where there are several.
+// Segments without layers and values are those of old versions: one segment per layer if there are
+// several.
 std::vector<Segment> segments_of(const NrrdFields& fields, std::uint64_t layers) {
   std::vector<Segment> segments;
   for (std::size_t at = 0; is_told(fields, at); ++at) {

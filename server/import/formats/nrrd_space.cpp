@@ -19,12 +19,12 @@ bool is_lattice_kind(std::string_view kind) {
   return kind == "domain" || kind == "space" || kind == "???" || kind == "none";
 }
 
-// Kinds of axes along which whole volumes lie. A vector's components are as good as volumes.
+// Kinds of axes along which volumes lie. A vector's components count as volumes.
 bool is_volume_kind(std::string_view kind) {
   return kind == "list" || kind == "time" || kind == "vector";
 }
 
-// The name of the kind of each axis, in lower case.
+// The kind of each axis, in lower case.
 std::vector<std::string> kinds_of(const NrrdFields& fields, std::size_t axes) {
   const auto said = words(value_of(fields, "kinds"));
   std::vector<std::string> kinds;
@@ -40,7 +40,7 @@ std::size_t count_of(std::string_view text, std::string_view part) {
   return count;
 }
 
-// The components' axes are the only ones that may lie nowhere in space.
+// Only the axes of components may have no direction.
 void check_space_is_told(const NrrdFields& fields, std::size_t component_axes) {
   const std::string directions = lower(value_of(fields, "spacedirections"));
   const std::string spacings = lower(value_of(fields, "spacings"));
@@ -52,13 +52,13 @@ void check_space_is_told(const NrrdFields& fields, std::size_t component_axes) {
   }
 }
 
-// The signs that turn a space into LPS.
+// The signs that convert a space to LPS.
 struct Space {
   std::string_view name;
   std::array<double, 3> to_lps;
 };
 
-// The space that the header names. Throws for those of which nothing tells how they lie in LPS.
+// The header's space. Throws for spaces without a known relation to LPS.
 std::optional<Space> space_of(const NrrdFields& fields) {
   static constexpr std::array<double, 3> kSame = {1, 1, 1};
   static constexpr Space kReadable[] = {
@@ -86,20 +86,19 @@ std::optional<Space> space_of(const NrrdFields& fields) {
 
 // --- Axes ----------------------------------------------------------------------------------------
 
-// What the header says of one axis.
 struct Axis {
   std::uint64_t size = 1;
   bool is_component = false;
-  bool is_node = false;  // min and max are told of the outer samples, not of their cells' borders
+  bool is_node = false;  // min and max are the outer samples, not the borders of their cells
   double spacing = kUnknown;
   double min = kUnknown;
   double max = kUnknown;
-  std::vector<double> direction;  // the step between samples; unknown numbers where it has none
+  std::vector<double> direction;  // the step between samples; NaN if it has none
 
   bool has_direction() const { return !direction.empty() && is_known(direction.front()); }
 };
 
-// Of the kinds that components have, those that a single one may be.
+// The component kinds that an axis of size 1 may have.
 bool is_kind_of_one(std::string_view kind) {
   static constexpr std::string_view kKinds[] = {
       "list",   "time", "point", "vector", "contravariant-vector", "covariant-vector",
@@ -107,12 +106,12 @@ bool is_kind_of_one(std::string_view kind) {
   return std::ranges::find(kKinds, kind) != std::end(kKinds);
 }
 
-// "none" and "???" are told by the format to be written in no other way.
+// The format allows "none" and "???" only in this spelling.
 bool is_unknown_word(std::string_view word) { return word == "none" || word == "???"; }
 
 void set_kind(Axis& axis, std::string_view word) {
   if (is_unknown_word(word)) {
-    // The format's own library forgets the centering of such an axis.
+    // The format's own library ignores the centering of such an axis.
     if (word == "none") axis.is_node = false;
     return;
   }
@@ -130,7 +129,7 @@ void set_center(Axis& axis, std::string_view word) {
   }
 }
 
-// How many dimensions the space has in which the axes lie; 0 when there is none.
+// The number of dimensions of the axes' space; 0 if it is unknown.
 std::size_t space_dimension(const NrrdFields& fields) {
   constexpr std::uint64_t kMost = 8;
   const std::string_view text = value_of(fields, "spacedimension");
@@ -182,7 +181,7 @@ std::vector<Axis> all_axes(const NrrdFields& fields, std::span<const std::uint64
   return axes;
 }
 
-// The axes on which samples lie.
+// The axes of samples.
 std::vector<Axis> lattice_axes(const NrrdFields& fields, std::span<const std::uint64_t> sizes,
                                std::size_t dimension) {
   std::vector<Axis> axes = all_axes(fields, sizes);
@@ -203,8 +202,7 @@ std::vector<Axis> lattice_axes(const NrrdFields& fields, std::span<const std::ui
 
 bool has_extent(const Axis& axis) { return is_known(axis.min) && is_known(axis.max); }
 
-// Between samples, where min and max are the places of the outer ones or the borders of their
-// cells.
+// The distance between samples; min and max are the outer samples or the borders of their cells.
 double spacing_of_extent(const Axis& axis) {
   const std::uint64_t steps = axis.is_node ? axis.size - 1 : axis.size;
   const double spacing = (axis.max - axis.min) / static_cast<double>(steps);
@@ -229,8 +227,8 @@ void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_spac
     if (!in_space && has_extent(axis)) geometry.spacing[at] = spacing_of_extent(axis);
     return;
   }
-  // As the format's own library computes them: volumes that were read by it before have the same
-  // canonical file, to the last bit.
+  // Computed as in the format's own library, so that earlier volumes keep the same canonical file,
+  // to the last bit.
   double squares = 0;
   for (const double part : axis.direction) squares += part * part;
   const double spacing = std::sqrt(squares);
@@ -257,8 +255,8 @@ void set_space_origin(Geometry& geometry, const NrrdFields& fields, std::size_t 
   std::copy_n(origin->begin(), std::min<std::size_t>(dimension, 3), geometry.origin.begin());
 }
 
-// Without a space the first samples lie half a spacing behind the axes' mins, where those are the
-// borders of cells.
+// Without a space, the first sample lies half a spacing after the axis min if that is the border of
+// a cell.
 void set_origin_from_mins(Geometry& geometry, std::span<const Axis> axes) {
   const auto has_length = [](const Axis& axis) {
     return is_known(axis.max) || is_known(axis.spacing);
@@ -280,7 +278,7 @@ void turn_into_lps(Geometry& geometry, const Space& space) {
   }
 }
 
-// The unit of every axis, or empty where the header has none.
+// The unit of all axes; empty if the header has none.
 std::string unit_of(const NrrdFields& fields) {
   const bool in_space = fields.contains("spaceunits");
   const std::string_view text = value_of(fields, in_space ? "spaceunits" : "units");
@@ -339,8 +337,8 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
 
 namespace {
 
-// The numbers of an extent of Slicer's, (first, last) along each axis, if they are as many samples
-// as the sizes tell.
+// The first indices of a Slicer extent, (first, last) along each axis. Empty unless the extent
+// matches the sizes.
 std::optional<std::array<double, 3>> first_of_extent(const NrrdFields& fields, std::string_view key,
                                                      const std::vector<std::uint64_t>& sizes) {
   const std::vector<std::string_view> numbers = words(value_of(fields, own_key(key)));
@@ -358,7 +356,7 @@ std::optional<std::array<double, 3>> first_of_extent(const NrrdFields& fields, s
   return first;
 }
 
-// Turns what old versions of Slicer wrote into LPS.
+// Converts the geometry of old Slicer versions to LPS.
 void place_as_slicer(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
                      Geometry& geometry, std::vector<Note>& notes) {
   auto first = first_of_extent(fields, "Segment0_Extent", sizes);

@@ -1,6 +1,6 @@
-// What an NRRD header says about space (https://teem.sourceforge.net/nrrd/format.html): its fields
-// space, space dimension, space directions, space origin, space units, spacings, axis mins, axis
-// maxs, centers, kinds and units.
+// The spatial fields of an NRRD header (https://teem.sourceforge.net/nrrd/format.html): space,
+// space dimension, space directions, space origin, space units, spacings, axis mins, axis maxs,
+// centers, kinds and units.
 #pragma once
 
 #include <cstdint>
@@ -13,38 +13,37 @@
 
 namespace isomesh::import {
 
-// A header's fields. Names are in lower case and without spaces, because "data file" and
-// "datafile" are the same field.
+// A header's fields. Names are in lower case without spaces: "data file" and "datafile" are the
+// same field.
 using NrrdFields = std::map<std::string, std::string, std::less<>>;
 
-// Empty for a field that the header does not have.
+// Returns an empty text for a missing field.
 std::string_view value_of(const NrrdFields& fields, std::string_view name);
 
-// The field by which the program's own pair "key:=value" is kept.
+// The name under which a private pair "key:=value" is stored.
 std::string own_key(std::string_view key);
 
-// What the sizes along a header's axes mean.
+// The meaning of the sizes of a header's axes.
 struct NrrdSizes {
-  std::vector<std::uint64_t> all;      // as the header tells them
-  std::vector<std::uint64_t> lattice;  // of the axes on which samples lie, at most three
-  std::uint64_t volumes = 1;           // along the axis of another kind that has several
+  std::vector<std::uint64_t> all;      // in the header's order
+  std::vector<std::uint64_t> lattice;  // of the axes of samples, at most three
+  std::uint64_t volumes = 1;           // the size of another axis with several elements
   std::string volume_kind;             // "list", "time", ...
-  bool is_interleaved = false;         // that axis is the first, which runs fastest
+  bool is_interleaved = false;         // that axis is the first and runs fastest
 };
 
-// Axes of components, lists and time have kinds of their own and may stand anywhere; one of them,
-// the first or the last, may have several volumes. Throws Error kUnusableVolume for components such
-// as colours, and for several such axes.
+// Axes of components, lists and time have their own kinds and may be anywhere; one of them, the
+// first or the last, may have several volumes. Throws Error kUnusableVolume for components such as
+// colours, and for several such axes.
 NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes);
 
-// The geometry of the first three of the lattice's axes, in LPS millimetres. RAS and LAS become
-// LPS. Of the other spaces those that are right-handed are taken as they are, because nothing says
-// how they lie in the patient, and left-handed ones are refused. A space of four dimensions without
-// a name is what old versions of Slicer wrote segmentations in: RAS, with the place of the samples
-// in Segment0_Extent; a note tells so. An axis without a spacing or a direction has samples as far
-// apart as its min and max tell, or 1 mm, and a header without an origin begins at (0,0,0), as the
-// readers of the format have it. Throws Error kUnusableVolume when the fields contradict each other
-// or the format.
+// The geometry of the lattice's first three axes, in LPS millimetres. Converts RAS and LAS to LPS.
+// Other right-handed spaces are used unchanged, because their relation to the patient is unknown;
+// left-handed ones are rejected. An unnamed space of four dimensions is a segmentation of an old
+// Slicer version: RAS, with the samples' position in Segment0_Extent, which a note reports. An axis
+// without a spacing or a direction gets it from its min and max, otherwise 1 mm. Without an origin
+// the first sample is at (0,0,0). Both are as in the format's other readers. Throws Error
+// kUnusableVolume if the fields contradict each other or the format.
 Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
                        std::vector<Note>& notes);
 

@@ -1,13 +1,13 @@
-// Raw samples, which a request describes.
+// Raw samples, described by the request.
 #pragma once
 
 #include "server/import/source/reader.h"
 
 namespace isomesh::import {
 
-// Writes the samples that the task's options describe. Throws Error kInvalidParameter when the
-// description is none of a volume or the body's size is not what it tells; kTooLarge,
-// kUnusableVolume, kOutOfSpace, kInternal as import_volume does.
+// Imports the samples that the task's options describe. Throws Error kInvalidParameter if the
+// description is invalid or does not match the body's size; kTooLarge, kUnusableVolume,
+// kOutOfSpace, kInternal as import_volume does.
 Volume parse_raw(const Input& input);
 
 }  // namespace isomesh::import

@@ -65,7 +65,7 @@ Geometry geometry_of(const VtiAttributes& image, const Extent& extent) {
   geometry.spacing = numbers_of<3>(image, "Spacing", {1, 1, 1});
   geometry.direction = numbers_of<9>(image, "Direction", geometry.direction);
   geometry.origin = numbers_of<3>(image, "Origin", {0, 0, 0});
-  // The file's origin is the place of the index (0,0,0), which the extent may leave out.
+  // The file's origin is the position of index (0,0,0), which may be outside of the extent.
   for (int axis = 0; axis < 3; ++axis) {
     const Vector3 step = step_of(geometry, axis);
     const auto count = static_cast<double>(extent.first[static_cast<std::size_t>(axis)]);
@@ -94,7 +94,7 @@ StoredType type_of(const VtiArray& array) {
                  " is not supported. A sample must be one real number.");
 }
 
-// The image's samples: the array that the point data names as its scalars, or the only one.
+// The image's samples: the array that is the point data's Scalars, or the only one.
 const VtiArray& scalars_of(const VtiDocument& document) {
   const std::string_view scalars = attribute_of(document.point_data, "Scalars");
   const VtiArray* found = nullptr;
@@ -143,8 +143,8 @@ VtkCompression compression_of(const VtiDocument& document) {
   throw_unusable("The VTK file's compressor " + in_quotes(compressor) + " is unknown.");
 }
 
-// Throws where an entity or a comment stands among the samples, because the decoder would read it
-// as samples.
+// Throws if an entity or a comment is among the samples, because the decoder would read it as
+// samples.
 void check_text(const InputFile& file, const CompressedRange& text) {
   constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
   for (std::uint64_t done = 0; done < text.bytes;) {
@@ -157,7 +157,7 @@ void check_text(const InputFile& file, const CompressedRange& text) {
   }
 }
 
-// Appended data is no XML, so the parser does not notice when the end of the file is missing.
+// Appended data is not XML, so the parser does not notice a truncated file.
 void check_end(const InputFile& file) {
   constexpr std::uint64_t kTailBytes = 256;
   const std::string tail = file.text(file.size() - std::min(kTailBytes, file.size()), kTailBytes);
@@ -255,7 +255,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
 }
 
 MostBytes most_vti_bytes(const InputFile& beginning, const ImportTask& task) {
-  // Of each sample, in all arrays together: 32 numbers in text.
+  // Per sample, in all arrays together: 32 numbers as text.
   constexpr std::uint64_t kMostPerSample = 1024;
   const Extent extent = extent_of(read_vti_image(beginning), "WholeExtent");
   const auto& dims = extent.dims;

@@ -9,20 +9,20 @@
 
 namespace isomesh::import {
 
-// True for all of VTK's XML files; those that hold no image are refused with the reason.
+// True for all of VTK's XML files; files without an image are rejected later, with the reason.
 bool is_vti(std::string_view head);
 
-// Whether such a file may hold an image, as far as its beginning tells.
+// True if such a file may hold an image, by its beginning.
 bool may_hold_image(std::string_view head);
 
-// Reads the XML up to the samples. They are the scalars of the point data, of one component, in one
-// piece that fills the whole extent. VTK does not say how its space lies in the patient; it is
-// taken for LPS, as programs made with ITK write it. Throws Error kUnusableVolume.
+// Reads the XML up to the samples. They are the point data's scalars, of one component, in one
+// piece that fills the whole extent. VTK does not define its space's relation to the patient; LPS
+// is assumed, as programs based on ITK write it. Throws Error kUnusableVolume.
 SourceVolume parse_vti(const InputFile& file, const Companions& companions,
                        const ImportOptions& options);
 
-// As the image's extent tells, with room for other arrays than the samples. Throws Error
-// kUnusableVolume where the file does not begin with that.
+// By the image's extent, with room for further arrays. Throws Error kUnusableVolume if the
+// beginning does not have it.
 MostBytes most_vti_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -10,7 +10,7 @@
 namespace isomesh::import {
 namespace {
 
-// Reads a document piece by piece, up to its appended data, which is no XML.
+// Parses a document incrementally up to its appended data, which is not XML.
 class Parser : public XmlHandler {
  public:
   enum class Until { kImage, kSamples };
@@ -35,7 +35,7 @@ class Parser : public XmlHandler {
   }
 
  private:
-  // The library looks at a tag or comment from its beginning again for each piece of it.
+  // expat rescans an unfinished tag or comment with each piece, so their length is bounded.
   void check_progress(std::uint64_t read) const {
     constexpr std::uint64_t kLongest = std::uint64_t{1} << 20;
     if (read > kLongest && reader_.begin() < read - kLongest) {
@@ -45,7 +45,7 @@ class Parser : public XmlHandler {
   }
 
   void encoding(std::string_view encoding) override {
-    // In others the samples' text could not be read byte by byte.
+    // Other encodings do not allow reading the samples' text byte by byte.
     const std::string name = lower(encoding);
     if (name == "utf-8" || name == "us-ascii" || name == "iso-8859-1") return;
     throw_unusable("The VTK file's encoding " + in_quotes(name) + " is not supported.");

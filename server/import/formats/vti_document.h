@@ -16,16 +16,16 @@ namespace isomesh::import {
 
 using VtiAttributes = std::map<std::string, std::string, std::less<>>;
 
-// Empty where there is none.
+// Returns an empty text if missing.
 std::string_view attribute_of(const VtiAttributes& attributes, std::string_view name);
 
 // An array of the point data.
 struct VtiArray {
   VtiAttributes attributes;
-  CompressedRange text;  // the file's bytes between its tags
+  CompressedRange text;  // the byte range between its tags
 };
 
-// The parts of the XML that a volume needs.
+// The parts of the document that a volume needs.
 struct VtiDocument {
   VtiAttributes file;
   VtiAttributes image;
@@ -34,15 +34,15 @@ struct VtiDocument {
   std::size_t pieces = 0;
   std::vector<VtiArray> arrays;
   VtiAttributes appended;
-  std::uint64_t appended_at = 0;  // where its data begins in the file; 0: there is none
+  std::uint64_t appended_at = 0;  // file offset of its data; 0: none
 };
 
-// Reads the document up to its appended data, which is no XML. Throws Error kUnusableVolume when it
-// is not well-formed or no image, and for what XML can hold and VTK does not write.
+// Reads the document up to its appended data, which is not XML. Throws Error kUnusableVolume if it
+// is not well-formed, not an image, or uses XML features that VTK does not write.
 VtiDocument read_vti_document(const InputFile& file);
 
-// The attributes of the image, which come before anything large. Throws as read_vti_document, also
-// when they are not in the file, of which the end may be missing.
+// Reads the image's attributes, which precede anything large. Throws as read_vti_document, also if
+// they are missing because the file is truncated.
 VtiAttributes read_vti_image(const InputFile& beginning);
 
 }  // namespace isomesh::import

@@ -11,7 +11,7 @@
 namespace isomesh::import {
 namespace {
 
-// Of which some may be no sample's in the end.
+// Some of them may occur in no sample in the end.
 constexpr std::size_t kMostStates = std::size_t{1} << 20;
 
 template <class Value>
@@ -73,7 +73,7 @@ std::vector<LabelEntry> Combinations::entries(std::vector<LabelEntry> named) con
   for (const Node& node : nodes_) {
     if (node.value == 0) continue;
     count += node.size;
-    // Each takes some bytes of an answer, and one combination may be of thousands.
+    // Each takes a few bytes of a response, and one combination may have thousands of labels.
     if (count > Volume::kMostLabels * 16) {
       throw_unusable(
           "The segments overlap in too many combinations to list. Choose one segment with "

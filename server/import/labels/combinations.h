@@ -1,5 +1,5 @@
-// Labels that overlap -> samples that have one value each: the number of the combination of labels
-// that the sample has.
+// Overlapping labels -> samples with a single value: the number of the sample's combination of
+// labels.
 #pragma once
 
 #include <cstddef>
@@ -13,46 +13,47 @@
 
 namespace isomesh::import {
 
-// The combinations of labels that samples have. A label that is alone keeps its number, and other
-// combinations get the free ones above the highest label, in the order in which they are asked for.
-// Not thread safe.
+// Numbers the combinations of labels of samples. A single label keeps its number. Other
+// combinations get free numbers above the highest label, in the order of the requests. Not thread
+// safe.
 class Combinations {
  public:
-  // What a sample has so far. A default one has no label.
+  // A sample's labels so far. The default has none.
   using State = std::uint32_t;
   static constexpr State kNone = 0;
 
-  // Labels are 1..highest_label, which is 65535 at most.
+  // Labels are 1..highest_label, at most 65535.
   explicit Combinations(std::uint32_t highest_label);
 
-  // What a sample of `state` has that is of `label`, too. Its labels come in ascending order.
-  // Throws Error kUnusableVolume when there are too many combinations.
+  // Adds `label` to the labels of `state`. Add labels in ascending order. Throws Error
+  // kUnusableVolume if there are too many combinations.
   State with(State state, std::uint32_t label);
 
-  // A label above the others that nothing else has. Throws as value() does.
+  // Returns an unused label above all others. Throws as value() does.
   std::uint32_t new_label();
 
-  // The value of samples of that state, at most 65535. Throws Error kUnusableVolume when there are
-  // more combinations than that.
+  // The value of samples of that state, at most 65535. Throws Error kUnusableVolume if there are
+  // more combinations.
   std::uint32_t value(State state);
 
-  // The values that have been asked for of each label of which another value than its own has; the
-  // entries' `values` are set, those without an entry get one. Ascending.
+  // For each label with values beside its own: its requested values. Sets the entries' `values`,
+  // and adds missing entries. Ascending.
   std::vector<LabelEntry> entries(std::vector<LabelEntry> named) const;
 
-  // Writes the values of a run of samples as `type`, uint8 or uint16. False when one does not fit.
+  // Writes the values of consecutive samples as `type`, uint8 or uint16. Returns false if one does
+  // not fit.
   bool write(std::span<const State> states, SampleType type, std::span<std::byte> target);
 
-  // How many of the samples that were written are of several labels; empty where none is.
+  // A note on the number of written samples with several labels; empty if there are none.
   std::optional<Note> note() const;
 
  private:
-  // One label more than another combination.
+  // A combination: its parent and one more label.
   struct Node {
     State parent = kNone;
     std::uint32_t label = 0;
-    std::uint32_t size = 0;   // how many labels
-    std::uint32_t value = 0;  // 0: not asked for yet
+    std::uint32_t size = 0;   // number of labels
+    std::uint32_t value = 0;  // 0: not requested yet
   };
 
   std::uint32_t next_value();
@@ -62,7 +63,7 @@ class Combinations {
   std::uint32_t next_value_;
   std::size_t overlaps_ = 0;
   std::uint64_t overlapping_samples_ = 0;
-  // Of the last call of with(): samples come in runs.
+  // Caches the last call of with(): equal samples are often adjacent.
   std::uint64_t last_key_ = 0;
   State last_state_ = kNone;
 };

@@ -13,7 +13,7 @@
 namespace isomesh::import {
 namespace {
 
-// Of names, and of values by some ten bytes each: what an import's answer has room for.
+// Names, and about ten bytes per value: bounded by the size of an import's response.
 constexpr std::size_t kMostBytes = std::size_t{4} << 20;
 
 std::string valid_utf8(std::string_view text) {
@@ -40,7 +40,7 @@ void check_size(const std::vector<LabelEntry>& entries) {
 }  // namespace
 
 std::string label_name(std::string_view text) {
-  // More than the bytes that can remain, before others are replaced by longer ones.
+  // Cut before conversion, which may lengthen the text.
   const std::string_view first = beginning(trimmed(text), LabelEntry::kMostNameBytes);
   const std::string name = volume::normalized(printable(valid_utf8(first)));
   return std::string(beginning(name, LabelEntry::kMostNameBytes));

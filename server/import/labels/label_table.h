@@ -1,4 +1,4 @@
-// What files say of their labels -> Volume::labels.
+// Labels as files describe them -> Volume::labels.
 #pragma once
 
 #include <array>
@@ -11,15 +11,14 @@
 
 namespace isomesh::import {
 
-// A name as a label may have it: UTF-8 without control characters, cut where it is too long.
+// A valid label name: UTF-8 without control characters, truncated to the limit.
 std::string label_name(std::string_view text);
 
-// Red, green and blue, 0..1 or clamped to that, as "#rrggbb"; empty for numbers that are not
-// finite.
+// Red, green and blue, clamped to 0..1, as "#rrggbb"; empty for non-finite numbers.
 std::optional<std::string> label_color(const std::array<double, 3>& parts);
 
-// Ascending, each label once, as the first of several entries has it. Throws Error kUnusableVolume
-// when there are more than Volume::kMostLabels, or their names and values are more than megabytes.
+// Sorts the entries; of several for one label the first is used. Throws Error kUnusableVolume if
+// there are more than Volume::kMostLabels, or if names and values exceed 4 MiB.
 std::vector<LabelEntry> label_table(std::vector<LabelEntry> entries);
 
 }  // namespace isomesh::import

@@ -22,7 +22,7 @@ constexpr double kMostColor = 255;
 struct TextEntry {
   std::int64_t label = 0;
   std::string_view name;
-  // The name's only word, where a single number follows it, as in MRIcron's tables.
+  // The first word of a name followed by a single number, as in MRIcron's tables.
   std::string_view name_ahead_of_number;
   std::optional<Color> color;
 };
@@ -43,7 +43,7 @@ std::optional<Color> color_of(Words words) {
   return color;
 }
 
-// From the beginning of the first to the end of the last: words are views of one line.
+// From the beginning of the first word to the end of the last: words are views of one line.
 std::string_view joined(Words words) {
   const char* const begin = words.front().data();
   const char* const end = words.back().data() + words.back().size();
@@ -55,7 +55,7 @@ std::string_view without_quotes(std::string_view name) {
   return trimmed(name.substr(1, name.size() - 2));
 }
 
-// Numbers come first: a colour, with an opacity or with all that ITK-SNAP tells.
+// Numbers first: a colour, optionally with an opacity or ITK-SNAP's flags.
 std::optional<TextEntry> after_color(std::int64_t label, Words rest, std::size_t numbers) {
   if (numbers != 3 && numbers != 4 && numbers != 6) return std::nullopt;
   const auto color = color_of(rest);
@@ -64,7 +64,7 @@ std::optional<TextEntry> after_color(std::int64_t label, Words rest, std::size_t
   return TextEntry{.label = label, .name = name, .name_ahead_of_number = {}, .color = color};
 }
 
-// A name comes first. Three or four numbers at the end are its colour, with an opacity or without.
+// Name first. Three or four numbers at the end are its colour, optionally with an opacity.
 std::optional<TextEntry> ahead_of_color(std::int64_t label, Words rest) {
   constexpr std::size_t kMostNumbers = 4;
   std::size_t numbers = 0;
@@ -90,8 +90,8 @@ std::optional<TextEntry> entry_of(std::string_view line) {
   return numbers > 0 ? after_color(*label, rest, numbers) : ahead_of_color(*label, rest);
 }
 
-// MRIcron's tables have a number behind each name. A name may end with a number, too: then names
-// without it would be alike.
+// MRIcron's tables have a number after each name. But names may also end with a number: then they
+// would be equal without it.
 bool have_numbers_behind(std::span<const TextEntry> entries) {
   std::set<std::string_view> names;
   return std::ranges::all_of(entries, [&](const TextEntry& entry) {
@@ -99,7 +99,7 @@ bool have_numbers_behind(std::span<const TextEntry> entries) {
   });
 }
 
-// Parts of colours are 0 to 1 in some tables, and 0 to 255 in others.
+// Colours are 0 to 1 in some tables, and 0 to 255 in others.
 double largest_color(std::span<const TextEntry> entries) {
   double largest = 0;
   for (const TextEntry& entry : entries) {
@@ -120,7 +120,7 @@ std::vector<LabelEntry> named(std::span<const TextEntry> entries, bool is_of_sli
   const double scale = 1 / largest_color(entries);
   std::vector<LabelEntry> labels;
   for (const TextEntry& entry : entries) {
-    if (entry.name == "(none)") continue;  // Slicer's, for a number without a label
+    if (entry.name == "(none)") continue;  // Slicer's name for a number without a label
     const std::string_view name = numbered ? entry.name_ahead_of_number : entry.name;
     LabelEntry label = {.label = entry.label,
                         .name = label_name(is_of_slicer ? with_spaces(name) : std::string(name))};

@@ -1,4 +1,4 @@
-// Tables of labels in text, as programs write them beside a label volume.
+// Text tables of labels, as programs write them beside a label volume.
 #pragma once
 
 #include <string_view>
@@ -8,13 +8,13 @@
 
 namespace isomesh::import {
 
-// The labels of a table. Each line is a label's number with its name, and possibly its colour:
+// Parses a table. Each line has a label's number, its name, and possibly its colour:
 //   1 Left-Thalamus 0 118 14 0              FreeSurfer's and 3D Slicer's colour tables
 //   1 255 0 0 1 1 1 "Left thalamus"         ITK-SNAP's label descriptions
 //   1 0.2 0.4 0.9 Left thalamus             FSLeyes' lookup tables
 //   1 Left thalamus
 // Lines that begin with "#", "%" or "//" are comments. Returns none unless every other line is such
-// an entry, and for more than Volume::kMostLabels. Not in order. Never throws for what it reads.
+// an entry, and for more than Volume::kMostLabels. Unordered. Never throws because of the text.
 std::vector<LabelEntry> labels_of_text(std::string_view text);
 
 }  // namespace isomesh::import

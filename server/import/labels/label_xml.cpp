@@ -31,7 +31,7 @@ std::optional<std::string> color_of(const Attributes& attributes) {
   return label_color(parts);
 }
 
-// "1" "liver" "2" "spleen" ..., between the tags of an element of their own.
+// "1" "liver" "2" "spleen" ..., as the text of one element.
 std::vector<LabelEntry> afni_labels(std::string_view text) {
   std::vector<std::string_view> words;
   const std::size_t begin = text.find('>');
@@ -59,7 +59,7 @@ class Parser : public XmlHandler {
     try {
       reader_.read(text, true);
     } catch (const XmlError&) {
-      return {};  // names are an extra; the samples are there without
+      return {};  // labels are optional; the samples are usable without them
     }
     return std::move(entries_);
   }
@@ -95,10 +95,10 @@ class Parser : public XmlHandler {
 
   const std::uint64_t volume_;
   std::vector<LabelEntry> entries_;
-  Attributes attributes_;     // of the last element that began
+  Attributes attributes_;     // of the last start tag
   std::string text_;          // within it
-  bool is_in_text_ = false;   // that is kept
-  bool is_of_volume_ = true;  // where no element says of which
+  bool is_in_text_ = false;   // true while text is collected
+  bool is_of_volume_ = true;  // true if no element names a volume
   XmlReader reader_{*this};
 };
 

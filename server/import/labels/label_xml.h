@@ -1,4 +1,4 @@
-// Tables of labels in XML.
+// XML tables of labels.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace isomesh::import {
 
-// The labels that a document has for one of its file's volumes: Caret's LabelTable in the
-// VolumeInformation of that index, or AFNI's attribute VALUE_LABEL_DTABLE. None where it has
-// neither or is no well-formed XML; at most one more than Volume::kMostLabels. Not in order.
+// The labels of one of the file's volumes: Caret's LabelTable in the VolumeInformation of that
+// index, or AFNI's attribute VALUE_LABEL_DTABLE. Empty if the document has neither or is not
+// well-formed; at most one more than Volume::kMostLabels. Unordered.
 std::vector<LabelEntry> labels_of_xml(std::string_view text, std::uint64_t volume);
 
 }  // namespace isomesh::import

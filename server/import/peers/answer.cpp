@@ -34,7 +34,7 @@ constexpr const char* kNumberOfSeriesRelatedInstances = "00201209";
   throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS is not DICOM JSON");
 }
 
-// The first value of an attribute; null where it has none.
+// The first value of an attribute; null if missing.
 const Json* value_of(const Json& object, const char* tag) {
   const auto attribute = object.find(tag);
   if (attribute == object.end() || !attribute->is_object()) return nullptr;
@@ -56,7 +56,7 @@ std::string uid_of(const Json& object, const char* tag) {
   return uid;
 }
 
-// Servers write whole numbers as numbers or, for IS, as strings too.
+// Servers write integers as numbers or, for IS, also as strings.
 template <class Number>
 std::optional<Number> number_of(const Json& object, const char* tag) {
   const Json* value = value_of(object, tag);

@@ -1,4 +1,4 @@
-// What a PACS answers to a search or to what it was sent: DICOM JSON (PS3.18, F).
+// A PACS's responses to searches and uploads: DICOM JSON (PS3.18, F).
 #pragma once
 
 #include <filesystem>
@@ -7,8 +7,8 @@
 
 namespace isomesh::import {
 
-// Reads an answer to QIDO-RS (a list of objects) or to STOW-RS (one object with what was stored and
-// what was not). An empty file is an empty list. Throws Error kPacsUnreachable when it is neither.
+// Reads a response of QIDO-RS (a list of objects) or STOW-RS (one object with stored and failed
+// instances). An empty file is an empty list. Throws Error kPacsUnreachable for anything else.
 process::PeersAnswer read_answer(const std::filesystem::path& file);
 
 }  // namespace isomesh::import

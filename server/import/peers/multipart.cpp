@@ -24,7 +24,7 @@ constexpr std::size_t kLongestBoundary = 70;
   throw Error(ErrorCode::kSeriesIncomplete, "the response of the PACS ends before its last part");
 }
 
-// The file's bytes in order, of which some are kept until they have been looked at.
+// The file's bytes in order, with a buffer for lookahead.
 class Window {
  public:
   explicit Window(const std::filesystem::path& path) : file_(path) {}
@@ -32,7 +32,7 @@ class Window {
   std::string_view view() const { return std::string_view(buffer_).substr(begin_); }
   void drop(std::size_t count) { begin_ += count; }
 
-  // False at the file's end.
+  // Returns false at the end of the file.
   bool more() {
     buffer_.erase(0, begin_);
     begin_ = 0;
@@ -51,8 +51,8 @@ class Window {
 
 using Take = std::function<void(std::string_view bytes)>;
 
-// Gives everything before the next `mark` to `take`, and drops the mark. False when it does not
-// come; then all has been given.
+// Passes everything before the next `mark` to `take`, and consumes the mark. Returns false if there
+// is none; then everything was passed.
 bool take_until(Window& window, const std::string& mark, const Take& take) {
   const std::boyer_moore_horspool_searcher searcher(mark.begin(), mark.end());
   while (true) {
@@ -64,7 +64,7 @@ bool take_until(Window& window, const std::string& mark, const Take& take) {
       window.drop(before + mark.size());
       return true;
     }
-    // The end may be the beginning of a mark.
+    // The end may be the start of a mark.
     const std::size_t sure = view.size() - std::min(view.size(), mark.size() - 1);
     take(view.substr(0, sure));
     window.drop(sure);
@@ -76,7 +76,7 @@ bool take_until(Window& window, const std::string& mark, const Take& take) {
   }
 }
 
-// What follows a boundary on its line. True when it was the closing one.
+// Reads the characters after a boundary. Returns true for the closing one.
 bool is_closing(Window& window) {
   while (window.view().size() < 2) {
     if (!window.more()) throw_cut();
@@ -84,10 +84,10 @@ bool is_closing(Window& window) {
   return window.view().starts_with("--");
 }
 
-// Passes over the rest of the boundary's line and the part's headers, up to the empty line.
+// Skips the rest of the boundary's line and the part's headers, up to the empty line.
 void skip_head(Window& window) {
   std::size_t bytes = 0;
-  // The line of the boundary may be followed by the empty line at once.
+  // The empty line may directly follow the boundary's line.
   if (!take_until(window, "\r\n", [&](std::string_view text) { bytes += text.size(); })) {
     throw_cut();
   }
@@ -130,7 +130,7 @@ std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path&
                                                     const MultipartLimits& limits) {
   Window window(file);
   const std::string mark = "\r\n--" + boundary;
-  // The first boundary has no line break before it unless something comes before that.
+  // The first boundary has no preceding line break unless there is a preamble.
   if (!take_until(window, mark.substr(2), [](std::string_view) {})) throw_cut();
   std::vector<std::filesystem::path> parts;
   std::uint64_t bytes = 0;

@@ -1,4 +1,4 @@
-// Unpacks what a DICOMweb server sends: multipart/related (RFC 2387, PS3.18 8.6.1.2).
+// Unpacks a DICOMweb response: multipart/related (RFC 2387, PS3.18 8.6.1.2).
 #pragma once
 
 #include <cstddef>
@@ -15,13 +15,13 @@ struct MultipartLimits {
   std::size_t max_parts = 0;
 };
 
-// The parameter `boundary` of a Content-Type. Throws Error kSeriesIncomplete where there is none
-// that a boundary can be (RFC 2046, 5.1.1): what came is no answer of that kind.
+// The parameter `boundary` of a Content-Type. Throws Error kSeriesIncomplete if it is missing or
+// invalid (RFC 2046, 5.1.1): the response is of another kind.
 std::string boundary_of(std::string_view content_type);
 
-// Writes the content of each part to a file of its own in `folder`, which exists and is empty, and
-// returns those in order. Headers of parts are passed over. Throws Error kSeriesIncomplete when the
-// closing boundary does not come, kTooLarge beyond the limits.
+// Writes each part's content to a file in `folder`, which must exist and be empty, and returns the
+// files in order. Ignores the parts' headers. Throws Error kSeriesIncomplete if the closing
+// boundary is missing, kTooLarge beyond the limits.
 std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path& file,
                                                     const std::string& boundary,
                                                     const std::filesystem::path& folder,

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kMostInstances = 20000;
 
-// Compares the patients of a series' instances. Their texts stay here: no error names a patient.
+// Compares the patients of a series' instances. Error messages never name a patient.
 class PatientCheck {
  public:
   // Throws Error kUnusableVolume.
@@ -36,11 +36,11 @@ class PatientCheck {
 
  private:
   std::optional<std::string> id_;
-  std::string issuer_;  // Not every image needs to have it.
+  std::string issuer_;  // may be missing in some images
 };
 
-// The files of the series' instances, each once. Nothing that is missing may pass: half a head is a
-// volume, too. Nor may two patients in one volume.
+// The files of the series' instances, without duplicates. Rejects missing instances, because half a
+// head is also a valid volume, and instances of several patients.
 std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::path>& parts,
                                            const process::PeersSeries& asked,
                                            const ImportTask& task) {

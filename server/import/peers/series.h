@@ -1,4 +1,4 @@
-// A series as a PACS sends it, to one volume.
+// A series from a PACS -> one volume.
 #pragma once
 
 #include "proto/types.h"
@@ -6,10 +6,10 @@
 
 namespace isomesh::import {
 
-// Reads the task's source, which is multipart/related with one DICOM file a part, as the task's
-// options say of what series. Objects that came twice are read once. Throws Error kSeriesIncomplete
-// when it is not whole, holds an object of another series or study, or other objects than were
-// listed; and what import_volume throws of the images themselves.
+// Reads the task's source, multipart/related with one DICOM file per part, as the series in the
+// task's options. Duplicate objects are read once. Throws Error kSeriesIncomplete if it is
+// truncated, or has objects of another series or study, or differs from the list of objects; and as
+// import_volume does.
 Volume read_peers_series(const ImportTask& task, const FormatListener& listener);
 
 }  // namespace isomesh::import

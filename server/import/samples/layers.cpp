@@ -22,7 +22,7 @@ std::uint32_t highest_label(const Labels& labels) {
   return highest;
 }
 
-// Reads some samples of every layer at a time, and says what they have.
+// Reads the same samples of all layers, and combines their segments.
 template <class Sample>
 class LayerReader {
  public:
@@ -33,7 +33,7 @@ class LayerReader {
         at_once_(
             std::max<std::size_t>(kLayerPieceBytes / sizeof(Sample) / source.chosen.count, 1)) {}
 
-  // The states of at most `most` samples from `first` on.
+  // Reads the states of at most `most` samples from `first` on.
   void read(std::uint64_t first, std::vector<State>& states, Combinations& combinations) {
     const std::uint64_t layers = source_.chosen.count;
     const auto count =
@@ -93,7 +93,7 @@ class LayerReader {
   std::uint32_t last_label_ = 0;
 };
 
-// Empty when the type holds too few values.
+// Returns empty if the type is too small.
 template <class Sample>
 std::optional<Combinations> write_states(const PlainSamples& samples, const SourceVolume& source,
                                          SampleType type, std::span<std::byte> target) {

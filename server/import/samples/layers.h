@@ -1,4 +1,4 @@
-// Segmentations whose segments lie in several layers of one file.
+// Segmentations with several layers in one file.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,10 @@
 
 namespace isomesh::import {
 
-// Writes the canonical file of all layers as one label map, whose samples number the combinations
-// of segments that they are of (combinations.h), and returns the volume as finish() does, with its
-// labels. `samples` are those of all layers. Values that no segment has become labels without a
-// name. Throws Error kUnusableVolume also when there are too many combinations.
+// Writes the canonical file of all layers as one label map, whose samples are numbers of
+// combinations of segments (combinations.h). Returns the volume as finish() does, with its labels.
+// `samples` are those of all layers. Values without a segment become labels without a name. Throws
+// Error kUnusableVolume also if there are too many combinations.
 Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Volume volume,
                     const std::filesystem::path& target);
 

@@ -23,12 +23,12 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
                  " bytes of samples, but the file has " + std::to_string(found) + ".");
 }
 
-// All samples, or the share of them that one data file holds.
+// All samples, or the part in one data file.
 struct Part {
   const InputFile& file;
   CompressedRange range;
   std::uint64_t bytes = 0;  // once decoded
-  Skip skip = 0;            // of what is decoded
+  Skip skip = 0;            // decoded bytes
   StoredType type = StoredType::kUint8;
 };
 
@@ -37,14 +37,14 @@ struct Part {
                  " bytes of samples that its header declares.");
 }
 
-// As inflate_range, of any kind of stream.
+// As inflate_range, for any kind of stream.
 using StreamDecoder = std::function<std::uint64_t(const InputFile&, const CompressedRange&,
                                                   std::uint64_t limit, const ByteSink&)>;
 
-// How many bytes a header within encoded data may have.
+// The largest size of a header within encoded data.
 constexpr std::uint64_t kMostSkipped = std::uint64_t{1} << 20;
 
-// Writes the decoded bytes, those that are to be skipped among them.
+// Writes the decoded bytes, including those to skip.
 void decode_stream(const Part& part, ScratchFile& scratch, const StreamDecoder& decode) {
   const std::uint64_t known = part.skip.value_or(0);
   const std::uint64_t most = part.bytes + (part.skip ? known : kMostSkipped);
@@ -67,7 +67,7 @@ void copy_part(const Part& part, ScratchFile& scratch) {
   }
 }
 
-// Collects decoded bytes, so that each system call writes many of them.
+// Buffers decoded bytes, to save system calls.
 class Decoded {
  public:
   Decoded(std::uint64_t expected, ScratchFile& scratch) : scratch_(scratch), expected_(expected) {}
@@ -114,7 +114,7 @@ std::optional<Sample> parse_sample(std::string_view word) {
 }
 
 void decode_word(std::string_view word, StoredType type, Decoded& decoded) {
-  // Some writers separate the numbers by commas as well.
+  // Some writers also separate numbers by commas.
   if (word.ends_with(',')) word.remove_suffix(1);
   with_stored_sample(type, [&](auto sample) {
     const auto value = parse_sample<decltype(sample)>(word);
@@ -193,7 +193,7 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
   }
 }
 
-// How many bytes follow the samples.
+// The number of bytes after the samples.
 std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume) {
   const std::uint64_t expected = volume.stored_bytes();
   const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
@@ -241,7 +241,7 @@ void Payload::decode(const SourceVolume& volume, const std::filesystem::path& sc
   offset_ = volume.decoded_skip.value_or(decoded_->size() - volume.stored_bytes());
 }
 
-// Copies every count-th sample of the file into one that holds nothing else.
+// Copies the samples of one interleaved volume into a file of their own.
 void Payload::pick_interleaved(const SourceVolume& volume, const std::filesystem::path& scratch) {
   const std::size_t size = bytes_per_sample(layout_.type);
   const std::size_t step = size * volume.chosen.count;

@@ -1,4 +1,4 @@
-// Encoded samples of a file -> their plain bytes.
+// A file's encoded samples -> plain bytes.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,19 @@
 
 namespace isomesh::import {
 
-// The plain bytes of the chosen volume's samples. They lie in the file that they came in where they
-// are plain and in one piece there, otherwise in a scratch file, which is removed with this object.
-// Bytes decoded from text are little-endian.
+// The plain bytes of the selected volume's samples. They stay in the input file if they are plain
+// and contiguous there. Otherwise they are in a scratch file, which the destructor removes. Bytes
+// decoded from text are little-endian.
 class Payload {
  public:
-  // Throws Error kUnusableVolume when the file holds fewer samples than its header tells, or when
-  // encoded samples are more or cannot be decoded. Never writes more bytes than the header's
-  // samples take up. `file` must outlive the payload.
+  // Throws Error kUnusableVolume if the file has fewer samples than declared, or if encoded samples
+  // are more or cannot be decoded. Never writes more bytes than the declared samples have. `file`
+  // must outlive the payload.
   Payload(const InputFile& file, const SourceVolume& volume, const std::filesystem::path& scratch);
 
   const InputFile& file() const { return decoded_ ? *decoded_ : file_; }
   std::uint64_t offset() const { return offset_; }
   const SampleLayout& layout() const { return layout_; }
-  // What was found while the bytes were looked for.
   const std::vector<Note>& notes() const { return notes_; }
 
  private:

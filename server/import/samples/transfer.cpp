@@ -25,8 +25,8 @@ Geometry usable_geometry(const SourceVolume& source) {
   return geometry;
 }
 
-// The smallest sample is outside for every iso-value above it, and keeps the surface beside it
-// where the other samples have it.
+// The smallest sample is outside for every iso-value above it, and keeps the adjacent surface in
+// place.
 void replace_non_finite(std::span<std::byte> samples, SampleType type, double smallest) {
   with_sample(type, [&](auto sample) {
     using Sample = decltype(sample);
@@ -39,7 +39,7 @@ void replace_non_finite(std::span<std::byte> samples, SampleType type, double sm
   });
 }
 
-// What the file says is known; otherwise samples may look as if.
+// Declared labels are certain; otherwise the samples may look like labels.
 void note_labels(std::span<const std::byte> samples, Volume& volume) {
   const std::size_t told = volume.labels.size();
   const auto values = volume::label_count(samples, volume.type, volume.dims);
@@ -68,8 +68,8 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   Volume volume;
   volume.dims = source.dims;
   volume.geometry = usable_geometry(source);
-  // Raw samples are first compared with the size of their file, so that a file that is too short is
-  // refused as truncated even where its header tells of more samples than are accepted.
+  // Raw samples are compared with the file's size first, so that a truncated file is reported as
+  // truncated even if its header declares more samples than allowed.
   if (source.encoding != Encoding::kRaw) check_limits(source, task.limits);
   const Payload payload(file, source, task.scratch);
   check_limits(source, task.limits);
@@ -78,7 +78,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   if (source.layers)
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task.target);
-  // Labels are whole numbers.
+  // Labels are integers.
   if (is_integer(canonical_type(payload.layout()))) volume.labels = source.labels;
   return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),
                          task.target);

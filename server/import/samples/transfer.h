@@ -19,20 +19,20 @@ struct PlainSamples {
   SampleLayout layout;
 };
 
-// Writes the canonical file `target` of `volume`, of which dims and geometry are told and usable,
-// and returns it with type, range, suggested iso-value and bytes filled in.
-// Throws Error kUnusableVolume when a sample is not a finite number, kOutOfSpace, kInternal.
+// Writes the canonical file `target` of `volume`, whose dims and geometry are set and valid.
+// Returns it with type, range, suggested iso-value and bytes set. Throws Error kUnusableVolume if a
+// sample is not finite, kOutOfSpace, kInternal.
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target);
 
-// Writes the canonical file of the volume that a header describes as `source`, whose samples lie in
-// `file` or in the files that `source` names. Throws Error kUnusableVolume also when its geometry
-// cannot be used or its samples cannot be decoded, kTooLarge beyond the task's limits.
+// Writes the canonical file of the volume `source`, whose samples are in `file` or in the data
+// files of `source`. Throws Error kUnusableVolume also if its geometry is invalid or its samples
+// cannot be decoded, kTooLarge beyond the task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
-// The end of writing a canonical file: measures the samples, flushes them and returns `volume`, of
-// which dims, type and geometry are told, with range, suggested iso-value and bytes filled in.
-// Throws Error kUnusableVolume when a sample is not a finite number, kOutOfSpace, kInternal.
+// Completes a canonical file: measures and flushes the samples. `volume` has dims, type and
+// geometry; returns it with range, suggested iso-value and bytes set. Throws Error kUnusableVolume
+// if a sample is not finite, kOutOfSpace, kInternal.
 Volume finish(CanonicalWriter& writer, Volume volume);
 
 }  // namespace isomesh::import

@@ -16,7 +16,7 @@ std::uint64_t expand_lz4(std::span<const std::byte> stored, std::span<std::byte>
 }
 
 std::uint64_t expand_xz(std::span<const std::byte> stored, std::span<std::byte> target) {
-  std::uint64_t memory = std::uint64_t{256} << 20;  // its strongest setting takes 65 MiB
+  std::uint64_t memory = std::uint64_t{256} << 20;  // the strongest setting needs 65 MiB
   std::size_t from = 0;
   std::size_t to = 0;
   const lzma_ret result = ::lzma_stream_buffer_decode(

@@ -1,4 +1,4 @@
-// The compressed blocks of VTK's XML files.
+// Compressed blocks of VTK's XML files.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,13 @@
 
 namespace isomesh::import {
 
-// A block as vtkLZ4DataCompressor (one block of LZ4) or vtkLZMADataCompressor (one .xz stream)
-// leaves it. Returns what it holds: `bytes`, at most kLargestVtkBlock. Throws Error
-// kUnusableVolume when it is damaged or holds more or less.
+// Decompresses a block of vtkLZ4DataCompressor (one LZ4 block) or vtkLZMADataCompressor (one .xz
+// stream). Returns `bytes` bytes, at most kLargestVtkBlock. Throws Error kUnusableVolume if it is
+// damaged or has another size.
 std::vector<std::byte> expanded_block(VtkCompression compression, std::span<const std::byte> stored,
                                       std::uint64_t bytes);
 
-// Such blocks are expanded in memory. VTK itself makes blocks of some 32 KiB.
+// Such blocks are decompressed in memory. VTK writes blocks of about 32 KiB.
 inline constexpr std::uint64_t kLargestVtkBlock = std::uint64_t{64} << 20;
 
 }  // namespace isomesh::import

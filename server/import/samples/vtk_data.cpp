@@ -36,7 +36,7 @@ bool is_space(char letter) {
   return letter == ' ' || letter == '\t' || letter == '\r' || letter == '\n';
 }
 
-// Decodes base64 text of a file, in order.
+// Decodes a file's base64 text in order.
 class Base64 {
  public:
   Base64(const InputFile& file, const CompressedRange& range)
@@ -51,8 +51,8 @@ class Base64 {
     }
   }
 
-  // The header and each block are encoded by themselves, so the rest of a group of digits is
-  // dropped between them.
+  // The header and each block are encoded separately, so incomplete groups of digits between them
+  // are dropped.
   void end_part() { waiting_ = 0; }
 
  private:
@@ -117,18 +117,17 @@ std::uint64_t count_at(std::span<const std::byte> header, std::size_t index,
 
 // The header of compressed blocks.
 struct Blocks {
-  std::uint64_t bytes = 0;  // of each block but the last, decoded
+  std::uint64_t bytes = 0;  // of each block except the last, decoded
   std::uint64_t last_bytes = 0;
-  std::vector<std::uint64_t> stored;  // bytes of each block in the file
+  std::vector<std::uint64_t> stored;  // each block's compressed size in bytes
 };
 
 constexpr std::size_t kCountsAheadOfSizes = 3;
 
-// The number of blocks. Throws where the three counts of the header cannot be right.
+// The number of blocks. Throws if the header's three counts are inconsistent.
 std::size_t block_count(std::span<const std::byte> counts, std::uint64_t expected,
                         const VtkEncoding& encoding) {
-  // VTK's blocks have at least 32 KiB. Smaller ones are accepted up to a number whose sizes fit
-  // into memory.
+  // VTK's blocks have at least 32 KiB. Smaller ones are accepted while their sizes fit into memory.
   constexpr std::uint64_t kMostBlocks = std::uint64_t{1} << 24;
   constexpr std::uint64_t kLargestBlock = std::uint64_t{1} << 40;
   const std::uint64_t count = count_at(counts, 0, encoding);
@@ -154,8 +153,7 @@ Blocks blocks_of(std::span<const std::byte> counts, const VtkEncoding& encoding)
   const std::size_t all = counts.size() / count_bytes(encoding);
   for (std::size_t at = kCountsAheadOfSizes; at < all; ++at) {
     blocks.stored.push_back(count_at(counts, at, encoding));
-    // Bytes that cannot be compressed grow by little. The bound also keeps the sum from
-    // overflowing.
+    // Incompressible bytes grow slightly. The bound also prevents overflow of the sum.
     if (blocks.stored.back() > blocks.bytes + blocks.bytes / 2 + kPieceBytes) {
       throw_unusable("A compressed block of the VTK array is too large.");
     }
@@ -163,7 +161,7 @@ Blocks blocks_of(std::span<const std::byte> counts, const VtkEncoding& encoding)
   return blocks;
 }
 
-// The bytes of a file, as they are or decoded from base64.
+// A file's bytes, plain or decoded from base64.
 class Source {
  public:
   Source(const InputFile& file, const CompressedRange& range, bool base64)
@@ -178,7 +176,7 @@ class Source {
   }
 
   const InputFile& file() const { return file_; }
-  std::uint64_t next() const { return next_; }  // where the next byte lies, without base64
+  std::uint64_t next() const { return next_; }  // file offset of the next byte, if not base64
 
   void end_part() {
     if (base64_) base64_->end_part();

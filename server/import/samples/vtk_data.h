@@ -1,4 +1,4 @@
-// The samples of VTK's XML files in their binary forms.
+// Binary samples of VTK's XML files.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace isomesh::import {
 
-// Decodes the array that begins at `range` into `target`. It must have `bytes` bytes. Throws Error
-// kUnusableVolume when it is damaged, ends early or has another size.
+// Decodes the array at the start of `range` into `target`; it must have `bytes` bytes. Throws Error
+// kUnusableVolume if it is damaged, truncated or has another size.
 void decode_vtk(const InputFile& file, const CompressedRange& range, std::uint64_t bytes,
                 const VtkEncoding& encoding, const std::filesystem::path& scratch,
                 ScratchFile& target);

@@ -24,8 +24,8 @@ class Stream {
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  // Fills `output` as far as `input` goes. Returns how many bytes it has made; `input` is what is
-  // left of it, and `is_over` says whether the stream has ended.
+  // Decodes from `input` to `output`. Returns the number of bytes written; leaves the rest in
+  // `input`, and sets `is_over` at the end of the stream.
   std::size_t decode(std::span<std::byte>& input, std::span<std::byte> output, bool& is_over) {
     stream_.next_in = reinterpret_cast<char*>(input.data());
     stream_.avail_in = static_cast<unsigned>(input.size());
@@ -45,7 +45,7 @@ class Stream {
   bz_stream stream_ = {};
 };
 
-// Some writers fill the last block up with zeros. Nothing else may follow.
+// Some writers pad the last block with zeros. Nothing else may follow.
 bool is_padding(std::span<const std::byte> bytes) {
   return std::ranges::all_of(bytes, [](std::byte byte) { return byte == std::byte{0}; });
 }
@@ -69,7 +69,7 @@ std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, 
   std::uint64_t produced = 0;
   do {
     Stream stream;
-    // A full output may mean that the library holds bytes back that it has decoded already.
+    // After a full output the library may hold back decoded bytes.
     bool is_full = false;
     for (bool is_over = false; !is_over;) {
       if (!is_full && !refill()) {

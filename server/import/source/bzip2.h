@@ -1,4 +1,4 @@
-// Inflates bzip2 streams, with bounded memory and a bounded output.
+// Decompresses bzip2 streams with bounded memory and output.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace isomesh::import {
 
-// As inflate_range, for bzip2: one stream or several that follow one another.
+// As inflate_range, for one bzip2 stream or several consecutive ones.
 std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, std::uint64_t limit,
                            const ByteSink& sink);
 

@@ -36,7 +36,7 @@ class Inflater {
   z_stream stream_ = {};
 };
 
-// zlib's interface has no const, but it only reads its input.
+// zlib's interface lacks const, but zlib only reads its input.
 void set_input(z_stream& stream, std::span<const std::byte> input) {
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(input.data()));
   stream.avail_in = static_cast<uInt>(input.size());
@@ -62,13 +62,13 @@ void set_output(z_stream& stream, std::span<std::byte> output) {
               "The compressed data is followed by data that is not part of it.");
 }
 
-// Gives zlib the range's bytes, piece by piece.
+// Feeds the range's bytes to zlib.
 class Feed {
  public:
   Feed(const InputFile& file, const CompressedRange& range)
       : file_(file), next_(range.offset), end_(range.offset + range.bytes), piece_(kPieceBytes) {}
 
-  // False at the end of the range, and of the file when that comes first.
+  // Returns false at the end of the range or of the file.
   bool refill(z_stream& stream) {
     const std::uint64_t wanted = std::min<std::uint64_t>(piece_.size(), end_ - next_);
     const std::size_t count = file_.read(next_, std::span(piece_).first(wanted));
@@ -84,7 +84,7 @@ class Feed {
   std::vector<std::byte> piece_;
 };
 
-// What gzip writes behind its data.
+// The trailer of gzip.
 struct Trailer {
   std::uint32_t checksum = 0;
   std::uint32_t bytes = 0;  // modulo 2^32
@@ -107,8 +107,8 @@ struct Trailer {
   }
 };
 
-// Some writers fill the last block up with zeros, and some that write bare deflated data leave
-// gzip's trailer behind it. Nothing else may follow.
+// Some writers pad the last block with zeros, and some writers of raw deflate data append gzip's
+// trailer. Nothing else may follow.
 void require_only_padding(Feed& feed, z_stream& stream, const std::optional<Trailer>& trailer) {
   std::string rest;
   do {
@@ -121,7 +121,7 @@ void require_only_padding(Feed& feed, z_stream& stream, const std::optional<Trai
     }
   } while (feed.refill(stream));
   if (rest.empty()) return;
-  // A checksum may begin with zeros, which were taken for padding, and end with them.
+  // A checksum may begin with zeros, which were consumed as padding, and end with zeros.
   std::string expected = trailer ? trailer->text() : std::string();
   expected.erase(0, std::min(expected.find_first_not_of('\0'), expected.size()));
   if (expected.empty() || !rest.starts_with(expected) ||
@@ -162,8 +162,8 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
   std::uint64_t produced = 0;
   Trailer trailer;
   for (;;) {
-    // More input is asked for only when the output was not full: a full one may mean that zlib
-    // holds bytes back that it has decoded already.
+    // Input is refilled only if the output was not full: otherwise zlib may hold back inflated
+    // bytes.
     if (stream.avail_in == 0 && !feed.refill(stream)) throw_truncated();
     int status = Z_OK;
     do {

@@ -1,4 +1,4 @@
-// What this folder uses of the layers below it, by its own name there.
+// Names of lower layers that this folder uses without qualification.
 #pragma once
 
 #include "server/process/import_message.h"

@@ -1,4 +1,4 @@
-// What an import has to know about a format.
+// The interface between import and its formats.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@
 
 namespace isomesh::import {
 
-// How many leading bytes of a file tell its format.
+// The number of leading bytes that identify a format.
 inline constexpr std::size_t kSniffBytes = 4096;
 
-// Room for headers, and for what some programs leave behind the samples.
+// Room for headers, and for trailing bytes of some programs.
 inline constexpr std::uint64_t kHeadroomBytes = std::uint64_t{1} << 20;
 
 // Called with the name of each format before a file of it is read: "archive", then "nifti", ...
 using FormatListener = std::function<void(std::string_view format)>;
 
-// A file that is to be read, no longer compressed as a whole.
+// A file to read, already decompressed.
 struct Input {
   std::filesystem::path path;
   Companions companions;
@@ -33,24 +33,23 @@ struct Input {
   const FormatListener& listener;
 };
 
-// What one file of a format holds: a volume, slices that make one together with those of other
-// files, or other files.
+// The content of a file: a volume, slices of a volume, or other files.
 enum class Content { kVolume, kSlices, kFiles };
 
-// One row of the table in readers.cpp.
+// A row of the table in readers.cpp.
 struct Reader {
-  std::string_view name;   // that of the API; "archive" is none of a volume
+  std::string_view name;   // as in the API; "archive" has no volume format
   std::string_view title;  // for a person
   Content content = Content::kVolume;
-  // Whether a file of the format begins so. Null for raw samples, which look like anything.
+  // Recognises the beginning of a file. Null for raw samples, which have no signature.
   bool (*sniff)(std::string_view head) = nullptr;
   // Reads the input and writes the task's target. Throws as import_volume does.
   Volume (*parse)(const Input& input) = nullptr;
-  // How many bytes may come with such a beginning, which is plain: all of the file, or at least the
-  // first kBeginningBytes of it. Null for archives and raw samples. Throws as `parse` does.
+  // The largest possible size of a file, by its plain beginning: the whole file or at least its
+  // first kBeginningBytes. Null for archives and raw samples. Throws as `parse` does.
   MostBytes (*most_bytes)(const InputFile& beginning, const ImportTask& task) = nullptr;
-  // The companions that hold the samples of a header, so that they are no volumes of their own.
-  // Null for formats whose headers name none. Throws as `parse` does.
+  // The companions that hold a header's samples and are therefore not volumes of their own. Null
+  // for formats without data files. Throws as `parse` does.
   std::vector<std::string> (*data_names)(const InputFile& file,
                                          const Companions& companions) = nullptr;
 };

@@ -1,4 +1,4 @@
-// A folder for what is unpacked.
+// A folder for unpacked files.
 #pragma once
 
 #include <cerrno>
@@ -12,7 +12,7 @@
 
 namespace isomesh::import {
 
-// Lies within `scratch`, and is removed with all that was put into it. Not thread safe.
+// A folder within `scratch`. The destructor removes it and its content. Not thread safe.
 class TemporaryFolder {
  public:
   // Throws Error kOutOfSpace or kInternal.

@@ -10,7 +10,7 @@
 namespace isomesh::import {
 namespace {
 
-// A file of another size than the header tells belongs to another volume.
+// A file of another size belongs to another volume.
 [[noreturn]] void throw_other_size(const std::string& name, std::uint64_t found,
                                    std::uint64_t expected) {
   throw_unusable("The data file " + in_quotes(name) + " has " + std::to_string(found) +
@@ -20,7 +20,7 @@ namespace {
 }  // namespace
 
 std::uint64_t SourceVolume::most_encoded_bytes() const {
-  constexpr std::uint64_t kTextPerSample = 32;  // "-1.7976931348623157e+308", and white space
+  constexpr std::uint64_t kTextPerSample = 32;  // "-1.7976931348623157e+308" and white space
   constexpr std::uint64_t kHexPerByte = 4;
   switch (encoding) {
     case Encoding::kText:
@@ -33,7 +33,7 @@ std::uint64_t SourceVolume::most_encoded_bytes() const {
     case Encoding::kVtk:
       break;
   }
-  // Whatever deflate cannot compress it stores, with a few bytes for each block.
+  // Deflate stores incompressible data with a few extra bytes per block.
   constexpr std::uint64_t kStoredShare = 100;
   return stored_bytes() + stored_bytes() / kStoredShare;
 }

@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kPieceSamples = std::size_t{1} << 17;
 
-// Whether the double is the integer that it was made of. A double of 2^63 or 2^64 must not be
-// converted back, because the integer's type does not hold it.
+// True if the double equals its integer. A double of 2^63 or 2^64 must not be converted back,
+// because the integer type cannot hold it.
 template <class Stored>
 bool is_exact(Stored stored, double value) {
   if constexpr (std::is_same_v<Stored, std::int64_t>) {
@@ -42,7 +42,7 @@ void convert(std::span<const std::byte> stored, const Rescale& rescale, std::byt
     Stored sample;
     std::memcpy(&sample, stored.data() + at, sizeof(Stored));
     const double value = to_double(sample) * rescale.slope + rescale.intercept;
-    // A value beyond the largest float becomes infinite, and the volume is refused for it later.
+    // Values beyond the largest float become infinite, and the volume is rejected later.
     const auto canonical = static_cast<Canonical>(value);
     std::memcpy(target, &canonical, sizeof(Canonical));
     target += sizeof(Canonical);

@@ -1,4 +1,4 @@
-// Samples as files store them -> samples as canonical volumes hold them.
+// Samples as stored in files -> samples of canonical volumes.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace isomesh::import {
 
-// The type of one sample in a file: those of canonical volumes, by the same names and numbers, and
-// the two that become another.
+// The type of a sample in a file: the types of canonical volumes, with the same names and numbers,
+// and two more that are converted.
 enum class StoredType {
 #define ISOMESH_NAME(Sample, name, kType) kType = static_cast<int>(SampleType::kType),
   ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_NAME)
@@ -33,7 +33,7 @@ decltype(auto) with_stored_sample(StoredType type, Use&& use) {
 std::size_t bytes_per_sample(StoredType type);
 StoredType stored_type(SampleType type);
 
-// What a sample means: stored * slope + intercept.
+// The meaning of a sample: stored * slope + intercept.
 struct Rescale {
   double slope = 1;
   double intercept = 0;
@@ -42,21 +42,20 @@ struct Rescale {
 struct SampleLayout {
   StoredType type = StoredType::kUint8;
   bool big_endian = false;
-  std::optional<Rescale> rescale;  // empty: samples mean what is stored
+  std::optional<Rescale> rescale;  // empty: stored values are final
 };
 
-// What the samples become. Rescaled ones become float32 where that holds every stored value
-// (integers of up to 16 bits, float32) and float64 otherwise; 64-bit integers become float64.
+// The canonical type. Rescaled samples become float32 if that represents every stored value
+// (integers of up to 16 bits, float32), otherwise float64; 64-bit integers become float64.
 SampleType canonical_type(const SampleLayout& layout);
 
-// Reads as many samples as `target` has room for, from `offset` of the file on, and converts them
-// to their canonical type on the way, with bounded memory.
-// Throws Error kUnusableVolume when the file ends early or a 64-bit integer is not exact in
-// float64.
+// Reads samples from `offset` until `target` is full, converted to their canonical type, with
+// bounded memory. Throws Error kUnusableVolume if the file ends early or a 64-bit integer is not
+// exact in float64.
 void read_samples(const InputFile& file, std::uint64_t offset, const SampleLayout& layout,
                   std::span<std::byte> target);
 
-// Reverses the bytes of every sample; `bytes` holds whole samples.
+// Reverses the bytes of each sample; `bytes` holds whole samples.
 void swap_bytes(std::span<std::byte> bytes, std::size_t bytes_per_sample);
 
 }  // namespace isomesh::import

@@ -32,7 +32,7 @@ std::vector<Choice> choices_of(const SeriesVolumes& all) {
   return choices;
 }
 
-// The volume that the options choose; the only one needs no choice.
+// The volume selected by the options. A single volume needs no selection.
 std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
                              std::vector<Note>& notes) {
   const std::size_t count = all.volumes.size();
@@ -65,7 +65,7 @@ std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
 
 bool is_label_slice(const Slice& slice) { return slice.image->segmentation.has_value(); }
 
-// A volume for each object.
+// One volume per object.
 SeriesVolumes one_an_object(const std::vector<Slice>& slices) {
   SeriesVolumes all = {"their objects", {}};
   std::size_t last = 0;
@@ -82,7 +82,7 @@ SeriesVolumes one_an_object(const std::vector<Slice>& slices) {
   return all;
 }
 
-// A volume for each segment, of which some frames are there.
+// One volume per segment that has frames.
 SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   SeriesVolumes all = {"their segments", {}};
   const Image& image = *slices.front().image;
@@ -96,7 +96,7 @@ SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   return all;
 }
 
-// Planes without a frame are planes without a label.
+// Planes without a frame have no label.
 void note_empty_planes(const Stack& stack, std::vector<Note>& notes) {
   std::uint32_t filled = 0;
   for (std::size_t i = 0; i < stack.planes.size(); ++i) {

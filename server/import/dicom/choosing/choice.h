@@ -1,4 +1,4 @@
-// The frames of a series -> the one volume of them that a request asks for.
+// The frames of a series -> the requested volume.
 #pragma once
 
 #include <vector>
@@ -8,12 +8,11 @@
 
 namespace isomesh::import::dicom {
 
-// The stack of the series, or of the volume that `options` choose among several: of times, echoes
-// and the like, of several segmentations, or of a segmentation's segments. Adds to `notes` what was
-// decided.
+// Returns the stack of the series. If the series has several volumes (times, echoes, several
+// segmentations, a segmentation's segments), `options` select one. Adds the decisions to `notes`.
 //
-// Throws Error kUnusableVolume as make_stack and make_label_stack do, with the choices where there
-// are several and none was chosen, and overridable where only the frames of reference are at fault.
+// Throws Error kUnusableVolume as make_stack and make_label_stack do; with the choices if there are
+// several volumes and none was selected; overridable if only the frames of reference are wrong.
 Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
                    std::vector<Note>& notes);
 

@@ -32,8 +32,7 @@ void ignore(Upload& upload, const std::filesystem::path& path, const std::string
   }
 }
 
-// Some anonymisers keep identifiers only in the meta information, so those are taken where the data
-// set has none.
+// Some anonymisers keep identifiers only in the meta information, which is the fallback.
 DicomInstance instance_of(const DicomFile& file) {
   DicomInstance instance = {utf8(file.data(), kSopClassUid), utf8(file.data(), kSopInstanceUid)};
   if (instance.sop_class_uid.empty()) instance.sop_class_uid = file.meta().sop_class_uid;
@@ -41,8 +40,8 @@ DicomInstance instance_of(const DicomFile& file) {
   return instance;
 }
 
-// Some programs write no UIDs. What is then the series' name is none that a UID can be: those do
-// not end with a part 0 behind a single number.
+// Some programs write no UIDs. The name of such a series cannot be a valid UID: those do not end
+// with a component 0 after a single number.
 std::string series_name(const DataSet& data) {
   std::string uid = utf8(data, kSeriesInstanceUid);
   if (!uid.empty()) return uid;
@@ -107,7 +106,7 @@ std::string count_of(std::int64_t count) {
   return std::to_string(count) + (count == 1 ? " slice" : " slices");
 }
 
-// One entry for each series: "head, 93 slices".
+// One entry per series: "head, 93 slices".
 std::vector<Choice> list_series(std::span<const Source> sources) {
   struct Series {
     std::string description;

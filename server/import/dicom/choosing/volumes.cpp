@@ -19,7 +19,7 @@ namespace {
 using Slices = std::vector<Slice>;
 
 constexpr std::uint64_t kMostPlaces = std::uint64_t{1} << 28;
-// Of more slices than this only single attributes are tried.
+// For more slices than this, only single attributes are tried.
 constexpr std::size_t kManySlices = std::size_t{1} << 16;
 
 std::string phase_of(const Slice& slice, std::size_t attribute) {
@@ -35,7 +35,7 @@ std::optional<double> finite_number(const std::string& text) {
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
-// Numbers by their size, before texts by their letters.
+// Orders numbers by value, before texts in alphabetical order.
 bool is_before(const std::string& a, const std::string& b) {
   const auto one = finite_number(a);
   const auto other = finite_number(b);
@@ -44,11 +44,11 @@ bool is_before(const std::string& a, const std::string& b) {
   return a < b;
 }
 
-// One way of telling frames apart: a value for each, by its rank among all.
+// An attribute that may distinguish frames: each slice's value, by its rank.
 struct Criterion {
   std::string name;
-  std::vector<std::string> values;   // in rising order
-  std::vector<std::uint32_t> ranks;  // one a slice
+  std::vector<std::string> values;   // ascending
+  std::vector<std::uint32_t> ranks;  // one per slice
 };
 
 Criterion criterion_of(std::string name, const std::vector<std::string>& of_slices) {
@@ -63,7 +63,7 @@ Criterion criterion_of(std::string name, const std::vector<std::string>& of_slic
   return criterion;
 }
 
-// The slices of one orientation, size and spacing, with the position of each.
+// The slices of one orientation, size and spacing, with their positions.
 struct Positions {
   std::vector<std::uint32_t> of_slices;
   std::uint32_t count = 0;
@@ -83,11 +83,11 @@ Positions positions_of(const std::vector<Placed>& placed) {
   return positions;
 }
 
-// The volume of each slice, when the criteria together give as many volumes as lie at one position,
-// and no volume two slices at one.
+// Assigns a volume to each slice by its values of the criteria. Empty unless the number of volumes
+// equals the slices at one position, and no volume has two slices at one position.
 std::optional<std::vector<std::uint32_t>> volumes_by(std::span<const Criterion* const> criteria,
                                                      const Positions& positions) {
-  // Too few values for so many volumes, and what would take the memory of no series that there is.
+  // Too few values for that many volumes, or more combinations than any real series has.
   std::uint64_t combinations = 1;
   for (const Criterion* criterion : criteria) combinations *= criterion->values.size();
   const std::uint64_t places = std::uint64_t{positions.most_at_one} * positions.count;
@@ -118,12 +118,12 @@ std::optional<std::vector<std::uint32_t>> volumes_by(std::span<const Criterion* 
   return volumes;
 }
 
-// True for what has several values, but not more than there can be volumes.
+// True if it has several values, but no more than possible volumes.
 bool is_useful(const Criterion& criterion, const Positions& positions) {
   return criterion.values.size() > 1 && criterion.values.size() <= positions.most_at_one;
 }
 
-// The instance number of each slice's object, or which file it is when that is not told.
+// Each slice's instance number, or its file's index if that is missing.
 std::vector<std::string> objects_of(const std::vector<Placed>& placed) {
   std::vector<std::string> objects;
   for (const Placed& each : placed) {
@@ -148,7 +148,7 @@ std::vector<Criterion> criteria_of(const std::vector<Placed>& placed, const Posi
   return criteria;
 }
 
-// How the order of acquisition numbers a slice: in its series, or in its object.
+// A slice's number in the order of acquisition, in its series or in its object.
 std::vector<std::int64_t> acquisition_order(const std::vector<Placed>& placed) {
   const bool one_object = std::ranges::all_of(
       placed, [&](const Placed& each) { return each.slice.file == placed.front().slice.file; });
@@ -162,8 +162,8 @@ std::vector<std::int64_t> acquisition_order(const std::vector<Placed>& placed) {
   return order;
 }
 
-// The volume of each slice by the order of acquisition: one volume after the other, or one position
-// after the other. Any other order tells nothing.
+// Assigns a volume to each slice by the order of acquisition: volume by volume, or position by
+// position. Empty for any other order.
 std::optional<std::vector<std::uint32_t>> volumes_by_order(const std::vector<Placed>& placed,
                                                            const Positions& positions) {
   const std::vector<std::int64_t> order = acquisition_order(placed);
@@ -179,7 +179,7 @@ std::optional<std::vector<std::uint32_t>> volumes_by_order(const std::vector<Pla
     for (std::size_t at = 0; at < sorted.size() && is_whole; ++at) {
       const std::size_t volume = by_volume ? at / positions.count : at % count;
       const std::size_t place = volume * positions.count + positions.of_slices[sorted[at]];
-      // Numbers that come twice give no order.
+      // Duplicate numbers define no order.
       is_whole = !taken[place] && (at == 0 || order[sorted[at - 1]] != order[sorted[at]]);
       taken[place] = true;
       volumes[sorted[at]] = static_cast<std::uint32_t>(volume);
@@ -229,8 +229,7 @@ std::string names_of(std::span<const Criterion* const> criteria) {
   return names;
 }
 
-// Calls `use` with every one, then every two, then every three of the criteria, until it returns
-// true.
+// Calls `use` with each one, then each two, then each three of the criteria, until it returns true.
 template <class Use>
 bool for_few(const std::vector<Criterion>& criteria, std::size_t slices, const Use& use) {
   std::vector<const Criterion*> chosen;
@@ -273,10 +272,10 @@ SeriesVolumes split_by_phase(Slices slices) {
   return whole();
 }
 
-// Groups in the order in which their first slices come.
+// Groups in the order of their first slices.
 template <class IsSame>
 std::vector<Slices> grouped(const Slices& slices, const IsSame& is_same) {
-  // Series have few groups; what has many is no volume, and is not to take long.
+  // Real series have few groups. The limit bounds the time for others.
   constexpr std::size_t kMostGroups = 100;
   std::vector<Slices> groups;
   for (const Slice& slice : slices) {
@@ -293,7 +292,7 @@ std::vector<Slices> grouped(const Slices& slices, const IsSame& is_same) {
 
 bool is_tile(const Slice& slice) { return slice.image->tiles_per_row > 0; }
 
-// The slices of each mosaic, in the order of their instance numbers.
+// The slices of each mosaic, ordered by instance number.
 std::vector<Slices> mosaics_of(const Slices& slices) {
   std::map<std::pair<std::int64_t, std::size_t>, Slices> mosaics;
   for (const Slice& slice : slices) {
@@ -306,7 +305,7 @@ std::vector<Slices> mosaics_of(const Slices& slices) {
 
 SeriesVolumes one_a_mosaic(const Slices& slices) {
   const std::vector<Slices> mosaics = mosaics_of(slices);
-  // As if all lay at one position, so that what tells them apart is what they differ in.
+  // Placed at one position, so that split_by_phase finds the attributes in which they differ.
   std::vector<Placed> firsts;
   for (const Slices& mosaic : mosaics) firsts.push_back({mosaic.front(), 0});
   const auto count = static_cast<std::uint32_t>(mosaics.size());
@@ -357,7 +356,7 @@ SeriesVolumes split_volumes(std::vector<Slice> slices) {
   SeriesVolumes result;
   result.difference = "orientation, size or pixel spacing";
   for (Slices& group : groups) {
-    // A single slice beside a stack is no volume; what it is is said when nothing else is one.
+    // A single slice beside a stack is not a volume. It is reported if nothing else is one.
     if (group.size() < 2) continue;
     const std::string lattice = described(group.front());
     SeriesVolumes parts = split_by_phase(std::move(group));

@@ -1,4 +1,4 @@
-// The frames of a series -> the volumes that they make: times, echoes, b-values and the like.
+// The frames of a series -> its volumes: times, echoes, b-values and others.
 #pragma once
 
 #include <string>
@@ -9,25 +9,25 @@
 namespace isomesh::import::dicom {
 
 struct SeriesVolume {
-  std::string title;  // what sets it apart: "EchoTime 4.92, 20 slices"
+  std::string title;  // distinguishes it: "EchoTime 4.92, 20 slices"
   std::vector<Slice> slices;
-  // How many slices the others have, where this one has fewer: it was broken off.
+  // The number of slices of the other volumes if this one has fewer, because its acquisition was
+  // aborted.
   std::size_t whole_count = 0;
 };
 
 struct SeriesVolumes {
-  std::string difference;  // by what they differ: "EchoTime"; empty when there is one
+  std::string difference;  // the attribute in which they differ: "EchoTime"; empty for one volume
   std::vector<SeriesVolume> volumes;
 };
 
-// Splits where several frames lie at one position, by the attributes that tell them apart, in
-// rising order of their values; where none does, by the order in which the frames were acquired.
-// Mosaics are a volume each. Frames of other sizes, spacings and orientations are volumes of their
-// own, too. At least two of the volumes of one lattice are whole; a slice that is merely doubled is
-// no split.
+// Splits frames at equal positions by the attributes that distinguish them, in ascending order of
+// their values; otherwise by the order of acquisition. Each mosaic is a volume. Frames of different
+// size, spacing or orientation are in different volumes. At least two volumes of one lattice must
+// be complete, so duplicated slices alone cause no split.
 //
-// Nothing is left out: where no split gives every frame its place, all are one volume, and
-// make_stack says why that is none.
+// Omits nothing: if no split gives every frame its place, all frames are one volume, and make_stack
+// reports the reason.
 SeriesVolumes split_volumes(std::vector<Slice> slices);
 
 }  // namespace isomesh::import::dicom

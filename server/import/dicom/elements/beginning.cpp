@@ -26,8 +26,8 @@ std::uint32_t little_endian(std::string_view bytes) {
   return number;
 }
 
-// Takes the first element off `rest`. Two letters where an implicit length would stand are always a
-// value representation: as a length they would reach beyond the head.
+// Removes the first element from `rest`. Two letters in place of an implicit length are always a
+// value representation: as a length they would exceed the head.
 std::optional<LeadingElement> take_element(std::string_view& rest) {
   constexpr std::size_t kShortHead = 8;
   constexpr std::size_t kLongHead = 12;

@@ -9,7 +9,7 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// Scanners write about a hundred fields of some values.
+// Scanners write about a hundred fields with a few values each.
 constexpr std::uint32_t kMostFields = 1024;
 constexpr std::uint32_t kMostItems = 1024;
 constexpr std::size_t kNameBytes = 64;
@@ -18,7 +18,7 @@ constexpr std::size_t kNameBytes = 64;
   throw_unusable("The DICOM image's Siemens header (0029,1010) is truncated or corrupt.");
 }
 
-// Takes pieces off the front of the bytes.
+// Consumes bytes from the front.
 class Cursor {
  public:
   explicit Cursor(std::string_view bytes) : rest_(bytes) {}
@@ -30,7 +30,7 @@ class Cursor {
     return piece;
   }
 
-  // The last value of a header may lack its padding.
+  // The last value may lack its padding.
   void skip_padding(std::size_t count) { rest_.remove_prefix(std::min(count, rest_.size())); }
 
   std::uint32_t number() {
@@ -57,7 +57,7 @@ std::string_view up_to_zero(std::string_view text) { return text.substr(0, text.
 std::vector<std::string> take_items(Cursor& cursor, std::uint32_t count) {
   std::vector<std::string> values;
   for (std::uint32_t item = 0; item < count; ++item) {
-    // Of its four numbers the second is the length in both layouts.
+    // The second of its four numbers is the length in both layouts.
     cursor.take(4);
     const std::uint32_t length = cursor.number();
     cursor.take(8);
@@ -78,7 +78,7 @@ CsaHeader parse_csa_header(std::string_view bytes) {
   CsaHeader header;
   for (std::uint32_t field = 0; field < fields; ++field) {
     const std::string name(up_to_zero(cursor.take(kNameBytes)));
-    cursor.take(12);  // how many values there should be, and of what kind
+    cursor.take(12);  // number and kind of values
     const std::uint32_t items = cursor.count(kMostItems);
     cursor.take(4);
     header.insert_or_assign(name, take_items(cursor, items));

@@ -1,4 +1,4 @@
-// The header of their own that Siemens' scanners write into (0029,1010): named fields of texts.
+// Siemens' private header in (0029,1010): named fields of texts.
 #pragma once
 
 #include <map>
@@ -8,15 +8,15 @@
 
 namespace isomesh::import::dicom {
 
-// The fields by name, each with its values, which are texts without padding; empty ones are left
-// out. Both known layouts are read: the one that begins with "SV10" and the older one.
+// The values of each field, as texts without padding; empty ones are omitted. Both known layouts
+// are read: the older one, and the one that begins with "SV10".
 using CsaHeader = std::map<std::string, std::vector<std::string>, std::less<>>;
 
-// Throws Error kUnusableVolume when a count or length in `bytes` reaches beyond them. Takes time
-// and memory in proportion to `bytes`. Thread safe.
+// Throws Error kUnusableVolume if a count or length exceeds `bytes`. Time and memory are
+// proportional to `bytes`. Thread safe.
 CsaHeader parse_csa_header(std::string_view bytes);
 
-// The numbers of a field. Empty when it is not there, or is no list of finite numbers.
+// The numbers of a field. Empty if it is missing or not a list of finite numbers.
 std::vector<double> csa_numbers(const CsaHeader& header, std::string_view field);
 
 }  // namespace isomesh::import::dicom

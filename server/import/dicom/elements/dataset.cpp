@@ -34,7 +34,7 @@ void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
   }
 }
 
-// The inflated beginning, in a file of its own.
+// Inflates the beginning into a file of its own.
 void inflate_beginning(const InputFile& file, std::uint64_t offset, ScratchFile& scratch) {
   inflate_range(
       file, {offset, file.size() - offset}, kBeginningBytes,
@@ -163,7 +163,7 @@ std::uint64_t most_file_bytes(const InputFile& beginning, const std::filesystem:
       return most_bytes(parse_beginning(beginning, meta.end, meta.transfer_syntax),
                         most_sample_bytes);
     }
-    // What it takes deflated is less than that.
+    // The deflated file is smaller than that.
     ScratchFile inflated(scratch, ".beginning");
     inflate_beginning(beginning, meta.end, inflated);
     return most_bytes(parse_beginning(InputFile(inflated.path()), 0, meta.transfer_syntax),

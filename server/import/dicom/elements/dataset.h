@@ -1,7 +1,7 @@
-// The structure of a DICOM file: its elements, checked against the bytes that are there.
+// The elements of a DICOM file, checked against the file's size.
 //
-// GDCM's reader allocates whatever a length says and follows sequences to any depth, so elements
-// are read by ourselves, and GDCM is given only pixel data that has been checked (decode.h).
+// GDCM's reader allocates any declared length and follows sequences to any depth. So this parser
+// reads the elements, and GDCM gets only checked pixel data (decode.h).
 #pragma once
 
 #include <cstdint>
@@ -15,99 +15,98 @@
 
 namespace isomesh::import::dicom {
 
-// Group and element: 0x00280010 is (0028,0010).
+// (group << 16) | element: 0x00280010 is (0028,0010).
 using Tag = std::uint32_t;
 
 std::string tag_name(Tag tag);  // "(0028,0010)"
 
-// Values are padded to an even length by a space, those of identifiers by a zero.
+// Removes the padding to an even length: a space, or a zero in identifiers.
 std::string_view without_padding(std::string_view value);
 
 class DataSet;
 
 struct Element {
   Tag tag = 0;
-  std::string value;           // as stored; empty when it is longer than kLongestValue
+  std::string value;           // as stored; empty if longer than kLongestValue
   std::vector<DataSet> items;  // of a sequence
 };
 
-// Longer values are not read, because no volume needs one.
+// Longer values are skipped; no volume needs them.
 inline constexpr std::uint64_t kLongestValue = 4096;
 
-// The elements of a file or of one item of a sequence, without private ones but for those of
-// private_elements.h.
+// The elements of a file or of a sequence item. Of private ones only those of private_elements.h.
 class DataSet {
  public:
   std::vector<Element> elements;
   bool big_endian = false;
 
-  // The first with this tag, or null.
+  // Returns the first element with this tag, or null.
   const Element* find(Tag tag) const;
 
-  // The first item of a sequence, or null.
+  // Returns the first item of a sequence, or null.
   const DataSet* item(Tag sequence) const;
 
-  // The value without its padding; empty when there is none.
+  // The value without its padding; empty if missing.
   std::string_view text(Tag tag) const;
 
-  // The parts of a text between backslashes, without spaces around them.
+  // The parts of a text between backslashes, trimmed.
   std::vector<std::string_view> texts(Tag tag) const;
 
-  // Decimal strings. Empty when there is no value or one that is no list of finite numbers.
+  // Decimal strings. Empty if the value is missing or not a list of finite numbers.
   std::vector<double> numbers(Tag tag) const;
   std::optional<std::int64_t> integer(Tag tag) const;
 
   // Binary numbers of 16 (US) or 32 bits (UL).
   std::optional<std::uint32_t> unsigned_number(Tag tag) const;
 
-  // Binary numbers of 16 bits (US). Empty when there are none.
+  // Binary numbers of 16 bits (US). Empty if missing.
   std::vector<std::uint32_t> unsigned_numbers(Tag tag) const;
 
-  // Binary numbers of double precision (FD). Empty when there are none.
+  // Binary numbers of double precision (FD). Empty if missing.
   std::vector<double> binary_reals(Tag tag) const;
 };
 
-// A run of bytes in a file.
+// A byte range of a file.
 struct Extent {
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
 };
 
-// Where the pixels lie.
+// The location of the pixels.
 struct PixelElement {
   Tag tag = 0;
-  bool is_words = false;  // OW rather than OB: bytes of big-endian files are swapped in pairs
-  Extent native;          // not used when encapsulated
+  bool is_words = false;  // OW, not OB: big-endian files have swapped pairs of bytes
+  Extent native;          // unused if encapsulated
   bool is_encapsulated = false;
   std::vector<Extent> fragments;
-  std::vector<std::uint64_t> frame_offsets;  // the basic offset table, which may be empty
+  std::vector<std::uint64_t> frame_offsets;  // the basic offset table; may be empty
 };
 
-// The group 0002, which comes before a file's data set.
+// Group 0002, before a file's data set.
 struct MetaInformation {
-  std::string transfer_syntax;  // empty when none is told
+  std::string transfer_syntax;  // empty if missing
   std::string sop_class_uid;
   std::string sop_instance_uid;
-  std::uint64_t end = 0;  // where the data set begins
+  std::uint64_t end = 0;  // the start of the data set
 };
 
-// How many bytes a file may have that begins so: of its image, twice what its rows, columns, frames
-// and bits take, since compression may make them more, beside headers; of another object, or where
-// the beginning does not tell, some hundred million. A deflated file's inflated beginning is put
-// into `scratch`. Never throws because of the bytes.
+// The largest possible size of a file with this beginning. For an image: twice the size by its
+// rows, columns, frames and bits, because compression may enlarge it, and the headers. For other
+// objects, and without that information, about 268 MB. The inflated beginning of a deflated file is
+// written to `scratch`. Never throws because of the bytes.
 std::uint64_t most_file_bytes(const InputFile& beginning, const std::filesystem::path& scratch,
                               std::uint64_t most_sample_bytes);
 
 // One DICOM file. Immutable.
 class DicomFile {
  public:
-  // Reads up to the pixels. A deflated file is inflated into `scratch`, up to what its beginning
-  // tells (most_file_bytes). Throws Error kUnusableVolume when the file is truncated, corrupt or of
-  // a transfer syntax that is not known.
+  // Reads up to the pixels. Inflates a deflated file into `scratch`, up to most_file_bytes of its
+  // beginning. Throws Error kUnusableVolume if the file is truncated or corrupt, or its transfer
+  // syntax is unknown.
   DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,
             std::uint64_t most_sample_bytes);
 
-  // The file that the offsets of `pixels` count from: this one, or what it was inflated to.
+  // The file that the offsets of `pixels` refer to: this one, or its inflated copy.
   const InputFile& bytes() const { return inflated_ ? *inflated_ : file_; }
   const MetaInformation& meta() const { return meta_; }
   const std::string& transfer_syntax() const { return meta_.transfer_syntax; }

@@ -15,27 +15,27 @@ namespace {
 
 constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
 constexpr unsigned kDeepestSequence = 32;
-// Bounds on elements, items and fragments together, and on the bytes of elements that are kept.
+// Bounds on the number of elements, items and fragments, and on the bytes of stored elements.
 constexpr std::size_t kMostParts = std::size_t{1} << 21;
 constexpr std::size_t kMostKeptBytes = std::size_t{1} << 28;
 constexpr std::size_t kWindowBytes = std::size_t{1} << 16;
 
-// The two ways in which data sets are written.
+// The encoding of a data set.
 struct Encoding {
   bool is_explicit = true;
   bool big_endian = false;
 };
 
-// The head of an element, which comes before its value.
+// An element without its value.
 struct Head {
   Tag tag = 0;
-  std::string vr;  // empty when it is implicit
+  std::string vr;  // empty if implicit
   std::uint32_t length = 0;
 
   bool has_undefined_length() const { return length == kUndefinedLength; }
 };
 
-// The sequences that a volume needs; implicit ones do not say that they are sequences.
+// The sequences that a volume needs; implicit elements do not declare that they are sequences.
 bool is_needed_sequence(Tag tag) {
   switch (tag) {
     case kFrameContentSequence:
@@ -59,7 +59,7 @@ bool is_needed_sequence(Tag tag) {
   }
 }
 
-// Some programs leave representations blank that they do not know, before lengths of 16 bits.
+// Some programs write blanks for unknown representations, followed by a 16-bit length.
 bool is_blank(std::string_view vr) {
   return vr == "  " || vr == "??" || vr == std::string_view("\0\0", 2);
 }
@@ -90,7 +90,7 @@ class Parser {
     return meta;
   }
 
-  // True when the element at the position names its value representation.
+  // True if the next element has an explicit value representation.
   bool looks_explicit() {
     if (end() - at_ < 8) return true;
     return is_representation(window(at_ + 4, 2));
@@ -99,7 +99,7 @@ class Parser {
   void read_file(const Encoding& encoding, ParsedFile& result) {
     result.data.big_endian = encoding.big_endian;
     while (at_ < end()) {
-      // Media that are read in blocks leave zeros and other bytes after the last element.
+      // Media that are read in blocks have zeros or other bytes after the last element.
       if (end() - at_ < 8 || number(at_, 4, encoding.big_endian) == 0) break;
       const Head head = read_head(encoding, end());
       if (is_pixel_data(head.tag)) {
@@ -111,7 +111,7 @@ class Parser {
   }
 
  private:
-  // Reads bytes that are known to be in the file.
+  // Returns bytes of the file; the caller has checked the bounds.
   std::string_view window(std::uint64_t offset, std::size_t count) {
     if (offset < window_begin_ || offset + count > window_begin_ + window_.size()) {
       window_ = file_.text(offset, std::max(kWindowBytes, count));
@@ -135,7 +135,7 @@ class Parser {
     return tag;
   }
 
-  // Throws unless `bytes` more lie before `limit`.
+  // Throws unless `limit` is at least `bytes` ahead.
   void require(std::uint64_t bytes, std::uint64_t limit, Tag tag) const {
     if (limit >= at_ && bytes <= limit - at_) return;
     const std::string name = is_pixel_data(tag) ? "pixel data"
@@ -180,7 +180,7 @@ class Parser {
     return value;
   }
 
-  // Throws when there are more parts than any scanner writes, which would fill the memory.
+  // Throws if there are more parts than any scanner writes; they would exhaust memory.
   void count_part() {
     if (++parts_ <= kMostParts) return;
     throw_unusable("The DICOM file has more than the " + std::to_string(kMostParts) +
@@ -197,7 +197,7 @@ class Parser {
     set.elements.push_back(std::move(element));
   }
 
-  // Reads an element of a file's data set, of which some private ones are needed, too.
+  // Reads an element of the file's data set, including required private ones.
   void read_outer_element(const Head& head, const Encoding& encoding, DataSet& set) {
     if (!is_private(head.tag)) return read_element(head, encoding, end(), 0, set);
     const auto needed = blocks_.needed(head.tag);
@@ -212,14 +212,14 @@ class Parser {
   void read_element(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
                     DataSet& set) {
     if (is_pixel_data(head.tag) && head.has_undefined_length()) {
-      read_fragments(encoding, limit);  // an icon's, which are passed over
+      read_fragments(encoding, limit);  // an icon's fragments, which are skipped
       return;
     }
     Element element = read_content(head, encoding, limit, depth);
     if (!is_private(head.tag)) keep(set, std::move(element));
   }
 
-  // Whose dictionary a tag is looked up in.
+  // The dictionary of a tag.
   enum class Meaning { kPublic, kKnownPrivate };
 
   Element read_content(const Head& head, const Encoding& encoding, std::uint64_t limit,
@@ -233,7 +233,7 @@ class Parser {
       element.value = read_value(head, limit, is_known ? kLongestPrivateValue : kLongestValue);
       return element;
     }
-    // Systems that do not know an element pass it on as UN, with its items in implicit encoding.
+    // Systems that do not know an element store it as UN, with its items in implicit encoding.
     const Encoding inside = head.vr == "UN" ? Encoding{false, false} : encoding;
     read_items(head, inside, limit, depth + 1, element);
     return element;
@@ -298,7 +298,7 @@ class Parser {
     return pixels;
   }
 
-  // Reads the items of compressed pixels. The first is a table of offsets.
+  // Reads the fragments of compressed pixels. The first item is a table of offsets.
   std::vector<Extent> read_fragments(const Encoding& encoding, std::uint64_t limit) {
     std::vector<Extent> fragments;
     for (;;) {
@@ -361,7 +361,7 @@ DataSet parse_beginning(const InputFile& file, std::uint64_t offset,
   try {
     parser.read_file(encoding_of(parser, transfer_syntax), result);
   } catch (const Error& error) {
-    // The file's end, which may lie anywhere. What else is wrong is found when all of it is read.
+    // The file may end anywhere. Other errors are found when the whole file is read.
     if (error.code() != ErrorCode::kUnusableVolume) throw;
   }
   return std::move(result.data);

@@ -10,14 +10,14 @@
 
 namespace isomesh::import::dicom {
 
-// True for two capital letters, which is what a value representation (PS3.5, 6.2) is.
+// True for two capital letters, the form of a value representation (PS3.5, 6.2).
 bool is_representation(std::string_view text);
 
-// True for a value representation whose length has 16 bits. All others, and all that the standard
-// will add, have 32 bits after two reserved bytes.
+// True for value representations with 16-bit lengths. All others, also future ones, have 32-bit
+// lengths after two reserved bytes.
 bool has_short_length(std::string_view vr);
 
-// The group 0002, if it stands at `offset`. Throws Error kUnusableVolume.
+// Reads group 0002 if it is at `offset`. Throws Error kUnusableVolume.
 MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offset);
 
 struct ParsedFile {
@@ -25,15 +25,15 @@ struct ParsedFile {
   std::optional<PixelElement> pixels;
 };
 
-// Reads the data set from `offset` on, up to its pixels; nothing that a volume needs follows them.
-// The first element decides whether value representations are explicit, because some writers tell
-// the wrong syntax. Throws Error kUnusableVolume when an element reaches beyond the sequence or
-// file that holds it, sequences are nested too deeply, or there are too many elements.
+// Reads the data set from `offset` up to its pixels; volumes need no later element. The first
+// element decides whether value representations are explicit, because some writers declare the
+// wrong syntax. Throws Error kUnusableVolume if an element exceeds its sequence or file, sequences
+// are nested too deeply, or there are too many elements.
 ParsedFile parse_data_set(const InputFile& file, std::uint64_t offset,
                           std::string_view transfer_syntax);
 
-// The elements of a data set of which the file may hold only the beginning, as far as they can be
-// read; never throws because of the bytes.
+// Reads the elements of a data set, possibly truncated, as far as possible. Never throws because of
+// the bytes.
 DataSet parse_beginning(const InputFile& file, std::uint64_t offset,
                         std::string_view transfer_syntax);
 

@@ -29,7 +29,7 @@ void PrivateBlocks::reserve(Tag tag, std::string_view creator) {
   const unsigned block = tag & 0xFFFFU;
   if (!is_private(tag) || block < 0x10 || block > 0xFF) return;
   const auto* known = std::ranges::find(kNeeded, creator, &NeededElement::creator);
-  // One block for each creator is enough, and bounds what is remembered.
+  // One block per creator suffices; the limit bounds memory.
   if (known == kNeeded.end() || blocks_.size() >= kNeeded.size()) return;
   blocks_.push_back({(tag & 0xFFFF0000U) | block << 8, known->creator});
 }

@@ -16,8 +16,8 @@ namespace {
 constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
 
 struct CharacterSet {
-  std::string_view defined_term;  // without "ISO_IR " or "ISO 2022 IR " before it
-  const char* name;               // iconv's
+  std::string_view defined_term;  // without the prefix "ISO_IR " or "ISO 2022 IR "
+  const char* name;               // iconv's name
 };
 
 constexpr std::array kCharacterSets = {
@@ -32,7 +32,7 @@ constexpr std::array kCharacterSets = {
     CharacterSet{"58", "EUC-CN"},         CharacterSet{"192", "UTF-8"},
     CharacterSet{"GB18030", "GB18030"},   CharacterSet{"GBK", "GBK"}};
 
-// Null for one that is not known.
+// Returns null if unknown.
 const char* iconv_name(std::string_view term) {
   for (const std::string_view prefix : {"ISO_IR ", "ISO 2022 IR "}) {
     if (term.starts_with(prefix)) term.remove_prefix(prefix.size());
@@ -42,8 +42,8 @@ const char* iconv_name(std::string_view term) {
   return found == kCharacterSets.end() ? nullptr : found->name;
 }
 
-// Where several are told, a text begins with the first and may switch to the others. The last is
-// taken: it is the one with several bytes per letter, and its converter knows the first, too.
+// With several character sets, a text begins with the first and may switch to the others. The last
+// one is used: it is multi-byte, and its converter includes the first.
 const char* character_set(const DataSet& data) {
   const auto terms = data.texts(kSpecificCharacterSet);
   if (terms.empty()) return "US-ASCII";
@@ -51,7 +51,7 @@ const char* character_set(const DataSet& data) {
   return iconv_name(terms.back());
 }
 
-// Korean and Chinese texts begin with an escape sequence, which iconv's converters do not know.
+// Korean and Chinese texts begin with an escape sequence that iconv's converters do not know.
 std::string without_announcements(std::string_view text) {
   std::string result(text);
   for (const std::string_view escape : {"\x1b$)C", "\x1b$)A", "\x1b(B"}) {
@@ -120,7 +120,7 @@ std::string converted(std::string_view text, const char* from) {
 }  // namespace
 
 void load_character_sets() {
-  // A module stays loaded as long as a converter of it is open.
+  // A module stays loaded while one of its converters is open.
   for (const CharacterSet& set : kCharacterSets) static_cast<void>(iconv_open("UTF-8", set.name));
 }
 

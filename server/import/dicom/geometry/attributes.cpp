@@ -17,14 +17,14 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// For direction cosines, which are often written with only four decimals.
+// For direction cosines, often written with only four decimals.
 constexpr double kCosineTolerance = 1e-3;
 
 enum class Kind { kText, kReal, kWord };
 
 struct PhaseRow {
   std::string_view name;
-  Tag group;  // 0: of the object itself
+  Tag group;  // 0: the object itself
   Tag tag;
   Kind kind;
 };
@@ -56,10 +56,10 @@ constexpr std::array kPhaseRows = {
     PhaseRow{"ContentTime", 0, kContentTime, Kind::kText},
 };
 
-// Texts come from a file and go into messages.
+// File texts that appear in messages.
 constexpr std::size_t kLongestPhase = 64;
 
-// Cut before a letter, which may have several bytes.
+// Cut at the start of a character, which may have several bytes.
 std::string shortened(std::string text) {
   if (text.size() <= kLongestPhase) return text;
   std::size_t end = kLongestPhase;
@@ -92,16 +92,16 @@ constexpr auto kPhaseNames = [] {
   return names;
 }();
 
-// The group of a row among functional groups; null when it is not there.
+// The row's group among functional groups, or null.
 const DataSet* group_of(const PhaseRow& row, const DataSet& groups) {
   if (row.group != kDiffusionGradientSequence) return groups.item(row.group);
-  // The gradient's direction lies in a sequence within its group.
+  // The gradient's direction is in a sequence within its group.
   const DataSet* diffusion = groups.item(kMrDiffusionSequence);
   return diffusion == nullptr ? nullptr : diffusion->item(row.group);
 }
 
-// What the rows of groups find in `groups`, which may be null, and with `object` those of none find
-// in it.
+// The rows with a value in `groups`, which may be null, and, with `object`, the rows without a
+// group that have one there.
 std::vector<Phase> phases_in(const DataSet* groups, const DataSet* object) {
   std::vector<Phase> phases;
   for (std::size_t at = 0; at < kPhaseRows.size(); ++at) {
@@ -115,7 +115,7 @@ std::vector<Phase> phases_in(const DataSet* groups, const DataSet* object) {
   return phases;
 }
 
-// Empty where it is not told.
+// Empty if missing.
 std::optional<double> factor(const DataSet& data, Tag tag) {
   const std::string_view text = data.text(tag);
   if (text.empty()) return std::nullopt;
@@ -188,7 +188,7 @@ Plane plane_of(const Attributes& attributes) {
   if (std::abs(dot(plane.along_row, plane.along_column)) > kCosineTolerance) {
     throw_unusable("The DICOM image's rows and columns are not perpendicular.");
   }
-  // The file tells the distance between rows first, then that between columns.
+  // The file has the distance between rows first, then that between columns.
   plane.spacing = {spacing[1], spacing[0]};
   if (!(spacing[0] > 0 && spacing[1] > 0)) {
     throw_unusable("The DICOM image's pixel spacing is not positive.");

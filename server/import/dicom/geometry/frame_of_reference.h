@@ -1,4 +1,4 @@
-// Whether slices may be said to lie in one space.
+// Checks that slices share one coordinate system.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@
 
 namespace isomesh::import::dicom {
 
-// Positions are told in a frame of reference, which all slices of a volume share. Some anonymisers
-// give each slice another one, or none. What they have in common is then only that they lie on one
-// even line, which the caller has made sure of: that is taken as enough where every slice has
-// another frame of reference or none, and noted. Where they fall into groups, they may come from
-// several places: that is refused, unless `options` accept it.
+// Positions refer to a frame of reference, which all slices of a volume share. Some anonymisers
+// give each slice a different one, or none. Then the only evidence is that the slices lie evenly
+// spaced on one line, which the caller has checked. This suffices if every slice has a different
+// frame of reference or none; a note reports it. Groups of slices may come from several coordinate
+// systems and are rejected unless `options` accept them.
 //
-// Returns a note where the slices have several. Throws Error kUnusableVolume, overridable.
+// Returns a note if the slices have several. Throws Error kUnusableVolume, overridable.
 std::optional<Note> note_on_frames_of_reference(std::span<const Slice> slices,
                                                 const ImportOptions& options);
 

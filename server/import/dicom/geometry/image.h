@@ -1,4 +1,4 @@
-// One DICOM object that holds images: how its samples are stored and where each frame lies.
+// A DICOM object with images: the layout of its samples and the geometry of its frames.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace isomesh::import::dicom {
 
-// How the samples of a frame are stored: one after another, rows from top to bottom.
+// The layout of a frame's samples: rows from top to bottom, without gaps.
 struct PixelLayout {
   std::uint32_t columns = 0;
   std::uint32_t rows = 0;
@@ -24,7 +24,7 @@ struct PixelLayout {
   bool is_float = false;
 
   std::uint64_t samples() const { return std::uint64_t{columns} * rows; }
-  // Frames of single bits follow one another without a gap.
+  // Frames of single bits have no gaps between them.
   std::uint64_t bytes_of(std::uint64_t frames) const {
     return (samples() * frames * bits_allocated + 7) / 8;
   }
@@ -32,32 +32,31 @@ struct PixelLayout {
   bool operator==(const PixelLayout&) const = default;
 };
 
-// Where a frame's samples lie, in the patient's space. All of its members are empty together when
-// the object does not tell.
+// The geometry of a frame's samples in the patient's space. All members are empty if the object
+// does not define it.
 struct Plane {
   Vector3 position = {};               // of the first sample, in mm
-  Vector3 along_row = {};              // unit vector from a sample to the next in its row
+  Vector3 along_row = {};              // unit vector from a sample to the next in the row
   Vector3 along_column = {};           // unit vector from a row to the next
   std::array<double, 2> spacing = {};  // mm, along the row and along the column
 };
 
-// The value of an attribute in which frames at the same position may differ.
+// The value of an attribute in which frames at one position may differ.
 struct Phase {
-  std::size_t attribute = 0;  // its place in phase_names() (attributes.h)
+  std::size_t attribute = 0;  // index in phase_names() (attributes.h)
   std::string value;
 
   bool operator==(const Phase&) const = default;
 };
 
 struct Frame {
-  std::uint32_t number = 0;  // from 0, in its object
+  std::uint32_t number = 0;  // in its object, from 0
   Plane plane;
   Rescale rescale;
-  std::uint32_t segment = 0;  // of a segmentation whose frames are one segment's; 0: none
-  std::vector<Phase> phases;  // the frame's own
+  std::uint32_t segment = 0;  // of a segmentation with one segment per frame; 0: none
+  std::vector<Phase> phases;  // of this frame alone
 };
 
-// A segment of a segmentation.
 struct Segment {
   std::uint32_t number = 0;
   std::string label;                 // UTF-8
@@ -66,14 +65,14 @@ struct Segment {
   bool operator==(const Segment&) const = default;
 };
 
-// What the samples of a segmentation are.
+// The meaning of a segmentation's samples.
 enum class SegmentKind {
-  kBinary,      // bits, in frames of one segment each
-  kFractional,  // shares or probabilities, in such frames
-  kLabelMap,    // numbers of segments
+  kBinary,      // bits; one segment per frame
+  kFractional,  // occupancy or probability; one segment per frame
+  kLabelMap,    // segment numbers
 };
 
-// What only segmentations (PS3.3, A.51 and A.108) have.
+// Attributes of segmentations only (PS3.3, A.51 and A.108).
 struct Segmentation {
   std::vector<Segment> segments;
   SegmentKind kind = SegmentKind::kBinary;
@@ -82,17 +81,17 @@ struct Segmentation {
 };
 
 struct Image {
-  std::string file_name;  // without folders; empty when the upload is one file
+  std::string file_name;  // without folders; empty for a single uploaded file
   std::string frame_of_reference_uid;
   std::string modality;
-  std::string rescale_type;  // the unit of rescaled samples: "HU" of a CT; may be empty
+  std::string rescale_type;  // the unit of rescaled samples: "HU" for CT; may be empty
   std::string photometric;   // "MONOCHROME1" or "MONOCHROME2"
   std::optional<std::int64_t> instance_number;
   PixelLayout stored;  // of a frame in the file
-  PixelLayout layout;  // of each of `frames`
-  // Above 0 the file has one frame, in which `frames` lie as tiles, so many side by side.
+  PixelLayout layout;  // of each of `frames`, decoded
+  // If nonzero, the file has one frame, with `frames` as tiles in rows of this length.
   std::uint32_t tiles_per_row = 0;
-  bool is_distance_assumed = false;  // the tiles' slices are as far apart as they are thick
+  bool is_distance_assumed = false;  // the tiles' spacing is their slice thickness
   std::vector<Frame> frames;
   std::vector<Phase> phases;  // of the whole object
   std::optional<Segmentation> segmentation;

@@ -10,7 +10,7 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// For direction cosines: a quarter of a millimetre at half a metre.
+// For direction cosines: 0.25 mm at a distance of 500 mm.
 constexpr double kOrientationTolerance = 5e-4;
 constexpr double kRelativeSpacingTolerance = 1e-3;
 
@@ -28,7 +28,7 @@ bool nearly_same(const std::array<double, 2>& a, const std::array<double, 2>& b)
   return true;
 }
 
-// Names a slice whose place in the stack is not known yet.
+// Names a slice whose position in the stack is unknown.
 std::string place_of(const Slice& slice) {
   const std::string& file = slice.image->file_name;
   std::string text;
@@ -37,7 +37,7 @@ std::string place_of(const Slice& slice) {
   return text;
 }
 
-// The slice with which most agree, if there is such a majority, otherwise some slice.
+// A slice equal to the majority if there is one, otherwise any slice.
 template <class IsSame>
 const Slice& usual_slice(std::span<const Slice> slices, const IsSame& is_same) {
   const Slice* candidate = &slices.front();

@@ -30,7 +30,7 @@ std::string number_of(std::size_t place, std::size_t count, bool from_end) {
   return std::to_string(from_end ? count - place : place + 1);
 }
 
-// The positions that hold more than one slice, each with how many.
+// Throws if a position has several slices.
 void refuse_shared_positions(std::span<const Placed> placed, bool from_end) {
   const std::vector<std::size_t> first_of_position = position_starts(placed);
   const std::size_t positions = first_of_position.size();
@@ -107,8 +107,8 @@ void refuse_gaps(std::span<const Placed> placed, bool from_end) {
   }
 }
 
-// Every slice must lie where steps of one length and direction lead. This also finds slices that
-// are shifted within their planes.
+// Every slice must lie at equal steps along one line. This also finds slices that are shifted
+// within their planes.
 void refuse_crooked(std::span<const Placed> placed, const Vector3& step, bool from_end) {
   const double tolerance = kPlaceTolerance * length(step);
   for (std::size_t i = 0; i < placed.size(); ++i) {

@@ -1,4 +1,4 @@
-// Frames in the order in which they come -> one lattice, or the reason why they make none.
+// Unordered frames -> one lattice, or the reason why they have none.
 #pragma once
 
 #include <span>
@@ -13,17 +13,17 @@ namespace isomesh::import::dicom {
 struct Slice {
   const Image* image = nullptr;
   const Frame* frame = nullptr;
-  std::size_t file = 0;  // index of the file that holds it
+  std::size_t file = 0;  // index of its file
 };
 
 struct Stack {
   std::vector<Slice> slices;  // from the first plane of the lattice to the last
   Geometry geometry;
-  // Slices are numbered from 1 as the scanner did: from the other end where its instance numbers
-  // fall along the stack.
+  // Slices are numbered from 1 as by the scanner: from the other end if its instance numbers
+  // descend along the stack.
   bool numbered_from_end = false;
-  // Of a segmentation: the plane of each slice, and how many planes there are. Empty elsewhere,
-  // where every plane has its slice.
+  // For a segmentation: each slice's plane, and the number of planes. Otherwise empty: every plane
+  // has a slice.
   std::vector<std::uint32_t> planes = {};
   std::uint32_t plane_count = 0;
 
@@ -31,18 +31,18 @@ struct Stack {
     return plane_count > 0 ? plane_count : static_cast<std::uint32_t>(slices.size());
   }
 
-  // "slice 3 of 20", for a slice by its place in `slices`.
+  // "slice 3 of 20", for an index in `slices`.
   std::string name(std::size_t place) const;
 };
 
 // Sorts slices by position along their normal, never by name or instance number. A tilted gantry
-// makes a sheared lattice: the third direction is the one from slice to slice. Frames of reference
-// are not looked at (frame_of_reference.h).
+// gives a sheared lattice: the third axis runs from slice to slice. Does not check frames of
+// reference (frame_of_reference.h).
 //
-// Throws Error kUnusableVolume, naming slices, when there are fewer than two, their sizes,
-// spacings or orientations (a component by more than 5e-4) differ, several lie at one position, one
-// is missing, or one lies further from its place in the lattice than a twentieth of the slices'
-// distance.
+// Throws Error kUnusableVolume, naming slices, if there are fewer than two; if their sizes,
+// spacings or orientations (a component by more than 5e-4) differ; if several are at one position;
+// if one is missing; or if one deviates from its lattice position by more than a twentieth of the
+// slice distance.
 Stack make_stack(std::vector<Slice> slices);
 
 }  // namespace isomesh::import::dicom

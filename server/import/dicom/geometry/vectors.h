@@ -1,4 +1,4 @@
-// Arithmetic with places and directions in the patient's space.
+// Vector arithmetic in the patient's space.
 #pragma once
 
 #include <cmath>
@@ -19,7 +19,7 @@ inline Vector3 difference(const Vector3& a, const Vector3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-// The place `distance` mm from `place` along `direction`, a unit vector.
+// `direction` is a unit vector, `distance` in mm.
 inline Vector3 moved(const Vector3& place, const Vector3& direction, double distance) {
   return {place[0] + direction[0] * distance, place[1] + direction[1] * distance,
           place[2] + direction[2] * distance};

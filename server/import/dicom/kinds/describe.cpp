@@ -52,7 +52,7 @@ void check_label_layout(const Segmentation& segmentation, const PixelLayout& lay
                  (layout.is_signed ? " and a sign." : "."));
 }
 
-// The commonest reason why a file makes no volume: a picture that some program has made.
+// The most common reason for an unusable file: a picture made by some program.
 void refuse_placeless(const DataSet& data, std::uint32_t frames) {
   if (frames > 1 || has_functional_groups(data)) return;
   for (const auto& [tag, name] :
@@ -64,7 +64,7 @@ void refuse_placeless(const DataSet& data, std::uint32_t frames) {
   }
 }
 
-// A single bit becomes a sample of eight.
+// Single bits become 8-bit samples.
 PixelLayout unpacked(PixelLayout layout) {
   if (layout.bits_allocated != 1) return layout;
   layout.bits_allocated = 8;

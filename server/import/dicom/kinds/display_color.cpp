@@ -12,14 +12,14 @@ namespace {
 
 using Triple = std::array<double, 3>;
 
-// L* is 0..100 and a*, b* are -128..127, each over all of 16 bits.
+// L* is 0..100 and a*, b* are -128..127; each spans all 16 bits.
 Triple cie_lab(const std::vector<std::uint32_t>& stored) {
   constexpr double kMost = 0xFFFF;
   return {stored[0] / kMost * 100, stored[1] / kMost * 255 - 128, stored[2] / kMost * 255 - 128};
 }
 
-// CIE 15, from D65: the standard has the white of profiles' connection space, D50, but dcmqi and
-// what descends from it write sRGB's own, and their colours are to come back as they were.
+// CIE 15, from D65. The standard requires D50, the white point of profile connection spaces. But
+// dcmqi and its descendants write sRGB's own white point, and their colours must be preserved.
 Triple cie_xyz(const Triple& lab) {
   constexpr Triple kWhite = {0.95047, 1, 1.08883};
   constexpr double kLinearBelow = 6.0 / 29;

@@ -1,4 +1,4 @@
-// Colours as DICOM recommends them for display.
+// DICOM's recommended display colours.
 #pragma once
 
 #include <optional>
@@ -8,8 +8,8 @@
 
 namespace isomesh::import::dicom {
 
-// The Recommended Display CIELab Value (PS3.3, C.10.7.1.1) as "#rrggbb" of sRGB, clamped to its
-// gamut. Empty where the data set has none.
+// The Recommended Display CIELab Value (PS3.3, C.10.7.1.1) as "#rrggbb" in sRGB, clamped to its
+// gamut. Empty if missing.
 std::optional<std::string> display_color(const DataSet& data);
 
 }  // namespace isomesh::import::dicom

@@ -21,8 +21,8 @@ std::vector<double> offsets_of(const DataSet& data, std::size_t frames) {
                  " for their positions.");
 }
 
-// The distance of each plane from the first, along the normal. The offsets in the file begin with
-// 0; those of transverse planes may be the patient's z instead.
+// The distance of each plane from the first, along the normal. The file's offsets begin with 0, or,
+// for transverse planes, may be the patient's z.
 std::vector<double> distances_of(const DataSet& data, const Plane& first, std::size_t frames) {
   std::vector<double> offsets = offsets_of(data, frames);
   if (offsets.front() == 0) return offsets;

@@ -16,7 +16,7 @@ namespace isomesh::import::dicom {
 namespace {
 
 constexpr std::uint32_t kMostTiles = 4096;
-// How far the two normals may be apart: the image's own, and that of the CSA header.
+// The largest difference between the image's normal and that of the CSA header.
 constexpr double kParallel = 1e-2;
 
 bool has_image_type(const DataSet& data, std::string_view type) {
@@ -76,7 +76,7 @@ double slice_count(const DataSet& data, const CsaHeader& header) {
       "(0029,1010).");
 }
 
-// The way in which the slices follow one another.
+// The direction from slice to slice.
 Vector3 slice_normal(const Plane& plane, const CsaHeader& header) {
   const auto told = csa_numbers(header, "SliceNormalVector");
   if (told.size() != 3) {

@@ -1,24 +1,24 @@
-// One frame that holds the slices of a volume as tiles, from left to right and from top to bottom:
-// the mosaics of Siemens and the grids of United Imaging.
+// Frames that hold a volume's slices as tiles, from left to right and top to bottom: mosaics of
+// Siemens and grids of United Imaging.
 #pragma once
 
 #include "server/import/dicom/geometry/image.h"
 
 namespace isomesh::import::dicom {
 
-// True for an object that says it is one. Objects with functional groups never are, though scanners
-// leave the word in those that they have unfolded.
+// True if the object is declared as one. Objects with functional groups never are, though scanners
+// keep the word after unfolding them.
 bool is_mosaic(const DataSet& data);
 
-// Replaces the one frame of `image`, which has its plane, by one for each tile.
+// Replaces the one frame of `image`, whose plane is set, by one frame per tile.
 //
 // A Siemens mosaic is a square of tiles. Its position is that of a slice as large as the mosaic
-// with the same centre as the first tile; its slices follow one another along the normal of the CSA
-// header, which may point either way. A grid of United Imaging has as many rows as it needs, and
-// tells each slice's position.
+// with the centre of the first tile. Its slices follow one another along the normal of the CSA
+// header, in either direction. A grid of United Imaging has as many rows as it needs, and a
+// position for each slice.
 //
-// Throws Error kUnusableVolume when the object does not tell how many slices there are and where
-// they lie, or its size is none of so many tiles.
+// Throws Error kUnusableVolume if the object does not define the number and the positions of the
+// slices, or if the tiles do not fit its size.
 void unfold_mosaic(const DataSet& data, Image& image);
 
 }  // namespace isomesh::import::dicom

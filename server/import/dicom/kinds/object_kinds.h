@@ -1,4 +1,4 @@
-// Which objects are no part of a volume, though they lie beside one.
+// DICOM objects that lie beside a volume but are not part of it.
 #pragma once
 
 #include <optional>
@@ -8,8 +8,7 @@
 
 namespace isomesh::import::dicom {
 
-// Why an object is no part of a volume: raw data, a report, a localiser, ... Empty when it may be
-// an image.
+// The reason to ignore an object: raw data, a report, a localiser, ... Empty if it may be an image.
 std::optional<std::string> reason_to_ignore(const DicomFile& file);
 
 }  // namespace isomesh::import::dicom

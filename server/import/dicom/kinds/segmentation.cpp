@@ -38,7 +38,7 @@ std::vector<Segment> segments_of(const DataSet& data) {
   return segments;
 }
 
-// Empty where the object does not tell it.
+// Empty if missing.
 std::optional<double> slice_distance(const DataSet& data) {
   const auto told =
       Attributes(data, 0).place(kPixelMeasuresSequence).numbers(kSpacingBetweenSlices);
@@ -51,7 +51,7 @@ bool is_whole_step(double gap, double distance) {
   return std::round(steps) >= 1 && std::abs(steps - std::round(steps)) <= kPlaceTolerance;
 }
 
-// The distances from each position to the next.
+// The distances between consecutive positions.
 std::vector<double> gaps_of(std::span<const Placed> placed, std::span<const std::size_t> starts) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < starts.size(); ++i) {
@@ -60,7 +60,7 @@ std::vector<double> gaps_of(std::span<const Placed> placed, std::span<const std:
   return gaps;
 }
 
-// The distance of planes of which all positions are some.
+// The distance of planes that include all positions.
 double plane_distance(const std::vector<double>& gaps, const std::optional<double>& told) {
   const auto fits = [&](double distance) {
     return std::ranges::all_of(gaps, [&](double gap) { return is_whole_step(gap, distance); });
@@ -72,7 +72,7 @@ double plane_distance(const std::vector<double>& gaps, const std::optional<doubl
                  " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
-// The number of each slice's plane.
+// Each slice's plane.
 std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
                                      const std::optional<double>& told) {
   const std::vector<std::size_t> starts = position_starts(placed);
@@ -106,7 +106,7 @@ void refuse_crooked(std::span<const Placed> placed, const Stack& stack, const Ve
   }
 }
 
-// Two frames of one segment at one place contradict each other.
+// Two frames of one segment at one position are contradictory.
 void refuse_doubled(const Stack& stack) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> seen;
   for (std::size_t i = 0; i < stack.slices.size(); ++i) {
@@ -151,7 +151,7 @@ std::uint32_t highest_segment(const Stack& stack) {
   return segment(std::ranges::max(stack.slices, {}, segment));
 }
 
-// Samples as they are stored.
+// Copies the stored samples.
 void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
                  std::span<std::byte> target) {
   std::vector<std::byte> stored;
@@ -164,7 +164,7 @@ void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
   }
 }
 
-// The slices, those of a plane by their segments, as combinations want them.
+// Orders slices by plane, then by segment, as Combinations::with requires.
 std::vector<std::size_t> by_plane_and_segment(const Stack& stack) {
   std::vector<std::size_t> order(stack.slices.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -174,7 +174,7 @@ std::vector<std::size_t> by_plane_and_segment(const Stack& stack) {
   return order;
 }
 
-// Of samples that are half of the maximum or more, which a set bit is.
+// Adds the segment to samples of at least half the maximum, which includes set bits.
 void add_segment(std::span<const std::byte> samples, const Slice& slice,
                  std::span<Combinations::State> states, Combinations& combinations) {
   const std::uint32_t maximum = slice.image->segmentation->maximum;
@@ -184,7 +184,7 @@ void add_segment(std::span<const std::byte> samples, const Slice& slice,
   }
 }
 
-// False when a value does not fit into the type.
+// Returns false if a value does not fit into the type.
 bool write_combinations(const Stack& stack, SampleType type, const ReadSlice& read,
                         std::span<std::byte> target, Combinations& combinations) {
   const std::vector<std::size_t> order = by_plane_and_segment(stack);
@@ -216,7 +216,7 @@ std::vector<LabelEntry> entries_of(const std::vector<Segment>& segments) {
   return label_table(std::move(entries));
 }
 
-// Those that have a frame.
+// The segments that have a frame.
 std::vector<Segment> segments_in(const Stack& stack) {
   std::set<std::uint32_t> numbers;
   for (const Slice& slice : stack.slices) numbers.insert(slice.frame->segment);

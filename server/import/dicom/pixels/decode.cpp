@@ -47,7 +47,7 @@ const Syntax* find_syntax(std::string_view uid) {
   return found == kSyntaxes.end() ? nullptr : found;
 }
 
-// What a code stream's header tells.
+// The size in a code stream's header.
 struct StreamSize {
   std::uint32_t columns = 0;
   std::uint32_t rows = 0;
@@ -63,8 +63,8 @@ std::uint32_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::
   return number;
 }
 
-// Frame headers have the markers C0 to CF, but for C4, C8 and CC, which are tables or reserved, and
-// JPEG-LS's F7.
+// Frame headers have the markers C0 to CF, except C4, C8 and CC, which are tables or reserved, and
+// F7 of JPEG-LS.
 bool is_frame_header(std::uint32_t marker) {
   if (marker == 0xFFF7) return true;
   return marker >= 0xFFC0 && marker <= 0xFFCF && marker != 0xFFC4 && marker != 0xFFC8 &&
@@ -75,7 +75,7 @@ std::optional<StreamSize> jpeg_size(std::span<const std::byte> stream) {
   if (stream.size() < 4 || big_endian(stream, 0, 2) != 0xFFD8) return std::nullopt;
   for (std::size_t at = 2; at + 10 <= stream.size();) {
     const std::uint32_t marker = big_endian(stream, at, 2);
-    if (marker == 0xFFFF) {  // fill bytes may stand before a marker
+    if (marker == 0xFFFF) {  // fill bytes may precede a marker
       ++at;
       continue;
     }
@@ -91,7 +91,7 @@ std::optional<StreamSize> jpeg_size(std::span<const std::byte> stream) {
   return std::nullopt;
 }
 
-// ISO/IEC 15444-1, A.5.1: the SIZ segment is the first behind the start of the code stream.
+// ISO/IEC 15444-1, A.5.1: the SIZ segment is the first one after the start of the code stream.
 std::optional<StreamSize> jpeg_2000_size(std::span<const std::byte> stream) {
   constexpr std::size_t kNeeded = 43;
   if (stream.size() < kNeeded || big_endian(stream, 0, 4) != 0xFF4FFF51) return std::nullopt;
@@ -106,8 +106,8 @@ std::optional<StreamSize> jpeg_2000_size(std::span<const std::byte> stream) {
                     .bits = (big_endian(stream, 42, 1) & 0x7FU) + 1};
 }
 
-// GDCM fills a cut stream up without an error, so the stream must have its end, FFD9, and nothing
-// but padding after it.
+// GDCM fills up a truncated stream without an error. So the stream must end with FFD9, followed
+// only by padding.
 bool is_whole(std::span<const std::byte> stream) {
   while (!stream.empty() && stream.back() == std::byte{0}) stream = stream.first(stream.size() - 1);
   return stream.size() >= 2 && big_endian(stream, stream.size() - 2, 2) == 0xFFD9;
@@ -151,8 +151,8 @@ void decode_rle_segment(std::span<const std::byte> segment, std::size_t first, s
   }
 }
 
-// PS3.5, annex G: one segment of packed bytes for every byte of a sample, the highest first. It is
-// decoded here, because GDCM's decoder reports success on streams that end early.
+// PS3.5, annex G: one segment of packed bytes per byte of a sample, highest first. Decoded here,
+// because GDCM reports success for streams that end early.
 void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
                 std::span<std::byte> target) {
   constexpr std::size_t kHeaderBytes = 64;
@@ -178,7 +178,7 @@ void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
   }
 }
 
-// GDCM writes warnings about files to the standard error output, which nobody should read there.
+// GDCM writes warnings about files to standard error.
 void silence_gdcm() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -236,7 +236,7 @@ void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const 
   try {
     decoded = decode_by_gdcm(syntax.family, input, layout, output);
   } catch (const std::exception&) {
-    // GDCM's texts are not passed on, because they name its source files.
+    // GDCM's messages are not forwarded, because they name its source files.
   }
   const gdcm::ByteValue* bytes = decoded ? output.GetByteValue() : nullptr;
   if (bytes == nullptr || std::size_t{bytes->GetLength()} < target.size()) {

@@ -9,12 +9,12 @@
 
 namespace isomesh::import::dicom {
 
-// True for the transfer syntaxes that frames are decoded from.
+// True for the supported transfer syntaxes.
 bool can_decode(std::string_view transfer_syntax);
 
-// Decodes one frame into `target`, which has layout.frame_bytes() bytes, little-endian. What the
-// code stream tells about its size is compared with the layout before anything is decoded.
-// Throws Error kUnusableVolume with the reason, a clause without a subject: "its ...".
+// Decodes one frame into `target`, which has layout.frame_bytes() bytes, little-endian. Compares
+// the size in the code stream with the layout before decoding. Throws Error kUnusableVolume with
+// the reason, a clause without a subject: "its ...".
 void decode_frame(std::string_view transfer_syntax, std::span<const std::byte> compressed,
                   const PixelLayout& layout, std::span<std::byte> target);
 

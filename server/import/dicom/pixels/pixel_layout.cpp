@@ -11,7 +11,7 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// A bound, because one frame is decoded in memory.
+// One frame is decoded in memory, so its size is bounded.
 constexpr std::uint64_t kMostFrameBytes = std::uint64_t{1} << 29;
 
 constexpr std::uint32_t kMostSamplesOfRow = 0xFFFF;
@@ -27,7 +27,7 @@ void refuse_colours(const DataSet& data) {
   const std::string_view photometric = data.text(kPhotometricInterpretation);
   if (samples == 1 && photometric.starts_with("MONOCHROME")) return;
   if (samples == 1 && photometric == "PALETTE COLOR") {
-    // The labels of a segmentation stay what they are under colours.
+    // A segmentation's labels do not depend on its palette.
     if (!data.text(kSegmentationType).empty()) return;
     throw_unusable(
         "The DICOM image is in colour: its samples are indices into a palette. Only grey images "
@@ -56,7 +56,7 @@ void check_bits(const PixelLayout& layout) {
   }
 }
 
-// Floating-point numbers have elements of their own, whatever else the object tells of its bits.
+// Floating-point numbers have their own elements; the declared bits do not apply.
 bool take_float(const DicomFile& file, PixelLayout& layout) {
   if (!file.pixels() || file.pixels()->tag == kPixelData) return false;
   layout.is_float = true;
@@ -67,7 +67,7 @@ bool take_float(const DicomFile& file, PixelLayout& layout) {
   return true;
 }
 
-// Empty where it is not told.
+// An empty syntax is missing in the file.
 bool is_native_syntax(std::string_view syntax) {
   return syntax.empty() || syntax == kImplicitLittleEndian || syntax == kExplicitLittleEndian ||
          syntax == kDeflated || syntax == kExplicitBigEndian;

@@ -10,7 +10,7 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// Compressed samples may be larger than plain ones, but not by much.
+// Compression may enlarge samples slightly.
 std::uint64_t most_compressed_bytes(const PixelLayout& layout) {
   return layout.frame_bytes() * 2 + (std::uint64_t{1} << 20);
 }
@@ -19,7 +19,7 @@ void swap_pairs(std::span<std::byte> bytes) {
   for (std::size_t at = 0; at + 1 < bytes.size(); at += 2) std::swap(bytes[at], bytes[at + 1]);
 }
 
-// Every compressed frame begins like this, whatever the syntax.
+// The start of a compressed frame in all supported syntaxes.
 bool begins_frame(const DicomFile& file, const Extent& fragment) {
   const std::string head = file.bytes().text(fragment.offset, 4);
   return head.starts_with("\xFF\xD8\xFF") || head.starts_with("\xFF\x4F\xFF\x51");
@@ -34,7 +34,7 @@ std::vector<std::size_t> first_fragments(const DicomFile& file, std::size_t fram
   const std::size_t fragments = pixels.fragments.size();
   const bool has_table = pixels.frame_offsets.size() == frames;
   std::vector<std::size_t> firsts;
-  std::uint64_t offset = 0;  // of a fragment's item from the first one's
+  std::uint64_t offset = 0;  // of a fragment's item, relative to the first one's
   for (std::size_t i = 0; i < fragments; ++i) {
     const bool is_first = fragments == frames || i == 0 ||
                           (frames > 1 && (has_table ? is_one_of(pixels.frame_offsets, offset)
@@ -86,12 +86,12 @@ void FrameReader::read_tile(std::uint32_t tile, std::span<std::byte> target) {
   }
 }
 
-// Bits fill bytes from the lowest on, and frames follow one another within bytes.
+// Bits fill bytes from the lowest, and frames may start within a byte.
 void FrameReader::read_bits(std::uint32_t frame, std::span<std::byte> target) const {
   const PixelElement& pixels = *file_.pixels();
   const std::uint64_t first = std::uint64_t{frame} * target.size();
   const bool is_swapped = file_.transfer_syntax() == kExplicitBigEndian && pixels.is_words;
-  // Whole words, because a big-endian one has its bytes turned around.
+  // Whole words, because big-endian words have swapped bytes.
   const std::uint64_t begin = first / 16 * 2;
   const std::uint64_t end = std::min((first + target.size() + 15) / 16 * 2, pixels.native.bytes);
   std::vector<std::byte> packed(end - begin);

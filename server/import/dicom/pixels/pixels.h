@@ -1,4 +1,4 @@
-// The samples of one frame, as they are stored or compressed.
+// Reads a frame's samples, plain or compressed.
 #pragma once
 
 #include <cstddef>
@@ -13,12 +13,12 @@ namespace isomesh::import::dicom {
 // safe.
 class FrameReader {
  public:
-  // Throws Error kUnusableVolume when the frames cannot be told apart among compressed fragments.
+  // Throws Error kUnusableVolume if frames cannot be assigned to compressed fragments.
   FrameReader(const DicomFile& file, const Image& image);
 
-  // Reads one frame of the image into `target`, which has layout.frame_bytes() bytes:
-  // little-endian, bits as they are stored, single ones as a byte each. Throws Error
-  // kUnusableVolume when the frame cannot be decoded or is of another size than its object tells.
+  // Reads one frame of the image into `target`, which has layout.frame_bytes() bytes: little-endian
+  // stored values, single bits as bytes. Throws Error kUnusableVolume if the frame cannot be
+  // decoded or its size differs from the declared one.
   void read(std::uint32_t frame, std::span<std::byte> target);
 
  private:
@@ -31,8 +31,8 @@ class FrameReader {
   const DicomFile& file_;
   const Image& image_;
   const PixelLayout& stored_;
-  std::vector<std::byte> mosaic_;  // the one frame of tiles, once it was read
-  // Where each compressed frame begins among the fragments, and one beyond the last.
+  std::vector<std::byte> mosaic_;  // the frame of all tiles, once read
+  // The first fragment of each compressed frame, and the end of the last.
   std::vector<std::size_t> first_fragments_;
 };
 

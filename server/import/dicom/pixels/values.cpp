@@ -12,7 +12,7 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// Products of these and samples of 32 bits are exact in 64 bits.
+// Products of such factors and 32-bit samples are exact in 64 bits.
 constexpr double kLargestFactor = 0x1p30;
 
 bool is_integral(double value) {
@@ -92,7 +92,7 @@ bool convert(std::span<const std::byte> stored, const PixelLayout& layout, const
       if (!std::in_range<Value>(exact)) return false;
       value = static_cast<Value>(exact);
     } else {
-      // A value beyond the largest float becomes infinite, and the volume is refused for it later.
+      // Values beyond the largest float become infinite, and the volume is rejected later.
       value = static_cast<Value>(static_cast<double>(sample) * rescale.slope + rescale.intercept);
     }
     std::memcpy(target, &value, sizeof(Value));

@@ -1,4 +1,4 @@
-// Stored samples -> what they mean: bits cut out, signs extended, slope and intercept applied.
+// Stored samples -> modality values: extracts bits, extends signs, applies slope and intercept.
 #pragma once
 
 #include <span>
@@ -9,14 +9,13 @@
 
 namespace isomesh::import::dicom {
 
-// The types to try, in order, for the samples of all slices; the last holds every one. They are
-// integers where all slopes and intercepts are, otherwise float32, or float64 for integers of 32
-// bits and floating-point numbers of 64. int16 is tried before int32 because what a CT stores in 16
-// bits is seldom beyond it.
+// The types to try, in order, for the samples of all slices; the last fits all. They are integers
+// if all slopes and intercepts are, otherwise float32, or float64 for 32-bit integers and 64-bit
+// floats. int16 precedes int32, because 16-bit CT values seldom exceed it.
 std::vector<SampleType> candidate_types(std::span<const Slice> slices);
 
-// Writes the values of one frame's stored samples as `type`; samples that are padding keep their
-// values. False when one of them does not fit.
+// Writes the values of one frame's stored samples as `type`; padding is not treated specially.
+// Returns false if one does not fit.
 bool convert_frame(std::span<const std::byte> stored, const PixelLayout& layout,
                    const Rescale& rescale, SampleType type, std::span<std::byte> target);
 
