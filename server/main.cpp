@@ -9,6 +9,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -26,6 +27,7 @@
 #include "server/callbacks/signature.h"
 #include "server/callbacks/targets.h"
 #include "server/commands.h"
+#include "server/configured_files.h"
 #include "server/dicomweb/dicomweb.h"
 #include "server/dimse/c_store.h"
 #include "server/dimse/listener.h"
@@ -158,26 +160,22 @@ void check_places(const Options& options) {
       !std::filesystem::is_directory(options.data, absent)) {
     throw invalid_parameter("data", options.data.string() + " is not a folder");
   }
-  const auto& authorities = options.callback_authorities;
-  if (!authorities.empty() && ::access(authorities.c_str(), R_OK) != 0) {
-    throw invalid_parameter("callback-ca", authorities.string() + " cannot be read");
-  }
 }
 
 // Tells what would be used. Throws what a start would that finds a mistake in it; touches neither
 // the data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
+  std::optional<orders::Hospital> hospital;
+  if (!options.hospital.empty()) hospital = orders::read_hospital(options.hospital);
+  if (hospital && hospital->dimse) dimse::listen_address(*hospital->dimse);
+  if (!options.store.empty()) store::postgresql::check_url(options.store);
+  check_configured_files(options, hospital ? &*hospital : nullptr);
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
   check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
-  if (!options.store.empty()) store::postgresql::check_url(options.store);
   check_blobs(options.blobs);
-  if (!options.hospital.empty()) {
-    const orders::Hospital hospital = orders::read_hospital(options.hospital);
-    if (hospital.dimse) dimse::listen_address(*hospital.dimse);
-  }
   std::cout << as_config(cli, Remarks::kNo);
   return 0;
 }
