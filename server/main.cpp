@@ -25,6 +25,7 @@
 #include "server/callbacks/signature.h"
 #include "server/callbacks/targets.h"
 #include "server/commands.h"
+#include "server/configured_files.h"
 #include "server/ending.h"
 #include "server/http/app/outcomes.h"
 #include "server/http/guards/auth.h"
@@ -154,16 +155,12 @@ void check_places(const Options& options) {
       !std::filesystem::is_directory(options.data, absent)) {
     throw invalid_parameter("data", options.data.string() + " is not a folder");
   }
-  const auto& authorities = options.callback_authorities;
-  if (!authorities.empty() && ::access(authorities.c_str(), R_OK) != 0) {
-    throw invalid_parameter("callback-ca", authorities.string() + " cannot be read");
-  }
 }
 
 #ifndef ISOMESH_HOSPITAL
 namespace hospital {
 
-void check(const std::filesystem::path& /*file*/) {
+ConfiguredFiles check(const std::filesystem::path& /*file*/) {
   throw invalid_parameter("hospital", "is not known to this isomeshd: it was built without");
 }
 
@@ -180,13 +177,14 @@ std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
 // data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
+  if (!options.store.empty()) store::postgresql::check_url(options.store);
+  check_configured_files(options,
+                         options.hospital.empty() ? ConfiguredFiles() : hospital::check(options.hospital));
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
   check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
-  if (!options.store.empty()) store::postgresql::check_url(options.store);
   check_blobs(options.blobs);
-  if (!options.hospital.empty()) hospital::check(options.hospital);
   std::cout << as_config(cli, Remarks::kNo);
   return 0;
 }

@@ -219,9 +219,22 @@ class HospitalWing final : public http::Wing {
 
 }  // namespace
 
-void check(const std::filesystem::path& file) {
+http::ConfiguredFiles check(const std::filesystem::path& file) {
   const orders::Hospital hospital = orders::read_hospital(file);
   if (hospital.dimse) dimse::listen_address(*hospital.dimse);
+  http::ConfiguredFiles files;
+  for (const orders::PacsSettings& pacs : hospital.pacs) {
+    const std::string name = "pacs " + pacs.name + ": ";
+    files.emplace_back(name + "ca-file", pacs.ca_file);
+    files.emplace_back(name + "password-file", pacs.password_file);
+    files.emplace_back(name + "token-file", pacs.token_file);
+  }
+  if (const auto& syslog = hospital.syslog) {
+    files.emplace_back("audit.ca-file", syslog->ca_file);
+    files.emplace_back("audit.certificate-file", syslog->certificate_file);
+    files.emplace_back("audit.key-file", syslog->key_file);
+  }
+  return files;
 }
 
 std::unique_ptr<http::Wing> open(const http::WingSettings& settings,

@@ -9,8 +9,9 @@
 
 namespace isomesh::hospital {
 
-// Throws Error kInvalidParameter when the file of --hospital has a mistake. Touches nothing else.
-void check(const std::filesystem::path& file);
+// The files that the file of --hospital names. Throws Error kInvalidParameter when it has a mistake.
+// Touches nothing else.
+http::ConfiguredFiles check(const std::filesystem::path& file);
 
 // A wing that is not open when no file is given. Throws as check() does, and Error kUnavailable
 // when it cannot listen for series.

@@ -197,6 +197,47 @@ TEST(Configuration, WhatAStartWouldRefuseIsToldToo) {
   EXPECT_EQ(tokens.status, 1);
 }
 
+TEST(Configuration, EachFileThatCannotBeReadIsNamed) {
+  const TemporaryFolder folder;
+  const auto absent = [&](const std::string& name) {
+    return (folder / ("absent-" + name)).string();
+  };
+  write_file(folder / "hospital.toml",
+             "[[pacs]]\nname = \"main\"\ndicomweb = \"https://pacs\"\n"
+             "ca-file = \"" +
+                 absent("pacs-ca") + "\"\ntoken-file = \"" + absent("token") +
+                 "\"\n[audit]\nsyslog = \"tls://collector\"\nca-file = \"" + absent("audit-ca") +
+                 "\"\n");
+  const std::vector<std::string> command = {ISOMESHD,
+                                            "check",
+                                            "--data",
+                                            folder / "data",
+                                            "--hospital",
+                                            folder / "hospital.toml",
+                                            "--tls-cert",
+                                            absent("cert"),
+                                            "--tls-key",
+                                            absent("key"),
+                                            "--callback-ca",
+                                            absent("callback"),
+                                            "--blob-ca",
+                                            absent("blob"),
+                                            "--store",
+                                            "postgresql://db/x?sslmode=verify-full&sslrootcert=" +
+                                                absent("root") + "&sslcert=" + absent("client")};
+  const Finished told = run(command, {"PGSSLKEY=" + absent("client-key")});
+  EXPECT_EQ(told.status, 1);
+  for (const std::string name : {"pacs-ca", "token", "audit-ca", "cert", "key", "callback", "blob",
+                                 "root", "client", "client-key"}) {
+    EXPECT_THAT(told.errors, HasSubstr(absent(name) + " cannot be read: No such file")) << name;
+  }
+  EXPECT_THAT(told.errors, HasSubstr("pacs main: ca-file: "));
+  EXPECT_THAT(told.errors, HasSubstr("store: sslrootcert: "));
+  const Finished folders =
+      run({ISOMESHD, "check", "--data", folder / "data", "--callback-ca", "/"});
+  EXPECT_THAT(folders.errors, HasSubstr("callback-ca: / cannot be read: Is a directory"));
+}
+
 // Without tokens only this machine may ask.
 TEST(Start, TheOpenNetworkIsRefusedUnlessAskedFor) {
   const TemporaryFolder folder;

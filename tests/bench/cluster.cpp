@@ -204,6 +204,8 @@ Finding measure_takeover(Postgres& postgres, const std::filesystem::path& progra
     const auto before = victim.job(id).started;
     cluster.add();
     Client other = cluster.client(1);
+    // Until then it leaves leases that run out to their holders.
+    std::this_thread::sleep_for(store::JobStoreOptions{}.grace + kBetweenLooks);
     const auto killed = Clock::now();
     cluster.kill(0);
     for (Job now = other.job(id); now.started == before || now.state != JobState::kRunning;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/http/observe/metrics.h"
@@ -47,6 +48,9 @@ struct WingServices {
   store::ReceivedStore& received;
   std::function<store::Time()> believed_now;
 };
+
+// Files by the settings that name them; a name may be empty.
+using ConfiguredFiles = std::vector<std::pair<std::string, std::filesystem::path>>;
 
 // Thread safe where said.
 class Wing {

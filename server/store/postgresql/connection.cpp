@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <new>
 #include <utility>
@@ -116,15 +117,44 @@ class Connection::Answer : public Rows::Source {
 
 void Connection::Clear::operator()(pg_result* result) const { PQclear(result); }
 
+namespace {
+
+using UrlParts = std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)>;
+
+// Null where it is not valid.
+UrlParts parts_of(const std::string& url) {
+  char* complaint = nullptr;
+  UrlParts parts(PQconninfoParse(url.c_str(), &complaint), &PQconninfoFree);
+  PQfreemem(complaint);  // it repeats what it complains of
+  return parts;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::filesystem::path>> files_of_url(const std::string& url) {
+  constexpr std::array kFiles = {"sslrootcert", "sslcert", "sslkey", "sslcrl", "passfile"};
+  std::vector<std::pair<std::string, std::filesystem::path>> files;
+  const UrlParts parts = parts_of(url);
+  if (!parts) return files;
+  for (const PQconninfoOption* part = parts.get(); part->keyword != nullptr; ++part) {
+    if (std::ranges::find(kFiles, std::string_view(part->keyword)) == kFiles.end()) continue;
+    const char* file = part->val;
+    if (file == nullptr && part->envvar != nullptr) file = std::getenv(part->envvar);
+    const std::string_view name = file == nullptr ? "" : file;
+    // The authorities of the system, and a key in an engine of OpenSSL, are no files.
+    const bool is_file = !name.empty() && name != "system" &&
+                         (name.find(':') == std::string_view::npos || name.starts_with('/'));
+    if (is_file) files.emplace_back(part->keyword, file);
+  }
+  return files;
+}
+
 void check_url(const std::string& url) {
   const auto refuse = [](const std::string& why) { throw invalid_parameter("store", why); };
   if (!url.starts_with("postgresql://") && !url.starts_with("postgres://")) {
     refuse("must be a URL that begins with postgresql://");
   }
-  char* complaint = nullptr;
-  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> parts(
-      PQconninfoParse(url.c_str(), &complaint), &PQconninfoFree);
-  PQfreemem(complaint);  // it repeats what it complains of
+  const UrlParts parts = parts_of(url);
   if (!parts) refuse("is not a valid PostgreSQL URL");
   for (const PQconninfoOption* part = parts.get(); part->keyword != nullptr; ++part) {
     const std::string_view name = part->keyword;

@@ -4,11 +4,13 @@
 
 #include <chrono>
 #include <cstddef>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -29,6 +31,10 @@ class Interrupted : public Error {
 // Throws Error kInvalidParameter for a URL that libpq does not read, or that holds a password: it
 // would be seen in the list of processes and in what `isomeshd check` prints.
 void check_url(const std::string& url);
+
+// Files of certificates, keys and passwords that the URL or the environment names, by libpq's words
+// for them. None where the URL is not valid.
+std::vector<std::pair<std::string, std::filesystem::path>> files_of_url(const std::string& url);
 
 // Why no connection can be made, as libpq says it; empty if one can. The text may name hosts, users
 // and files, so it is for the operator alone. libpq never puts a password into it.
