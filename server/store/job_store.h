@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -129,6 +130,10 @@ struct JobStoreOptions {
   int attempts = 3;                             // how often a job is begun that fails
   std::chrono::milliseconds retry_delay{1000};  // after the first attempt; four times it after each
   std::string mesher_version = {};              // results of another one are not reused
+  // How long a run is expected to take. Owners take turns by it; it is asked once for each job,
+  // when that is submitted.
+  std::function<double(const Volume&, const JobParameters&)> expected_ms =
+      [](const Volume&, const JobParameters&) { return 1000.0; };
 };
 
 // Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
@@ -156,8 +161,9 @@ class JobStore {
   // and kUnavailable when the queue is full.
   virtual Job remake(const std::string& id) = 0;
 
-  // The next job by priority, then age, for `lease` from now. A job whose like is running for the
-  // same owner is left until that one has ended. Empty when there is none.
+  // The next job for `lease` from now: by priority, then by turns of the owners (sql/turns.h), then
+  // by age. A job whose like is running for the same owner is left until that one has ended. Empty
+  // when there is none.
   virtual std::optional<Lease> claim(const std::string& worker,
                                      std::chrono::milliseconds lease) = 0;
 
