@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/ids.h"
+#include "server/jobs/estimate.h"
 #include "server/jobs/pipeline.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/identity.h"
@@ -29,6 +30,7 @@ namespace {
 store::JobStoreOptions job_options(const Options& options) {
   store::JobStoreOptions result = options.jobs;
   result.mesher_version = jobs::kMesherVersion;
+  result.expected_ms = jobs::expected_ms;
   return result;
 }
 

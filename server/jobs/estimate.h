@@ -64,6 +64,10 @@ class CostModel {
   std::map<MeshFormat, Correction> files_;  // kFewBytes for those that are not here
 };
 
+// How long a run is expected to take before anything of its volume is read, in milliseconds: as on
+// a surface of typical size. Owners take turns in the queue by it.
+double expected_ms(const Volume& volume, const JobParameters& parameters);
+
 // Estimates jobs on stored volumes, whose surfaces a process of its own counts. Counts of the last
 // surfaces are kept. Thread safe; what it is
 // made of must outlive it.

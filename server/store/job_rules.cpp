@@ -1,6 +1,7 @@
 #include "server/store/job_rules.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/sha256.h"
 #include "base/share.h"
@@ -29,6 +30,13 @@ std::string result_key(const std::string& volume, const std::vector<Note>& notes
   if (parameters.certify) text += "\ncertified";
   for (const Note& note : notes_in_mesh(notes)) text += '\n' + note.code + ": " + note.detail;
   return sha256_of(text);
+}
+
+std::int64_t turn_cost_us(double expected_ms) {
+  constexpr double kLeast = 1;
+  constexpr double kMost = 24.0 * 3600 * 1000;
+  const double bounded = std::isnan(expected_ms) ? kMost : std::clamp(expected_ms, kLeast, kMost);
+  return std::llround(bounded * 1000);
 }
 
 void throw_no_volume(bool is_gone) {

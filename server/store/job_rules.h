@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ inline constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
 // `notes` are the volume's: a mesh carries some of them.
 std::string result_key(const std::string& volume, const std::vector<Note>& notes,
                        const JobParameters& parameters, const std::string& mesher_version);
+
+// What a turn in the queue costs, in microseconds: how long the run is expected to take. Never
+// nothing, so that no owner's jobs are free, and at most a day.
+std::int64_t turn_cost_us(double expected_ms);
 
 // The job's volume is not there, or not any more.
 [[noreturn]] void throw_no_volume(bool is_gone);

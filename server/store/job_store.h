@@ -137,6 +137,10 @@ struct JobStoreOptions {
   std::chrono::milliseconds grace{10'000};
   // By which leases are renewed and outages are measured.
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
+  // How long a run is expected to take. Owners take turns by it; it is asked once for each job,
+  // when that is submitted.
+  std::function<double(const Volume&, const JobParameters&)> expected_ms =
+      [](const Volume&, const JobParameters&) { return 1000.0; };
 };
 
 // Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
@@ -166,8 +170,9 @@ class JobStore {
   // cannot be made again, and kUnavailable when the queue is full.
   virtual Job remake(const std::string& id) = 0;
 
-  // The next job by priority, then age, for `lease` from now. A job whose like is running for the
-  // same owner is left until that one has ended. Empty when there is none.
+  // The next job for `lease` from now: by priority, then by turns of the owners (sql/turns.h), then
+  // by age. A job whose like is running for the same owner is left until that one has ended. Empty
+  // when there is none.
   virtual std::optional<Lease> claim(const std::string& worker,
                                      std::chrono::milliseconds lease) = 0;
 

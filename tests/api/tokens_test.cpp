@@ -126,6 +126,43 @@ TEST_F(TokensTest, ATokenSeesItsOwnAloneAndAnAdministratorAll) {
   EXPECT_EQ(daemon_.get(of_volume, bearer(mr_)).status, 200);
 }
 
+// The queue is filled while no job runs, so that nothing depends on who is faster.
+TEST_F(TokensTest, AnOwnersJobWaitsForOneRunningJobAWorkerHoweverManyAnotherHasQueued) {
+  constexpr int kWorkers = 2;
+  const TemporaryFolder data;
+  const RawUpload sphere = sphere_upload();
+  std::string volume;
+  const auto submit_as = [&](const Daemon& daemon, const std::string& token, int iso) {
+    JobParameters parameters;
+    parameters.volume = volume;
+    parameters.iso = iso;
+    return Client({.server = daemon.url(), .token = token}).submit(parameters).id;
+  };
+  std::vector<std::string> many;
+  std::string one;
+  {
+    Daemon idle(data / "data", "127.0.0.1:0", {"--tokens", file_, "--workers", "0"});
+    for (const std::string& token : {ct_, mr_}) {
+      const Answer uploaded =
+          idle.send("POST", "/v1/volumes?" + sphere.query, sphere.bytes, bearer(token));
+      ASSERT_EQ(uploaded.status, 201) << uploaded.body;
+      volume = volume_from_json(uploaded.body).id;
+    }
+    for (int n = 0; n < 12; ++n) many.push_back(submit_as(idle, ct_, 90 + n));
+    one = submit_as(idle, mr_, 100);
+    ASSERT_EQ(idle.stop(), 0);
+  }
+  const Daemon daemon(data / "data", "127.0.0.1:0",
+                      {"--tokens", file_, "--workers", std::to_string(kWorkers)});
+  const std::string started =
+      Client({.server = daemon.url(), .token = mr_}).wait(one).started.value();
+  Client ct({.server = daemon.url(), .token = ct_});
+  const auto is_before = [&](const std::string& id) {
+    return ct.wait(id).started.value() < started;
+  };
+  EXPECT_LE(std::ranges::count_if(many, is_before), kWorkers);
+}
+
 TEST_F(TokensTest, TheCommandSendsItAndSaysWhatIsMissing) {
   const Finished refused = daemon_.command({"list"});
   EXPECT_EQ(refused.status, 1);

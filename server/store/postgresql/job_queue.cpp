@@ -75,9 +75,10 @@ Submission PostgresJobStore::submit(const JobSpec& spec) {
 
 std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, Job job) {
   const std::int64_t accepted = database_.now_us();
-  const std::string key =
-      database_.read([&](SqlConnection& connection) { return result_key_of(connection, spec); })
-          .value_or("");
+  const Asked found =
+      database_.read([&](SqlConnection& connection) { return look_up(connection, spec); })
+          .value_or(Asked{});
+  const std::string& key = found.result_key;
   const auto made = made_like(spec.owner, key);
   const MeshSummary* mesh = made && made->mesh && !refusing_ ? &*made->mesh : nullptr;
   if (mesh != nullptr) {
@@ -99,6 +100,7 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
       {"idempotency_key", spec.idempotency_key.empty() ? Json() : Json(spec.idempotency_key)},
       {"request_digest", spec.request_digest},
       {"record", to_record(job)},
+      {"cost", found.cost_us},
       {"node", database_.node()},
       {"latest", made ? Json(made->job) : Json()},
       {"reuses", mesh != nullptr},

@@ -93,16 +93,17 @@ std::uint64_t copy(Source& from, Connection& to, const Table& table) {
 std::uint64_t copy_jobs(Source& from, Connection& to) {
   constexpr Table kTable = {
       "jobs(id, owner, state, priority, volume, result_key, accepted, finished, not_before, "
-      "attempts, fence, waiting_for, idempotency_key, request_digest, record, receiver, url)",
+      "attempts, fence, waiting_for, idempotency_key, request_digest, record, cost, receiver, "
+      "url)",
       "SELECT id, owner, state, priority, volume, result_key, accepted, finished, not_before, "
-      "attempts, fence, waiting_for, idempotency_key, coalesce(request_digest, ''), record FROM "
-      "jobs ORDER BY id",
-      17};
+      "attempts, fence, waiting_for, idempotency_key, coalesce(request_digest, ''), record, cost "
+      "FROM jobs ORDER BY id",
+      18};
   const std::string sql = insertion(kTable);
   std::uint64_t count = 0;
   Rows rows = from.query(kTable.rows);
   for (; rows.next(); ++count) {
-    Values values(rows, 15);
+    Values values(rows, 16);
     const auto callback = job_from_record(rows.text(14)).parameters.callback;
     values.add(callback ? std::optional(receiver_of(callback->url)) : std::nullopt);
     values.add(callback ? std::optional(callback->url) : std::nullopt);

@@ -3,6 +3,8 @@
 #include <array>
 #include <string>
 
+#include "server/store/sql/turns.h"
+
 namespace isomesh::store::postgresql {
 namespace {
 
@@ -211,6 +213,18 @@ ALTER TABLE audit ADD COLUMN IF NOT EXISTS chain text;  -- see AuditChain; none 
 )sql",
                                 R"sql(
 COMMENT ON TABLE runs IS 'leases: a row is its holder''s until somebody ends it, also after its time';
+)sql",
+                                R"sql(
+ALTER TABLE jobs ADD COLUMN cost bigint NOT NULL DEFAULT 1000000;  -- microseconds that a run is expected to take
+DROP INDEX jobs_queue;
+CREATE INDEX jobs_by_turn ON jobs(priority, owner, seq) WHERE state = 0;
+CREATE TABLE turns(                    -- of owners' last claims; see turns.h
+  priority int NOT NULL,
+  owner text COLLATE "C" NOT NULL,
+  start_tag bigint NOT NULL,
+  finish_tag bigint NOT NULL,
+  PRIMARY KEY(priority, owner)
+) WITH (fillfactor = 50);
 )sql"};
 
 // As the newest version has them, each a verb in one round trip. Whoever changes one adds a
@@ -251,8 +265,8 @@ DECLARE s record; old record; n bigint; latest text;
 BEGIN
   SELECT * INTO s FROM jsonb_to_record(p) AS t(
     id text, owner text, priority int, volume text, result_key text, accepted bigint, receiver text, url text,
-    idempotency_key text, request_digest text, record text, node uuid, latest text, reuses boolean, blobs jsonb,
-    most bigint, has_share boolean);
+    idempotency_key text, request_digest text, record text, cost bigint, node uuid, latest text, reuses boolean,
+    blobs jsonb, most bigint, has_share boolean);
   IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = s.id) THEN  -- asked again after a lost connection
     RETURN QUERY SELECT 'new', s.id;
     RETURN;
@@ -285,9 +299,9 @@ BEGIN
     IF NOT s.has_share THEN RETURN QUERY SELECT 'no share', NULL::text; RETURN; END IF;
   END IF;
   INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
-                   request_digest, record)
+                   request_digest, record, cost)
     VALUES(s.id, s.owner, 0, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url, s.idempotency_key,
-           s.request_digest, s.record)
+           s.request_digest, s.record, coalesce(s.cost, 1000000))  -- older daemons tell none
     ON CONFLICT DO NOTHING;
   IF NOT FOUND THEN                    -- two with one key
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
@@ -304,24 +318,37 @@ BEGIN
 END $$;
 
 -- A claim that is lost with the database's power is made again, so it does not wait for the disk. The fence is
--- never one that a lost claim had: the time is in it.
+-- never one that a lost claim had: the time is in it. Claims are made one after the other, so that each sees the turns
+-- that the others have taken.
 CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint)
 RETURNS TABLE(id text, fence bigint, attempts int, owner text, record text, accepted bigint, claimed bigint)
 LANGUAGE plpgsql AS $$
-DECLARE c record; now_us bigint; f bigint;
+DECLARE turn record; c record; now_us bigint; f bigint;
 BEGIN
   PERFORM set_config('synchronous_commit', 'off', true);
+  PERFORM pg_advisory_xact_lock(hashtext('isomesh claim'), hashtext(current_schema()));
   LOOP
     now_us := isomesh_now();
-    SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted INTO c FROM jobs j
-      WHERE j.state = 0 AND j.not_before <= now_us
-        AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)
-      ORDER BY j.priority, j.seq LIMIT 1 FOR UPDATE OF j SKIP LOCKED;
-    IF NOT FOUND THEN RETURN; END IF;
+    SELECT head.id, q.priority, q.start_tag INTO turn FROM queued_owners q CROSS JOIN LATERAL (
+        SELECT j.id, j.seq FROM jobs j
+          WHERE j.state = 0 AND j.priority = q.priority AND j.owner = q.owner AND j.not_before <= now_us
+            AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)
+          ORDER BY j.seq LIMIT 1) AS head
+      ORDER BY q.priority, q.start_tag, head.seq LIMIT 1;
+    IF NOT FOUND THEN
+      DELETE FROM turns;
+      RETURN;
+    END IF;
+    SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted, j.cost INTO c FROM jobs j
+      WHERE j.id = turn.id AND j.state = 0 FOR UPDATE;
+    CONTINUE WHEN NOT FOUND;           -- cancelled meanwhile
     f := greatest(c.fence + 1, now_us);
     INSERT INTO runs(job, fence, owner, result_key, node, worker, claimed, lease_until)
-      VALUES(c.id, f, c.owner, c.result_key, p_node, p_worker, now_us, now_us + p_lease) ON CONFLICT DO NOTHING;
-    CONTINUE WHEN NOT FOUND;           -- its like was claimed meanwhile: that run is seen now
+      VALUES(c.id, f, c.owner, c.result_key, p_node, p_worker, now_us, now_us + p_lease);
+    -- Nothing of a higher priority is ready.
+    DELETE FROM turns t WHERE (t.priority, t.finish_tag) <= (turn.priority, turn.start_tag);
+    INSERT INTO turns AS t VALUES(turn.priority, c.owner, turn.start_tag, turn.start_tag + c.cost)
+      ON CONFLICT ON CONSTRAINT turns_pkey DO UPDATE SET start_tag = excluded.start_tag, finish_tag = excluded.finish_tag;
     UPDATE jobs j SET state = 1, fence = f, attempts = c.attempts + 1, waiting_for = NULL WHERE j.id = c.id;
     INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, c.owner, c.id, 0, 1, 1, 0);
     RETURN QUERY SELECT c.id, f, c.attempts + 1, c.owner, c.record, c.accepted, now_us;
@@ -452,6 +479,7 @@ void migrate(Connection& connection) {
     transaction->script(kTables[static_cast<std::size_t>(next)]);
   }
   if (version < kNewest) {
+    transaction->script(kQueuedOwners);
     transaction->script(kFunctions);
     transaction->query("UPDATE isomesh_version SET version = ?1", kNewest);
   }

@@ -95,13 +95,15 @@ Job SqlJobStore::with_progress(const Row& row) const {
 
 // --- What is asked before one is stored
 
-std::optional<std::string> SqlJobStore::result_key_of(SqlConnection& connection,
-                                                      const JobSpec& spec) const {
+std::optional<SqlJobStore::Asked> SqlJobStore::look_up(SqlConnection& connection,
+                                                       const JobSpec& spec) const {
   Rows row = connection.query("SELECT record FROM volumes WHERE owner = ?1 AND id = ?2", spec.owner,
                               spec.parameters.volume);
   if (!row.next()) return std::nullopt;
-  return result_key(spec.parameters.volume, volume_from_record(row.text(0)).notes, spec.parameters,
-                    options_.mesher_version);
+  const Volume volume = volume_from_record(row.text(0));
+  return Asked{.result_key = result_key(spec.parameters.volume, volume.notes, spec.parameters,
+                                        options_.mesher_version),
+               .cost_us = turn_cost_us(options_.expected_ms(volume, spec.parameters))};
 }
 
 void SqlJobStore::throw_no_volume_of(SqlConnection& connection, const JobSpec& spec) {
@@ -130,8 +132,8 @@ Job SqlJobStore::remake(const std::string& id) {
     spec.owner = row.owner;
     spec.parameters = row.job.parameters;
     spec.parameters.callback.reset();
-    const auto key = result_key_of(connection, spec);
-    if (key && row.result_key != *key) throw_other_version();
+    const auto asked = look_up(connection, spec);
+    if (asked && row.result_key != asked->result_key) throw_other_version();
     Rows rows = connection.query(
         select_ +
             "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.id > ?3 ORDER BY j.id DESC LIMIT 1",

@@ -44,6 +44,12 @@ class SqlJobStore : public JobStore {
     int attempts = 0;
     std::uint64_t fence = 0;
     bool cancelling = false;
+    std::int64_t cost_us = 0;  // see turns.h
+  };
+  // What is known of a job that is to be stored.
+  struct Asked {
+    std::string result_key;
+    std::int64_t cost_us = 0;
   };
   // A run that this process has claimed.
   struct Live {
@@ -83,7 +89,7 @@ class SqlJobStore : public JobStore {
   // What this process knows of its own runs is newer than what is recorded.
   Job with_progress(const Row& row) const;
   // Empty when its volume is not there.
-  std::optional<std::string> result_key_of(SqlConnection& connection, const JobSpec& spec) const;
+  std::optional<Asked> look_up(SqlConnection& connection, const JobSpec& spec) const;
   // Throws that it is not, or not any more.
   [[noreturn]] static void throw_no_volume_of(SqlConnection& connection, const JobSpec& spec);
   bool is_full(SqlConnection& connection) const;

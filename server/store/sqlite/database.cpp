@@ -6,6 +6,7 @@
 
 #include "proto/error.h"
 #include "server/store/files/files.h"
+#include "server/store/sql/turns.h"
 
 namespace isomesh::store {
 namespace {
@@ -183,6 +184,18 @@ ALTER TABLE audit ADD COLUMN chain TEXT;  -- see AuditChain; none in entries of 
 CREATE TRIGGER audit_is_not_replaced BEFORE INSERT ON audit
   WHEN EXISTS(SELECT 1 FROM audit WHERE id = new.id)
   BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
+)sql",
+                               R"sql(
+ALTER TABLE jobs ADD COLUMN cost INTEGER NOT NULL DEFAULT 1000000;  -- microseconds that a run is expected to take
+DROP INDEX jobs_queue;
+CREATE INDEX jobs_by_turn ON jobs(priority, owner, id, state) WHERE state = 0;  -- covers the look for owners
+CREATE TABLE turns(           -- of owners' last claims; see turns.h
+  priority INTEGER NOT NULL,
+  owner TEXT NOT NULL,
+  start_tag INTEGER NOT NULL,
+  finish_tag INTEGER NOT NULL,
+  PRIMARY KEY(priority, owner)
+) WITHOUT ROWID;
 )sql"};
 
 // Versions 1 and 2 were never released.
@@ -214,6 +227,7 @@ Connection::Mode migrated(const std::filesystem::path& file) {
   for (std::int64_t next = version == 0 ? kFirst : version + 1; next <= kNewest; ++next) {
     connection.script(kSteps[static_cast<std::size_t>(next - kFirst)]);
   }
+  connection.script(kQueuedOwners);
   connection.script(("PRAGMA user_version=" + std::to_string(kNewest)).c_str());
   transaction.commit();
   return Connection::Mode::kWrite;

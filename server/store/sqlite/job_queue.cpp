@@ -42,9 +42,10 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
   {
     Change change(*this);
     if (auto before = known(change.connection(), spec)) return *std::move(before);
-    const auto result_key = result_key_of(change.connection(), spec);
-    if (!result_key) throw_no_volume_of(change.connection(), spec);
-    row.result_key = *result_key;
+    const auto asked = look_up(change.connection(), spec);
+    if (!asked) throw_no_volume_of(change.connection(), spec);
+    row.result_key = asked->result_key;
+    row.cost_us = asked->cost_us;
     row.accepted = now_us();
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;
@@ -63,10 +64,10 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
         spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
     change->run(
         "INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, not_before, "
-        "attempts, fence, cancelling, idempotency_key, request_digest, record) "
-        "VALUES(?, ?, 0, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?)",
+        "attempts, fence, cancelling, idempotency_key, request_digest, record, cost) "
+        "VALUES(?, ?, 0, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?, ?)",
         row.job.id, row.owner, spec.parameters.priority, spec.parameters.volume, row.result_key,
-        row.accepted, key, spec.request_digest, to_record(row.job));
+        row.accepted, key, spec.request_digest, to_record(row.job), row.cost_us);
     if (mesh) {
       row.job.reused = true;
       succeed(change, row, *mesh);
@@ -84,16 +85,10 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   // A claim that a power cut takes back leaves the job queued, and its worker is gone.
   Change change(*this, Durability::kProcess);
   const std::int64_t now = now_us();
-  std::optional<Row> next;
-  {
-    Rows query = change->query(
-        select_ +
-            "WHERE j.state = 0 AND j.not_before NOT BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS "
-            "(SELECT 1 FROM jobs r WHERE r.owner = j.owner AND r.result_key = j.result_key AND "
-            "r.state = 1) ORDER BY j.priority, j.id LIMIT 1",
-        now, kLongestWaitUs);
-    if (!query.next()) return std::nullopt;
-    next = row_of(query);
+  auto next = take_turn(change, now);
+  if (!next) {
+    change.commit();
+    return std::nullopt;
   }
   Row& row = *next;
   row.fence += 1;
@@ -121,6 +116,36 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
     throw;
   }
   return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
+}
+
+std::optional<SqliteJobStore::Row> SqliteJobStore::take_turn(Change& change,
+                                                             std::int64_t now) const {
+  std::string id;
+  std::int64_t start_tag = 0;
+  {
+    Rows query = change->query(
+        "WITH heads AS MATERIALIZED (SELECT q.priority, q.start_tag, (SELECT j.id FROM jobs j "
+        "WHERE j.state = 0 AND j.priority = q.priority AND j.owner = q.owner AND j.not_before NOT "
+        "BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS (SELECT 1 FROM jobs r WHERE r.owner = j.owner "
+        "AND r.result_key = j.result_key AND r.state = 1) ORDER BY j.id LIMIT 1) AS job FROM "
+        "queued_owners q) SELECT job, start_tag FROM heads WHERE job IS NOT NULL ORDER BY "
+        "priority, start_tag, job LIMIT 1",
+        now, kLongestWaitUs);
+    if (query.next()) {
+      id = query.text(0);
+      start_tag = query.integer(1);
+    }
+  }
+  std::optional<Row> row;
+  if (!id.empty()) row = find(change.connection(), std::nullopt, id);
+  // Nothing of a higher priority is ready, or nothing at all.
+  constexpr int kAfterAll = static_cast<int>(Priority::kBulk) + 1;
+  const int priority = row ? static_cast<int>(row->job.parameters.priority) : kAfterAll;
+  change->run("DELETE FROM turns WHERE (priority, finish_tag) <= (?, ?)", priority, start_tag);
+  if (!row) return row;
+  change->run("INSERT OR REPLACE INTO turns VALUES(?, ?, ?, ?)", priority, row->owner, start_tag,
+              start_tag + row->cost_us);
+  return row;
 }
 
 Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,

@@ -33,7 +33,7 @@ std::uint64_t greatest_event(Connection& connection) {
 SqliteJobStore::SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options)
     : SqlJobStore(database, blobs, std::move(options),
                   "SELECT j.record, j.owner, j.result_key, j.accepted, j.attempts, j.fence, "
-                  "j.cancelling FROM jobs j "),
+                  "j.cancelling, j.cost FROM jobs j "),
       database_(database),
       log_(greatest_event(database.reader())) {}
 
@@ -44,7 +44,8 @@ SqliteJobStore::Row SqliteJobStore::row_of(const Rows& rows) const {
           .accepted = rows.integer(3),
           .attempts = static_cast<int>(rows.integer(4)),
           .fence = static_cast<std::uint64_t>(rows.integer(5)),
-          .cancelling = rows.boolean(6)};
+          .cancelling = rows.boolean(6),
+          .cost_us = rows.integer(7)};
 }
 
 std::vector<Event> SqliteJobStore::events(const Viewer& viewer, const std::string& job,
@@ -117,8 +118,9 @@ std::optional<MeshSummary> SqliteJobStore::mesh_like(
 
 std::optional<MeshSummary> SqliteJobStore::spoilt_mesh_for(const JobSpec& spec) const {
   auto mesh = database_.read([&](SqlConnection& connection) -> std::optional<MeshSummary> {
-    const auto key = result_key_of(connection, spec);
-    return key ? mesh_like(connection, spec.owner, *key, std::nullopt) : std::nullopt;
+    const auto asked = look_up(connection, spec);
+    return asked ? mesh_like(connection, spec.owner, asked->result_key, std::nullopt)
+                 : std::nullopt;
   });
   return !mesh || is_intact(*mesh, blobs_) ? std::nullopt : std::move(mesh);
 }

@@ -44,6 +44,8 @@ class SqliteJobStore : public SqlJobStore {
   void tell(Event event, std::int64_t) override { log_.tell(std::move(event)); }
   void close_events() override { log_.close(); }
 
+  // The job that is to run next, whose owner's turn is over with that.
+  std::optional<Row> take_turn(Change& change, std::int64_t now) const;
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
   // The job that the same key made before.
   std::optional<Submission> known(Connection& connection, const JobSpec& spec) const;

@@ -202,6 +202,29 @@ TEST(CostModel, FilesThatHoldTheMeshExactlyAreCertifiedOnce) {
               1e-6);
 }
 
+// By which owners take turns.
+TEST(ExpectedTime, GrowsWithTheVolumeAndWithWhatIsAsked) {
+  Volume volume;
+  volume.dims = {100, 100, 100};
+  const double least = expected_ms(volume, {});
+  EXPECT_GT(least, 0);
+  const auto with = [&](const auto& change) {
+    JobParameters parameters;
+    change(parameters);
+    return expected_ms(volume, parameters);
+  };
+  EXPECT_GT(with([](JobParameters& all) { all.passes = 100; }), least);
+  EXPECT_GT(with([](JobParameters& all) { all.certify = true; }), least);
+  EXPECT_GT(with([](JobParameters& all) { all.max_error_mm = 0.1; }), least);
+  EXPECT_LT(with([](JobParameters& all) { all.crop = {{{0, 0, 0}, {10, 10, 10}}}; }), least);
+  const double all_of_it = with([](JobParameters& all) {
+    all.crop = {{{-500, -500, -500}, {500, 500, 500}}};
+  });
+  EXPECT_EQ(all_of_it, least);
+  volume.dims = {200, 200, 200};
+  EXPECT_GT(expected_ms(volume, {}), 3 * least);
+}
+
 TEST(CostModel, LevelsOfDetailTakeTime) {
   JobParameters parameters;
   parameters.formats = {MeshFormat::kGlb};

@@ -27,8 +27,11 @@ TEST_F(ClusterTest, TablesOfANewerVersionAreRefused) {
 
 TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
   const std::string id = submit();
-  ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); UPDATE "
-      "isomesh_version SET version = 1");
+  ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
+      "queued_owners; DROP TABLE turns; DROP INDEX jobs_by_turn; ALTER TABLE jobs DROP COLUMN "
+      "cost; "
+      "CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; UPDATE isomesh_version SET "
+      "version = 1");
   one_.emplace(url_, "one", blobs_);
   const Lease lease = one().claimed();
   EXPECT_EQ(lease.id, id);

@@ -53,6 +53,26 @@ TEST_P(RaceConformance, EveryJobIsClaimedByOneWorker) {
   EXPECT_TRUE(std::ranges::equal(taken, submitted));
 }
 
+// However their claims meet: each sees the turns that the others have taken.
+TEST_P(RaceConformance, WorkersSideBySideTakeTheOwnersByTurns) {
+  constexpr int kClaims = 10;  // of each worker
+  for (int n = 0; n < 4 * kClaims; ++n) submit(unlike(), "");
+  for (int n = 0; n < 4 * kClaims; ++n) submit(unlike(), "other");
+  std::atomic<int> of_other = 0;
+  std::vector<std::jthread> workers;
+  for (int worker = 0; worker < 4; ++worker) {
+    workers.emplace_back([&, name = "worker " + std::to_string(worker)] {
+      for (int n = 0; n < kClaims; ++n) {
+        const auto lease = jobs().claim(name, kLongLease);
+        ASSERT_TRUE(lease);
+        if (lease->owner == "other") ++of_other;
+      }
+    });
+  }
+  workers.clear();
+  EXPECT_EQ(of_other, 2 * kClaims);
+}
+
 TEST_P(RaceConformance, CancelAgainstFinishGivesOneEnd) {
   for (int round = 0; round < 100; ++round) {
     const std::string id = submit().id;

@@ -90,7 +90,9 @@ TEST_F(DatabaseTest, OfTheVersionBeforeKeepsItsVolumesWithTheirLabels) {
           "UPDATE volumes SET record = coalesce(labelled, record); DROP INDEX volumes_by_time; "
           "ALTER TABLE volumes DROP COLUMN labelled; DROP TRIGGER audit_is_not_replaced; ALTER "
           "TABLE "
-          "audit DROP COLUMN chain; PRAGMA user_version=6");
+          "audit DROP COLUMN chain; DROP VIEW queued_owners; DROP TABLE turns; DROP INDEX "
+          "jobs_by_turn; ALTER TABLE jobs DROP COLUMN cost; CREATE INDEX jobs_queue ON "
+          "jobs(priority, id) WHERE state = 0; PRAGMA user_version=6");
   Database database(data_);
   const SqlVolumeStore volumes(database);
   EXPECT_EQ(volumes.get("", "aa"), plain);

@@ -88,7 +88,8 @@ class SqliteEngine : public Engine {
     jobs_.emplace(*database_, *blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
-                                         .mesher_version = "test"});
+                                         .mesher_version = "test",
+                                         .expected_ms = options_.expected_ms});
   }
 
   const EngineOptions options_;
@@ -152,7 +153,8 @@ class PostgresEngine : public Engine {
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
                                          .mesher_version = "test",
-                                         .grace = std::chrono::milliseconds(0)});
+                                         .grace = std::chrono::milliseconds(0),
+                                         .expected_ms = options_.expected_ms});
   }
 
   const EngineOptions options_;

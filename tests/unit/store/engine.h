@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ struct EngineOptions {
   std::size_t max_queued = 100'000;
   std::chrono::milliseconds retry_delay{0};
   bool may_lose_power = false;
+  std::function<double(const Volume&, const JobParameters&)> expected_ms =
+      [](const Volume&, const JobParameters&) { return 1.0; };
 };
 
 // Empty stores that belong together, gone with all they hold when it goes.
