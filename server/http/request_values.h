@@ -87,6 +87,9 @@ std::string cursor_after(std::string_view kind, std::string_view id);
 // The `id` in the parameter `cursor`, printable ASCII; empty without one.
 std::string id_after(const Request& request, std::string_view kind);
 
+// The label in the parameter `cursor` of a list of labels; empty without one.
+std::optional<std::int64_t> label_after(const Request& request, std::string_view kind);
+
 // The error of a cursor that cursor_after has not made for this list.
 Error wrong_cursor();
 

@@ -19,8 +19,6 @@ std::unique_ptr<net::Source> blob_source(std::unique_ptr<store::BlobReader> blob
 
 // A text that stays where it is for as long as the process runs.
 std::unique_ptr<net::Source> text_source(std::string_view text);
-// One that several answers share.
-std::unique_ptr<net::Source> text_source(std::shared_ptr<const std::string> text);
 
 // The next bytes of a body, none at its end. Some may be empty. What it throws cuts the body off.
 using NextPiece = std::function<std::optional<std::string>()>;
