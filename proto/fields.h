@@ -365,6 +365,7 @@ void visit(Is<VolumeLabels> auto& self, auto&& field) {
   field("volume", self.volume);
   field("background", self.background);
   field("labels", self.labels);
+  field("next", self.next);
 }
 
 void visit(Is<Estimate::Queue> auto& self, auto&& field) {
@@ -395,6 +396,9 @@ void visit(Is<Estimate> auto& self, auto&& field) {
   field("queue", self.queue);
   if (is_told(self, !self.labels.empty())) {
     field("labels", self.labels);
+  }
+  if (is_told(self, self.labels_count.has_value())) {
+    field("labels_count", self.labels_count);
   }
 }
 

@@ -48,7 +48,8 @@ struct VolumeLabel {
 struct VolumeLabels {
   std::string volume;
   std::int64_t background = 0;
-  std::vector<VolumeLabel> labels;  // ascending, at most Volume::kMostLabels
+  std::vector<VolumeLabel> labels;  // ascending, at most Volume::kMostLabels, or a page of them
+  std::optional<std::string> next = {};  // the cursor of the next page
 
   bool operator==(const VolumeLabels&) const = default;
 };

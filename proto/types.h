@@ -371,7 +371,10 @@ struct Estimate {
   bool fits = false;                          // true if one job may use that much memory
   double milliseconds = 0;                    // of the run, without the time in the queue
   Queue queue;
-  std::vector<Label> labels = {};  // ascending; only of a job by labels
+  // Ascending, of a job by labels. One by more than MeshSummary::kMostListedLabels has their
+  // number.
+  std::vector<Label> labels = {};
+  std::optional<std::uint64_t> labels_count = {};
 
   bool operator==(const Estimate&) const = default;
 };

@@ -172,8 +172,19 @@ Histogram Client::histogram(const std::string& id, std::uint32_t bins) {
 }
 
 VolumeLabels Client::labels(const std::string& id, std::int64_t background) {
-  const std::string query = query_string({{"background", std::to_string(background)}});
-  return volume_labels_from_json(impl_->repeat({.target = volume_path(id) + "/labels" + query}));
+  VolumeLabels all;
+  std::optional<std::string> cursor;
+  do {
+    Query query = {{"background", std::to_string(background)}};
+    if (cursor) query.emplace_back("cursor", *cursor);
+    VolumeLabels page = volume_labels_from_json(
+        impl_->repeat({.target = volume_path(id) + "/labels" + query_string(query)}));
+    all.volume = page.volume;
+    all.background = page.background;
+    std::ranges::move(page.labels, std::back_inserter(all.labels));
+    cursor = page.labels.empty() ? std::nullopt : page.next;
+  } while (cursor);
+  return all;
 }
 
 void Client::slice(const std::string& id, const SliceOptions& options,

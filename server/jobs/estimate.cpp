@@ -199,7 +199,11 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.scheme = parameters.scheme;
   const CountedSurface counted = count(viewer, volume, parameters, iso);
   const SurfaceSize& surface = counted.size;
-  estimate.labels = counted.labels;
+  if (counted.labels.size() <= MeshSummary::kMostListedLabels) {
+    estimate.labels = counted.labels;
+  } else {
+    estimate.labels_count = counted.labels.size();
+  }
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   estimate.memory_bytes = estimate_memory(surface, parameters, parameters.certify);

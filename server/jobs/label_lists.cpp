@@ -6,7 +6,6 @@
 #include <type_traits>
 #include <unordered_map>
 
-#include "proto/json.h"
 #include "proto/samples.h"
 #include "server/jobs/stored_samples.h"
 #include "server/mesh/lattice/lattice.h"
@@ -200,11 +199,20 @@ VolumeLabels LabelLists::of(const store::Viewer& viewer, const Volume& volume,
   return list_of(*counts(viewer, volume), volume, background);
 }
 
-std::shared_ptr<const std::string> LabelLists::json_of(const store::Viewer& viewer,
-                                                       const Volume& volume,
-                                                       std::int64_t background) {
-  return texts_.get({viewer, volume.id, volume.created, background},
-                    [&] { return to_json(of(viewer, volume, background)); });
+VolumeLabels LabelLists::page_of(const store::Viewer& viewer, const Volume& volume,
+                                 std::int64_t background, std::optional<std::int64_t> after) {
+  const auto list = lists_.get({viewer, volume.id, volume.created, background},
+                               [&] { return of(viewer, volume, background); });
+  const auto& all = list->labels;
+  const auto begin =
+      after ? std::ranges::upper_bound(all, *after, {}, &VolumeLabel::label) : all.begin();
+  const auto left = static_cast<std::size_t>(all.end() - begin);
+  const std::size_t count = std::min(left, MeshSummary::kMostListedLabels);
+  VolumeLabels page = {.volume = list->volume,
+                       .background = background,
+                       .labels = {begin, begin + static_cast<std::ptrdiff_t>(count)}};
+  if (count < left) page.next = std::to_string(page.labels.back().label);
+  return page;
 }
 
 }  // namespace isomesh::jobs

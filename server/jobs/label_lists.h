@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -25,7 +26,7 @@ LabelValues values_of(const Volume& volume);
 class LabelLists {
  public:
   static constexpr std::size_t kVolumes = 16;  // 3 MB each at most
-  static constexpr std::size_t kTexts = 4;     // some 20 MB each at most
+  static constexpr std::size_t kLists = 4;     // some 10 MB each at most
   static constexpr std::size_t kMostWaiting = 12;
 
   explicit LabelLists(const store::BlobStore& blobs) : blobs_(blobs) {}
@@ -40,9 +41,10 @@ class LabelLists {
   std::shared_ptr<const std::vector<mesh::LabelVoxels>> counts(const store::Viewer& viewer,
                                                                const Volume& volume);
 
-  // The same as JSON, shared by all that send it, since it may be long.
-  std::shared_ptr<const std::string> json_of(const store::Viewer& viewer, const Volume& volume,
-                                             std::int64_t background);
+  // The first labels of that list after the label `after`, at most MeshSummary::kMostListedLabels
+  // of them. Its `next` is the last of them, as a text, if there are more.
+  VolumeLabels page_of(const store::Viewer& viewer, const Volume& volume, std::int64_t background,
+                       std::optional<std::int64_t> after);
 
  private:
   using Counts = std::vector<mesh::LabelVoxels>;
@@ -50,8 +52,8 @@ class LabelLists {
   const store::BlobStore& blobs_;
   Memo<std::pair<store::Viewer, std::string>, Counts> counts_{kVolumes, kMostWaiting};
   // By when the record was made, too: the same samples may come again with other names.
-  Memo<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, std::string> texts_{
-      kTexts, kMostWaiting};
+  Memo<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
+      kLists, kMostWaiting};
 };
 
 }  // namespace isomesh::jobs

@@ -189,6 +189,38 @@ class ManyLabelsTest : public LabelsTest {
   const Job job_ = made_of_many();
 };
 
+TEST_F(ManyLabelsTest, OfTheVolumeAreListedInPages) {
+  const std::string path = "/v1/volumes/" + job_.parameters.volume + "/labels";
+  std::int64_t last = 0;
+  std::size_t pages = 0;
+  for (std::string query = "?background=0"; !query.empty(); ++pages) {
+    const Answer answer = daemon_.get(path + query);
+    ASSERT_EQ(answer.status, 200) << answer.body;
+    const VolumeLabels page = volume_labels_from_json(answer.body);
+    EXPECT_LE(page.labels.size(), MeshSummary::kMostListedLabels);
+    for (const VolumeLabel& label : page.labels) EXPECT_EQ(label.label, ++last);
+    query = page.next ? "?cursor=" + *page.next : "";
+  }
+  EXPECT_EQ(last, kLabels);
+  EXPECT_EQ(pages, 4U);
+  EXPECT_EQ(daemon_.client().labels(job_.parameters.volume).labels.size(), kLabels);
+  const json jobs = json::parse(page().body);
+  for (const std::string& wrong : {std::string("1"), jobs["next"].get<std::string>()}) {
+    EXPECT_TRUE(blames(daemon_.get(path + "?cursor=" + wrong), "cursor")) << wrong;
+  }
+}
+
+TEST_F(ManyLabelsTest, AnEstimateTellsTheirNumber) {
+  const std::string path = "/v1/estimate?format=stl&volume=" + job_.parameters.volume + "&labels=";
+  const Estimate all = estimate_from_json(daemon_.get(path + "all").body);
+  EXPECT_EQ(all.labels_count, kLabels);
+  EXPECT_TRUE(all.labels.empty());
+  EXPECT_EQ(all.triangles, job_.mesh->triangles);
+  const Estimate some = estimate_from_json(daemon_.get(path + "1,2").body);
+  EXPECT_EQ(some.labels.size(), 2U);
+  EXPECT_FALSE(some.labels_count);
+}
+
 TEST_F(ManyLabelsTest, AreListedInPages) {
   ASSERT_EQ(job_.state, JobState::kSucceeded) << to_json(job_);
   std::int64_t last = 0;

@@ -190,6 +190,8 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   many_labels.mesh->labels_count = 257;
   Estimate of_labels = estimate;
   of_labels.labels = {{3, 12}};
+  Estimate of_many_labels = estimate;
+  of_many_labels.labels_count = 257;
   Volume volume = daemon_.client().volume(job_.parameters.volume);
   volume.modality = "CT";
   volume.presets = {{"bone", 250}};
@@ -216,6 +218,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"JobParameters", to_json(by_labels.parameters)},
       {"JobList", to_json(std::vector{by_labels, many_labels})},
       {"Estimate", to_json(of_labels)},
+      {"Estimate", to_json(of_many_labels)},
       {"Order", to_json(order)},
       {"OrderList", to_json(std::vector{order})},
       {"PacsList", to_json(std::vector<PacsStatus>(1))},
@@ -232,7 +235,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   check.expect_all();
   // None of an answer's members may be missing, but for those of some jobs only.
   const std::set<std::string> of_some = {"Volume dicom", "Estimate iso", "Estimate labels",
-                                         "Estimate simplified_triangles"};
+                                         "Estimate labels_count", "Estimate simplified_triangles"};
   for (const auto& [schema, text] : complete) {
     if (schema == "JobParameters" || schema == "Problem") continue;
     const json whole = json::parse(text);

@@ -144,7 +144,11 @@ class Jobs(DaemonTest):
 
     def test_many_labels_are_listed_in_pages(self):
         samples = numpy.arange(343, dtype="uint16").reshape(7, 7, 7)
-        job = self.client.wait(self.client.submit(self.client.upload(samples), labels="all", formats=["stl"]))
+        volume = self.client.upload(samples)
+        listed = self.client.labels(volume, background=7)
+        self.assertEqual([each["label"] for each in listed["labels"]], [n for n in range(343) if n != 7])
+        self.assertEqual((listed["volume"], listed["background"]), (volume["id"], 7))
+        job = self.client.wait(self.client.submit(volume, labels="all", formats=["stl"]))
         self.assertNotIn("labels", job["mesh"])
         self.assertEqual(job["mesh"]["labels_count"], 342)
         labels = list(self.client.job_labels(job))

@@ -34,8 +34,6 @@ class BlobSource : public net::Source {
 class TextSource : public net::Source {
  public:
   explicit TextSource(std::string_view text) : left_(text) {}
-  explicit TextSource(std::shared_ptr<const std::string> text)
-      : shared_(std::move(text)), left_(*shared_) {}
 
   More next(std::string& bytes) override {
     const std::string_view piece = left_.substr(0, kBlockBytes);
@@ -45,7 +43,6 @@ class TextSource : public net::Source {
   }
 
  private:
-  const std::shared_ptr<const std::string> shared_;
   std::string_view left_;
 };
 
@@ -88,10 +85,6 @@ std::unique_ptr<net::Source> blob_source(std::unique_ptr<store::BlobReader> blob
 
 std::unique_ptr<net::Source> text_source(std::string_view text) {
   return std::make_unique<TextSource>(text);
-}
-
-std::unique_ptr<net::Source> text_source(std::shared_ptr<const std::string> text) {
-  return std::make_unique<TextSource>(std::move(text));
 }
 
 std::unique_ptr<net::Source> computed_source(NextPiece next, bool in_chunks) {

@@ -19,8 +19,6 @@ std::unique_ptr<net::Source> blob_source(std::unique_ptr<store::BlobReader> blob
 
 // The text must live as long as the process.
 std::unique_ptr<net::Source> text_source(std::string_view text);
-// A text shared by several responses.
-std::unique_ptr<net::Source> text_source(std::shared_ptr<const std::string> text);
 
 // Returns the next bytes of a body, which may be empty; nothing at its end. An exception truncates
 // the body.

@@ -246,6 +246,14 @@ std::string id_after(const Request& request, std::string_view kind) {
   return text.substr(prefix.size());
 }
 
+std::optional<std::int64_t> label_after(const Request& request, std::string_view kind) {
+  const std::string after = id_after(request, kind);
+  if (after.empty()) return std::nullopt;
+  const auto label = parse_int64(after);
+  if (!label) throw wrong_cursor();
+  return label;
+}
+
 Error wrong_cursor() {
   return invalid_parameter("cursor", "must be the `next` of a page of this list");
 }

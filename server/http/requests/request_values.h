@@ -86,6 +86,9 @@ std::string cursor_after(std::string_view kind, std::string_view id);
 // The `id` in the parameter `cursor`, printable ASCII; empty if missing.
 std::string id_after(const Request& request, std::string_view kind);
 
+// The label in the parameter `cursor` of a list of labels; empty without one.
+std::optional<std::int64_t> label_after(const Request& request, std::string_view kind);
+
 // The error for a cursor of another list.
 Error wrong_cursor();
 

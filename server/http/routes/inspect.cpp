@@ -87,17 +87,14 @@ void preview(App& app, const Request& request, Response& response) {
 
 // Names are in the volume's record, which may change, so the list is not immutable.
 void labels(App& app, const Request& request, Response& response) {
-  check_known(request, {"background"});
+  constexpr const char* kCursor = "volume labels";
+  check_known(request, {"background", "cursor"});
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
   const std::int64_t background = whole_number_of(request, "background", 0);
-  auto list = app.services.labels.json_of(viewer_of(request), volume, background);
-  if (is_known(request, response, etag_of(*list), kAskEachTime)) return;
-  const std::size_t length = list->size();
-  response.status = 200;
-  response.stream = {.source = text_source(std::move(list)),
-                     .media_type = "application/json",
-                     .framing = Framing::kLength,
-                     .length = length};
+  VolumeLabels page = app.services.labels.page_of(viewer_of(request), volume, background,
+                                                  label_after(request, kCursor));
+  if (page.next) page.next = cursor_after(kCursor, *page.next);
+  answer_tagged_json(request, response, to_json(page));
 }
 
 void estimate(App& app, const Request& request, Response& response) {

@@ -202,9 +202,7 @@ void check_has_mesh(const Job& job) {
 void list_labels(const App& app, const Request& request, Response& response) {
   constexpr const char* kCursor = "labels";
   check_known(request, {"cursor"});
-  const std::string after = id_after(request, kCursor);
-  const auto last = parse_int64(after);
-  if (!after.empty() && !last) throw wrong_cursor();
+  const auto last = label_after(request, kCursor);
   const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
   check_has_mesh(job);
   const jobs::JobLabels labels = labels_of(app, job);

@@ -59,7 +59,7 @@ TEST_F(LabelListsTest, TellsWhatTheSamplesHave) {
                             .high = {3, 1, 1},
                             .bounds = {{{9, -21.75, 31.5}, {13, -20.75, 34.5}}}};
   EXPECT_THAT(list.labels, ElementsAre(seven, nine));
-  EXPECT_EQ(volume_labels_from_json(*lists_.json_of("", volume, 0)), list);
+  EXPECT_EQ(lists_.page_of("", volume, 0, {}), list);
 }
 
 TEST_F(LabelListsTest, TheBackgroundMayBeAnotherValue) {
@@ -98,13 +98,13 @@ TEST_F(LabelListsTest, AVoxelMayBelongToSeveralLabels) {
 }
 
 // The same samples may come again, with other names.
-TEST_F(LabelListsTest, ATextIsOfOneRecord) {
+TEST_F(LabelListsTest, AListIsOfOneRecord) {
   Volume volume = add_three_voxels();
   volume.labels = {{.label = 7, .name = "old"}};
-  EXPECT_THAT(*lists_.json_of("", volume, 0), testing::HasSubstr("old"));
+  EXPECT_EQ(lists_.page_of("", volume, 0, {}).labels.front().name, "old");
   volume.labels[0].name = "new";
   volume.created += "0";
-  EXPECT_THAT(*lists_.json_of("", volume, 0), testing::HasSubstr("new"));
+  EXPECT_EQ(lists_.page_of("", volume, 0, {}).labels.front().name, "new");
 }
 
 // Planes and volumes that are cut into blocks of 4 MiB.
@@ -152,6 +152,22 @@ TEST_F(LabelListsTest, SixteenBitsOfLabelsAreTheMost) {
   EXPECT_EQ(test::code_thrown_by([&] { lists_.of("", more, 0); }), ErrorCode::kUnusableVolume);
 }
 
+TEST_F(LabelListsTest, ComeInPages) {
+  std::vector<std::int32_t> samples(8 * 8 * 9);
+  for (std::size_t at = 0; at < samples.size(); ++at) samples[at] = static_cast<std::int32_t>(at);
+  const Volume volume = add_samples(samples, {8, 8, 9}, SampleType::kInt32);
+  std::int64_t last = 0;
+  std::optional<std::int64_t> after;
+  for (const std::size_t expected : {256U, 256U, 63U}) {
+    const VolumeLabels page = lists_.page_of("", volume, 0, after);
+    ASSERT_EQ(page.labels.size(), expected);
+    for (const VolumeLabel& label : page.labels) EXPECT_EQ(label.label, ++last);
+    EXPECT_EQ(page.next, expected < 256 ? std::nullopt : std::optional(std::to_string(last)));
+    after = last;
+  }
+  EXPECT_THAT(lists_.page_of("", volume, 0, last).labels, testing::IsEmpty());
+}
+
 TEST_F(LabelListsTest, FractionsAreNoLabels) {
   const Volume volume = add_samples(std::vector<float>(24, 1), {4, 3, 2}, SampleType::kFloat32);
   EXPECT_EQ(test::code_thrown_by([&] { lists_.of("", volume, 0); }), ErrorCode::kUnusableVolume);
@@ -167,10 +183,10 @@ TEST_F(LabelListsTest, SamplesThatAreCutMeanwhileAreDamaged) {
 // An answer that comes at once would tell that somebody else has the volume, too.
 TEST_F(LabelListsTest, AreCountedForEachViewer) {
   const Volume volume = add_three_voxels();
-  lists_.json_of("one", volume, 0);
+  lists_.page_of("one", volume, 0, {});
   blobs_.erase(volume.id);
-  EXPECT_NO_THROW(lists_.json_of("one", volume, 1));
-  EXPECT_EQ(test::code_thrown_by([&] { lists_.json_of("two", volume, 0); }),
+  EXPECT_NO_THROW(lists_.page_of("one", volume, 1, {}));
+  EXPECT_EQ(test::code_thrown_by([&] { lists_.page_of("two", volume, 0, {}); }),
             ErrorCode::kUnusableVolume);
 }
 

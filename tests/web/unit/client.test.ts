@@ -51,6 +51,14 @@ describe('the labels of a job', () => {
   });
 });
 
+describe('the labels of a volume', () => {
+  it('come from all pages', async () => {
+    const list = await client.labelsOf(id, 0);
+    expect(list.labels.map(({ label }) => label)).toEqual([1, 2, 3]);
+    expect(list.next).toBe(null);
+  });
+});
+
 describe('follow', () => {
   it('rejects with a TimeoutError at the time limit, and closes its stream', async () => {
     const began = performance.now();

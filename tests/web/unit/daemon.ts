@@ -60,6 +60,10 @@ export class Daemon {
     } else if (path === `/v1/jobs/${id}/labels`) {
       const isLast = request.url?.endsWith('?cursor=the%20rest') === true;
       response.end(JSON.stringify(isLast ? { labels: [{ label: 3 }], next: null } : { labels: [{ label: 1 }, { label: 2 }], next: 'the rest' }));
+    } else if (path === `/v1/volumes/${id}/labels`) {
+      const isLast = request.url?.endsWith('?background=0&cursor=the%20rest') === true;
+      const labels = isLast ? [{ label: 3 }] : [{ label: 1 }, { label: 2 }];
+      response.end(JSON.stringify({ volume: id, background: 0, labels, next: isLast ? null : 'the rest' }));
     } else if (path === '/v1/jobs' && request.method === 'POST') {
       response.writeHead(202).end(JSON.stringify({ id, key: request.headers['idempotency-key'] }));
     } else if (path === '/v1/volumes' && request.method === 'POST') {

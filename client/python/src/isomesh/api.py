@@ -214,6 +214,8 @@ class VolumeLabels(TypedDict):
     background: int
     #: In ascending order.
     labels: Sequence[VolumeLabel]
+    #: The cursor of the next page. Null on the last page.
+    next: Optional[str]
 
 
 class VolumeLabel(TypedDict):
@@ -270,8 +272,11 @@ class Estimate(TypedDict):
     milliseconds: float
     #: The current number of jobs that the client can see.
     queue: EstimateQueue
-    #: For a job by labels: the exact number of triangles of each label's surface.
+    #: For a job by labels: the exact number of triangles of each label's surface. Left out if
+    #: there are more than 256 labels.
     labels: NotRequired[Sequence[EstimateLabels]]
+    #: The number of labels if they are not listed.
+    labels_count: NotRequired[int]
 
 
 class Callback(TypedDict):

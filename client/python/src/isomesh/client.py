@@ -204,7 +204,9 @@ class Client:
 
     def labels(self, volume: Union[str, api.Volume], background: int = 0) -> api.VolumeLabels:
         """The labels of a segmentation, with their voxels, volumes, names and colours."""
-        return cast("api.VolumeLabels", self._exchange.get(f"{_volume_path(volume)}/labels?background={int(background)}"))
+        query = {"background": str(int(background))}
+        labels = list(self._exchange.pages(f"{_volume_path(volume)}/labels", "labels", query))
+        return {"volume": _id_of(volume), "background": int(background), "labels": labels, "next": None}
 
     # --- Jobs ------------------------------------------------------------------------------------
 

@@ -101,8 +101,17 @@ export class Client {
     return this.connection.json(`${volumePath(id)}/histogram?bins=${bins}`, { signal });
   }
 
-  labelsOf(id: string, background: number, signal?: GlobalAbortSignal): Promise<VolumeLabels> {
-    return this.connection.json(`${volumePath(id)}/labels?background=${background}`, { signal });
+  /** Lists the labels of a volume in ascending order. Samples with the value `background` belong to none. */
+  async labelsOf(id: string, background: number, signal?: GlobalAbortSignal): Promise<VolumeLabels> {
+    const path = `${volumePath(id)}/labels?background=${background}`;
+    const list: VolumeLabels = await this.connection.json(path, { signal });
+    while (list.next !== null) {
+      const query: string = `&cursor=${encodeURIComponent(list.next)}`;
+      const page: VolumeLabels = await this.connection.json(path + query, { signal });
+      list.labels.push(...page.labels);
+      list.next = page.next;
+    }
+    return list;
   }
 
   async slicePicture(
