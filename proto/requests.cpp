@@ -120,7 +120,7 @@ class Flaws {
  private:
   struct Open {
     std::set<std::string> names;
-    std::string name;  // of the next value
+    std::string name;
   };
 
   void see_text(const std::string& text) {
@@ -143,7 +143,7 @@ class Flaws {
 
   std::vector<Open> open_;
   std::vector<std::string> repeated_;
-  std::vector<std::string> halves_;  // paths
+  std::vector<std::string> halves_;
 };
 
 // Converts a query's text to the JSON value that a body would have.
@@ -218,7 +218,6 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   refuse_if(has_background, "label_values", names_background);
 }
 
-// Rules between parameters.
 void settle(const Json& json, JobParameters& parameters, RequestReader& reader) {
   // Clients that send every member also send the default of `close`.
   if (parameters.crop) parameters.close = true;
@@ -241,7 +240,6 @@ void settle(const Json& json, JobParameters& parameters, RequestReader& reader) 
   if (parameters.distances) reader.add("distances", kNeedsGlb);
 }
 
-// Defaults differ between jobs with labels and other jobs.
 JobParameters defaults_of(const Json& json) {
   return json.contains("labels") ? label_parameters({}) : JobParameters{};
 }
@@ -268,7 +266,6 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
   return parameters;
 }
 
-// The body of PATCH /v1/volumes/{id}.
 struct VolumeName {
   std::optional<std::string> name;
 };

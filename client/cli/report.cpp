@@ -36,7 +36,6 @@ std::string iso_of(const JobParameters& parameters) {
   return parameters.iso ? human_number(*parameters.iso) : "otsu";
 }
 
-// The iso-value or the labels that the surface belongs to.
 std::string subject_of(const JobParameters& parameters) {
   const auto& labels = parameters.labels;
   if (!labels) {

@@ -20,7 +20,7 @@
 
 namespace isomesh::codec {
 
-struct Grid;  // draco/grid.h
+struct Grid;
 
 // Our own Draco encoder finds the mesh's topology while it traverses the triangles; it equals
 // measure_topology's. Encoders that may use it return the topology if they have it.
@@ -70,7 +70,7 @@ void encode_vtk(const mesh::Mesh& mesh, Space space, const mesh::Context& contex
 // The origin of a mesh: all parameters, beside the samples, that determine its bytes. No owner, no
 // host, nothing of the job.
 struct Provenance {
-  std::string volume;  // its id
+  std::string volume;
   MeshParameters parameters;
   double iso = 0;  // the value used, also for Otsu's threshold
   std::array<std::uint32_t, 3> dims = {0, 0, 0};

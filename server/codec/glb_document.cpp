@@ -82,7 +82,6 @@ std::size_t add_view(Json& gltf, const MeshoptArray& array, std::size_t offset) 
   return gltf["bufferViews"].size() - 1;
 }
 
-// As above, for decompressed arrays.
 void add_primitive(Json& gltf, const MeshoptChunk& chunk, std::size_t offset) {
   Json attributes = Json::object();
   std::size_t indices = 0;

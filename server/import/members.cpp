@@ -22,7 +22,6 @@
 namespace isomesh::import {
 namespace {
 
-// Only this many ignored files are listed.
 constexpr std::size_t kMostNamed = 100;
 
 // A member of a known format.

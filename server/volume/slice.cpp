@@ -151,7 +151,6 @@ std::optional<std::string_view> SlicePng::next() {
   return bytes_;
 }
 
-// After the last row, writes the end of the file.
 void SlicePng::write_row() {
   if (next_row_ < height_) {
     read_row(next_row_);

@@ -67,7 +67,7 @@ std::string hex_color(const std::array<double, 3>& color) {
 
 struct Object {
   std::string name;
-  std::string part_number;  // none if empty
+  std::string part_number;
   std::size_t material = 0;
   bool is_solid = false;
 };

@@ -86,7 +86,6 @@ std::string cursor_after(std::string_view kind, std::string_view id);
 // The `id` in the parameter `cursor`, printable ASCII; empty if missing.
 std::string id_after(const Request& request, std::string_view kind);
 
-// The error for a cursor of another list.
 Error wrong_cursor();
 
 // The last event that a reconnecting client has seen; empty if missing.

@@ -72,7 +72,6 @@ double plane_distance(const std::vector<double>& gaps, const std::optional<doubl
                  " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
-// Each slice's plane.
 std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
                                      const std::optional<double>& told) {
   const std::vector<std::size_t> starts = position_starts(placed);
@@ -151,7 +150,6 @@ std::uint32_t highest_segment(const Stack& stack) {
   return segment(std::ranges::max(stack.slices, {}, segment));
 }
 
-// Copies the stored samples.
 void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
                  std::span<std::byte> target) {
   std::vector<std::byte> stored;
