@@ -190,8 +190,8 @@ struct DracoParameters {
   bool operator==(const DracoParameters&) const = default;
 };
 
-// Selects connected components. Keeps all if empty. With several members: of the components nearest
-// to the points that are large enough, the largest ones.
+// Selects connected components; keeps all if empty. Several members apply in this order:
+// `nearest_to`, `min_triangles`, `keep`.
 struct ComponentFilter {
   std::optional<std::uint32_t> keep;              // number of the largest components to keep; at
                                                   // least 1
