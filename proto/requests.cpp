@@ -39,7 +39,6 @@ constexpr QueryName::Kind kind_of() {
   return QueryName::Kind::kValue;
 }
 
-// The table's parameters by their names in a query.
 const std::map<std::string, QueryName>& query_names() {
   static const std::map<std::string, QueryName> names = [] {
     std::map<std::string, QueryName> by_name;
@@ -284,7 +283,6 @@ bool is_for_bodies(const std::string& name) {
   return found && !query_names().contains(name);
 }
 
-// Converts a query's text to the JSON value that a body would have.
 Json value_of(const std::string& text, const QueryName& name) {
   switch (name.kind) {
     case QueryName::Kind::kText:

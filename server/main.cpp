@@ -225,7 +225,6 @@ struct OpenHospital {
     return all;
   }
 
-  // Aborts transfers in both directions.
   void stop() {
     answers.stop();
     if (dimse) dimse->stop();

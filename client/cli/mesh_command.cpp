@@ -111,7 +111,6 @@ class Run {
         client_(client_of(options, stop)),
         bar_(!options.quiet && (!is_one_of_many || options.jobs == 1)) {}
 
-  // The exit status. Throws Error.
   int input(const Input& input) {
     seen_ = {};
     std::unique_ptr<ScratchFile> copy;

@@ -61,7 +61,6 @@ std::string size_of(const MeshFile& file) {
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
 }
 
-// The iso-value that was used, also with Otsu's method.
 void tell_iso(const MeshSummary& mesh, Rows& rows) {
   if (mesh.iso) rows.push_back({"iso-value", human_number(*mesh.iso)});
 }

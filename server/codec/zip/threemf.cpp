@@ -72,7 +72,6 @@ struct Object {
   bool is_solid = false;
 };
 
-// Streams the package with its one model.
 class Package {
  public:
   struct Size {

@@ -81,7 +81,6 @@ SeriesVolumes one_an_object(const std::vector<Slice>& slices) {
   return all;
 }
 
-// One volume per segment that has frames.
 SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   SeriesVolumes all = {"their segments", {}};
   const Image& image = *slices.front().image;

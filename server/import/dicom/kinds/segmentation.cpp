@@ -38,7 +38,6 @@ std::vector<Segment> segments_of(const DataSet& data) {
   return segments;
 }
 
-// Empty if missing.
 std::optional<double> slice_distance(const DataSet& data) {
   const auto told =
       Attributes(data, 0).place(kPixelMeasuresSequence).numbers(kSpacingBetweenSlices);
@@ -51,7 +50,6 @@ bool is_whole_step(double gap, double distance) {
   return std::round(steps) >= 1 && std::abs(steps - std::round(steps)) <= kPlaceTolerance;
 }
 
-// The distances between consecutive positions.
 std::vector<double> gaps_of(std::span<const Placed> placed, std::span<const std::size_t> starts) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < starts.size(); ++i) {
@@ -214,7 +212,6 @@ std::vector<LabelEntry> entries_of(const std::vector<Segment>& segments) {
   return label_table(std::move(entries));
 }
 
-// The segments that have a frame.
 std::vector<Segment> segments_in(const Stack& stack) {
   std::set<std::uint32_t> numbers;
   for (const Slice& slice : stack.slices) numbers.insert(slice.frame->segment);
