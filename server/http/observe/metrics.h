@@ -19,17 +19,19 @@
 
 namespace isomesh::http {
 
+// An answered request.
 struct AnsweredRequest {
   std::string_view method;
   std::string_view route;  // its pattern, or kNoRoute
   int status = 0;
   double seconds = 0;
-  std::uint64_t bytes_in = 0;
+  std::uint64_t bytes_in = 0;   // of its body
   std::uint64_t bytes_out = 0;  // of the response's body
 };
 
 std::string_view name_of(callbacks::CallbackOutcome outcome);
 
+// Only with a PACS.
 struct OrderLevels {
   store::OrderCounts counts;
   std::vector<orders::Attempts> failed;
@@ -40,8 +42,8 @@ struct OrderLevels {
 struct Levels {
   std::array<std::uint64_t, 3> queued = {};  // by Priority
   std::uint64_t running = 0;
-  std::uint64_t uploads = 0;  // in progress
-  std::uint64_t callbacks = 0;
+  std::uint64_t uploads = 0;    // in progress
+  std::uint64_t callbacks = 0;  // waiting for delivery
   std::uint64_t disk_used_bytes = 0;
   std::uint64_t disk_free_bytes = 0;
   std::optional<OrderLevels> orders = {};
@@ -56,7 +58,9 @@ class Metrics {
   Metrics& operator=(const Metrics&) = delete;
 
   void count(const AnsweredRequest& request);
+  // A job in a final state.
   void count_ended(const Job& job);
+  // A rejected volume.
   void count_refused(ErrorCode reason);
   void count(callbacks::CallbackOutcome outcome);
 
