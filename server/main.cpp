@@ -225,6 +225,7 @@ struct OpenHospital {
     return all;
   }
 
+  // Aborts transfers in both directions.
   void stop() {
     answers.stop();
     if (dimse) dimse->stop();
