@@ -1,4 +1,3 @@
-// The wall clock as text.
 #pragma once
 
 #include <chrono>

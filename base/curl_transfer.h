@@ -21,7 +21,6 @@ namespace isomesh::curl {
 // the transfer.
 class Guard {
  public:
-  // Returns the result of `run`, or `on_failure` if it throws.
   template <class Run>
   std::size_t operator()(std::size_t on_failure, const Run& run) {
     try {

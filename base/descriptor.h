@@ -1,4 +1,3 @@
-// A file descriptor that its owner closes.
 #pragma once
 
 #include <cstddef>

@@ -50,7 +50,7 @@ struct FieldError {
 
 // A parameter that resolves an ambiguous request.
 struct Choice {
-  std::string parameter;  // of the query
+  std::string parameter;
   std::string value;
   std::string title;  // of this choice, for a person
 
@@ -78,11 +78,9 @@ class Error : public std::runtime_error {
   const std::vector<FieldError>& fields() const { return fields_; }
   const Remedy& remedy() const { return remedy_; }
 
-  // Returns a copy with another detail.
   Error with_detail(const std::string& detail) const {
     return Error(code_, detail, fields_).with_remedy(remedy_);
   }
-  // Returns a copy with another remedy.
   Error with_remedy(Remedy remedy) const {
     Error other = *this;
     other.remedy_ = std::move(remedy);
@@ -95,7 +93,6 @@ class Error : public std::runtime_error {
   Remedy remedy_;
 };
 
-// kInvalidParameter with one invalid field.
 Error invalid_parameter(const std::string& field, const std::string& message);
 
 // kInvalidParameter with several invalid fields; the detail names them all.

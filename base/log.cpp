@@ -43,7 +43,6 @@ std::string text_member(std::string_view name, std::string_view value) {
   return member(name, bare ? std::string(value) : quoted(value));
 }
 
-// The event's name precedes its members.
 std::string event_member(std::string_view name) {
   return chosen_format == LogFormat::kJson ? ",\"event\":" + quoted(name) : ' ' + std::string(name);
 }

@@ -33,7 +33,6 @@ class Sha256 {
   std::unique_ptr<State> state_;
 };
 
-// The hexadecimal digest of a text.
 std::string sha256_of(std::string_view text);
 
 }  // namespace isomesh

@@ -28,7 +28,6 @@ std::string_view beginning(std::string_view text, std::size_t most_bytes);
 // The parts between separators, trimmed; one more than there are separators.
 std::vector<std::string_view> split(std::string_view text, char separator);
 
-// The words between white space.
 std::vector<std::string_view> words(std::string_view text);
 
 // The lines that are not only white space, trimmed.

@@ -12,7 +12,6 @@
 
 namespace isomesh {
 
-// The word for all labels that a volume has.
 inline constexpr const char* kAllLabels = "all";
 
 void visit(Is<RawDescription> auto& self, auto&& field) {

@@ -38,7 +38,6 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 // As a page of volumes, with "labels".
 std::string to_json(const std::vector<LabelSummary>& labels, const std::string& next);
 
-// The body of PATCH /v1/volumes/{id}.
 std::string volume_name_to_json(const std::optional<std::string>& name);
 
 // Reads a server's response. Throws Error kInternal if it does not follow the API.

@@ -50,7 +50,6 @@ void make_object(Json& place);
 void make_array(Json& place);
 // Returns the member of that name; adds it as null if it is new.
 Json& member(Json& object, std::string_view name);
-// Appends a null element.
 Json& append(Json& array);
 
 bool is_null(const Json& json);

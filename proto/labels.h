@@ -54,7 +54,6 @@ struct VolumeLabels {
   bool operator==(const VolumeLabels&) const = default;
 };
 
-// The labels of a segmentation that a job separates.
 struct LabelChoice {
   std::vector<std::int64_t> values;  // empty: all labels of the volume
 

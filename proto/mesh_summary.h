@@ -23,7 +23,6 @@ struct MeshFile {
   bool operator==(const MeshFile&) const = default;
 };
 
-// One label's file within the ZIP.
 struct LabelFile {
   std::uint64_t bytes = 0;
   std::string sha256;        // hex
@@ -171,7 +170,6 @@ struct MeshSummary {
     bool operator==(const Dropped&) const = default;
   };
 
-  // Of vertices, by smoothing.
   struct Displacement {
     double mean = 0;
     double max = 0;
@@ -180,7 +178,7 @@ struct MeshSummary {
   };
 
   std::optional<double> iso = {};  // the value used; none by labels
-  bool empty = false;              // no surface
+  bool empty = false;
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t boundary_edges = 0;

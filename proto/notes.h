@@ -29,8 +29,8 @@ enum class NoteCode {
 
 struct NoteDescription {
   NoteCode code;
-  std::string_view name;     // stable
-  std::string_view meaning;  // one sentence
+  std::string_view name;
+  std::string_view meaning;
   // The code belongs to an error that a user may override: with `accept=name` the volume is taken
   // and has this note.
   bool is_acceptable = false;
@@ -57,7 +57,6 @@ struct Note {
 
 Note note_of(NoteCode code, std::string detail);
 
-// The notes that meshes carry, in their order.
 std::vector<Note> notes_in_mesh(const std::vector<Note>& notes);
 
 }  // namespace isomesh

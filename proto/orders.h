@@ -29,9 +29,8 @@ std::string_view to_string(OrderState value);
 template <>
 std::optional<OrderState> from_string(std::string_view name);
 
-// A series of a configured PACS.
 struct OrderSource {
-  std::string pacs;  // its name
+  std::string pacs;
   std::string study;
   std::string series;
   std::optional<std::uint32_t> instances = {};  // once the series is complete

@@ -19,20 +19,18 @@ concept Is = std::same_as<std::remove_const_t<Self>, T>;
 // The values that differ for one kind of smoothing.
 struct SmoothingCase {
   Smoothing smoothing;
-  std::optional<double> standard = {};  // the default for this kind
+  std::optional<double> standard = {};
   std::optional<double> maximum = {};
 };
 
-// The jobs that a parameter applies to.
 enum class JobKind { kAny, kAtIso, kByLabels };
 
 struct Parameter {
-  const char* name;        // the member in JSON
+  const char* name;
   const char* title = "";  // a short label
   const char* help = "";   // what it does, in one line
   const char* more = "";   // further sentences for readers of the API
   const char* unit = "";   // also the name's ending, as in max_displacement_mm
-  // The range of a number.
   std::optional<double> minimum = {};
   std::optional<double> above = {};
   std::optional<double> maximum = {};

@@ -292,7 +292,6 @@ class RequestReader {
     }
   }
 
-  // The table's row for the range of a label.
   static const Parameter& label_range() {
     static const Parameter range = [] {
       MeshParameters parameters;  // not constant, so that `visit` reaches members that may be

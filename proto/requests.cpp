@@ -39,7 +39,6 @@ constexpr QueryName::Kind kind_of() {
   return QueryName::Kind::kValue;
 }
 
-// The table's parameters by their names in a query.
 const std::map<std::string, QueryName>& query_names() {
   static const std::map<std::string, QueryName> names = [] {
     std::map<std::string, QueryName> by_name;
@@ -120,7 +119,7 @@ class Flaws {
  private:
   struct Open {
     std::set<std::string> names;
-    std::string name;  // of the next value
+    std::string name;
   };
 
   void see_text(const std::string& text) {
@@ -143,7 +142,7 @@ class Flaws {
 
   std::vector<Open> open_;
   std::vector<std::string> repeated_;
-  std::vector<std::string> halves_;  // paths
+  std::vector<std::string> halves_;
 };
 
 // Converts a query's text to the JSON value that a body would have.
@@ -218,7 +217,6 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   refuse_if(has_background, "label_values", names_background);
 }
 
-// Rules between parameters.
 void settle(const Json& json, JobParameters& parameters, RequestReader& reader) {
   // Clients that send every member also send the default of `close`.
   if (parameters.crop) parameters.close = true;
@@ -241,7 +239,6 @@ void settle(const Json& json, JobParameters& parameters, RequestReader& reader) 
   if (parameters.distances) reader.add("distances", kNeedsGlb);
 }
 
-// Defaults differ between jobs with labels and other jobs.
 JobParameters defaults_of(const Json& json) {
   return json.contains("labels") ? label_parameters({}) : JobParameters{};
 }
@@ -268,7 +265,6 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
   return parameters;
 }
 
-// The body of PATCH /v1/volumes/{id}.
 struct VolumeName {
   std::optional<std::string> name;
 };
@@ -287,7 +283,6 @@ bool is_for_bodies(const std::string& name) {
   return found && !query_names().contains(name);
 }
 
-// Converts a query's text to the JSON value that a body would have.
 Json value_of(const std::string& text, const QueryName& name) {
   switch (name.kind) {
     case QueryName::Kind::kText:

@@ -53,7 +53,6 @@ struct RawDescription {
   bool operator==(const RawDescription&) const = default;
 };
 
-// A suggested iso-value for a kind of volume.
 struct Preset {
   std::string name;
   double iso = 0;  // in the volume's units
@@ -96,7 +95,6 @@ struct DicomSegment {
   bool operator==(const DicomSegment&) const = default;
 };
 
-// The device that made the images.
 struct DicomEquipment {
   std::string manufacturer;
   std::string model_name;
@@ -169,10 +167,9 @@ struct Volume {
   bool operator==(const Volume&) const = default;
 };
 
-// The result for one volume of an upload that holds several.
 struct UploadedVolume {
-  std::string member;  // of the archive
-  int status = 0;      // as for a single upload: 201, 200, or the problem's
+  std::string member;
+  int status = 0;  // as for a single upload: 201, 200, or the problem's
   std::optional<Volume> volume = {};
   std::optional<Problem> problem = {};
 
@@ -193,8 +190,8 @@ struct DracoParameters {
   bool operator==(const DracoParameters&) const = default;
 };
 
-// Selects connected components. Keeps all if empty. With several members: of the components nearest
-// to the points that are large enough, the largest ones.
+// Selects connected components; keeps all if empty. Several members apply in this order:
+// `nearest_to`, `min_triangles`, `keep`.
 struct ComponentFilter {
   std::optional<std::uint32_t> keep;              // number of the largest components to keep; at
                                                   // least 1
@@ -325,9 +322,9 @@ struct Job {
   std::optional<std::string> started;
   std::optional<std::string> finished;
   Timing timing;
-  std::optional<MeshSummary> mesh;  // if it succeeded
-  std::optional<Problem> error;     // if it failed
-  bool reused = false;              // took the mesh of an equal job
+  std::optional<MeshSummary> mesh;
+  std::optional<Problem> error;
+  bool reused = false;  // took the mesh of an equal job
   std::optional<WaitingFor> waiting_for = {};
 
   bool operator==(const Job&) const = default;
@@ -337,7 +334,7 @@ struct Job {
 struct Histogram {
   std::string volume;
   std::array<double, 2> range = {0, 0};  // start of the first bin and end of the last
-  std::vector<std::uint64_t> counts;     // of each bin
+  std::vector<std::uint64_t> counts;
 
   bool operator==(const Histogram&) const = default;
 };
@@ -366,10 +363,10 @@ struct Estimate {
   std::uint64_t vertices = 0;
   // The approximate number after simplification, if the job asks for it.
   std::optional<std::uint64_t> simplified_triangles = {};
-  std::map<MeshFormat, std::uint64_t> bytes;  // of each file
-  std::uint64_t memory_bytes = 0;             // the job's peak, without its mapped volume
-  bool fits = false;                          // true if one job may use that much memory
-  double milliseconds = 0;                    // of the run, without the time in the queue
+  std::map<MeshFormat, std::uint64_t> bytes;
+  std::uint64_t memory_bytes = 0;  // the job's peak, without its mapped volume
+  bool fits = false;               // true if one job may use that much memory
+  double milliseconds = 0;         // of the run, without the time in the queue
   Queue queue;
   // Ascending, of a job by labels. One by more than MeshSummary::kMostListedLabels has their
   // number.
@@ -419,7 +416,6 @@ extern template std::optional<Stage> from_string(std::string_view);
 extern template std::optional<WaitingFor> from_string(std::string_view);
 extern template std::optional<Simplification::Bound> from_string(std::string_view);
 
-// All values that have a name, in the order of the contract.
 template <class Enum>
 std::vector<Enum> values_of();
 

@@ -55,7 +55,7 @@ struct Commands::State {
   TokenRequest token = {};
   std::string shell = {};
   std::filesystem::path folder = {};
-  std::string target = {};  // for move
+  std::string target = {};
   std::uint64_t after = 0;  // for the audit trail
   bool verify = false;      // the audit trail
   std::function<void()> chosen = {};

@@ -19,7 +19,6 @@
 namespace isomesh {
 namespace {
 
-// As in TOML: numbers and booleans unquoted.
 std::string quoted(const std::string& value) {
   const bool is_number = !value.empty() &&
                          value.find_first_not_of("0123456789.") == std::string::npos &&

@@ -1,4 +1,3 @@
-// Suggestions for misspelt names.
 #pragma once
 
 #include <string>

@@ -103,7 +103,6 @@ std::string bash_values(const CLI::App& app) {
   return cases;
 }
 
-// Replaces every % of a script by the program's name.
 std::string with_name(std::string script, const std::string& name) {
   for (std::size_t at = 0; (at = script.find('%', at)) != std::string::npos; at += name.size()) {
     script.replace(at, 1, name);

@@ -14,7 +14,6 @@ namespace isomesh::command_line {
 
 enum class Shell { kBash, kZsh, kFish };
 
-// The shell called "bash", "zsh" or "fish".
 std::optional<Shell> shell_from(std::string_view name);
 
 // Arguments by which the program prints the values of a positional, one per line, by the name of

@@ -114,7 +114,6 @@ std::string manual_page(const CLI::App& app, const Manual& manual) {
     for (const CLI::Option* option : shown_options(command)) {
       if (!option->check_lname("help")) commands += entry(*option);
     }
-    // Examples, which the help shows at its end.
     if (!command.get_footer().empty()) commands += ".PP\n" + paragraphs(command.get_footer());
   });
   page += ".SH DESCRIPTION\n" + plain(app.get_description()) + '\n' + options(app, ".SH");

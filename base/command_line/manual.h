@@ -17,10 +17,10 @@ struct Section {
 };
 
 struct Manual {
-  int number = 1;                 // the section of the manual
-  std::string version;            // of the program
-  std::string name;               // what the program does, for `whatis`: no capital, no full stop
-  std::vector<Section> sections;  // after the options
+  int number = 1;  // the section of the manual
+  std::string version;
+  std::string name;  // what the program does, for `whatis`: no capital, no full stop
+  std::vector<Section> sections;
 };
 
 // The page in roff's man macros (man(7)): options by their groups, and each subcommand with its own

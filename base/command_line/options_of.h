@@ -21,7 +21,6 @@ inline std::vector<const CLI::App*> shown_commands(const CLI::App& app) {
 
 inline bool is_flag(const CLI::Option& option) { return option.get_expected_max() == 0; }
 
-// "--output" and "-o".
 inline std::vector<std::string> names_of(const CLI::Option& option) {
   std::vector<std::string> names;
   for (const std::string& name : option.get_snames()) names.push_back("-" + name);

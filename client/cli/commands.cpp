@@ -45,7 +45,6 @@ int upload(const Options& options, const std::stop_token& stop) {
   return status;
 }
 
-// The parameters of a job on a stored volume.
 JobParameters parameters_of(const Options& options, Client& client) {
   JobParameters parameters = options.parameters;
   parameters.volume = volume_id(client, options.id);

@@ -30,7 +30,6 @@ class Lost : public Error {
 // The hint for a user if no server responds.
 void suggest_local();
 
-// The exit status for an error that ended a command.
 int status_of(const Error& error);
 using SampleRange = std::array<double, 2>;
 
@@ -62,7 +61,6 @@ std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
 // the presets, if there is none with that name.
 double preset_of(const Volume& volume, const std::string& name);
 
-// A line for each file that was written.
 std::string outputs_report(const Job& job, const std::vector<Output>& outputs);
 std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs);
 

@@ -35,7 +35,6 @@ std::vector<Candidate> volumes_of(Client& client) {
   return all;
 }
 
-// All pages, or only the first.
 std::vector<Candidate> jobs_of(Client& client, bool is_first_page) {
   std::vector<Candidate> all;
   std::string cursor;

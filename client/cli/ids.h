@@ -9,7 +9,6 @@
 
 namespace isomesh::cli {
 
-// An object that an id may stand for.
 struct Candidate {
   std::string id;
   std::string title;  // distinguishes it from others, for a person

@@ -43,7 +43,6 @@ Client parting_client(const Options& options) {
                  .silence_timeout = std::chrono::seconds{5}});
 }
 
-// Cancels the job after an interrupt.
 void cancel_after_stop(const Options& options, const std::string& id) {
   Client client = parting_client(options);
   try {
@@ -112,7 +111,6 @@ class Run {
         client_(client_of(options, stop)),
         bar_(!options.quiet && (!is_one_of_many || options.jobs == 1)) {}
 
-  // The exit status. Throws Error.
   int input(const Input& input) {
     seen_ = {};
     std::unique_ptr<ScratchFile> copy;
@@ -147,7 +145,6 @@ class Run {
   }
 
  private:
-  // A volume already on the server.
   int stored(const std::string& id, const std::string& name) {
     const Volume found = client_.volume(volume_id(client_, id));
     if (!options_.quiet) tell_notes(found, is_one_of_many_ ? name : "");
@@ -243,7 +240,6 @@ class Run {
   ClientTiming seen_;
 };
 
-// Meshes several inputs concurrently and reports each of them.
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
              Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;

@@ -217,7 +217,6 @@ class Parser {
     ids.group("");
   }
 
-  // Prints the manual page or a completion and ends the program, if that was asked for.
   void describe_itself() const {
     if (manual_->parsed()) throw EarlyExit(0, command_line::manual_page(app_, manual()));
     if (!completion_->parsed()) return;
@@ -294,7 +293,6 @@ class Parser {
     }
   }
 
-  // Some formats hold only one label, others only labels.
   void check_outputs() const {
     const auto& labels = options_.parameters.labels;
     for (const Output& output : options_.outputs) {

@@ -33,7 +33,6 @@ enum class Command {
   kIds,
 };
 
-// The options of orders.
 struct OrderOptions {
   std::string pacs;
   std::string study;

@@ -19,7 +19,6 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-// Seconds with two decimals.
 std::string in_seconds(Seconds time) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f s", time.count());

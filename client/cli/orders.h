@@ -12,9 +12,7 @@ class App;
 
 namespace isomesh::cli {
 
-// The arguments of `isomesh order`.
 void add_order_options(CLI::App& app, Options& options);
-// The arguments of `isomesh orders`.
 void add_orders_options(CLI::App& app, Options& options);
 
 // Places an order, waits for its end unless told not to, and reports the time of each step. Returns
@@ -24,7 +22,6 @@ int order(Client& client, const Options& options);
 // Shows, cancels or retries one order, or lists all.
 int orders(Client& client, const Options& options);
 
-// Lists the PACS.
 int pacs(Client& client, const Options& options);
 
 }  // namespace isomesh::cli

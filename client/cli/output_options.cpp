@@ -17,7 +17,6 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void refuse_output(const std::string& message) { wrong_usage("-o: " + message); }
 
-// The known suffixes: ".drc, .glb or .stl".
 std::string suffixes() {
   std::vector<std::string> all;
   for (const std::string& name : names_from<MeshFormat>()) all.push_back('.' + name);

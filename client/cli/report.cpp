@@ -37,7 +37,6 @@ std::string iso_of(const JobParameters& parameters) {
   return parameters.iso ? human_number(*parameters.iso) : "otsu";
 }
 
-// The iso-value or the labels that the surface belongs to.
 std::string subject_of(const JobParameters& parameters) {
   const auto& labels = parameters.labels;
   if (!labels) {
@@ -63,7 +62,6 @@ std::string size_of(const MeshFile& file) {
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
 }
 
-// The iso-value that was used, also with Otsu's method.
 void tell_iso(const MeshSummary& mesh, Rows& rows) {
   if (mesh.iso) rows.push_back({"iso-value", human_number(*mesh.iso)});
 }

@@ -7,7 +7,6 @@
 
 namespace isomesh::cli {
 
-// The groups of these options in help texts.
 inline constexpr const char* kUploadGroup = "Upload";
 inline constexpr const char* kRawGroup = "Raw samples";
 
@@ -17,7 +16,6 @@ enum class Inputs { kFiles, kFilesAndVolumes };
 // FILE and the options that select a volume in it.
 void add_file(CLI::App& app, Options& options, Inputs inputs = Inputs::kFiles);
 
-// The options that describe raw samples.
 void add_raw(CLI::App& app, Options& options);
 
 }  // namespace isomesh::cli

@@ -66,7 +66,6 @@ std::string disposition_of(const std::filesystem::path& path, const std::string&
   return "attachment; filename*=UTF-8''" + percent_encode(name.empty() ? file.string() : name);
 }
 
-// The body's SHA-256, in base64.
 std::string digest_of(const UploadBody& file) {
   Sha256 sha256;
   std::vector<char> piece(kDigestBytes);

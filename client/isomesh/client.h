@@ -48,7 +48,6 @@ struct ClientOptions {
 
 // Transferred bytes, and the total.
 using TransferProgress = std::function<void(std::uint64_t done, std::uint64_t total)>;
-// Called with the job's latest state.
 using JobProgress = std::function<void(const Job& job)>;
 
 struct UploadOptions {
@@ -80,10 +79,8 @@ struct SliceOptions {
 // The error for several uploaded volumes if one was expected, with them as choices.
 Error several_volumes(const std::vector<UploadedVolume>& volumes);
 
-// Called for each event of a job.
 using JobListener = std::function<void(const JobEvent& event)>;
 
-// Called with the order's latest state.
 using OrderProgress = std::function<void(const Order& order)>;
 
 struct OrderPage {

@@ -32,7 +32,7 @@ class EventReader {
   void finish_event();
 
   Listener listener_;
-  std::string line_;  // incomplete line
+  std::string line_;
   std::string name_;
   std::string data_;
   std::string id_;

@@ -24,7 +24,6 @@ class PartFile {
 
   void write(std::string_view bytes);
 
-  // Discards all bytes.
   void restart();
 
   // Syncs the bytes to disk, then moves the file. Call once, last.

@@ -16,13 +16,12 @@ namespace isomesh {
 inline constexpr std::chrono::seconds kLongestWait{30};
 // The minimum interval between polls, for a server that answers long polls immediately.
 inline constexpr std::chrono::milliseconds kShortestLook{200};
-inline constexpr std::size_t kKeyBytes = 16;  // of an idempotency key
+inline constexpr std::size_t kKeyBytes = 16;
 
 inline bool is_success(const HttpAnswer& answer) {
   return answer.status >= 200 && answer.status < 300;
 }
 
-// The error of an unsuccessful response.
 Error refusal(const HttpAnswer& answer);
 
 // Thread safe.

@@ -1,4 +1,3 @@
-// The client's methods for orders.
 #include "proto/orders.h"
 
 #include <algorithm>

@@ -133,7 +133,7 @@ std::vector<PackedFile> pair_of(const fs::path& path) {
 
 struct Member {
   std::string name;
-  char kind = '0';  // a regular file
+  char kind = '0';
   std::uint64_t bytes = 0;
 };
 

@@ -15,7 +15,7 @@
 namespace isomesh {
 
 struct PackedFile {
-  std::string name;  // within the archive
+  std::string name;
   std::filesystem::path path;
 };
 

@@ -61,7 +61,6 @@ bool may_pass(int status) {
   return std::ranges::count(kPassing, status) > 0;
 }
 
-// The upload's state, as the server reports it.
 struct Progress {
   std::uint64_t offset = 0;
   bool is_whole = false;
@@ -75,7 +74,6 @@ Progress progress_of(const HttpAnswer& answer, std::uint64_t bytes) {
   return {*offset, answer.header("upload-complete") == "?1"};
 }
 
-// The time limit and the back-off of retries.
 class Patience {
  public:
   // Call after progress.

@@ -76,7 +76,6 @@ std::string reason_of(CURLcode code) {
   }
 }
 
-// One request and its response.
 class Transfer {
  public:
   Transfer(const TransportOptions& options, const HttpRequest& request)
@@ -196,7 +195,6 @@ class Transfer {
     return allowed - std::chrono::duration_cast<milliseconds>(now - moved_at_);
   }
 
-  // True if bytes of the source are still to be sent.
   bool is_sending() const {
     return request_.source && info<curl_off_t>(CURLINFO_SIZE_UPLOAD_T) <
                                   static_cast<curl_off_t>(request_.source_bytes);
@@ -284,7 +282,7 @@ class Transfer {
 
   HttpAnswer answer_;
   curl::Guard guard_;
-  std::uint64_t provided_ = 0;  // of the source
+  std::uint64_t provided_ = 0;
   bool sink_has_begun_ = false;
   bool is_paused_ = false;  // the source waits until the response was read
   std::size_t head_bytes_ = 0;

@@ -9,7 +9,6 @@
 
 namespace isomesh {
 
-// A server's address.
 struct ServerAddress {
   std::string origin;                 // scheme, host and optional port: the prefix of URLs
   std::filesystem::path socket = {};  // a local socket; empty: the origin's host and port

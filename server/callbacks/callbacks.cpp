@@ -233,8 +233,8 @@ class Callbacks::Sender {
   std::vector<std::string> secrets_ ISOMESH_GUARDED_BY(mutex_);
   std::mt19937_64 random_{std::random_device()()};
   const Multi multi_;
-  std::map<std::string, std::unique_ptr<Attempt>> attempts_;  // by job
-  std::jthread thread_;                                       // last: it uses all of the above
+  std::map<std::string, std::unique_ptr<Attempt>> attempts_;
+  std::jthread thread_;  // last: it uses all of the above
 };
 
 Callbacks::Callbacks(store::Outbox& outbox, const CallbackTargets& targets, CallbackOptions options,

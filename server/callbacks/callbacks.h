@@ -49,7 +49,6 @@ class Callbacks {
   // Call after a job has ended: there may be deliveries.
   void wake();
 
-  // Replaces the signing keys, after their file was reread.
   void set_secrets(std::vector<std::string> secrets);
 
  private:

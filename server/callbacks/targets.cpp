@@ -81,7 +81,6 @@ std::optional<std::string> as_read(std::string path) {
   return std::nullopt;
 }
 
-// True if the path is the prefix or lies below it.
 bool lies_below(const std::string& path, const std::string& prefix) {
   return path.starts_with(prefix) &&
          (prefix.ends_with('/') || path.size() == prefix.size() || path[prefix.size()] == '/');

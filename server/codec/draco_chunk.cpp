@@ -16,7 +16,6 @@ namespace {
 constexpr int kSlowestOurs = 5;
 constexpr int kFastestOurs = 9;
 
-// Calls visit(triangle) for the run's triangles in order.
 template <class Visit>
 void for_each_triangle(const mesh::Mesh& mesh, const Run& run, Visit visit) {
   for (std::size_t t = run.begin; t < run.end; ++t) visit(mesh.triangles[t]);

@@ -85,7 +85,6 @@ class DracoEncoder {
   std::size_t most_triangles() const { return most_triangles_; }
 
  private:
-  // Input arrays, in layers as in mesh::Mesh.
   struct Part {
     std::span<const mesh::Vec3> positions;
     VertexData data;

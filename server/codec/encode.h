@@ -20,10 +20,7 @@
 
 namespace isomesh::codec {
 
-struct Grid;  // draco/grid.h
-
-// Our own Draco encoder finds the mesh's topology while it traverses the triangles; it equals
-// measure_topology's. Encoders that may use it return the topology if they have it.
+struct Grid;
 
 // Takes the encoded bytes, in order. It may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
@@ -36,7 +33,8 @@ bool is_own_draco(const DracoParameters& draco);
 // millimetres. Positions are quantised to draco.position_bits bits on a cubic grid that encloses
 // the mesh, so a decoded vertex is within half a grid step along each axis. The stream keeps the
 // number of vertices and triangles. The bytes do not depend on the number of threads. `grid`, if
-// given, replaces the mesh's own. Thread safe. Throws Error kUnusableVolume if a position is not
+// given, replaces the mesh's own. Thread safe. Returns the mesh's topology if our own encoder found
+// it on the way; it equals measure_topology's. Throws Error kUnusableVolume if a position is not
 // finite, kInternal if libdraco fails, and kCancelled, which libdraco's one call does not check.
 std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
                                          const mesh::Context& context, const Sink& sink,
@@ -70,7 +68,7 @@ void encode_vtk(const mesh::Mesh& mesh, Space space, const mesh::Context& contex
 // The origin of a mesh: all parameters, beside the samples, that determine its bytes. No owner, no
 // host, nothing of the job.
 struct Provenance {
-  std::string volume;  // its id
+  std::string volume;
   MeshParameters parameters;
   double iso = 0;  // the value used, also for Otsu's threshold
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
@@ -98,8 +96,8 @@ void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
 // triangles than the previous one is omitted. The file starts with the coarsest level. With
 // parameters.distances, every level has the attribute _DISTANCE_MM: the distances to the surface
 // `extracted`, before coordinates are rounded. The bytes do not depend on the number of threads.
-// Throws Error kTooLarge beyond GLB's 4 GiB, kInternal if Draco fails, and kCancelled, checked
-// before each block.
+// Returns the topology as encode_drc does. Throws Error kTooLarge beyond GLB's 4 GiB, kInternal if
+// Draco fails, and kCancelled, checked before each block.
 std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
                                          const mesh::Context& context, const Sink& sink,
                                          const mesh::TriangleGrid* extracted = nullptr);

@@ -18,8 +18,8 @@ namespace isomesh::codec {
 // The input of encoders of labels. All of it must outlive the encoding.
 struct LabelledSurface {
   const mesh::SeparatingSurface& walls;
-  const mesh::LabelTriangles& triangles;  // of the walls
-  std::span<const LabelSummary> labels;   // in the order of the walls' own
+  const mesh::LabelTriangles& triangles;
+  std::span<const LabelSummary> labels;  // in the order of the walls' own
   // The walls as extracted; for files with distances.
   const mesh::TriangleGrid* extracted = nullptr;
 };

@@ -31,7 +31,6 @@ constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;
 
-// The distances of a mesh's vertices, if requested.
 struct Distances {
   Distances() = default;
   Distances(const mesh::Mesh& mesh, const MeshParameters& parameters,
@@ -132,7 +131,6 @@ GlbPart part_of(const LabelSummary& label) {
   return part;
 }
 
-// The triangle fractions of the coarser levels.
 std::span<const double> coarser_shares(const MeshParameters& parameters) {
   return std::span(parameters.lods).subspan(parameters.lods.empty() ? 0 : 1);
 }

@@ -82,7 +82,6 @@ std::size_t add_view(Json& gltf, const MeshoptArray& array, std::size_t offset) 
   return gltf["bufferViews"].size() - 1;
 }
 
-// As above, for decompressed arrays.
 void add_primitive(Json& gltf, const MeshoptChunk& chunk, std::size_t offset) {
   Json attributes = Json::object();
   std::size_t indices = 0;
@@ -191,9 +190,6 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
   }
 }
 
-// For each level, the smallest fraction of the screen's height or width at which it is drawn. There
-// the next level has as many triangles per screen area as the finest has at full screen. The last
-// level is always drawn.
 Json extras_of(const LabelSummary& label) {
   return {{"label", label.label},
           {"voxels", label.voxels},
@@ -201,6 +197,9 @@ Json extras_of(const LabelSummary& label) {
           {"area_mm2", label.area_mm2}};
 }
 
+// For each level, the smallest fraction of the screen's height or width at which it is drawn. There
+// the next level has as many triangles per screen area as the finest has at full screen. The last
+// level is always drawn.
 Json screen_coverage(const GlbPart& part) {
   Json coverage = Json::array();
   for (std::size_t level = 1; level < part.levels.size(); ++level) {

@@ -1,4 +1,3 @@
-// The JSON document of a GLB file. Private to this folder.
 #pragma once
 
 #include <array>
@@ -37,7 +36,6 @@ struct GlbLevel {
     return triangles;
   }
 
-  // Calls visit(bytes) for each chunk.
   template <class Visit>
   void for_each_chunk(const Visit& visit) const {
     for (const DracoStream& stream : streams) visit(std::span(stream.bytes));

@@ -7,7 +7,6 @@
 
 namespace isomesh::codec {
 
-// Triangles and their vertices, as arrays.
 struct Arrays {
   std::span<const mesh::Vec3> positions;
   VertexData data;

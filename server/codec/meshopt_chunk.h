@@ -10,7 +10,6 @@
 
 namespace isomesh::codec {
 
-// One array in a chunk's bytes.
 struct MeshoptArray {
   enum class Kind { kPositions, kNormals, kDistances, kIndices };
 

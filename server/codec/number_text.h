@@ -14,7 +14,6 @@ namespace isomesh::codec {
 inline constexpr std::size_t kMostFloatBytes = 64;
 inline constexpr std::size_t kMostIndexBytes = 10;
 
-// The shortest text that reads as the same number.
 inline char* write_number(float number, char* out) {
   return std::to_chars(out, out + kMostFloatBytes, number, std::chars_format::fixed).ptr;
 }

@@ -18,7 +18,6 @@ inline mesh::Vec3 in_space(const mesh::Vec3& position, Space space) {
 // For encoders that take whole meshes. Needs the memory of another mesh.
 mesh::Mesh copy_in_space(const mesh::Mesh& mesh, Space space);
 
-// Its name in files.
 constexpr std::string_view letters_of(Space space) { return space == Space::kLps ? "LPS" : "RAS"; }
 
 }  // namespace isomesh::codec

@@ -61,7 +61,6 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
       "</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(vertices) +
       "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
       std::to_string(faces) + "\">\n";
-  // In the order of the arrays.
   header += "<Points>\n";
   header += appended.element("Float32", "Points", "NumberOfComponents=\"3\" ", point_bytes);
   header += "</Points>\n<Polys>\n";

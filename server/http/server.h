@@ -1,4 +1,3 @@
-// The HTTP side of the daemon.
 #pragma once
 
 #include <memory>
@@ -13,7 +12,6 @@ namespace isomesh::http {
 class Server {
  public:
   Server(const Services& services, const ServerOptions& options);
-  // Calls stop().
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -74,7 +74,6 @@ std::vector<Table> tables_in(const Companions& companions, const IsWanted& is_wa
   return tables;
 }
 
-// The stems of the other volume files.
 std::vector<std::string> stems_of_volumes(const Companions& companions) {
   std::vector<std::string> stems;
   for (const auto& [name, path] : companions.files) {

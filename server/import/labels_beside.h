@@ -14,7 +14,6 @@ namespace isomesh::import {
 // wrong one. The note on labels lists the table, or the candidates.
 void take_labels_beside(const Companions& companions, Volume& volume);
 
-// True if the file is such a table.
 bool is_label_table(const std::filesystem::path& path);
 
 }  // namespace isomesh::import

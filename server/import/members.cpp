@@ -22,10 +22,8 @@
 namespace isomesh::import {
 namespace {
 
-// Only this many ignored files are listed.
 constexpr std::size_t kMostNamed = 100;
 
-// A member of a known format.
 struct FoundVolume {
   ArchiveMember member;
   const Reader* reader = nullptr;
@@ -153,7 +151,6 @@ std::set<std::filesystem::path> data_of(const std::vector<FoundVolume>& found,
   return all;
 }
 
-// True if two volumes, including their data files, have the same bytes.
 bool are_same(const FoundVolume& one, const FoundVolume& other, Members& members) {
   try {
     for (const FoundVolume* volume : {&one, &other}) members.complete(*volume);
@@ -258,7 +255,6 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   return volume;
 }
 
-// Throws with the volumes as choices.
 [[noreturn]] void offer_members(const Contents& contents, const std::string& asked) {
   std::vector<Choice> choices;
   if (!contents.slices.empty()) {

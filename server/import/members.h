@@ -1,4 +1,3 @@
-// Imports the one volume of an archive.
 #pragma once
 
 #include <cstdint>

@@ -123,7 +123,6 @@ std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
   return reader.most_bytes(beginning.file(), task).file;
 }
 
-// Rejects selections that the file's kind does not support.
 void check_options(const Reader& reader, const ImportOptions& options) {
   const bool is_volume = reader.content == Content::kVolume;
   if (is_volume && !options.series.empty()) {

@@ -29,7 +29,6 @@ std::vector<std::string> data_names_of(const Reader& reader, const InputFile& be
 // Reads an input, plain or compressed as a whole. Throws as import_volume does.
 Volume read_input(const Reader& reader, Input input);
 
-// Reads raw samples as the task's options describe them.
 Volume read_raw_input(const Input& input);
 
 }  // namespace isomesh::import

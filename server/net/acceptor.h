@@ -74,7 +74,7 @@ class Acceptor {
     bool has_head = false;
     std::size_t wanted = 0;  // awaited bytes of the body
     Clock::time_point deadline;
-    bool is_watched = false;  // by epoll
+    bool is_watched = false;
   };
   using PendingList = std::list<Pending>;
 

@@ -17,7 +17,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Interval between checks of `stop`.
 constexpr int kLookMs = 100;
 
 std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses_of(const std::string& host,
@@ -31,7 +30,6 @@ std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses_of(const std::str
   return {found, &::freeaddrinfo};
 }
 
-// Returns true if the connection was established.
 bool await_connection(const Descriptor& socket, Clock::time_point deadline,
                       const std::stop_token& stop) {
   pollfd waiting = {socket.number(), POLLOUT, 0};

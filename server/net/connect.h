@@ -1,4 +1,3 @@
-// Outgoing connections.
 #pragma once
 
 #include <chrono>

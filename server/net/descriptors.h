@@ -1,4 +1,3 @@
-// Limits on open files and connections.
 #pragma once
 
 #include <cstddef>

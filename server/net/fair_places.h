@@ -1,4 +1,3 @@
-// Limits that parties share fairly.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +21,7 @@ class FairPlaces {
   // Releases its place on destruction, which is thread safe.
   class Place {
    public:
-    Place() = default;  // none
+    Place() = default;
     Place(Place&& other) noexcept;
     Place& operator=(Place&& other) noexcept;
     Place(const Place&) = delete;
@@ -52,7 +51,7 @@ class FairPlaces {
   const std::string what_;
   mutable Mutex mutex_;
   std::size_t taken_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  Counts parties_ ISOMESH_GUARDED_BY(mutex_);  // with places
+  Counts parties_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 }  // namespace isomesh::net

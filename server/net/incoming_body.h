@@ -43,10 +43,8 @@ class IncomingBody {
   // True if all bytes have arrived; never for a chunked body, whose end is not checked here.
   bool is_whole() const { return !framing_.chunked && received_ >= framing_.length.value_or(0); }
 
-  // True if reading ended because of malformed chunks.
   bool was_malformed() const { return was_malformed_; }
 
-  // True if reading ended because the body arrived too slowly.
   bool was_too_slow() const { return was_too_slow_; }
 
   // The connection's descriptor, until take_stream().
@@ -61,11 +59,11 @@ class IncomingBody {
 
   std::unique_ptr<ByteStream> stream_;
   const BodyFraming framing_;
-  const std::string begin_;  // bytes that came with the head
+  const std::string begin_;
   const BodyLimits limits_;
   const std::atomic<bool>& stopping_;
   bool waits_for_invitation_ = false;
-  std::size_t begin_read_ = 0;  // bytes of begin_ that were read
+  std::size_t begin_read_ = 0;
   std::uint64_t received_ = 0;
   std::size_t since_deadline_ = 0;
   std::optional<std::chrono::steady_clock::time_point> deadline_;  // set by the first read

@@ -1,4 +1,3 @@
-// A listening socket.
 #pragma once
 
 #include <string>

@@ -15,7 +15,7 @@
 namespace isomesh::net {
 
 struct ParkedRequest {
-  std::string job;                              // the job to wait for
+  std::string job;
   std::chrono::steady_clock::time_point until;  // latest time to resume
   std::function<void()> resume = {};            // called once; must not block
   // Its connection, open until it is resumed; -1: not watched.
@@ -43,7 +43,6 @@ class Parked {
 
   void job_ended(const std::string& job) ISOMESH_EXCLUDES(mutex_);
 
-  // Resumes all requests.
   void close() ISOMESH_EXCLUDES(mutex_);
 
  private:

@@ -128,7 +128,6 @@ void Sender::serve_event(const epoll_event& event) {
   if (sending != by_id_.end()) go_on(sending->second, event.events);
 }
 
-// Returns the time to end.
 Sender::Clock::time_point Sender::take_arrived() {
   std::vector<Response> arrived;
   std::vector<Computed> computed;

@@ -26,9 +26,9 @@ namespace isomesh::net {
 class Source {
  public:
   enum class More {
-    kBytes,   // bytes were appended, or call again at once, to compute them
-    kLater,   // none now; call again after Sender::wake or a second
-    kEnd,     // the response is complete
+    kBytes,  // bytes were appended, or call again at once, to compute them
+    kLater,  // none now; call again after Sender::wake or a second
+    kEnd,
     kBroken,  // failed; the connection is cut to tell the receiver
   };
 
@@ -47,7 +47,6 @@ class Source {
   virtual bool ends_with_reader() const { return false; }
 };
 
-// The bytes of a response and their connection.
 struct Response {
   std::unique_ptr<ByteStream> stream;
   std::string bytes;               // sent first
@@ -107,9 +106,9 @@ class Sender {
     std::size_t held = 0;  // initial size of response.bytes, until all are sent
     Phase phase = Phase::kSending;
     bool waits_for_source = false;
-    bool is_computed = false;        // a computing thread has its source
-    bool is_parting = false;         // in parting_
-    bool is_watched = false;         // by epoll
+    bool is_computed = false;  // a computing thread has its source
+    bool is_parting = false;   // in parting_
+    bool is_watched = false;
     std::size_t since_deadline = 0;  // bytes taken since the deadline was set
     std::size_t ignored = 0;         // bytes received after the response
     Clock::time_point deadline;

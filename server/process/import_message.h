@@ -26,7 +26,6 @@ struct PeersSeries {
   std::vector<std::string> instances;  // all of them, ascending, unique
 };
 
-// A request's options for the uploaded file.
 struct ImportOptions {
   std::optional<RawDescription> raw = {};  // empty: the file has a header
   std::string series = {};                 // UID of the DICOM series; empty: the only one
@@ -55,7 +54,6 @@ struct ImportTask {
   volume::SizeLimits limits = {};
 };
 
-// Limits of one import.
 struct ImportBounds {
   std::uint64_t memory_bytes = std::uint64_t{4} << 30;  // without the mapped samples
   std::chrono::seconds time = std::chrono::minutes(10);
@@ -91,7 +89,6 @@ struct PeersObject {
   bool operator==(const PeersObject&) const = default;
 };
 
-// A PACS's response.
 struct PeersAnswer {
   std::vector<PeersObject> objects;  // search results
   std::vector<PeersObject> stored;   // reported as stored
@@ -113,7 +110,6 @@ std::string volume_message(const Volume& volume);
 std::string answer_message(const PeersAnswer& answer);
 std::string error_message(const Error& error);
 
-// The messages of an import so far.
 struct ImportReport {
   bool begun = false;   // it has its order and will open the file
   std::string reading;  // the last format it named; printable

@@ -8,7 +8,6 @@
 namespace isomesh::process {
 namespace {
 
-// A message with room for one descriptor.
 struct Message {
   Message(void* bytes, std::size_t count) : content{bytes, count} {
     header.msg_iov = &content;

@@ -1,4 +1,3 @@
-// Converts samples to 8-bit grey.
 #pragma once
 
 #include <array>

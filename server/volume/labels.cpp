@@ -36,7 +36,6 @@ class Values {
   std::unordered_set<Sample> seen_;
 };
 
-// One flag per possible value.
 template <class Sample>
 requires(sizeof(Sample) <= 2) class Values<Sample> {
  public:
@@ -53,7 +52,7 @@ requires(sizeof(Sample) <= 2) class Values<Sample> {
 
 struct Neighbours {
   std::size_t pairs = 0;  // not both background
-  std::size_t same = 0;   // equal ones among these
+  std::size_t same = 0;
 };
 
 template <class Sample>

@@ -1,4 +1,3 @@
-// Names of volumes and labels.
 #pragma once
 
 #include <string>

@@ -1,4 +1,3 @@
-// Classes of DICOM objects without images.
 #pragma once
 
 #include <optional>

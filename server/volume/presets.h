@@ -1,4 +1,3 @@
-// Suggested iso-values for kinds of volumes.
 #pragma once
 
 #include <array>

@@ -32,7 +32,6 @@ class PreviewNrrd {
   // Limit of samples read per call of next(), rounded up to a whole row.
   static constexpr std::size_t kSamplesPerPiece = std::size_t{1} << 20;
 
-  // The size of the whole file in bytes.
   std::uint64_t size() const;
 
   // Returns the next bytes of the file, possibly none; empty at its end. Throws Error
@@ -49,13 +48,13 @@ class PreviewNrrd {
   std::shared_ptr<const CanonicalFile> volume_;
   PreviewChoice choice_;
   std::array<std::uint32_t, 3> block_ = {};  // samples averaged along each axis
-  std::array<std::uint32_t, 3> dims_ = {};   // of the result
+  std::array<std::uint32_t, 3> dims_ = {};
   bool has_begun_ = false;
-  std::uint32_t row_ = 0;  // the next to read
+  std::uint32_t row_ = 0;
   std::uint32_t slice_ = 0;
-  std::vector<double> sums_;  // of the present layer
+  std::vector<double> sums_;
   std::vector<std::uint32_t> counts_;
-  std::vector<std::byte> rows_;  // of the file
+  std::vector<std::byte> rows_;
   std::string bytes_;
 };
 

@@ -20,7 +20,6 @@ constexpr std::size_t kCloseBytes = 4096;
 constexpr std::size_t kReadBytes = std::size_t{1} << 20;
 constexpr int kCompression = 3;  // higher levels take much longer for 10 % fewer bytes
 
-// The volume's axes along a picture's columns and rows.
 struct Plane {
   std::size_t fixed;
   std::size_t column;
@@ -151,7 +150,6 @@ std::optional<std::string_view> SlicePng::next() {
   return bytes_;
 }
 
-// After the last row, writes the end of the file.
 void SlicePng::write_row() {
   if (next_row_ < height_) {
     read_row(next_row_);

@@ -61,8 +61,8 @@ class SlicePng {
   std::uint32_t height_ = 0;
   std::uint32_t next_row_ = 0;
   std::vector<std::uint8_t> row_;
-  std::vector<std::byte> block_;  // of the file
-  std::string bytes_;             // encoded; next() returned the first taken_ of them
+  std::vector<std::byte> block_;
+  std::string bytes_;  // encoded; next() returned the first taken_ of them
   std::size_t taken_ = 0;
   std::unique_ptr<Writer> writer_;
 };

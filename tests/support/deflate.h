@@ -12,7 +12,6 @@ std::string gzip(std::string_view bytes);
 std::string zlib(std::string_view bytes);
 std::string raw_deflate(std::string_view bytes);
 
-// One bzip2 stream.
 std::string bzip2(std::string_view bytes);
 
 }  // namespace isomesh::test

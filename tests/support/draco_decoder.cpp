@@ -11,7 +11,6 @@
 namespace isomesh::test {
 namespace {
 
-// Reads consecutive binary values.
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : bytes_(bytes) {}

@@ -1,4 +1,3 @@
-// The names of enumerations.
 #pragma once
 
 #include <string>

@@ -25,7 +25,6 @@ inline std::optional<ErrorCode> code_thrown_by(const std::function<void()>& acti
   return error ? std::optional(error->code()) : std::nullopt;
 }
 
-// The names of the invalid fields.
 inline std::vector<std::string> fields_of(const Error& error) {
   std::vector<std::string> names;
   for (const FieldError& field : error.fields()) names.push_back(field.field);

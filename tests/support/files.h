@@ -1,4 +1,3 @@
-// Files and folders of tests.
 #pragma once
 
 #include <cstddef>

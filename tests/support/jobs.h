@@ -1,4 +1,3 @@
-// Helpers for jobs in stores.
 #pragma once
 
 #include <cstdint>

@@ -183,7 +183,6 @@ Twelfths twelfths(const Point& at) {
   return result;
 }
 
-// The reference's vertex for each vertex of the mesh.
 Complaint name_vertices(const mesh::Mesh& mesh, const LabelReference& reference,
                         std::vector<std::uint32_t>& names) {
   std::map<Twelfths, std::uint32_t> places;
@@ -226,7 +225,6 @@ class TriangleBag {
  public:
   void add(const NamedTriangle& triangle) { ++counts_[triangle]; }
 
-  // Removes all of them if all are present.
   bool take(const std::vector<NamedTriangle>& triangles) {
     for (const NamedTriangle& triangle : triangles) {
       if (!counts_.contains(triangle)) return false;

@@ -45,7 +45,6 @@ class Groups {
 template <class T>
 class Lists {
  public:
-  // `sizes` has one entry per list.
   explicit Lists(const std::vector<std::uint32_t>& sizes) : begin_(sizes.size() + 1, 0) {
     std::partial_sum(sizes.begin(), sizes.end(), begin_.begin() + 1);
     fill_.assign(begin_.begin(), begin_.end() - 1);

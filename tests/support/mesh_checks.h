@@ -47,10 +47,10 @@ TopologyFacts topology_of(const Surface& surface);
 
 struct ExtentFacts {
   double area = 0;
-  double volume = 0;                 // signed sum of the tetrahedra from every triangle to the apex
-  double perimeter = 0;              // of all triangles: bounds the change of area when points move
-  double smallest_area = 0;          // of any triangle
-  std::uint64_t flat_triangles = 0;  // of zero area
+  double volume = 0;     // signed sum of the tetrahedra from every triangle to the apex
+  double perimeter = 0;  // of all triangles: bounds the change of area when points move
+  double smallest_area = 0;
+  std::uint64_t flat_triangles = 0;
   Point low = {0, 0, 0};
   Point high = {0, 0, 0};
 };

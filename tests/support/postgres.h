@@ -52,7 +52,6 @@ class Postgres {
 
   // Starts a stopped cluster as the standby of `primary`.
   void follow(const Postgres& primary);
-  // Makes the standby accept writes.
   void promote();
 
  private:

@@ -30,7 +30,6 @@ std::vector<char*> pointers_to(std::vector<std::string>& words) {
   return pointers;
 }
 
-// The files of a child's standard streams.
 class Streams {
  public:
   explicit Streams(const TemporaryFolder& folder) {

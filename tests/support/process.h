@@ -23,7 +23,6 @@ class Process {
   // NAME=VALUE. Throws std::runtime_error if it cannot be started.
   explicit Process(const std::vector<std::string>& command,
                    const std::vector<std::string>& environment = {});
-  // Kills it if it still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -41,7 +40,6 @@ class Process {
   // after kLongest.
   int wait();
 
-  // True if it ends within that time.
   bool ends_within(std::chrono::seconds longest);
 
   std::string output() const;
@@ -61,7 +59,6 @@ struct Finished {
   std::string errors;
 };
 
-// Starts the command and waits for its end.
 Finished run(const std::vector<std::string>& command,
              const std::vector<std::string>& environment = {});
 

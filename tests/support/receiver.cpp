@@ -17,7 +17,7 @@ namespace {}  // namespace
 struct Receiver::State {
   httplib::Server http;
   int port = 0;
-  std::mutex mutex;  // guards the following members
+  std::mutex mutex;
   std::condition_variable ending;
   bool is_ending = false;
   std::vector<int> statuses;

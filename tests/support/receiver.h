@@ -32,10 +32,8 @@ class Receiver {
 
   std::vector<Received> received() const;
 
-  // Sets the status of all later responses.
   void answer_with(int status);
 
-  // Returns true if that many requests arrive in time.
   bool gets(std::size_t count) const;
 
  private:

@@ -1,4 +1,3 @@
-// Compares a mesh with the reference.
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -31,18 +31,15 @@ class S3Peer {
   void fail(const std::string& what, int count = 0, const std::string& method = "",
             const std::string& part = "");
   void recover() { fail("nothing"); }
-  // Restores the initial state.
   void reset() { tell("/-/reset"); }
 
   // Stores an object as if another client had.
   void put(const std::string& key, std::string_view bytes);
-  // Makes an object older.
   void age(const std::string& key, std::chrono::seconds by);
   void list_in_pages_of(int objects);
   void forget_conditions();
 
   std::vector<std::string> keys();
-  // The number of such requests so far.
   int count(const std::string& method, const std::string& part = "");
   // Multipart uploads that are neither completed nor aborted.
   int open_uploads();

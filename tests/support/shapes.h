@@ -51,7 +51,6 @@ Field gyroid(double period);
 // The quartic whose surface in [-scale, scale]^3 has five handles, shrunk to the cube [-1, 1]^3.
 Field tangle_cube(double scale);
 
-// gain * field + offset.
 Field scaled(const Field& field, double gain, double offset);
 
 // The field at every sample, rounded to the nearest and saturated for integers.

@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kElementsPerTask = std::size_t{1} << 16;
 
-// True if `holds` is true for all elements, checked in parallel.
 template <class T, class Holds>
 bool all_of(const mesh::Buffer<T>& elements, const mesh::Context& context, const Holds& holds) {
   std::vector<char> fine((elements.size() + kElementsPerTask - 1) / kElementsPerTask);

@@ -94,7 +94,6 @@ Matrix transformation_of(const Json& node) {
   return matrix;
 }
 
-// A compressed array of EXT_meshopt_compression.
 struct Packed {
   Bytes bytes;
   std::size_t stride = 0;

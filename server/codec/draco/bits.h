@@ -29,7 +29,6 @@ class BitWriter {
     }
   }
 
-  // Writes the remaining bits.
   void finish() { std::memcpy(out_, &word_, bytes_of(used_)); }
 
  private:

@@ -29,7 +29,6 @@ class EdgeRows {
   };
   void begin(const Range& range, std::uint32_t* words);
 
-  // Adds the half-edges of consecutive faces.
   void add(const mesh::Triangle* triangles, Face begin, Face end);
 
   // No later triangle has the vertices [begin, end), all owned: their unmatched half-edges are

@@ -42,7 +42,6 @@ struct Surface {
 // Bits of each octahedral coordinate of a normal: precise to a tenth of a degree.
 inline constexpr int kNormalBits = 10;
 
-// The attributes' ids in a stream.
 inline constexpr std::uint32_t kPositionId = 0;
 inline constexpr std::uint32_t kNormalId = 1;
 

@@ -21,7 +21,6 @@ class Fans {
   // The original of each copy; copies are numbered after the surface's vertices.
   const std::vector<Vertex>& originals() const { return originals_; }
 
-  // True if a boundary runs through the vertex.
   bool on_boundary(Vertex vertex) const {
     return (on_boundary_[vertex / 64] >> (vertex % 64) & 1) != 0;
   }

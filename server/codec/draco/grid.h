@@ -1,4 +1,3 @@
-// The grid for the quantisation of positions.
 #pragma once
 
 #include <cstddef>

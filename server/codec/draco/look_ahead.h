@@ -21,8 +21,8 @@ class LookAhead {
 
   struct Seen {
     std::optional<Corner> end;  // the corner at which the traversal will end, if known
-    bool all = false;           // everything was traversed
-    Face reached = 0;           // a face farther along
+    bool all = false;
+    Face reached = 0;  // a face farther along
   };
 
   // Predicts a traversal that continues from this corner, after its `first` face, if it has one

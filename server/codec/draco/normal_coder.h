@@ -32,7 +32,6 @@ class NormalCoder {
   void reserve(std::size_t vertices) { coordinates_.reserve(vertices); }
   void quantise(std::span<const mesh::Vec3> normals, std::size_t begin, std::size_t end);
 
-  // Gives vertex `to` the normal of vertex `from`.
   void copy(std::size_t from, std::size_t to) { coordinates_[to] = coordinates_[from]; }
 
   CodedNormals code(const Connectivity& surface, const ValueOrder& order);
@@ -40,8 +39,8 @@ class NormalCoder {
  private:
   using Coordinates = std::array<std::uint16_t, 2>;
 
-  Scratch<Coordinates> coordinates_;  // per vertex
-  Scratch<Coordinates> symbols_;      // in stream order
+  Scratch<Coordinates> coordinates_;
+  Scratch<Coordinates> symbols_;  // in stream order
   Scratch<std::byte> coded_;
 };
 

@@ -11,7 +11,6 @@ namespace {
 // After the table, one cache line per slab.
 constexpr std::size_t kSpareWords = 16;
 
-// True if all vertices of the triangles are in [begin, end).
 bool all_within(std::span<const mesh::Triangle> triangles, Vertex begin, Vertex end) {
   const Vertex count = end - begin;
   std::uint32_t outside = 0;

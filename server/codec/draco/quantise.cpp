@@ -20,7 +20,6 @@ bool quantise(std::span<const mesh::Vec3> positions, const Grid& grid, GridPoint
               Extent& extent) {
   const auto steps = static_cast<float>((1 << grid.bits) - 1);
   const float scale = steps / grid.side;
-  // The fourth lane repeats the first.
   const Floats low = {grid.low[0], grid.low[1], grid.low[2], grid.low[0]};
   const Ints nowhere = {0, 0, 0, 0};
   Ints outside = nowhere;

@@ -1,4 +1,3 @@
-// Entropy coding of residuals; private to this folder.
 #pragma once
 
 #include <cstddef>

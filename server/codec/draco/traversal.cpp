@@ -110,7 +110,6 @@ void Traversal::take_rim(Vertex vertex) {
   rim_.push_back({vertex, components() - 1});
 }
 
-// Traverses from a corner until its connected component is done.
 bool Traversal::walk(Corner corner, const mesh::Context& context) {
   constexpr std::uint32_t kSymbolsBetweenLooks = 1 << 18;
   // Local copies: the compiler assumes that byte stores may alias the members.

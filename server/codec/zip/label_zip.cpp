@@ -70,7 +70,6 @@ struct Encoded {
   std::string sha256;
 };
 
-// For all labels' Draco streams.
 Grid shared_grid(const mesh::Mesh& walls, const MeshParameters& parameters) {
   const Space space = space_of(MeshFormat::kDrc, parameters);
   const int bits = parameters.draco.position_bits;

@@ -67,12 +67,11 @@ std::string hex_color(const std::array<double, 3>& color) {
 
 struct Object {
   std::string name;
-  std::string part_number;  // none if empty
+  std::string part_number;
   std::size_t material = 0;
   bool is_solid = false;
 };
 
-// Streams the package with its one model.
 class Package {
  public:
   struct Size {

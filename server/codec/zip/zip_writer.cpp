@@ -28,7 +28,6 @@ class ZipWriter::Library {
   // Freeing the archive may still write; discard that.
   ~Library() { is_over_ = true; }
 
-  // Returns the offset of the file's bytes.
   std::uint64_t begin(const std::string& name, std::optional<std::size_t> bytes) {
     const std::unique_ptr<archive_entry, Free> entry(archive_entry_new());
     check(entry ? ARCHIVE_OK : ARCHIVE_FATAL);

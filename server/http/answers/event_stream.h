@@ -30,7 +30,6 @@ class Broadcaster {
 
     void put(const store::Event& event) ISOMESH_EXCLUDES(mutex_);
     std::optional<store::Event> take() ISOMESH_EXCLUDES(mutex_);
-    // True if events were lost because too many were unread.
     bool has_lost_some() ISOMESH_EXCLUDES(mutex_);
 
    private:
@@ -62,7 +61,7 @@ class Broadcaster {
 
 struct EventStream {
   std::shared_ptr<Broadcaster::Mailbox> mailbox;
-  std::vector<store::Event> past;       // missed events
+  std::vector<store::Event> past;
   std::uint64_t last = 0;               // the last event that the listener has seen
   std::function<std::string()> result;  // the ended job, as JSON
   net::FairPlaces::Place place;         // one of the limited streams

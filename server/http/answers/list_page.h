@@ -53,7 +53,6 @@ class ListPage {
     return text;
   }
 
-  // True once the last piece was returned.
   bool is_over() const { return is_over_; }
 
  private:

@@ -28,7 +28,7 @@ struct App {
   Metrics& metrics = services.metrics;
   net::FairPlaces uploads;
   KeptUploads kept;
-  net::FairPlaces streams;  // of events
+  net::FairPlaces streams;
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
   // Earlier events belong to a previous process.

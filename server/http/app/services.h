@@ -42,7 +42,6 @@ struct ServerOptions {
   const net::TlsFiles* tls = nullptr;     // null: no TLS
 };
 
-// The components that the routes call.
 struct Services {
   const store::DataFolder& folder;
   const store::BlobStore& blobs;

@@ -27,7 +27,6 @@ Request request_of(net::Connection& connection) {
 
 }  // namespace
 
-// A request, its body, and its response.
 struct Connections::Exchange {
   Exchange(net::Connection connection, const net::BodyLimits& limits,
            const std::atomic<bool>& stopping)

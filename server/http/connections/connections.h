@@ -53,7 +53,6 @@ struct BodySizes {
 struct ConnectionHandlers {
   // Answers a request. Neither it nor its continuation may throw.
   std::function<std::optional<Continuation>(Request& request, Response& response)> answer;
-  // True if a job has ended or does not exist.
   net::Parked::HasEnded has_ended;
   // Called for every answered request, before its response is sent. May be empty.
   std::function<void(const Request& request, const Response& response, const BodySizes& sizes)>

@@ -28,7 +28,6 @@ std::string party_of(const Request& request);
 // caller's role does not permit the route.
 void begin_request(const Tokens* tokens, Request& request, Response& response);
 
-// Logs and counts the request.
 void end_request(Metrics& metrics, const Request& request, const Response& response,
                  const BodySizes& sizes);
 

@@ -33,10 +33,8 @@ void check_origin(const OriginRules& rules, const Request& request);
 // Sets the CORS headers that let an allowed page read the response.
 void allow_reading(const OriginRules& rules, const Request& request, Response& response);
 
-// True for a preflight request of an allowed page.
 bool is_preflight(const OriginRules& rules, const Request& request);
 
-// Responds that `methods` (separated by commas) are allowed.
 void answer_preflight(const std::string& methods, Response& response);
 
 }  // namespace isomesh::http

@@ -1,4 +1,3 @@
-// The authenticated sender of a request and its role.
 #pragma once
 
 #include <string>

@@ -17,7 +17,6 @@
 
 namespace isomesh::http {
 
-// The properties of such a body.
 struct PartialNote {
   std::string owner;
   Parameters query;       // of its first request
@@ -30,7 +29,6 @@ struct PartialNote {
   bool operator==(const PartialNote&) const = default;
 };
 
-// The lease to append.
 struct PartialTurn {
   std::uint64_t number = 0;
   std::uint64_t offset = 0;  // number of bytes when it began
@@ -110,7 +108,7 @@ class PartialUpload {
   PartialNote note_ ISOMESH_GUARDED_BY(mutex_);
   Descriptor file_ ISOMESH_GUARDED_BY(mutex_);
   std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  std::uint64_t turn_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the latest number
+  std::uint64_t turn_ ISOMESH_GUARDED_BY(mutex_) = 0;
   bool is_let_go_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 

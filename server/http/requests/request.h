@@ -20,7 +20,6 @@ namespace isomesh::http {
 // The route of unrouted requests in logs and metrics.
 inline constexpr std::string_view kNoRoute = "none";
 
-// The server's data about a request.
 struct RequestContext {
   std::chrono::steady_clock::time_point began =
       std::chrono::steady_clock::now();  // when its head was read

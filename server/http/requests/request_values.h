@@ -89,7 +89,6 @@ std::string id_after(const Request& request, std::string_view kind);
 // The label in the parameter `cursor` of a list of labels; empty without one.
 std::optional<std::int64_t> label_after(const Request& request, std::string_view kind);
 
-// The error for a cursor of another list.
 Error wrong_cursor();
 
 // The last event that a reconnecting client has seen; empty if missing.

@@ -1,4 +1,3 @@
-// A handler's response.
 #pragma once
 
 #include <chrono>
@@ -22,7 +21,6 @@ enum class Framing {
   kUntilConnectionEnds,
 };
 
-// A body that is produced while it is sent.
 struct StreamedBody {
   std::unique_ptr<net::Source> source;
   std::string media_type;
@@ -38,7 +36,6 @@ struct Response {
   std::optional<StreamedBody> stream;  // instead of `body`; never compressed
 
   bool has_header(std::string_view name) const;
-  // Replaces all headers of that name.
   void set_header(std::string_view name, std::string_view value);
   // Adds a header; for names that may occur several times, such as Vary.
   void add_header(std::string_view name, std::string_view value);

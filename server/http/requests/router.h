@@ -1,4 +1,3 @@
-// Finds the handler of a path and a method.
 #pragma once
 
 #include <deque>
@@ -36,7 +35,6 @@ class Route {
  public:
   explicit Route(std::string pattern);
 
-  // Also the route's name in logs and metrics.
   const std::string& pattern() const { return pattern_; }
   // Handlers by method, in alphabetical order.
   const std::map<std::string, Handler>& handlers() const { return handlers_; }

@@ -18,7 +18,6 @@ struct UploadLimits {
   std::chrono::seconds max_time = std::chrono::hours(1);  // in total; each read has its own limit
 };
 
-// A complete body.
 struct ReceivedBody {
   std::filesystem::path path;
   // The client's name of the file, without folders, from the form or the header

@@ -50,7 +50,6 @@ std::optional<ByteRange> part_of(const Request& request, Response& response,
   }
 }
 
-// Submits the job of a request whose body is the volume.
 Job submit_with_volume(App& app, const Request& request, Response& response) {
   std::vector<std::pair<std::string, std::string>> job_query;
   std::set<std::string> names;  // all names: this only checks for duplicates
@@ -148,7 +147,6 @@ LabelSummary label_of(const jobs::JobLabels& labels, const WhichMesh& which) {
   return *found;
 }
 
-// True if each label has a file of that format.
 bool is_zipped(const jobs::JobLabels& labels, MeshFormat format) {
   return labels.count() > 0 && labels.after(std::nullopt).front().files.contains(format);
 }

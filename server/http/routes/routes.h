@@ -61,7 +61,6 @@ void answer_list(const Request& request, Response& response, ListRequest<Row> li
   });
 }
 
-// The entity tag of a representation.
 std::string etag_of(const std::string& text);
 // For mutable content: the client caches and revalidates it.
 inline constexpr const char* kAskEachTime = "private, no-cache";
@@ -98,10 +97,9 @@ std::optional<Continuation> answer_at_end(App& app, const Request& request, Resp
                                           const Job& job, std::chrono::milliseconds wait,
                                           const JobAnswer& answer);
 
-// A file of a finished job.
 struct WhichMesh {
   MeshFormat format = MeshFormat::kDrc;
-  std::optional<std::int64_t> label = {};  // one label's own file
+  std::optional<std::int64_t> label = {};
 };
 
 // Answers with a finished job's mesh file: entity tag, one range, timings.

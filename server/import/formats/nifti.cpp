@@ -197,7 +197,6 @@ Placement qform_of(const NiftiHeader& header, const Vector3& spacing) {
   return placement;
 }
 
-// The position of sample (i,j,k).
 Vector3 point_of(const Placement& placement, const std::array<double, 3>& index) {
   Vector3 point = placement.origin;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -232,7 +231,6 @@ double shortest_step(const Placement& placement) {
   return shortest;
 }
 
-// Compares the steps of the chosen sform with the voxel sizes.
 void note_other_pixdim(const NiftiHeader& header, const Placement& sform, SourceVolume& volume) {
   constexpr double kTolerance = 0.01;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -276,7 +274,6 @@ Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
   return placement;
 }
 
-// If both forms are present, notes their difference.
 void note_other_form(const NiftiHeader& header, const Placement& taken, const Placement& other,
                      const std::string& name_of_taken, SourceVolume& volume) {
   constexpr double kVoxels = 0.01;

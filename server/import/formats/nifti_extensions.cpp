@@ -25,7 +25,6 @@ std::uint32_t number_at(std::string_view bytes, std::size_t at, bool big_endian)
   return number;
 }
 
-// Padded with zeros.
 std::string_view text_of(std::string_view data) { return data.substr(0, data.find('\0')); }
 
 bool may_have_labels(std::string_view text) {

@@ -56,7 +56,6 @@ void add_field(Fields& fields, std::string_view line) {
   }
 }
 
-// True if the rest of the header lists data files.
 bool names_list(const Fields& fields) {
   const auto found = fields.find(kDataFile);
   return found != fields.end() && found->second.starts_with("LIST");

@@ -7,7 +7,6 @@
 
 namespace isomesh::import {
 
-// True if the header defines segments.
 bool has_segments(const NrrdFields& fields);
 
 // Sets `volume.labels`, and `volume.layers` if the file's volumes are layers of integers and

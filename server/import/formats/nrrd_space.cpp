@@ -24,7 +24,6 @@ bool is_volume_kind(std::string_view kind) {
   return kind == "list" || kind == "time" || kind == "vector";
 }
 
-// The kind of each axis, in lower case.
 std::vector<std::string> kinds_of(const NrrdFields& fields, std::size_t axes) {
   const auto said = words(value_of(fields, "kinds"));
   std::vector<std::string> kinds;

@@ -19,7 +19,6 @@ using VtiAttributes = std::map<std::string, std::string, std::less<>>;
 // Returns an empty text if missing.
 std::string_view attribute_of(const VtiAttributes& attributes, std::string_view name);
 
-// An array of the point data.
 struct VtiArray {
   VtiAttributes attributes;
   CompressedRange text;  // the byte range between its tags

@@ -52,7 +52,7 @@ class Combinations {
   struct Node {
     State parent = kNone;
     std::uint32_t label = 0;
-    std::uint32_t size = 0;   // number of labels
+    std::uint32_t size = 0;
     std::uint32_t value = 0;  // 0: not requested yet
   };
 

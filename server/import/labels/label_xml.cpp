@@ -95,8 +95,8 @@ class Parser : public XmlHandler {
 
   const std::uint64_t volume_;
   std::vector<LabelEntry> entries_;
-  Attributes attributes_;     // of the last start tag
-  std::string text_;          // within it
+  Attributes attributes_;  // of the last start tag
+  std::string text_;
   bool is_in_text_ = false;   // true while text is collected
   bool is_of_volume_ = true;  // true if no element names a volume
   XmlReader reader_{*this};

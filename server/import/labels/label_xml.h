@@ -1,4 +1,3 @@
-// XML tables of labels.
 #pragma once
 
 #include <cstdint>

@@ -32,7 +32,6 @@ class Window {
   std::string_view view() const { return std::string_view(buffer_).substr(begin_); }
   void drop(std::size_t count) { begin_ += count; }
 
-  // Returns false at the end of the file.
   bool more() {
     buffer_.erase(0, begin_);
     begin_ = 0;

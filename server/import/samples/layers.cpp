@@ -33,7 +33,6 @@ class LayerReader {
         at_once_(
             std::max<std::size_t>(kLayerPieceBytes / sizeof(Sample) / source.chosen.count, 1)) {}
 
-  // Reads the states of at most `most` samples from `first` on.
   void read(std::uint64_t first, std::vector<State>& states, Combinations& combinations) {
     const std::uint64_t layers = source_.chosen.count;
     const auto count =

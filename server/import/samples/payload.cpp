@@ -193,7 +193,6 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
   }
 }
 
-// The number of bytes after the samples.
 std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume) {
   const std::uint64_t expected = volume.stored_bytes();
   const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());

@@ -12,7 +12,6 @@
 
 namespace isomesh::import {
 
-// Plain samples in a file.
 struct PlainSamples {
   const InputFile& file;
   std::uint64_t offset = 0;

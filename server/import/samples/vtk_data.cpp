@@ -115,7 +115,6 @@ std::uint64_t count_at(std::span<const std::byte> header, std::size_t index,
   return value;
 }
 
-// The header of compressed blocks.
 struct Blocks {
   std::uint64_t bytes = 0;  // of each block except the last, decoded
   std::uint64_t last_bytes = 0;

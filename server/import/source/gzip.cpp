@@ -62,7 +62,6 @@ void set_output(z_stream& stream, std::span<std::byte> output) {
               "The compressed data is followed by data that is not part of it.");
 }
 
-// Feeds the range's bytes to zlib.
 class Feed {
  public:
   Feed(const InputFile& file, const CompressedRange& range)
@@ -84,7 +83,6 @@ class Feed {
   std::vector<std::byte> piece_;
 };
 
-// The trailer of gzip.
 struct Trailer {
   std::uint32_t checksum = 0;
   std::uint32_t bytes = 0;  // modulo 2^32

@@ -11,7 +11,6 @@
 
 namespace isomesh::import {
 
-// True for the beginning of a gzip stream.
 bool is_gzip(std::span<const std::byte> head);
 
 // Inflates up to `count` bytes of a gzip file's head. Empty if it is not gzip. Never throws because

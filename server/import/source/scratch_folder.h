@@ -1,4 +1,3 @@
-// A folder for unpacked files.
 #pragma once
 
 #include <cerrno>

@@ -126,7 +126,6 @@ Note trailing_note(std::uint64_t bytes);
 Note duplicate_note(std::size_t files);
 std::string reason_of_double(std::string_view first_name);
 
-// The difference between the volumes of one file.
 struct Difference {
   std::string what;                                       // for example "time"
   std::function<std::string(std::uint64_t index)> title;  // of one volume, for example "6 s"

@@ -65,7 +65,6 @@ std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
 
 bool is_label_slice(const Slice& slice) { return slice.image->segmentation.has_value(); }
 
-// One volume per object.
 SeriesVolumes one_an_object(const std::vector<Slice>& slices) {
   SeriesVolumes all = {"their objects", {}};
   std::size_t last = 0;
@@ -82,7 +81,6 @@ SeriesVolumes one_an_object(const std::vector<Slice>& slices) {
   return all;
 }
 
-// One volume per segment that has frames.
 SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   SeriesVolumes all = {"their segments", {}};
   const Image& image = *slices.front().image;

@@ -69,7 +69,6 @@ bool begins_as_dicom(const std::filesystem::path& path) {
   return find_beginning(std::as_bytes(std::span(head))).has_value();
 }
 
-// Reads the files of one upload.
 class HeaderReader {
  public:
   HeaderReader(std::filesystem::path scratch, std::uint64_t most_sample_bytes)

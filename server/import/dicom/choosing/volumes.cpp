@@ -292,7 +292,6 @@ std::vector<Slices> grouped(const Slices& slices, const IsSame& is_same) {
 
 bool is_tile(const Slice& slice) { return slice.image->tiles_per_row > 0; }
 
-// The slices of each mosaic, ordered by instance number.
 std::vector<Slices> mosaics_of(const Slices& slices) {
   std::map<std::pair<std::int64_t, std::size_t>, Slices> mosaics;
   for (const Slice& slice : slices) {

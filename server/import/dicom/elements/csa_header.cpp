@@ -18,7 +18,6 @@ constexpr std::size_t kNameBytes = 64;
   throw_unusable("The DICOM image's Siemens header (0029,1010) is truncated or corrupt.");
 }
 
-// Consumes bytes from the front.
 class Cursor {
  public:
   explicit Cursor(std::string_view bytes) : rest_(bytes) {}

@@ -34,7 +34,6 @@ void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
   }
 }
 
-// Inflates the beginning into a file of its own.
 void inflate_beginning(const InputFile& file, std::uint64_t offset, ScratchFile& scratch) {
   inflate_range(
       file, {offset, file.size() - offset}, kBeginningBytes,

@@ -66,13 +66,11 @@ class DataSet {
   std::vector<double> binary_reals(Tag tag) const;
 };
 
-// A byte range of a file.
 struct Extent {
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
 };
 
-// The location of the pixels.
 struct PixelElement {
   Tag tag = 0;
   bool is_words = false;  // OW, not OB: big-endian files have swapped pairs of bytes

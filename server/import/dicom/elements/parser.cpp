@@ -20,7 +20,6 @@ constexpr std::size_t kMostParts = std::size_t{1} << 21;
 constexpr std::size_t kMostKeptBytes = std::size_t{1} << 28;
 constexpr std::size_t kWindowBytes = std::size_t{1} << 16;
 
-// The encoding of a data set.
 struct Encoding {
   bool is_explicit = true;
   bool big_endian = false;
@@ -219,7 +218,6 @@ class Parser {
     if (!is_private(head.tag)) keep(set, std::move(element));
   }
 
-  // The dictionary of a tag.
   enum class Meaning { kPublic, kKnownPrivate };
 
   Element read_content(const Head& head, const Encoding& encoding, std::uint64_t limit,

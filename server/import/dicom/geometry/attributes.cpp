@@ -115,7 +115,6 @@ std::vector<Phase> phases_in(const DataSet* groups, const DataSet* object) {
   return phases;
 }
 
-// Empty if missing.
 std::optional<double> factor(const DataSet& data, Tag tag) {
   const std::string_view text = data.text(tag);
   if (text.empty()) return std::nullopt;

@@ -10,7 +10,6 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// The number of slices per frame of reference.
 std::map<std::string_view, std::size_t> slices_by_uid(std::span<const Slice> slices) {
   std::map<std::string_view, std::size_t> counts;
   for (const Slice& slice : slices) ++counts[slice.image->frame_of_reference_uid];

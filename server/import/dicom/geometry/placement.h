@@ -15,7 +15,6 @@ inline constexpr double kPlaceTolerance = 0.05;
 // Slices within this distance are at one position.
 inline constexpr double kSamePlace_mm = 1e-3;
 
-// A slice and its position along the normal.
 struct Placed {
   Slice slice;
   double along = 0;  // mm

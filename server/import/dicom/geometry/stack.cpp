@@ -30,7 +30,6 @@ std::string number_of(std::size_t place, std::size_t count, bool from_end) {
   return std::to_string(from_end ? count - place : place + 1);
 }
 
-// Throws if a position has several slices.
 void refuse_shared_positions(std::span<const Placed> placed, bool from_end) {
   const std::vector<std::size_t> first_of_position = position_starts(placed);
   const std::size_t positions = first_of_position.size();

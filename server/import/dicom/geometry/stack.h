@@ -9,7 +9,6 @@
 
 namespace isomesh::import::dicom {
 
-// One frame of a series.
 struct Slice {
   const Image* image = nullptr;
   const Frame* frame = nullptr;

@@ -1,4 +1,3 @@
-// DICOM's recommended display colours.
 #pragma once
 
 #include <optional>

@@ -76,7 +76,6 @@ double slice_count(const DataSet& data, const CsaHeader& header) {
       "(0029,1010).");
 }
 
-// The direction from slice to slice.
 Vector3 slice_normal(const Plane& plane, const CsaHeader& header) {
   const auto told = csa_numbers(header, "SliceNormalVector");
   if (told.size() != 3) {

@@ -38,7 +38,6 @@ std::vector<Segment> segments_of(const DataSet& data) {
   return segments;
 }
 
-// Empty if missing.
 std::optional<double> slice_distance(const DataSet& data) {
   const auto told =
       Attributes(data, 0).place(kPixelMeasuresSequence).numbers(kSpacingBetweenSlices);
@@ -51,7 +50,6 @@ bool is_whole_step(double gap, double distance) {
   return std::round(steps) >= 1 && std::abs(steps - std::round(steps)) <= kPlaceTolerance;
 }
 
-// The distances between consecutive positions.
 std::vector<double> gaps_of(std::span<const Placed> placed, std::span<const std::size_t> starts) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < starts.size(); ++i) {
@@ -72,7 +70,6 @@ double plane_distance(const std::vector<double>& gaps, const std::optional<doubl
                  " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
-// Each slice's plane.
 std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
                                      const std::optional<double>& told) {
   const std::vector<std::size_t> starts = position_starts(placed);
@@ -151,7 +148,6 @@ std::uint32_t highest_segment(const Stack& stack) {
   return segment(std::ranges::max(stack.slices, {}, segment));
 }
 
-// Copies the stored samples.
 void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
                  std::span<std::byte> target) {
   std::vector<std::byte> stored;
@@ -216,7 +212,6 @@ std::vector<LabelEntry> entries_of(const std::vector<Segment>& segments) {
   return label_table(std::move(entries));
 }
 
-// The segments that have a frame.
 std::vector<Segment> segments_in(const Stack& stack) {
   std::set<std::uint32_t> numbers;
   for (const Slice& slice : stack.slices) numbers.insert(slice.frame->segment);

@@ -47,7 +47,6 @@ const Syntax* find_syntax(std::string_view uid) {
   return found == kSyntaxes.end() ? nullptr : found;
 }
 
-// The size in a code stream's header.
 struct StreamSize {
   std::uint32_t columns = 0;
   std::uint32_t rows = 0;
