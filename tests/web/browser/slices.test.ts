@@ -134,6 +134,50 @@ describe('a slice', () => {
   });
 });
 
+describe('slices before there is a mesh', () => {
+  it('tell places in millimetres, in the space that a person chooses', async () => {
+    const { page } = at;
+    await open(page);
+    const text = page.locator('[data-plane=axial] .slice-value');
+    // The middle of 48 samples of a millimetre, where the slices meet.
+    await expect.poll(() => text.innerText()).toMatch(/\d+ \u00b7 LPS 24, 24, 24 mm$/);
+    await page.getByLabel('Coordinates').selectOption('RAS');
+    await expect.poll(() => text.innerText()).toContain('RAS \u221224, \u221224, 24 mm');
+  });
+
+  it('are measured, and show it to those who hear them', async () => {
+    const { page } = at;
+    await open(page);
+    await page.getByRole('radio', { name: 'Length' }).check({ force: true });
+    const canvas = page.locator('[data-plane=axial] canvas');
+    const box = await canvas.boundingBox();
+    if (!box) throw new Error('there is no slice');
+    const place = noted(page, 'at');
+    // Samples of a millimetre, 48 across what the letters leave.
+    const scale = (Math.min(box.width, box.height) - 28) / 48;
+    await canvas.click({ position: { x: box.width / 2 - 10 * scale, y: box.height / 2 } });
+    await canvas.click({ position: { x: box.width / 2 + 10 * scale, y: box.height / 2 } });
+    await expect.poll(() => canvas.getAttribute('aria-label')).toMatch(/, (19\.[5-9]|20(\.[0-5])?) mm$/);
+    expect(noted(page, 'at')).toBe(place);
+    await page.keyboard.press('Escape');
+    await expect.poll(() => canvas.getAttribute('aria-label')).not.toContain('mm');
+  });
+
+  it('take the whole room one by one, and give it back', async () => {
+    const { page } = at;
+    await open(page);
+    const all = page.locator('.slices > figure');
+    const [axial, coronal] = [page.locator('[data-plane=axial]'), page.locator('[data-plane=coronal]')];
+    await expect.poll(() => all.count()).toBe(4);
+    const before = (await axial.boundingBox())?.width ?? 0;
+    await page.getByRole('button', { name: 'Enlarge axial slices' }).click();
+    await expect.poll(() => coronal.isVisible()).toBe(false);
+    expect((await axial.boundingBox())?.width).toBeGreaterThan(1.9 * before);
+    await axial.locator('.slice-title').dblclick();
+    await expect.poll(() => coronal.isVisible()).toBe(true);
+  });
+});
+
 describe('parameters', () => {
   it('that are no values of theirs make nothing, and say what they have to be', async () => {
     const { page } = at;

@@ -18,7 +18,7 @@ const keys: [string, string][] = [
   ['t w d', 'surface: flat shading, edges only, colours by distance'],
   ['c x m', 'surface: cut, show slices beside it, measure'],
   ['h o e', 'labels: hide the selected label, show only it, show all'],
-  ['Esc Delete', 'measuring: remove the last point, remove all distances'],
+  ['Esc Delete', 'measuring, also in slices: remove the last, remove all'],
 ];
 
 export function showHelp(): void {

@@ -82,9 +82,12 @@ export interface Look {
 }
 
 // CT is told by its values where a file does not say: nothing else goes so far below water.
-export function looksFor({ modality, range }: Pick<Volume, 'modality' | 'range'>): LookName[] {
-  const isCt = modality === 'CT' || (modality === null && range[0] <= -500);
-  return presets.map(({ name }) => name).filter((name) => isCt !== (name === 'MR'));
+export function isCt({ modality, range }: Pick<Volume, 'modality' | 'range'>): boolean {
+  return modality === 'CT' || (modality === null && range[0] <= -500);
+}
+
+export function looksFor(volume: Pick<Volume, 'modality' | 'range'>): LookName[] {
+  return presets.map(({ name }) => name).filter((name) => isCt(volume) !== (name === 'MR'));
 }
 
 function rgbOf(colour: string): [number, number, number] {

@@ -101,6 +101,12 @@ export function windowToFetch(shown: Window, iso: number, common: Window): Windo
   return [Number(low.toPrecision(6)), Number(high.toPrecision(6))];
 }
 
+// As an address says it; null if it does not.
+export function windowOfText(text: string): Window | null {
+  const [low, high] = text.split(',').map(Number);
+  return low !== undefined && high !== undefined && high > low ? [low, high] : null;
+}
+
 // For each value of a slice the grey of a window.
 export function greyTable(slice: Pick<Slice, 'window'>, shown: Window): Uint8ClampedArray {
   const table = new Uint8ClampedArray(256);

@@ -54,6 +54,7 @@ class JobSlices {
       isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
       crop: null,
+      measures: null,
       onError: tellError,
     };
     this.views = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));

@@ -21,7 +21,7 @@ import { go, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { cssColour, theme } from '../../ui/theme';
 import { defaultWindow, type Histogram } from '../../volume/histogram';
-import { SliceSource, type Window } from '../../volume/slices';
+import { SliceSource, windowOfText, type Window } from '../../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
@@ -34,6 +34,9 @@ import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
+import { makeEnlargeable } from '../slices/enlarge';
+import { sliceControls } from '../slices/slice_looks';
+import { SliceMeasures } from '../slices/slice_measure';
 import { SliceView, type SliceHost } from '../slices/slice_view';
 
 const mostBins = 1024;
@@ -42,11 +45,6 @@ const estimateDelay = 300;
 // Enough digits for any iso-value, and few enough to be read.
 function shortened(iso: number): number {
   return Number(iso.toPrecision(6));
-}
-
-function windowOfQuery(query: URLSearchParams): Window | null {
-  const [low, high] = (query.get('window') ?? '').split(',').map(Number);
-  return low !== undefined && high !== undefined && high > low ? [low, high] : null;
 }
 
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
@@ -71,6 +69,7 @@ class Prepare {
   private window: Window;
   private cursor: Vec3;
   private readonly slices: SliceView[];
+  private readonly measures = new SliceMeasures();
   private readonly histogram: HistogramView;
   private readonly live: LiveView;
   // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
@@ -106,7 +105,7 @@ class Prepare {
     this.parameters = startOfQuery(route.query, volume, this.defaults);
     this.history = new History(this.parameters);
     const common = defaultWindow(counts, volume.suggested_iso);
-    this.window = windowOfQuery(route.query) ?? common;
+    this.window = windowOfText(route.query.get('window') ?? '') ?? common;
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
     const host: SliceHost = {
@@ -119,10 +118,7 @@ class Prepare {
         window: this.window,
         cursor: this.cursor,
       }),
-      setWindow: (window) => {
-        this.window = window;
-        this.update();
-      },
+      setWindow: (window) => this.setWindow(window),
       setCursor: (cursor) => {
         this.cursor = cursor;
         this.update();
@@ -134,6 +130,7 @@ class Prepare {
       contourColour: () => cssColour('--contour'),
       crop: isUpright(volume) ? { box: () => this.box, setBox: (box) => this.setBox(within(volume, box)) } : null,
       onError: (error) => this.sliceFailed(error),
+      measures: this.measures,
     };
     this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
@@ -181,6 +178,8 @@ class Prepare {
         event.preventDefault();
         this.goBack(event.shiftKey ? this.history.redo() : this.history.undo());
       } else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
+      else if (event.key === 'Escape') this.measures.takeBack();
+      else if (event.key === 'Delete' && !isTyping(event)) this.measures.clear();
     });
   }
 
@@ -287,10 +286,13 @@ class Prepare {
 
   private layout(common: Window): HTMLElement {
     const { volume } = this;
+    const panes = [...this.slices.map(({ element, name }) => ({ element, name })), { element: this.live.element, name: 'the preview' }];
+    const area = h('section', { class: 'slices', 'aria-label': 'Slices' }, ...panes.map(({ element }) => element));
+    makeEnlargeable(area, panes);
     const element = h(
       'div',
       { class: 'prepare', 'data-title': volumeName(volume) },
-      h('section', { class: 'slices', 'aria-label': 'Slices' }, ...this.slices.map((view) => view.element), this.live.element),
+      area,
       h(
         'section',
         { class: 'panel', 'aria-label': 'Parameters' },
@@ -299,6 +301,7 @@ class Prepare {
         this.isoPart,
         this.labelPart,
         this.windowRow(common),
+        sliceControls(volume, this.measures, (window) => this.setWindow(window ?? common)),
         this.crop?.element ?? '',
         ...notedOf(volume),
         this.surfaceKind,
@@ -315,15 +318,13 @@ class Prepare {
 
   // The window of the slices, and the way back to the usual one.
   private windowRow(common: Window): HTMLElement {
-    const reset = button(
-      'Reset window',
-      () => {
-        this.window = common;
-        this.update();
-      },
-      { class: 'chip' },
-    );
+    const reset = button('Reset window', () => this.setWindow(common), { class: 'chip' });
     return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, reset);
+  }
+
+  private setWindow(window: Window): void {
+    this.window = window;
+    this.update();
   }
 
   private isoRow(): HTMLElement {

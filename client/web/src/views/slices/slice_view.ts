@@ -1,13 +1,14 @@
 // One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
 import type { Axis, Vec3, Volume } from '../../api/types';
-import { labelTitle } from '../../job/labels';
 import { h, uniqueId } from '../../ui/dom';
-import { formatValue } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
 import { contour } from '../../volume/contour';
 import { coloursOf, paintLabels, type LabelLook } from '../../volume/label_map';
 import { labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
+import { pixelsOf, sliceColours, sliceSpace } from './slice_looks';
+import type { SliceMeasures } from './slice_measure';
+import { SliceReadout } from './slice_readout';
 import { SliceZoom } from './slice_zoom';
 import {
   axisIndex,
@@ -20,7 +21,7 @@ import {
   type SlicePlane,
 } from '../../volume/geometry';
 import { SliceLoader } from '../../volume/slice_loader';
-import { greyTable, inSlice, valueIn, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
+import { greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
 
 export interface SliceState {
   iso: number | null; // of the contour
@@ -44,6 +45,8 @@ export interface SliceHost {
   // Null where nothing can be cropped.
   crop: CropHost | null;
   onError: (error: unknown) => void;
+  // Null where nothing is measured.
+  measures: SliceMeasures | null;
 }
 
 interface Press {
@@ -70,8 +73,7 @@ export class SliceView {
   private readonly buffer = document.createElement('canvas');
   private readonly loader: SliceLoader;
   private readonly state = h('p', { class: 'slice-state', role: 'status' });
-  // The value of the sample under the pointer.
-  private readonly value = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
+  private readonly readout: SliceReadout;
   private readonly zoom: SliceZoom;
   private readonly crop: SliceCrop | null;
   private scheduled = false;
@@ -94,11 +96,17 @@ export class SliceView {
     this.slider.disabled = this.count(this.layout.normal) === 1;
     this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
     this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
+    this.readout = new SliceReadout({
+      volume: host.volume,
+      isInteger: host.isInteger,
+      slice: () => this.loader.slice,
+      labels: () => host.state().labels,
+    });
     this.zoom = new SliceZoom(this.canvas, scope, () => this.draw());
     this.element = h(
       'figure',
       { class: 'slice', 'data-plane': plane },
-      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.value, this.zoom.element),
+      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.readout.element, this.zoom.element),
       h('figcaption', {}, h('span', { class: 'slice-title' }, titles[plane]), this.slider, this.place),
     );
     this.loader = new SliceLoader(host.source, this.layout.normal, scope, {
@@ -111,7 +119,14 @@ export class SliceView {
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
-    scope.onEnd(labelOpacity.subscribe(() => this.draw()));
+    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes]) {
+      if (look) scope.onEnd(look.subscribe(() => this.draw()));
+    }
+  }
+
+  // For who hears it.
+  get name(): string {
+    return `${this.plane} slices`;
   }
 
   // Shows the state as it is now.
@@ -181,12 +196,12 @@ export class SliceView {
       context.globalAlpha = 1;
     }
     this.paintLetters(context, ratio);
+    this.readout.show(cursor);
     const says = error ? `Slice ${index + 1} could not be loaded` : isLate ? `Loading slice ${index + 1}` : '';
     if (this.state.textContent !== says) this.state.textContent = says;
-    this.canvas.setAttribute(
-      'aria-label',
-      `${titles[this.plane]} slice ${index + 1}${iso === null ? '' : ` with the contour at iso-value ${iso}`}`,
-    );
+    const measured = (this.measured(index) ?? []).map(({ text }) => text).filter(Boolean);
+    const contoured = iso === null ? '' : ` with the contour at iso-value ${iso}`;
+    this.canvas.setAttribute('aria-label', [`${titles[this.plane]} slice ${index + 1}${contoured}`, ...measured].join(', '));
   }
 
   private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
@@ -214,6 +229,7 @@ export class SliceView {
     }
     strokePixels(context, 1.5 * ratio, this.host.contourColour());
     if (this.crop?.paint(context)) strokePixels(context, 1.5 * ratio, cropColour);
+    this.host.measures?.paint(context, ratio, this.measured(cursor[axisIndex(this.layout.normal)]) ?? []);
     context.restore();
   }
 
@@ -232,10 +248,9 @@ export class SliceView {
     const picture = context.createImageData(slice.width, slice.height);
     const table = greyTable(slice, this.host.state().window);
     const pixels = new Uint32Array(picture.data.buffer);
-    const opaque = 0xff00_0000;
+    const colours = pixelsOf(sliceColours.value);
     slice.values.forEach((value, i) => {
-      const grey = table[value] ?? 0;
-      pixels[i] = (opaque | (grey << 16) | (grey << 8) | grey) >>> 0;
+      pixels[i] = colours[table[value] ?? 0] ?? 0;
     });
     context.putImageData(picture, 0, 0);
   }
@@ -265,6 +280,16 @@ export class SliceView {
   private placeAt(event: PointerEvent): [number, number] {
     const [column, row] = this.pointAt(event);
     return [column - 0.5, row - 0.5];
+  }
+
+  private measured(index: number): ReturnType<SliceMeasures['textsOf']> | undefined {
+    return this.host.measures?.textsOf(this.host.volume, this.layout, index);
+  }
+
+  // Whether the click was one of a measurement.
+  private isMeasuring(event: PointerEvent): boolean {
+    const index = this.host.state().cursor[axisIndex(this.layout.normal)];
+    return this.host.measures?.take(this.plane, index, this.placeAt(event)) ?? false;
   }
 
   private edgesAt(event: PointerEvent): ReturnType<SliceCrop['at']> {
@@ -328,7 +353,7 @@ export class SliceView {
       if (this.crop?.end(event.pointerId) || press?.pointer !== event.pointerId) return;
       const cursor = press.moved ? null : this.sampleAt(event);
       press = null;
-      if (cursor) this.host.setCursor(cursor);
+      if (cursor && !this.isMeasuring(event)) this.host.setCursor(cursor);
     });
     scope.listen(canvas, 'pointercancel', (event: PointerEvent) => {
       this.crop?.end(event.pointerId);
@@ -339,38 +364,19 @@ export class SliceView {
     scope.listen(canvas, 'contextmenu', (event) => event.preventDefault());
   }
 
-  // The value of the sample there, rounded to what the picture's eight bits tell; null where they tell none.
-  private valueOf(place: Vec3 | null): { text: string; value: number | null } {
-    const { slice } = this.loader;
-    const normal = axisIndex(this.layout.normal);
-    if (!slice || place?.[normal] !== slice.index) return { text: '', value: null };
-    const [column, row] = pictureAxes(this.layout.normal);
-    const { labels } = this.host.state();
-    if (labels && slice.labels) {
-      const label = labels.map.at(slice.labels[place[row] * slice.width + place[column]] ?? 0);
-      return { text: label ? labelTitle(label) : '', value: null };
-    }
-    const { low, high } = valueIn(slice, place[column], place[row]);
-    if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
-    if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
-    const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
-    const middle = Math.round((low + high) / 2 / digits) * digits;
-    const value = Number(middle.toPrecision(6));
-    const isExact = this.host.isInteger && high - low < 1.5;
-    return { text: `${isExact ? '' : 'about '}${formatValue(isExact ? Math.round(value) : value)}`, value: isExact ? Math.round(value) : value };
-  }
-
   private listenToValues(): void {
     const { canvas, scope } = this;
     const take = (place: Vec3 | null): void => {
-      const { value } = this.valueOf(place);
+      const { value } = this.readout.valueAt(place);
       if (value !== null) this.host.setIso(value);
     };
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
-      if (event.pointerType === 'mouse') this.value.textContent = this.valueOf(this.sampleAt(event)).text;
+      if (event.pointerType === 'mouse') this.readout.point(this.sampleAt(event), this.host.state().cursor);
     });
-    scope.listen(canvas, 'pointerleave', () => (this.value.textContent = ''));
-    scope.listen(canvas, 'dblclick', (event: MouseEvent) => take(this.sampleAt(event)));
+    scope.listen(canvas, 'pointerleave', () => this.readout.point(null, this.host.state().cursor));
+    scope.listen(canvas, 'dblclick', (event: MouseEvent) => {
+      if (!this.host.measures?.finish()) take(this.sampleAt(event));
+    });
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
       if (event.key === 'i' && !event.ctrlKey && !event.metaKey && !event.altKey) take(this.host.state().cursor);
     });

@@ -1,0 +1,81 @@
+// How slices are looked at, on the whole page: their colours, and the coordinates that are told.
+import type { Vec3, Volume } from '../../api/types';
+import { colourTable } from '../../scene/colour_map';
+import { field, h, segmented } from '../../ui/dom';
+import { formatNumber } from '../../ui/format';
+import { Signal } from '../../ui/signal';
+import { isCt } from '../../volume/looks';
+import type { MeasureKind } from '../../volume/measure';
+import type { Window } from '../../volume/slices';
+import type { SliceMeasures } from './slice_measure';
+
+type ColourName = 'grey' | 'inverted' | 'hot' | 'even';
+type Space = 'LPS' | 'RAS';
+
+const colourNames: Record<ColourName, string> = { grey: 'Grey', inverted: 'Inverted', hot: 'Hot iron', even: 'Blue to yellow' };
+
+export const sliceColours = new Signal<ColourName>('grey');
+export const sliceSpace = new Signal<Space>('LPS');
+
+// In Hounsfield units, as radiologists set them.
+const ctWindows: readonly [string, Window][] = [
+  ['Brain', [0, 80]],
+  ['Lung', [-1350, 150]],
+  ['Bone', [-500, 1300]],
+  ['Abdomen', [-150, 250]],
+];
+
+// For each grey the pixel of a canvas.
+export function pixelsOf(name: ColourName): Uint32Array {
+  const even = name === 'even' ? colourTable(256) : null;
+  const colourAt = (grey: number): readonly [number, number, number] => {
+    if (even) return [even[4 * grey] ?? 0, even[4 * grey + 1] ?? 0, even[4 * grey + 2] ?? 0];
+    if (name === 'hot') return [Math.min(255, 3 * grey), Math.max(0, Math.min(255, 3 * grey - 255)), Math.max(0, 3 * grey - 510)];
+    const shown = name === 'inverted' ? 255 - grey : grey;
+    return [shown, shown, shown];
+  };
+  return Uint32Array.from({ length: 256 }, (_, grey) => {
+    const [red, green, blue] = colourAt(grey);
+    return (0xff00_0000 | (blue << 16) | (green << 8) | red) >>> 0;
+  });
+}
+
+// In millimetres.
+export function placeText([left, posterior, superior]: Vec3, space: Space): string {
+  const sign = space === 'RAS' ? -1 : 1;
+  return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value === 0 ? 0 : value, 1)).join(', ')} mm`;
+}
+
+function select<T extends string>(label: string, options: readonly (readonly [T, string])[], value: T, onChange: (value: T) => void): HTMLElement {
+  const element = h('select', {}, ...options.map(([name, text]) => h('option', { value: name, selected: name === value }, text)));
+  element.addEventListener('change', () => onChange(element.value as T));
+  return field(label, element);
+}
+
+// `setWindow` gets null for the usual window.
+export function sliceControls(volume: Volume, measures: SliceMeasures, setWindow: (window: Window | null) => void): HTMLElement {
+  const windows = [['Usual', null] as const, ...ctWindows];
+  const presets =
+    isCt(volume) &&
+    select('Window', windows.map(([name]) => [name, name] as const), 'Usual', (name) =>
+      setWindow(windows.find(([known]) => known === name)?.[1] ?? null),
+    );
+  const kinds = [
+    { value: 'none', label: 'Off' },
+    { value: 'length', label: 'Length', title: 'Click two points' },
+    { value: 'angle', label: 'Angle', title: 'Click three points; the angle is at the second' },
+    { value: 'area', label: 'Area', title: 'Click the corners; a double click closes it' },
+  ] as const;
+  return h(
+    'div',
+    { class: 'slice-controls' },
+    h(
+      'div',
+      { class: 'row' },
+      presets,
+      select('Colours', Object.entries(colourNames) as [ColourName, string][], sliceColours.value, (name) => (sliceColours.value = name)),
+      select('Coordinates', [['LPS', 'LPS'], ['RAS', 'RAS']], sliceSpace.value, (space) => (sliceSpace.value = space)),
+    ),
+    segmented<MeasureKind | 'none'>('Measure in slices', kinds, 'none', (kind) => (measures.kind.value = kind === 'none' ? null : kind)),
+  );
+}

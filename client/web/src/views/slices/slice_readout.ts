@@ -1,0 +1,57 @@
+// What is at a place of a slice: its value or label, and where it lies in the patient.
+import type { Vec3, Volume } from '../../api/types';
+import { labelTitle } from '../../job/labels';
+import { h } from '../../ui/dom';
+import { formatValue } from '../../ui/format';
+import { axisIndex, pictureAxes, toPatient } from '../../volume/geometry';
+import type { LabelLook } from '../../volume/label_map';
+import { valueIn, type Slice } from '../../volume/slices';
+import { placeText, sliceSpace } from './slice_looks';
+
+export interface ReadoutHost {
+  volume: Volume;
+  isInteger: boolean;
+  // The slice that is shown, if it is there.
+  slice: () => Slice | null;
+  // Null where samples are values.
+  labels: () => LabelLook | null;
+}
+
+export class SliceReadout {
+  readonly element = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
+  // Under the pointer; null: none, and the place where the slices meet is told.
+  private pointed: Vec3 | null = null;
+
+  constructor(private readonly host: ReadoutHost) {}
+
+  point(place: Vec3 | null, cursor: Vec3): void {
+    this.pointed = place;
+    this.show(cursor);
+  }
+
+  show(cursor: Vec3): void {
+    const place = this.pointed ?? cursor;
+    const text = [this.valueAt(place).text, placeText(toPatient(this.host.volume, place), sliceSpace.value)].filter(Boolean).join(' \u00b7 ');
+    if (this.element.textContent !== text) this.element.textContent = text;
+  }
+
+  // Rounded to what the picture's eight bits tell; null where they tell no value.
+  valueAt(place: Vec3 | null): { text: string; value: number | null } {
+    const slice = this.host.slice();
+    if (!slice || place?.[axisIndex(slice.axis)] !== slice.index) return { text: '', value: null };
+    const [column, row] = pictureAxes(slice.axis);
+    const labels = this.host.labels();
+    if (labels && slice.labels) {
+      const label = labels.map.at(slice.labels[place[row] * slice.width + place[column]] ?? 0);
+      return { text: label ? labelTitle(label) : 'no label', value: null };
+    }
+    const { low, high } = valueIn(slice, place[column], place[row]);
+    if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
+    if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
+    const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
+    const middle = Math.round((low + high) / 2 / digits) * digits;
+    const value = Number(middle.toPrecision(6));
+    const isExact = this.host.isInteger && high - low < 1.5;
+    return { text: `${isExact ? '' : 'about '}${formatValue(isExact ? Math.round(value) : value)}`, value: isExact ? Math.round(value) : value };
+  }
+}

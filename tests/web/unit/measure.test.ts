@@ -1,0 +1,66 @@
+import { describe, expect, it } from 'vitest';
+import { angleAt, areaOf, measureText } from '@/volume/measure';
+import { pixelsOf, placeText } from '@/views/slices/slice_looks';
+import { SliceMeasures } from '@/views/slices/slice_measure';
+import { slicePlane } from '@/volume/geometry';
+import type { Volume } from '@/api/types';
+
+const volume = {
+  dims: [10, 10, 10],
+  spacing: [2, 3, 4],
+  origin: [0, 0, 0],
+  direction: [1, 0, 0, 0, 1, 0, 0, 0, 1],
+} as unknown as Volume;
+
+describe('what is measured in slices', () => {
+  it('is in millimetres and degrees, wherever the plane lies', () => {
+    expect(angleAt([1, 0, 0], [0, 0, 0], [0, 5, 0])).toBeCloseTo(90);
+    expect(angleAt([1, 0, 0], [0, 0, 0], [-2, 0, 0])).toBeCloseTo(180);
+    expect(areaOf([[0, 0, 7], [4, 0, 7], [4, 3, 7], [0, 3, 7]])).toBeCloseTo(12);
+    // Not convex: an L.
+    expect(areaOf([[0, 0, 0], [0, 2, 0], [0, 2, 1], [0, 1, 1], [0, 1, 2], [0, 0, 2]])).toBeCloseTo(3);
+    expect(measureText('length', [[0, 0, 0], [3, 4, 0]])).toBe('5 mm');
+    expect(measureText('angle', [[0, 0, 0], [3, 4, 0]])).toBe('');
+  });
+
+  it('belongs to its slice, takes the spacing, and is taken back', () => {
+    const measures = new SliceMeasures();
+    const plane = slicePlane(volume, 'axial');
+    const texts = (index: number): string[] => measures.textsOf(volume, plane, index).map(({ text }) => text);
+    expect(measures.take('axial', 5, [1, 1])).toBe(false);
+    measures.kind.value = 'length';
+    expect(measures.take('axial', 5, [1, 1])).toBe(true);
+    expect(texts(5)).toEqual(['']);
+    measures.take('axial', 5, [1, 3]);
+    expect([texts(5), texts(6)]).toEqual([['6 mm'], []]);
+    // One that was begun elsewhere and left is gone.
+    measures.take('axial', 6, [0, 0]);
+    measures.take('axial', 5, [0, 0]);
+    measures.take('axial', 5, [5, 0]);
+    expect([texts(5), texts(6)]).toEqual([['6 mm', '10 mm'], []]);
+    measures.kind.value = 'area';
+    for (const point of [[0, 0], [2, 0], [2, 2], [0, 2], [0, 2]] as const) measures.take('axial', 5, point);
+    expect(measures.finish()).toBe(true);
+    expect(texts(5).at(-1)).toBe('24 mm\u00b2');
+    measures.takeBack();
+    expect(texts(5)).toHaveLength(2);
+    measures.clear();
+    expect(texts(5)).toEqual([]);
+  });
+});
+
+describe('the looks of slices', () => {
+  it('are colours for each grey, from the darkest to the brightest', () => {
+    expect(pixelsOf('grey')[128]).toBe(0xff80_8080);
+    expect(pixelsOf('inverted')[0]).toBe(0xffff_ffff);
+    for (const name of ['hot', 'even'] as const) {
+      const sums = [...pixelsOf(name)].map((pixel) => (pixel & 255) + ((pixel >> 8) & 255) + ((pixel >> 16) & 255));
+      expect(sums[255]).toBeGreaterThan((sums[0] ?? 0) + 300);
+    }
+  });
+
+  it('tell places in either space', () => {
+    expect(placeText([1, -2, 3.04], 'LPS')).toBe('LPS 1, \u22122, 3 mm');
+    expect(placeText([1, -2, 3.04], 'RAS')).toBe('RAS \u22121, 2, 3 mm');
+  });
+});
