@@ -16,7 +16,7 @@ using std::chrono::seconds;
 using store::Time;
 
 constexpr milliseconds kLongestSleep{1'000};
-constexpr std::size_t kMostDue = 200;
+constexpr std::size_t kFirstDue = 200;
 constexpr std::size_t kMostMeshing = 1'000'000;
 
 // Doubles, and is spread over its upper half, so that what failed together does not come back
@@ -183,7 +183,17 @@ void Orders::changed() {
 }
 
 std::optional<std::string> Orders::take(std::stop_token& cancelled) {
-  for (const store::OrderRecord& record : services_.orders.due(options_.now(), kMostDue)) {
+  // What waits for PACS that hang may be more than was looked at.
+  for (std::size_t limit = kFirstDue;; limit *= 4) {
+    const std::vector<store::OrderRecord> due = services_.orders.due(options_.now(), limit);
+    if (auto id = take_one_of(due, cancelled)) return id;
+    if (due.size() < limit) return std::nullopt;
+  }
+}
+
+std::optional<std::string> Orders::take_one_of(const std::vector<store::OrderRecord>& due,
+                                               std::stop_token& cancelled) {
+  for (const store::OrderRecord& record : due) {
     const std::string pacs = OrderSteps::pacs_of(record);
     const Lock lock(mutex_);
     const auto busy = std::ranges::count_if(running_, [&](const auto& running) {

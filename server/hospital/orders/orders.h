@@ -97,6 +97,8 @@ class Orders {
   void look_at_rule(const Rule& rule, const std::stop_token& stop);
   // The next order that may be worked on, which is this thread's then; empty when there is none.
   std::optional<std::string> take(std::stop_token& cancelled);
+  std::optional<std::string> take_one_of(const std::vector<store::OrderRecord>& due,
+                                         std::stop_token& cancelled);
   void give_back(const std::string& id);
   void advance(store::OrderRecord record, const std::stop_token& stop);
   // The record may be at an earlier step by now than the one that failed.

@@ -203,6 +203,15 @@ TEST_F(ReceivedOrdersTest, AreMadeThoughAnotherSeriesCannotBeRead) {
   EXPECT_EQ(received_.failures(), failures);
 }
 
+// However many wait for it.
+TEST_F(OrdersTest, OfOnePacsThatHangsHoldUpNoOther) {
+  main_->hangs = true;
+  for (int count = 0; count < 220; ++count) submit("main");
+  const std::string other = submit("other");
+  EXPECT_TRUE(until([&] { return get(other).job.has_value(); }));
+  main_->hangs = false;
+}
+
 // One PACS that hangs takes some threads, never all.
 TEST_F(OrdersTest, OfOnePacsDoNotHoldUpThoseOfAnother) {
   main_->hangs = true;
