@@ -7,7 +7,7 @@ import { button, checkbox, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
 import type { Scope } from '../../ui/signal';
-import { colourOf, LabelMap, type LabelLook } from '../../volume/label_map';
+import { colourOf, LabelMap, seriesColour, type LabelLook } from '../../volume/label_map';
 import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
 
@@ -30,7 +30,8 @@ export class LabelChoice {
   private readonly boxes = new Map<number, Box>();
   private triangles: ReadonlyMap<number, number> = new Map();
   private search: LabelSearch<VolumeLabel> | null = null;
-  private map: LabelMap | null = null;
+  // What `look` gives, made once for all labels.
+  private shown: LabelLook | null = null;
 
   // `onChange` gets undefined labels while none is chosen. `onLook`: other labels are to be seen, see `look`.
   constructor(
@@ -59,7 +60,7 @@ export class LabelChoice {
     this.asking = asking;
     this.body.replaceChildren(h('p', { role: 'status' }, 'Counting the labels'));
     this.labels = [];
-    this.map = null;
+    this.shown = null;
     this.chosen.clear();
     this.boxes.clear();
     this.search = null;
@@ -93,15 +94,18 @@ export class LabelChoice {
       ),
     );
     this.search.fill();
-    this.map = new LabelMap(labels);
+    const colours = new Map(labels.map((one) => [one.label, colourOf(one)]));
+    this.shown = {
+      map: new LabelMap(labels),
+      colourOf: (label) => colours.get(label) ?? seriesColour(label),
+      isShown: (label) => this.chosen.has(label),
+    };
     this.onLook();
   }
 
   // What is seen of the volume: the labels that are chosen. Null until they are counted.
   look(): LabelLook | null {
-    const { map, labels, chosen } = this;
-    const colours = new Map(labels.map((one) => [one.label, colourOf(one)]));
-    return map && { map, colourOf: (label) => colours.get(label) ?? '#000000', isShown: (label) => chosen.has(label) };
+    return this.shown;
   }
 
   // The triangles of each label's surface, from the estimate.

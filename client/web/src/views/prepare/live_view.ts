@@ -131,7 +131,7 @@ export class LiveView {
       return;
     }
     this.iso = null;
-    this.labels = { ...look, map: inBytes(look.map) };
+    this.labels = { ...look, map: this.wanted === look.map.key && this.labels ? this.labels.map : inBytes(look.map) };
     this.want(look.map.key);
     this.showPlace('Preview of the labels');
     if (this.preview && Number.isNaN(this.preview.window[0])) this.showLook();

@@ -89,6 +89,7 @@ class Prepare {
   private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
   private readonly problem = h('div');
   private readonly windowText = h('span', { class: 'window-text faint' });
+  private readonly resetWindow = h('button', { type: 'button', class: 'chip' }, 'Reset window');
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
   private isStarting = false;
@@ -318,8 +319,8 @@ class Prepare {
 
   // The window of the slices, and the way back to the usual one.
   private windowRow(common: Window): HTMLElement {
-    const reset = button('Reset window', () => this.setWindow(common), { class: 'chip' });
-    return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, reset);
+    this.resetWindow.addEventListener('click', () => this.setWindow(common));
+    return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, this.resetWindow);
   }
 
   private setWindow(window: Window): void {
@@ -382,6 +383,8 @@ class Prepare {
     this.crop?.show(this.box);
     this.histogram.show(this.iso, this.window);
     const [low, high] = this.window;
+    // Labels are seen as they are.
+    this.windowText.hidden = this.resetWindow.hidden = isByLabels(this.parameters);
     this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
     if (document.activeElement !== this.isoInput) this.isoInput.value = String(this.iso);
     noteInAddress({
