@@ -27,6 +27,27 @@ bool is_before(const Sample& a, const Sample& b) {
 // The neighbours of one sample, and of each of them those that are neighbours of both.
 using Star = std::map<Sample, Samples>;
 
+using Stars = std::map<Sample, Star>;
+
+// Those of all samples of a lattice. Most tests ask for a few again and again.
+const Stars& stars_of(const mesh::Dims& dims, Scheme scheme, std::uint32_t margin) {
+  static std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, Scheme, std::uint32_t>,
+                  Stars>
+      known;
+  const auto [place, is_new] = known.try_emplace({dims.x, dims.y, dims.z, scheme, margin});
+  if (!is_new) return place->second;
+  for_each_tetrahedron(dims, scheme, margin, [&](const Tetrahedron& corners) {
+    for (const Sample& centre : corners.samples) {
+      for (const Sample& a : corners.samples) {
+        for (const Sample& b : corners.samples) {
+          if (a != centre && b != centre && a != b) place->second[centre][a].insert(b);
+        }
+      }
+    }
+  });
+  return place->second;
+}
+
 // Those of `all` that can be reached from `first` through `all`.
 Samples reached(const Star& star, const Samples& all, const Sample& first) {
   Samples found = {first};
@@ -71,11 +92,10 @@ class RegularBuilder {
   RegularBuilder(const mesh::Lattice<T>& lattice, const mesh::ExtractOptions& options)
       : lattice_(lattice), options_(options), margin_(options.close ? 1 : 0) {
     reference_.plain = reference_surface(lattice, options);
+    stars_ = &stars_of(reference_.plain.dims, options.scheme, margin_);
   }
 
   RegularReference build() {
-    for_each_tetrahedron(reference_.plain.dims, options_.scheme, margin_,
-                         [&](const Tetrahedron& corners) { add_to_stars(corners); });
     for (std::uint32_t v = 0; v < reference_.plain.vertices.size(); ++v) add_crossing(v);
     for (const auto& [sample, own] : own_) find_candidates(sample, own);
     for (const auto& [sample, candidates] : candidates_) {
@@ -87,16 +107,6 @@ class RegularBuilder {
   }
 
  private:
-  void add_to_stars(const Tetrahedron& corners) {
-    for (const Sample& centre : corners.samples) {
-      for (const Sample& a : corners.samples) {
-        for (const Sample& b : corners.samples) {
-          if (a != centre && b != centre && a != b) stars_[centre][a].insert(b);
-        }
-      }
-    }
-  }
-
   void add_crossing(std::uint32_t v) {
     const ReferenceVertex& vertex = reference_.plain.vertices[v];
     number_[{vertex.inside, vertex.outside}] = number_[{vertex.outside, vertex.inside}] = v;
@@ -114,8 +124,8 @@ class RegularBuilder {
     if (options_.interpolation == Interpolation::kMidpoint) return 0;
     if (reference_.plain.is_phantom(s)) return std::numeric_limits<float>::infinity();
     const mesh::Dims& dims = lattice_.dims;
-    const T value = lattice_.samples[((s[2] - margin_) * dims.y + (s[1] - margin_)) * dims.x +
-                                     s[0] - margin_];
+    const T value =
+        lattice_.samples[((s[2] - margin_) * dims.y + (s[1] - margin_)) * dims.x + s[0] - margin_];
     return static_cast<float>(std::abs(static_cast<double>(value) - options_.iso));
   }
 
@@ -131,7 +141,7 @@ class RegularBuilder {
 
   void find_candidates(const Sample& sample, const Samples& own) {
     if (!is_within(sample)) return;
-    const Star& star = stars_.at(sample);
+    const Star& star = stars_->at(sample);
     for (const Samples& component : components_of(star, own)) {
       Samples rest;
       for (const auto& [neighbour, ring] : star) {
@@ -148,7 +158,7 @@ class RegularBuilder {
   }
 
   bool clashes(const Sample& sample, const Samples& component) const {
-    const Star& star = stars_.at(sample);
+    const Star& star = stars_->at(sample);
     for (const auto& [neighbour, ring] : star) {
       const auto theirs = candidates_.find(neighbour);
       if (theirs == candidates_.end() || !is_before(neighbour, sample) ||
@@ -175,7 +185,7 @@ class RegularBuilder {
   const mesh::ExtractOptions& options_;
   const std::uint32_t margin_;
   RegularReference reference_;
-  std::map<Sample, Star> stars_;
+  const Stars* stars_;
   std::map<std::pair<Sample, Sample>, std::uint32_t> number_;
   std::map<Sample, Samples> crossed_;
   std::map<Sample, Samples> own_;
@@ -216,8 +226,8 @@ std::vector<std::uint32_t> clusters_of(const RegularReference& reference) {
   return clusters;
 }
 
-// What each vertex of the plain mesh becomes in the regular one. It is read off the triangles, which
-// are in the same order; empty if those are not the plain ones without those that vanish.
+// What each vertex of the plain mesh becomes in the regular one. It is read off the triangles,
+// which are in the same order; empty if those are not the plain ones without those that vanish.
 std::vector<std::uint32_t> mapping(const mesh::Mesh& regular, const mesh::Mesh& plain,
                                    const std::vector<std::uint32_t>& clusters) {
   std::vector<std::uint32_t> to(plain.positions.size(), kAlone);
@@ -234,7 +244,9 @@ std::vector<std::uint32_t> mapping(const mesh::Mesh& regular, const mesh::Mesh& 
       const mesh::Triangle& kept = regular.triangles[next++];
       for (std::size_t i = 0; i < 3; ++i) {
         const std::uint32_t cluster = clusters[triangle[i]];
-        std::uint32_t& place = cluster == kAlone ? to[triangle[i]] : cluster_to.try_emplace(cluster, kAlone).first->second;
+        std::uint32_t& place = cluster == kAlone
+                                   ? to[triangle[i]]
+                                   : cluster_to.try_emplace(cluster, kAlone).first->second;
         if (place != kAlone && place != kept[i]) return {};
         place = kept[i];
       }
@@ -381,9 +393,8 @@ testing::AssertionResult has_topology_of(const mesh::Mesh& regular, const mesh::
   return testing::AssertionSuccess();
 }
 
-#define ISOMESH_INSTANTIATE(T, name, kType)                              \
-  template RegularReference regular_reference(const mesh::Lattice<T>&,   \
-                                              const mesh::ExtractOptions&);
+#define ISOMESH_INSTANTIATE(T, name, kType) \
+  template RegularReference regular_reference(const mesh::Lattice<T>&, const mesh::ExtractOptions&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -13,6 +13,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -93,9 +94,22 @@ class NearnessPlanes {
 };
 
 HWY_INLINE Word less(const std::int32_t* a, const std::int32_t* b) {
-  std::array<std::uint8_t, kWordBits> flags;
-  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] < b[x] ? 1 : 0;
-  return pack_word(flags);
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::CappedTag<std::int32_t, 8> eight;
+  if constexpr (hn::MaxLanes(eight) == 8) {
+    std::array<std::uint8_t, 16> bytes;  // eight of them may be written at once
+    for (std::size_t i = 0; i < 8; ++i) {
+      const auto is_less = hn::Lt(hn::LoadU(eight, a + 8 * i), hn::LoadU(eight, b + 8 * i));
+      hn::StoreMaskBits(eight, is_less, bytes.data() + i);
+    }
+    Word word = 0;
+    std::memcpy(&word, bytes.data(), sizeof word);
+    return word;
+  } else {
+    std::array<std::uint8_t, kWordBits> flags;
+    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] < b[x] ? 1 : 0;
+    return pack_word(flags);
+  }
 }
 
 // The crossed edges that 64 samples own, by direction: those whose crossing belongs to the first
@@ -106,10 +120,10 @@ struct EdgeWords {
   std::array<Word, 8> second = {};
 };
 
-// The crossings around 64 samples, by direction of Links.
+// The crossings around 64 samples, by direction of Links, with zeros behind those.
 struct StarWords {
-  std::array<Word, kMostDirections> own;
-  std::array<Word, kMostDirections> crossed;
+  std::array<Word, 20> own = {};  // a multiple of four, for wide registers
+  std::array<Word, 20> crossed = {};
 };
 
 // Finds the clusters of one slab's planes.
@@ -158,28 +172,34 @@ class ClusterWalk {
       out[w].any = 0;
       if (!row.may_cross(w)) continue;
       const CornerWords signs = row.corners(w);
+      triangles_ += row.count_triangles(w, signs);
       const std::array<Word, 8> crossed = row.crossed_edges(w, signs);
+      Word any = 0;
+      for (const Word all : crossed) any |= all;
+      if (any == 0) continue;
+      out[w].any = any;
+      std::array<const std::int32_t*, 4> near = {};  // from (y, z), (y + 1, z), ... on
+      if (!extraction_.is_midpoint) {
+        for (unsigned r = 0; r < 4; ++r) near[r] = nearness(w, y + (r & 1), z + (r >> 1));
+      }
       const auto nearer = [&](unsigned a, unsigned b) {
         // All middles are as near to the one sample as to the other.
         if (extraction_.is_midpoint) return signs[a];
-        return less(nearness(w, y, z, a), nearness(w, y, z, b));
+        return less(near[a >> 1] + (a & 1), near[b >> 1] + (b & 1));
       };
       for (unsigned direction = 1; direction < 8; ++direction) {
         const Word all = crossed[direction];
         const Word first = all == 0 ? 0 : all & row.between_ends(direction, nearer);
         out[w].first[direction] = first;
         out[w].second[direction] = all & ~first;
-        out[w].any |= all;
         vertices_ += static_cast<unsigned>(std::popcount(all));
       }
-      triangles_ += row.count_triangles(w, signs);
     }
   }
 
-  const std::int32_t* nearness(std::size_t w, std::uint32_t y, std::uint32_t z, unsigned corner) {
-    const std::uint32_t to_y = std::min(y + (corner >> 1 & 1), dims_.y - 1);
-    const std::uint32_t to_z = std::min(z + (corner >> 2), dims_.z - 1);
-    return nearness_.from(w, to_y, to_z) + (corner & 1);
+  // Beyond the last rows there is no edge to compare.
+  const std::int32_t* nearness(std::size_t w, std::uint32_t y, std::uint32_t z) {
+    return nearness_.from(w, std::min(y, dims_.y - 1), std::min(z, dims_.z - 1));
   }
 
   // Of the row's samples, the components that keep the first two conditions of links.h.
@@ -237,48 +257,48 @@ class ClusterWalk {
   }
 
   Directions candidates_of(const StarWords& star, unsigned bit, unsigned parity) const {
-    Directions own = 0;
-    const std::size_t count = links_.directions().size();
-    for (std::size_t d = 0; d < count; ++d) {
-      own |= static_cast<Directions>(star.own[d] >> bit & 1) << d;
-    }
+    const Directions crossed = directions_at(star.crossed, bit);
     Directions kept = 0;
-    while (own != 0) {
-      const Directions component = links_.facts(parity, own).first();
+    for (Directions own = directions_at(star.own, bit); own != 0;) {
+      ClusterFacts facts = links_.facts(parity, own);
+      const Directions component = facts.first();
+      if (component != own) facts = links_.facts(parity, component);
       own &= ~component;
-      const ClusterFacts facts = links_.facts(parity, component);
-      bool joins = facts.may_join();
-      for (Directions rest = facts.forbidden(); rest != 0; rest &= rest - 1) {
-        joins &= (star.crossed[static_cast<std::size_t>(std::countr_zero(rest))] >> bit & 1) == 0;
-      }
-      if (joins) kept |= component;
+      const bool joins = facts.may_join() & ((facts.forbidden() & crossed) == 0);
+      kept |= joins ? component : 0;
     }
     return kept;
   }
 
+  static Directions directions_at(const std::array<Word, 20>& words, unsigned bit) {
+    Word directions = 0;
+    for (std::size_t d = 0; d < words.size(); ++d) directions |= (words[d] >> bit & 1) << d;
+    return static_cast<Directions>(directions);
+  }
+
   // Of the candidates in a row, those that clash with none of an earlier sample.
   void find_clusters(std::uint32_t y, std::uint32_t z) {
-    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.directions.size()));
+    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
     const Word* candidates = candidate_samples(y, z);
     for (std::size_t w = 0; w < words_; ++w) {
-      Word joined = 0;
       for (Word rest = candidates[w]; rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
         const std::size_t x = w * kWordBits + bit;
-        const Directions kept = without_clashes(x, y, z);
+        const Directions all = candidate_directions(y, z)[x];
+        const ClusterFacts facts = links_.facts(parity(x, y, z), all);
+        const Directions kept = facts.risks() == 0 ? all : without_clashes(x, y, z, facts);
         if (kept == 0) continue;
-        joined |= Word{1} << bit;
-        add_cluster(kept, links_.facts(parity(x, y, z), kept));
+        add_clusters(x, kept, kept == all ? facts : links_.facts(parity(x, y, z), kept));
       }
-      layer_.samples.push_back(joined);
     }
   }
 
-  Directions without_clashes(std::size_t x, std::uint32_t y, std::uint32_t z) {
+  Directions without_clashes(std::size_t x, std::uint32_t y, std::uint32_t z,
+                             const ClusterFacts& facts) {
     const Directions mine = candidate_directions(y, z)[x];
     const unsigned here = parity(x, y, z);
     Directions kept = mine;
-    for (Directions rest = links_.facts(here, mine).risks(); rest != 0; rest &= rest - 1) {
+    for (Directions rest = facts.risks(); rest != 0; rest &= rest - 1) {
       const std::size_t d = links_.half() + static_cast<std::size_t>(std::countr_zero(rest));
       const auto& step = links_.directions()[d].step;
       const std::size_t to_x = x + static_cast<std::size_t>(step[0]);
@@ -305,8 +325,9 @@ class ClusterWalk {
     }
   }
 
-  void add_cluster(Directions joined, const ClusterFacts& facts) {
-    layer_.directions.push_back(joined);
+  void add_clusters(std::size_t x, Directions joined, const ClusterFacts& facts) {
+    const Directions several = facts.components() == 1 ? 0 : JoiningSample::kSeveral;
+    layer_.samples.push_back({static_cast<std::uint32_t>(x), joined | several});
     const auto below = static_cast<unsigned>(std::popcount(joined & links_.below()));
     vertices_ += facts.components();
     vertices_ -= static_cast<unsigned>(std::popcount(joined)) - below;
@@ -316,8 +337,8 @@ class ClusterWalk {
   }
 
   void end_layer(std::uint32_t z) {
-    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.directions.size()));
-    if (layer_.directions.empty()) layer_ = {};
+    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
+    if (layer_.samples.empty()) layer_ = {};
     count_.clusters[z] = std::move(layer_);
     count_.layer_vertices[z + 1] = vertices_;
     count_.layer_triangles[z + 1] = triangles_;
@@ -352,10 +373,10 @@ class ClusterWalk {
   const std::uint32_t first_plane_;
   SignField field_;
   NearnessPlanes nearness_;
-  const std::size_t edge_rows_;           // as many as gather looks back
+  const std::size_t edge_rows_;  // as many as gather looks back
   std::vector<EdgeWords> edges_;
-  std::vector<Word> candidates_;          // of two planes: which samples have some
-  std::vector<Directions> directions_;    // and in which directions
+  std::vector<Word> candidates_;        // of two planes: which samples have some
+  std::vector<Directions> directions_;  // and in which directions
   ClusterLayer layer_;
   std::uint64_t vertices_ = 0;  // of the layer
   std::uint64_t triangles_ = 0;

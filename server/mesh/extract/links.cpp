@@ -40,12 +40,32 @@ Directions component_of(const std::array<Directions, kMostDirections>& adjacent,
   return reached;
 }
 
-// Whether the bits, places of a ring of that size, are none or one run with two places free.
-bool is_run(unsigned bits, std::size_t size) {
-  if (bits == 0) return true;
-  const unsigned next = (bits >> 1 | bits << (size - 1)) & ((1U << size) - 1);
-  return std::popcount(bits & ~next) == 1 &&
-         static_cast<std::size_t>(std::popcount(bits)) + 2 <= size;
+// Sets of places of a ring, one bit each set.
+struct RingSets {
+  std::uint64_t runs = 0;   // none, or one run that leaves two places free
+  std::uint64_t risky = 0;  // those with a subset that is no such run
+};
+
+constexpr RingSets make_ring_sets(unsigned size) {
+  RingSets sets;
+  for (unsigned bits = 0; bits < 1U << size; ++bits) {
+    const unsigned next = (bits >> 1 | bits << (size - 1)) & ((1U << size) - 1);
+    const bool is_run =
+        std::popcount(bits & ~next) <= 1 && static_cast<unsigned>(std::popcount(bits)) + 2 <= size;
+    if (is_run) sets.runs |= std::uint64_t{1} << bits;
+  }
+  for (unsigned bits = 0; bits < 1U << size; ++bits) {
+    for (unsigned some = bits; some != 0; some = (some - 1) & bits) {
+      if ((sets.runs >> some & 1) == 0) sets.risky |= std::uint64_t{1} << bits;
+    }
+  }
+  return sets;
+}
+
+const RingSets& ring_sets(std::size_t size) {
+  static constexpr RingSets kOfFour = make_ring_sets(4);
+  static constexpr RingSets kOfSix = make_ring_sets(6);
+  return size == 4 ? kOfFour : kOfSix;
 }
 
 }  // namespace
@@ -113,7 +133,9 @@ Links::Link Links::make_link(Scheme scheme, unsigned parity) const {
     for (std::size_t b = a + 1; b < directions_.size(); ++b) {
       for (std::size_t c = b + 1; c < directions_.size(); ++c) {
         if ((link.adjacent[a] >> b & link.adjacent[a] >> c & link.adjacent[b] >> c & 1) != 0) {
-          link.triangles.push_back(bit(a) | bit(b) | bit(c));
+          bool is_above = false;
+          for (const std::size_t d : {a, b, c}) is_above |= directions_[d].step[2] > 0;
+          (is_above ? link.above : link.below).push_back(bit(a) | bit(b) | bit(c));
         }
       }
     }
@@ -125,8 +147,7 @@ Links::Link Links::make_link(Scheme scheme, unsigned parity) const {
 Links::Ring Links::make_ring(const Link& link, std::size_t direction) const {
   Ring ring;
   for (Directions rest = link.adjacent[direction]; rest != 0;) {
-    const Directions next =
-        ring.size == 0 ? rest : rest & link.adjacent[ring.mine[ring.size - 1]];
+    const Directions next = ring.size == 0 ? rest : rest & link.adjacent[ring.mine[ring.size - 1]];
     const auto place = static_cast<std::size_t>(std::countr_zero(next));
     ring.mine[ring.size] = static_cast<std::uint8_t>(place);
     ring.theirs[ring.size] = static_cast<std::uint8_t>(
@@ -154,20 +175,18 @@ ClusterFacts Links::find_facts(const Link& link, Directions set) const {
     if ((link.existing >> d & 1) == 0) continue;
     const Ring& ring = link.rings[d];
     const unsigned bits = on_ring(ring);
-    if ((free >> d & 1) != 0 && !is_run(bits, ring.size)) parts.forbidden |= bit(d);
-    if (d < half()) continue;
-    for (unsigned some = bits; some != 0; some = (some - 1) & bits) {
-      if (!is_run(some, ring.size)) parts.risks |= bit(d - half());
-    }
+    const RingSets& sets = ring_sets(ring.size);
+    if ((free >> d & 1) != 0 && (sets.runs >> bits & 1) == 0) parts.forbidden |= bit(d);
+    if (d >= half() && (sets.risky >> bits & 1) != 0) parts.risks |= bit(d - half());
   }
-  for (const Directions triangle : link.triangles) {
-    if (std::popcount(triangle & set) < 2) continue;
-    bool is_above = false;
-    for (Directions rest = triangle; rest != 0; rest &= rest - 1) {
-      is_above |= directions_[static_cast<std::size_t>(std::countr_zero(rest))].step[2] > 0;
-    }
-    ++(is_above ? parts.lost_above : parts.lost_below);
-  }
+  const auto count_lost = [&](const std::vector<Directions>& triangles) {
+    const auto is_lost = [&](Directions corners) {
+      return ((corners & set) & ((corners & set) - 1)) != 0;  // two of them, or all
+    };
+    return static_cast<unsigned>(std::ranges::count_if(triangles, is_lost));
+  };
+  parts.lost_above = count_lost(link.above);
+  parts.lost_below = count_lost(link.below);
   return ClusterFacts(parts);
 }
 
@@ -178,7 +197,7 @@ bool Links::clash(unsigned parity, std::size_t direction, Directions mine,
   for (std::size_t i = 0; i < ring.size; ++i) {
     both |= (mine >> ring.mine[i] & theirs >> ring.theirs[i] & 1) << i;
   }
-  return !is_run(both, ring.size);
+  return (ring_sets(ring.size).runs >> both & 1) == 0;
 }
 
 const Links& links_of(Scheme scheme) {

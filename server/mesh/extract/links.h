@@ -1,17 +1,18 @@
 // Which crossings around a sample may be joined into one vertex (G. M. Treece, R. W. Prager, A. H.
-// Gee, "Regularised marching tetrahedra", Computers & Graphics 23(4), 1999), by a rule that looks at
-// one sample and its neighbours alone; private to the kernels.
+// Gee, "Regularised marching tetrahedra", Computers & Graphics 23(4), 1999), by a rule that looks
+// at one sample and its neighbours alone; private to the kernels.
 //
 // The neighbours of a sample are its link, a triangulated sphere. A crossing belongs to that end of
 // its edge whose value is nearer to the iso-value, so a sample has a set of directions in which
 // crossings are its own. A connected component C of that set becomes one vertex if
 //  * C is not the whole link, and what it leaves of the link is connected;
-//  * for every direction p outside C that is crossed: on the ring of p, the neighbours of both p and
+//  * for every direction p outside C that is crossed: on the ring of p, the neighbours of both p
+//  and
 //    the sample, C is nothing, or one run that leaves at least two places free;
 //  * for every neighbour on the same side that has such a component E: on the ring of that
-//    neighbour, what is in both C and E is nothing, or one run that leaves at least two places free.
-//    Otherwise the component of that sample goes that is later in the order of the samples, whatever
-//    becomes of the other.
+//    neighbour, what is in both C and E is nothing, or one run that leaves at least two places
+//    free. Otherwise the component of that sample goes that is later in the order of the samples,
+//    whatever becomes of the other.
 // The first two say that the crossings' patches make a disk which touches no patch around it twice,
 // the third the same of two disks next to each other. So the joined surface has the components, the
 // boundary and the genus of the surface that it comes from.
@@ -130,7 +131,9 @@ class Links {
     Directions existing = 0;
     std::array<Directions, kMostDirections> adjacent = {};  // neighbours that are neighbours
     std::array<Ring, kMostDirections> rings = {};
-    std::vector<Directions> triangles;
+    // Its triangles: those of tetrahedra in the sample's layer, and in the one below.
+    std::vector<Directions> above;
+    std::vector<Directions> below;
     std::unique_ptr<std::atomic<ClusterFacts>[]> known;  // by the set
   };
 

@@ -3,13 +3,13 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/mesh/extract/sample_rows.cpp"
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <optional>
+
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
 
 #include "proto/samples.h"
 #include "server/mesh/lattice/rows-inl.h"
@@ -91,10 +91,10 @@ class RowsOf final : public SampleRows {
 };
 
 // Highway's tables hold functions, not templates.
-#define ISOMESH_FOR_TYPE(T, Name, kType)                                                 \
-  std::unique_ptr<const SampleRows> make_rows_##Name(                                    \
-      const Lattice<T>& lattice, const ExtractOptions& options, T smallest) {            \
-    return std::make_unique<RowsOf<T>>(lattice, options, smallest);                      \
+#define ISOMESH_FOR_TYPE(T, Name, kType)                                                          \
+  std::unique_ptr<const SampleRows> make_rows_##Name(const Lattice<T>& lattice,                   \
+                                                     const ExtractOptions& options, T smallest) { \
+    return std::make_unique<RowsOf<T>>(lattice, options, smallest);                               \
   }
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_FOR_TYPE)
 #undef ISOMESH_FOR_TYPE
@@ -105,12 +105,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace isomesh::mesh {
 
-#define ISOMESH_DISPATCH(T, Name, kType)                                                 \
-  HWY_EXPORT(make_rows_##Name);                                                          \
-  template <>                                                                            \
-  std::unique_ptr<const SampleRows> make_sample_rows(                                    \
-      const Lattice<T>& lattice, const ExtractOptions& options, T smallest) {            \
-    return HWY_DYNAMIC_DISPATCH(make_rows_##Name)(lattice, options, smallest);           \
+#define ISOMESH_DISPATCH(T, Name, kType)                                                          \
+  HWY_EXPORT(make_rows_##Name);                                                                   \
+  template <>                                                                                     \
+  std::unique_ptr<const SampleRows> make_sample_rows(const Lattice<T>& lattice,                   \
+                                                     const ExtractOptions& options, T smallest) { \
+    return HWY_DYNAMIC_DISPATCH(make_rows_##Name)(lattice, options, smallest);                    \
   }
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_DISPATCH)
 #undef ISOMESH_DISPATCH

@@ -25,8 +25,8 @@ struct RowEdges {
   std::uint32_t y = 0;
   std::uint32_t z = 0;
   std::uint32_t margin = 0;
-  std::uint32_t places = 0;         // a sample, a power of two
-  unsigned parity = 0;              // of the sample x = 0
+  std::uint32_t places = 0;           // a sample, a power of two
+  unsigned parity = 0;                // of the sample x = 0
   const EdgeSamples* ends = nullptr;  // of each number, those of even samples first
   std::span<const std::uint32_t> edges;
 };

@@ -166,8 +166,7 @@ class SlabWriter {
     if (begin == end) return;
     const LatticeToSpace& map = marched_.to_space;
     const std::uint32_t margin = marched_.margin;
-    const auto share =
-        field_.shares(y, z, std::span(vertices_).subspan(begin, end - begin));
+    const auto share = field_.shares(y, z, std::span(vertices_).subspan(begin, end - begin));
     const Double4 row_at =
         lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
     const Double4 step_x = lanes(map.step_x);
