@@ -41,7 +41,7 @@ interface Control {
 const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
 // The parameters that are always visible, in rows. All others are under "More", these first.
 const front = [['max_error_mm'], ['triangles', 'certify'], ['fill_cavities']];
-const behind = [['scheme', 'interpolation'], ['smoothing', 'passes'], ['priority']];
+const behind = [['scheme', 'interpolation'], ['regularize'], ['smoothing', 'passes'], ['priority']];
 
 export const shown = parameters.filter(({ name }) => !elsewhere.includes(name));
 
