@@ -73,16 +73,6 @@ SurfaceSize size_of(const SurfaceCount& count) {
 }
 
 template <class T>
-Extraction<T>::Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options,
-                          T the_smallest)
-    : Marching(the_lattice.dims, the_lattice.to_space, options.scheme, options.close),
-      lattice(the_lattice),
-      smallest(the_smallest),
-      placement(options, the_lattice.dims, the_lattice.to_space) {
-  if (options.close) border.emplace(the_lattice, options, the_smallest, placement);
-}
-
-template <class T>
 SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
                            const Context& context) {
   SurfaceCount count = empty_count(marched_dims(lattice.dims, options.close).z);
@@ -92,7 +82,8 @@ SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& opti
     return count;
   }
 
-  const Extraction<T> extraction(lattice, options, *smallest);
+  const Extraction extraction(lattice, options, *smallest);
+  if (options.regularize) count.clusters.resize(extraction.dims.z);
   count_pass(extraction, context, count);
   prefix_pass(count);
   return count;
@@ -107,7 +98,9 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
     return context.throw_if_stopped();
   }
 
-  write_pass(Extraction<T>(lattice, options, *smallest), kEdgePlaces, context, mesh, mesh);
+  Extraction extraction(lattice, options, *smallest);
+  extraction.clusters = count.clusters;
+  write_pass(extraction, kEdgePlaces, context, mesh, mesh);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                                      \

@@ -7,10 +7,11 @@
 // Transactions E74(1), 1991, whose Table 1 has both splits). The six-way split is Kuhn's (H. W.
 // Kuhn, "Some combinatorial lemmas in topology", IBM Journal of Research and Development 4(5),
 // 1960), which tiles by translation; of the five-way split every cell with odd i+j+k is mirrored,
-// or the diagonals of shared faces would cross. Vertices near a sample could be snapped to it, for
-// better triangles (G. M. Treece, R. W. Prager, A. H. Gee, "Regularised marching tetrahedra",
-// Computers & Graphics 23(4), 1999); here they stay where interpolation puts them, and smoothing
-// betters the triangles.
+// or the diagonals of shared faces would cross.
+//
+// A surface that is regularised has a third as many triangles: crossings around a sample become one
+// vertex at their mean, wherever that keeps the topology (links.h). Those on edges in the border of
+// the volume stay, and so does every boundary.
 //
 // Three passes: count_surface (1) counts the vertices and triangles of each layer and (2) sums the
 // counts up, so that every layer knows its place; extract_surface (3) writes every vertex and
@@ -27,6 +28,7 @@
 #include <vector>
 
 #include "server/mesh/context.h"
+#include "server/mesh/extract/clusters.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/lattice/placement.h"
 #include "server/mesh/mesh.h"
@@ -38,6 +40,7 @@ namespace isomesh::mesh {
 struct SurfaceCount {
   std::vector<std::uint64_t> layer_vertices = {0};
   std::vector<std::uint64_t> layer_triangles = {0};
+  std::vector<ClusterLayer> clusters;  // of each layer; empty of a surface that is not regularised
 
   std::uint64_t vertices() const { return layer_vertices.back(); }
   std::uint64_t triangles() const { return layer_triangles.back(); }

@@ -12,6 +12,8 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include <hwy/highway.h>
@@ -37,57 +39,21 @@ class SignPlane {
   std::vector<Word> bits_;
 };
 
-// The signs of up to 64 samples; bits beyond `count` are zero.
-template <class T>
-HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
-  std::array<std::uint8_t, kWordBits> flags = {};
-  if (count == kWordBits) {  // a constant count, which the compiler turns into wide compares
-    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
-  } else {
-    for (std::size_t x = 0; x < count; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
-  }
-  return pack_word(flags);
-}
-
-// Fills `plane` with the signs of the samples of plane z.
-template <class T>
-void classify(const Lattice<T>& lattice, std::uint32_t z, T smallest, SignPlane& plane) {
-  const std::size_t width = lattice.dims.x;
-  const T* samples = lattice.samples + std::size_t{z} * lattice.dims.y * width;
-  for (std::uint32_t y = 0; y < lattice.dims.y; ++y, samples += width) {
+// Fills `plane` with the signs of the samples of plane z, phantoms included, which are outside.
+inline void classify(const Extraction& extraction, std::uint32_t z, SignPlane& plane) {
+  const std::uint32_t margin = extraction.margin;
+  const auto is_phantom = [&](std::uint32_t at, std::uint32_t samples) {
+    return at < margin || at >= samples + margin;
+  };
+  for (std::uint32_t y = 0; y < extraction.dims.y; ++y) {
     Word* row = plane.row(y);
+    std::fill_n(row, plane.words(), 0);
+    if (is_phantom(y, extraction.inner.y) || is_phantom(z, extraction.inner.z)) continue;
+    extraction.samples->classify(y - margin, z - margin, row);
+    if (margin == 0) continue;
+    Word carry = 0;  // a phantom is the first of the row
     for (std::size_t w = 0; w < plane.words(); ++w) {
-      const std::size_t begin = w * kWordBits;
-      row[w] =
-          classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin), smallest);
-    }
-  }
-}
-
-// The same for the plane that is z when phantoms are numbered too: a phantom, which is outside, is
-// on each of its sides, so that rows begin one bit later.
-template <class T>
-void classify_with_margin(const Lattice<T>& lattice, std::uint32_t z, T smallest,
-                          SignPlane& plane) {
-  const std::size_t width = lattice.dims.x;
-  const std::size_t words = plane.words();
-  std::fill_n(plane.row(0), words, 0);
-  std::fill_n(plane.row(lattice.dims.y + 1), words, 0);
-  const bool is_phantom = z == 0 || z == lattice.dims.z + 1;
-  for (std::uint32_t y = 0; y < lattice.dims.y; ++y) {
-    Word* row = plane.row(y + 1);
-    if (is_phantom) {
-      std::fill_n(row, words, 0);
-      continue;
-    }
-    const T* samples = lattice.samples + (std::size_t{z - 1} * lattice.dims.y + y) * width;
-    Word carry = 0;
-    for (std::size_t w = 0; w < words; ++w) {
-      const std::size_t begin = std::min(w * kWordBits, width);
-      const Word signs =
-          classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin), smallest);
-      row[w] = signs << 1 | carry;
-      carry = signs >> (kWordBits - 1);
+      carry = std::exchange(row[w], row[w] << 1 | carry) >> (kWordBits - 1);
     }
   }
 }
@@ -145,12 +111,7 @@ class SignRow : public RowShape {
   // returned are valid.
   HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const SignCells& cells,
                                  std::uint32_t* next) const {
-    const unsigned directions = splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x);
-    const auto& members = kMembers[directions];
-    for (std::size_t i = 0; i < kEdgePlaces; ++i) {
-      next[i] = static_cast<std::uint32_t>(x * kEdgePlaces) + members[i];
-    }
-    return next + std::popcount(directions);
+    return list_edges(x, directions(x, bit, cells), next);
   }
 
   WordCount count(std::size_t w) const {
@@ -163,7 +124,6 @@ class SignRow : public RowShape {
     return count;
   }
 
- private:
   CornerWords corners(std::size_t w) const {
     CornerWords corners;
     for (unsigned r = 0; r < 4; ++r) {
@@ -173,19 +133,9 @@ class SignRow : public RowShape {
     return corners;
   }
 
+  // Word d: the samples whose edge of direction d is crossed.
   std::array<Word, 8> crossed_edges(std::size_t w, const CornerWords& corners) const {
     return edges_where(w, [&](unsigned a, unsigned b) { return corners[a] ^ corners[b]; });
-  }
-
-  // The cells that exist and have corners on both sides.
-  Word crossed_cells(std::size_t w, const CornerWords& corners) const {
-    Word any = 0;
-    Word all = ~Word{0};
-    for (const Word corner : corners) {
-      any |= corner;
-      all &= corner;
-    }
-    return any & ~all & cells(w);
   }
 
   unsigned count_triangles(std::size_t w, const CornerWords& corners) const {
@@ -200,6 +150,35 @@ class SignRow : public RowShape {
       }
     }
     return count;
+  }
+
+  using RowShape::between_ends;
+
+ protected:
+  // The set of crossed edges that the sample owns.
+  unsigned directions(std::size_t x, unsigned bit, const SignCells& cells) const {
+    return splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x);
+  }
+
+  HWY_INLINE static std::uint32_t* list_edges(std::size_t x, unsigned directions,
+                                              std::uint32_t* next) {
+    const auto& members = kMembers[directions];
+    for (std::size_t i = 0; i < kEdgePlaces; ++i) {
+      next[i] = static_cast<std::uint32_t>(x * kEdgePlaces) + members[i];
+    }
+    return next + std::popcount(directions);
+  }
+
+ private:
+  // The cells that exist and have corners on both sides.
+  Word crossed_cells(std::size_t w, const CornerWords& corners) const {
+    Word any = 0;
+    Word all = ~Word{0};
+    for (const Word corner : corners) {
+      any |= corner;
+      all &= corner;
+    }
+    return any & ~all & cells(w);
   }
 
   const std::array<CellSplit, 2>& splits_;
@@ -227,31 +206,34 @@ class SignCellWriter {
 
 // What the walk is told of an iso-value's signs: those of the planes around the one that is worked
 // on, each classified once as z rises.
-template <class T>
 class SignField {
  public:
-  using Marched = Extraction<T>;
+  using Marched = Extraction;
   using Output = Mesh;
   using Cells = SignCells;
   using Row = SignRow;
   static constexpr std::size_t kPlaces = kEdgePlaces;
   static constexpr bool kHasLines = false;
+  static constexpr bool kHasClusters = false;
 
-  SignField(const Extraction<T>& extraction, std::uint32_t first)
+  SignField(const Extraction& extraction, std::uint32_t first)
       : extraction_(extraction),
         dims_(extraction.dims),
         planes_{SignPlane(dims_), SignPlane(dims_), SignPlane(dims_)},
-        next_(first) {}
+        next_(first) {
+    for (unsigned parity = 0; parity < 2; ++parity) {
+      for (unsigned direction = 0; direction < kPlaces; ++direction) {
+        const EdgeEnds edge = extraction.splits[parity].ends[direction];
+        ends_[parity * kPlaces + direction] = {sample_offset(extraction.inner, edge.from),
+                                               sample_offset(extraction.inner, edge.to)};
+      }
+    }
+  }
 
   // Classifies up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
     for (; next_ <= z + 1 && next_ < dims_.z; ++next_) {
-      SignPlane& plane = planes_[next_ % kPlanes];
-      if (extraction_.margin == 0) {
-        classify(extraction_.lattice, next_, extraction_.smallest, plane);
-      } else {
-        classify_with_margin(extraction_.lattice, next_, extraction_.smallest, plane);
-      }
+      classify(extraction_, next_, planes_[next_ % kPlanes]);
     }
   }
 
@@ -262,36 +244,32 @@ class SignField {
             planes_[z % kPlanes], planes_[above % kPlanes], y};
   }
 
+  // The signs of a row of plane z - 1, z or z + 1.
+  const Word* signs(std::uint32_t y, std::uint32_t z) const { return planes_[z % kPlanes].row(y); }
+
   static Mesh& mesh_of(Mesh& mesh) { return mesh; }
 
   EdgeFrame frame(unsigned parity, std::size_t direction) const {
-    const LatticeToSpace& map = extraction_.lattice.to_space;
     const EdgeEnds ends = extraction_.splits[parity].ends[direction];
-    EdgeFrame frame;
-    frame.from = sample_offset(ends.from);
-    frame.to = sample_offset(ends.to);
-    frame.start = space_offset(map, ends.from);
-    frame.run = space_offset(map, ends.to) - frame.start;
-    return frame;
+    const Double4 start = space_offset(extraction_.to_space, ends.from);
+    return {start, space_offset(extraction_.to_space, ends.to) - start};
   }
 
-  // The share of the way along its edge of each vertex in a row between the lattice's own samples.
-  template <std::uint32_t kMargin>
-  auto shares(std::uint32_t y, std::uint32_t z) const {
-    const Lattice<T>& lattice = extraction_.lattice;
-    const T* samples = lattice.samples - kMargin +
-                       (std::size_t{z - kMargin} * lattice.dims.y + (y - kMargin)) * lattice.dims.x;
-    return [samples, this](std::size_t x, const EdgeFrame& edge) {
-      return extraction_.placement.share(samples[x + edge.from], samples[x + edge.to]);
-    };
+  // The share of the way along its edge of each vertex of a row between the lattice's own samples.
+  auto shares(std::uint32_t y, std::uint32_t z, std::span<const std::uint32_t> vertices) {
+    const std::uint32_t margin = extraction_.margin;
+    if (shares_.size() < vertices.size()) shares_.resize(2 * vertices.size());
+    extraction_.samples->shares({y - margin, z - margin, margin, kPlaces,
+                                 extraction_.parity(0, y, z), ends_.data(), vertices},
+                                shares_.data());
+    return [shares = shares_.data()](std::size_t i) { return shares[i]; };
   }
 
   BorderVertex place_at_border(std::uint32_t x, std::uint32_t y, std::uint32_t z,
                                std::size_t direction, const EdgeFrame& /*frame*/) const {
     const CellSplit& split = extraction_.splits[extraction_.parity(x, y, z)];
-    const auto placed = extraction_.border->place(
+    return extraction_.samples->place_at_border(
         {std::int64_t{x} - 1, std::int64_t{y} - 1, std::int64_t{z} - 1}, split.ends[direction]);
-    return {placed.position, placed.on_border};
   }
 
   SignCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
@@ -302,16 +280,12 @@ class SignField {
  private:
   static constexpr std::uint32_t kPlanes = 3;
 
-  std::ptrdiff_t sample_offset(unsigned corner) const {
-    const std::ptrdiff_t row = extraction_.lattice.dims.x;
-    const std::ptrdiff_t plane = row * extraction_.lattice.dims.y;
-    return (corner & 1) + (corner >> 1 & 1) * row + (corner >> 2) * plane;
-  }
-
-  const Extraction<T>& extraction_;
+  const Extraction& extraction_;
   const Dims dims_;
   std::array<SignPlane, kPlanes> planes_;
   std::uint32_t next_;
+  std::array<EdgeSamples, 2 * kPlaces> ends_;  // of the edges, by parity and direction
+  std::vector<double> shares_;
 };
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

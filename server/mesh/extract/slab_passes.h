@@ -47,6 +47,10 @@ void count_pass(const Marched& marched, const Context& context, SurfaceCount& co
 
 // Pass 2: where each layer begins.
 inline void prefix_pass(SurfaceCount& count) {
+  for (std::size_t k = 1; k < count.clusters.size(); ++k) {
+    count.layer_vertices[k] -= count.clusters[k].vertices_below;
+    count.layer_triangles[k] -= count.clusters[k].triangles_below;
+  }
   for (auto* sums : {&count.layer_vertices, &count.layer_triangles}) {
     std::partial_sum(sums->begin(), sums->end(), sums->begin());
   }

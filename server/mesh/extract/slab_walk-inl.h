@@ -13,6 +13,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -105,6 +106,13 @@ class SlabWriter {
  private:
   // Numbers the vertices of a row's samples from `vertex` on, and places those of the slab.
   void number_row(std::uint32_t y, std::uint32_t z, std::uint32_t& vertex) {
+    if constexpr (Field::kHasClusters) {
+      // Some edges of a cluster belong to samples of the rows behind and below.
+      const std::array rows = {rows_.indices(y, z), rows_.indices(y - 1, z),
+                               rows_.indices(y, z - 1), rows_.indices(y - 1, z - 1)};
+      Vec3* positions = z < slab_.end ? mesh_.positions.data() + vertex : nullptr;
+      vertex = field_.number_clusters(y, z, rows, vertex, positions);
+    }
     find_vertices(y, z);
     std::uint32_t* indices = rows_.indices(y, z);
     for (std::size_t i = 0; i < vertices_found_; ++i) {
@@ -132,9 +140,9 @@ class SlabWriter {
   }
 
   // Places the vertices of the row, the first of which is `vertex`.
-  void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) const {
+  void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
     if constexpr (Field::kHasLines) mark_lines(vertex);
-    if (marched_.margin == 0) return place_inner<0>(0, vertices_found_, y, z, vertex);
+    if (marched_.margin == 0) return place_inner(0, vertices_found_, y, z, vertex);
     // Edges that lie in a face of the volume's box or leave it have samples here as their owners.
     const auto is_at_border = [](std::uint32_t at, std::uint32_t samples) {
       return at <= 1 || at + 2 >= samples;
@@ -148,19 +156,19 @@ class SlabWriter {
       while (begin < end && is_at_border(vertices_[end - 1] / kPlaces, dims_.x)) --end;
     }
     place_at_border(0, begin, y, z, vertex);
-    place_inner<1>(begin, end, y, z, vertex);
+    place_inner(begin, end, y, z, vertex);
     place_at_border(end, vertices_found_, y, z, vertex);
   }
 
   // Those of the vertices [begin, end), between the lattice's own samples.
-  template <std::uint32_t kMargin>
   void place_inner(std::size_t begin, std::size_t end, std::uint32_t y, std::uint32_t z,
-                   std::uint32_t vertex) const {
+                   std::uint32_t vertex) {
     if (begin == end) return;
     const LatticeToSpace& map = marched_.to_space;
-    const auto share = field_.template shares<kMargin>(y, z);
+    const std::uint32_t margin = marched_.margin;
+    const auto share = field_.shares(y, z, std::span(vertices_).subspan(begin, end - begin));
     const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - kMargin) + lanes(map.step_z) * (z - kMargin);
+        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
     const Double4 step_x = lanes(map.step_x);
     const unsigned row_parity = marched_.parity(0, y, z);
     Vec3* out = mesh_.positions.data() + vertex;
@@ -169,9 +177,9 @@ class SlabWriter {
       const std::uint32_t x = place / kPlaces;
       const EdgeFrame& edge = frames_[(x + row_parity) & 1][place % kPlaces];
       const Double4 at =
-          row_at + step_x * static_cast<double>(static_cast<std::int32_t>(x - kMargin));
+          row_at + step_x * static_cast<double>(static_cast<std::int32_t>(x - margin));
       const Float4 position =
-          __builtin_convertvector(at + edge.start + edge.run * share(x, edge), Float4);
+          __builtin_convertvector(at + edge.start + edge.run * share(i - begin), Float4);
       std::memcpy(out + i, &position, sizeof *out);
     }
   }

@@ -9,24 +9,23 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "proto/samples.h"
+#include "server/mesh/extract/clusters-inl.h"
+#include "server/mesh/extract/regular-inl.h"
 #include "server/mesh/extract/signs-inl.h"
 #include "server/mesh/extract/slab_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// Highway's tables hold functions, not templates.
-#define ISOMESH_FOR_TYPE(T, Name, kType)                                                           \
-  void count_slab_##Name(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) { \
-    count_slab_of<SignField<T>>(extraction, slab, count);                                          \
-  }                                                                                                \
-  void write_slab_##Name(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory,   \
-                         Mesh& mesh) {                                                             \
-    write_slab_of<SignField<T>>(extraction, slab, memory, mesh);                                   \
-  }
-ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_FOR_TYPE)
-#undef ISOMESH_FOR_TYPE
+void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
+  if (extraction.regularize) return ClusterWalk(extraction, slab, count).count();
+  count_slab_of<SignField>(extraction, slab, count);
+}
+
+void write_signs(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh) {
+  if (extraction.regularize) return write_slab_of<RegularField>(extraction, slab, memory, mesh);
+  write_slab_of<SignField>(extraction, slab, memory, mesh);
+}
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -34,20 +33,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace isomesh::mesh {
 
-#define ISOMESH_DISPATCH(T, Name, kType)                                                    \
-  HWY_EXPORT(count_slab_##Name);                                                            \
-  HWY_EXPORT(write_slab_##Name);                                                            \
-  template <>                                                                               \
-  void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) { \
-    HWY_DYNAMIC_DISPATCH(count_slab_##Name)(extraction, slab, count);                       \
-  }                                                                                         \
-  template <>                                                                               \
-  void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory,   \
-                  Mesh& mesh) {                                                             \
-    HWY_DYNAMIC_DISPATCH(write_slab_##Name)(extraction, slab, memory, mesh);                \
-  }
-ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_DISPATCH)
-#undef ISOMESH_DISPATCH
+HWY_EXPORT(count_signs);
+HWY_EXPORT(write_signs);
+
+void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
+  HWY_DYNAMIC_DISPATCH(count_signs)(extraction, slab, count);
+}
+
+void write_slab(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh) {
+  HWY_DYNAMIC_DISPATCH(write_signs)(extraction, slab, memory, mesh);
+}
 
 }  // namespace isomesh::mesh
 #endif

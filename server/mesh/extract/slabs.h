@@ -5,13 +5,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <optional>
+#include <span>
 #include <vector>
 
 #include "base/mutex.h"
 #include "server/mesh/extract/extract.h"
-#include "server/mesh/lattice/border.h"
-#include "server/mesh/lattice/placement.h"
+#include "server/mesh/extract/sample_rows.h"
 #include "server/mesh/lattice/tetrahedra.h"
 
 namespace isomesh::mesh {
@@ -58,14 +57,21 @@ struct Marching {
 };
 
 // What all slabs of an extraction at an iso-value share.
-template <class T>
 struct Extraction : Marching {
-  Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options, T the_smallest);
+  // `smallest`: the smallest value that is inside.
+  template <class T>
+  Extraction(const Lattice<T>& lattice, const ExtractOptions& options, T smallest)
+      : Marching(lattice.dims, lattice.to_space, options.scheme, options.close),
+        inner(lattice.dims),
+        is_midpoint(options.interpolation == Interpolation::kMidpoint),
+        regularize(options.regularize),
+        samples(make_sample_rows(lattice, options, smallest)) {}
 
-  const Lattice<T>& lattice;
-  T smallest;  // the smallest value that is inside
-  Placement placement;
-  std::optional<BorderPlacement<T>> border;  // of a surface that is closed
+  Dims inner;  // of the lattice itself
+  bool is_midpoint;
+  bool regularize;
+  std::unique_ptr<const SampleRows> samples;
+  std::span<const ClusterLayer> clusters;  // of a surface that is regularised, when it is written
 };
 
 // The memory that a slab numbers its vertices in. A slab that has ended gives its block back and
@@ -107,12 +113,10 @@ inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {
 
 // Pass 1, count: how many vertices and triangles layer k has goes to layer_vertices[k + 1] and
 // layer_triangles[k + 1].
-template <class T>
-void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count);
+void count_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count);
 
 // Pass 3, write: the slab's vertices and triangles go to their places, which mesh.layer_vertices
 // and mesh.layer_triangles tell.
-template <class T>
-void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
+void write_slab(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
 
 }  // namespace isomesh::mesh

@@ -274,6 +274,7 @@ class LabelField {
   using Row = LabelRow;
   static constexpr std::size_t kPlaces = kSlotPlaces;
   static constexpr bool kHasLines = true;
+  static constexpr bool kHasClusters = false;
 
   LabelField(const Separation& separation, std::uint32_t first)
       : separation_(separation),
@@ -318,9 +319,9 @@ class LabelField {
     return frame;
   }
 
-  template <std::uint32_t kMargin>
-  auto shares(std::uint32_t /*y*/, std::uint32_t /*z*/) const {
-    return [](std::size_t /*x*/, const EdgeFrame& /*frame*/) { return 0.5; };
+  auto shares(std::uint32_t /*y*/, std::uint32_t /*z*/,
+              std::span<const std::uint32_t> /*vertices*/) const {
+    return [](std::size_t /*vertex*/) { return 0.5; };
   }
 
   // Phantoms have one label, so no more than one corner is one. The vertex is half-way to it from

@@ -33,8 +33,7 @@ BorderPlacement<T>::BorderPlacement(const Lattice<T>& lattice, const ExtractOpti
       contour_(options, kContourWays * least_way_) {}
 
 template <class T>
-typename BorderPlacement<T>::Vertex BorderPlacement<T>::place(const Sample& cell,
-                                                              const EdgeEnds& ends) const {
+BorderVertex BorderPlacement<T>::place(const BorderSample& cell, const EdgeEnds& ends) const {
   const Offset start = corner_offset(ends.from);
   const Offset end = corner_offset(ends.to);
   Sample from;
@@ -44,7 +43,7 @@ typename BorderPlacement<T>::Vertex BorderPlacement<T>::place(const Sample& cell
     to[axis] = cell[axis] + end[axis];
   }
   const LatticeToSpace& map = lattice_.to_space;
-  Vertex vertex;
+  BorderVertex vertex;
   if (is_phantom(from) || is_phantom(to)) {
     vertex.on_border = true;
     const Point at = is_phantom(from) ? cap_point(to, from) : cap_point(from, to);

@@ -25,26 +25,28 @@
 
 namespace isomesh::mesh {
 
+// In the lattice's own numbers; phantoms are at -1 and at the numbers of samples.
+using BorderSample = std::array<std::int64_t, 3>;
+
+// A vertex near the border of the volume.
+struct BorderVertex {
+  Vec3 position = {0, 0, 0};
+  bool on_border = false;  // its edge lies in a face of the volume's box or leads to a phantom
+};
+
 // Immutable, so safe to read from several threads. Instantiated for the eight types of SampleType.
 template <class T>
 class BorderPlacement {
  public:
-  // In the lattice's own numbers; phantoms are at -1 and at the numbers of samples.
-  using Sample = std::array<std::int64_t, 3>;
-
   // `interior` places what is not on the border. `lattice` must outlive this.
   BorderPlacement(const Lattice<T>& lattice, const ExtractOptions& options, T smallest,
                   const Placement& interior);
 
-  struct Vertex {
-    Vec3 position = {0, 0, 0};
-    bool on_border = false;  // its edge lies in a face of the volume's box or leads to a phantom
-  };
-
   // The vertex on a crossed edge between corners of the cell whose corner 0 is `cell`.
-  Vertex place(const Sample& cell, const EdgeEnds& ends) const;
+  BorderVertex place(const BorderSample& cell, const EdgeEnds& ends) const;
 
  private:
+  using Sample = BorderSample;
   using Offset = std::array<std::int64_t, 3>;
   using Point = std::array<double, 3>;
 

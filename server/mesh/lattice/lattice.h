@@ -19,6 +19,13 @@ struct Dims {
   bool has_cells() const { return x > 1 && y > 1 && z > 1; }
 };
 
+// From a sample to the one at the corner 0..7 of the cell that begins there, in x-fastest order.
+inline std::ptrdiff_t sample_offset(const Dims& dims, unsigned corner) {
+  const std::ptrdiff_t row = dims.x;
+  return (corner & 1) + (corner >> 1 & 1) * row +
+         (corner >> 2) * row * static_cast<std::ptrdiff_t>(dims.y);
+}
+
 // p = origin + step_x * i + step_y * j + step_z * k, in millimetres.
 struct LatticeToSpace {
   std::array<double, 3> origin = {0, 0, 0};

@@ -14,6 +14,7 @@ struct ExtractOptions {
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
   bool close = false;  // cap the surface where it meets the lattice's border
+  bool regularize = false;  // join crossings around a sample, see links.h
 };
 
 // Immutable, so safe to read from several threads.

@@ -143,6 +143,17 @@ class RowShape {
 
   Word cells(std::size_t w) const { return has_y_ && has_z_ ? has_next(w) : 0; }
 
+  // What `compare(a, b)` says of the corners at the first and the second end of the edges of a
+  // direction, each sample's own.
+  template <class Compare>
+  HWY_INLINE Word between_ends(unsigned direction, Compare compare) const {
+    const Word edges = compare(0U, direction);
+    if (!five_ || std::popcount(direction) != 2) return edges;
+    // The diagonal of a face joins its two other corners when its sample is odd.
+    const unsigned low = direction & (~direction + 1);
+    return (edges & even_) | (compare(low, direction ^ low) & ~even_);
+  }
+
   // Word d: the samples whose edge of direction d exists and is crossed; word 0 is zero.
   // `differ(a, b)`: the cells whose corners a and b are on two sides.
   template <class Differ>
@@ -152,13 +163,8 @@ class RowShape {
     std::array<Word, 8> crossed = {};
     for (unsigned direction = 1; direction < 8; ++direction) {
       if ((existing() >> direction & 1) == 0) continue;
-      Word edges = differ(0U, direction);
-      if (five_ && std::popcount(direction) == 2) {
-        // The diagonal of a face joins its two other corners when its sample is odd.
-        const unsigned low = direction & (~direction + 1);
-        edges = (edges & even_) | (differ(low, direction ^ low) & ~even_);
-      }
-      crossed[direction] = edges & ((direction & 1) != 0 ? next_x : here);
+      crossed[direction] =
+          between_ends(direction, differ) & ((direction & 1) != 0 ? next_x : here);
     }
     return crossed;
   }
@@ -189,19 +195,11 @@ HWY_INLINE Double4 space_offset(const LatticeToSpace& map, unsigned corner) {
          lanes(map.step_z) * (corner >> 2);
 }
 
-// What placing a vertex needs to know of the edge that it lies on, relative to the sample that owns
-// it. A vertex that lies on none has a line of its own, half-way on which it is.
+// Where the edge that a vertex lies on begins and how it runs, in millimetres, as seen from the
+// sample that owns it. A vertex that lies on none has a line of its own, half-way on which it is.
 struct EdgeFrame {
-  std::ptrdiff_t from = 0;  // the samples at its ends
-  std::ptrdiff_t to = 0;
-  Double4 start = {};  // where it begins and how it runs, in millimetres
+  Double4 start = {};
   Double4 run = {};
-};
-
-// A vertex near the border of the volume.
-struct BorderVertex {
-  Vec3 position = {0, 0, 0};
-  bool on_border = false;
 };
 
 // For each edge of a cell, where its vertex's index lies from corner 0's first place on.

@@ -97,7 +97,7 @@ class Smoother {
         context_(context),
         quiet_{context.stop, nullptr},
         mesh_(mesh),
-        plan_(plan_for(options, size_of({mesh.layer_vertices, mesh.layer_triangles}))),
+        plan_(plan_for(options, size_of({mesh.layer_vertices, mesh.layer_triangles, {}}))),
         slabs_(cut_slabs(mesh, plan_.slabs)),
         before_(mesh.layers()),
         after_(mesh.layers()),

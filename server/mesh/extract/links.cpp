@@ -1,0 +1,209 @@
+#include "server/mesh/extract/links.h"
+
+#include <algorithm>
+#include <bit>
+#include <tuple>
+
+#include "server/mesh/lattice/tetrahedra.h"
+
+namespace isomesh::mesh {
+namespace {
+
+using Step = std::array<int, 3>;
+
+Step position(unsigned corner) {
+  return {static_cast<int>(corner & 1), static_cast<int>(corner >> 1 & 1),
+          static_cast<int>(corner >> 2)};
+}
+
+Step minus(const Step& a, const Step& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+bool is_later(const Step& step) {
+  return std::tuple(step[2], step[1], step[0]) > std::tuple(0, 0, 0);
+}
+
+std::size_t axes_of(const Step& step) {
+  return 3 - static_cast<std::size_t>(std::ranges::count(step, 0));
+}
+
+Directions bit(std::size_t direction) { return Directions{1} << direction; }
+
+// The directions of `set` that can be reached from its lowest one.
+Directions component_of(const std::array<Directions, kMostDirections>& adjacent, Directions set) {
+  Directions reached = set & (~set + 1);
+  for (Directions before = 0; reached != before;) {
+    before = reached;
+    for (Directions rest = before; rest != 0; rest &= rest - 1) {
+      reached |= adjacent[static_cast<std::size_t>(std::countr_zero(rest))] & set;
+    }
+  }
+  return reached;
+}
+
+// Sets of places of a ring, one bit each set.
+struct RingSets {
+  std::uint64_t runs = 0;   // none, or one run that leaves two places free
+  std::uint64_t risky = 0;  // those with a subset that is no such run
+};
+
+constexpr RingSets make_ring_sets(unsigned size) {
+  RingSets sets;
+  for (unsigned bits = 0; bits < 1U << size; ++bits) {
+    const unsigned next = (bits >> 1 | bits << (size - 1)) & ((1U << size) - 1);
+    const bool is_run =
+        std::popcount(bits & ~next) <= 1 && static_cast<unsigned>(std::popcount(bits)) + 2 <= size;
+    if (is_run) sets.runs |= std::uint64_t{1} << bits;
+  }
+  for (unsigned bits = 0; bits < 1U << size; ++bits) {
+    for (unsigned some = bits; some != 0; some = (some - 1) & bits) {
+      if ((sets.runs >> some & 1) == 0) sets.risky |= std::uint64_t{1} << bits;
+    }
+  }
+  return sets;
+}
+
+const RingSets& ring_sets(std::size_t size) {
+  static constexpr RingSets kOfFour = make_ring_sets(4);
+  static constexpr RingSets kOfSix = make_ring_sets(6);
+  return size == 4 ? kOfFour : kOfSix;
+}
+
+}  // namespace
+
+Links::Links(Scheme scheme) {
+  add_directions(scheme);
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
+    if ((directions_[d].corner >> 2) != 0) below_ |= bit(d);
+  }
+  links_.push_back(make_link(scheme, 0));
+  if (scheme == Scheme::kFive) links_.push_back(make_link(scheme, 1));
+}
+
+// From the owners' edges to those of the samples at their ends.
+void Links::add_directions(Scheme scheme) {
+  for (const bool odd : {false, true}) {
+    const CellSplit& split = cell_split(scheme, odd);
+    for (std::uint8_t place = 1; place < 8; ++place) {
+      const auto [from, to] = split.ends[place];
+      if (from == to) continue;
+      for (const LinkDirection& direction :
+           {LinkDirection{minus(position(to), position(from)), from, place, false},
+            LinkDirection{minus(position(from), position(to)), to, place, true}}) {
+        if (std::ranges::find(directions_, direction) == directions_.end()) {
+          directions_.push_back(direction);
+        }
+      }
+    }
+  }
+  // Along the axes first, so that sets of those alone are small numbers.
+  const auto rank = [](const LinkDirection& direction) {
+    Step step = direction.step;
+    const bool later = is_later(step);
+    if (!later) step = minus({0, 0, 0}, step);
+    return std::tuple(!later, axes_of(step), step);
+  };
+  std::ranges::sort(directions_, {}, rank);
+}
+
+int Links::find(const Step& step) const {
+  const auto found = std::ranges::find(directions_, step, &LinkDirection::step);
+  return found == directions_.end() ? -1 : static_cast<int>(found - directions_.begin());
+}
+
+Links::Link Links::make_link(Scheme scheme, unsigned parity) const {
+  Link link;
+  const auto parity_at = [&](const Step& step) {
+    return (parity + static_cast<unsigned>(step[0] + step[1] + step[2])) & 1;
+  };
+  const auto has = [&](unsigned of, const Step& step) {
+    return find(step) >= 0 && (scheme == Scheme::kSix || of == 0 || axes_of(step) == 1);
+  };
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
+    if (has(parity, directions_[d].step)) link.existing |= bit(d);
+  }
+  for (std::size_t a = 0; a < directions_.size(); ++a) {
+    const Step& to = directions_[a].step;
+    for (std::size_t b = 0; b < directions_.size(); ++b) {
+      if ((link.existing >> a & link.existing >> b & 1) == 0) continue;
+      if (has(parity_at(to), minus(directions_[b].step, to))) link.adjacent[a] |= bit(b);
+    }
+  }
+  for (std::size_t a = 0; a < directions_.size(); ++a) {
+    if ((link.existing >> a & 1) != 0) link.rings[a] = make_ring(link, a);
+    for (std::size_t b = a + 1; b < directions_.size(); ++b) {
+      for (std::size_t c = b + 1; c < directions_.size(); ++c) {
+        if ((link.adjacent[a] >> b & link.adjacent[a] >> c & link.adjacent[b] >> c & 1) != 0) {
+          bool is_above = false;
+          for (const std::size_t d : {a, b, c}) is_above |= directions_[d].step[2] > 0;
+          (is_above ? link.above : link.below).push_back(bit(a) | bit(b) | bit(c));
+        }
+      }
+    }
+  }
+  link.known = std::make_unique<std::atomic<ClusterFacts>[]>(std::bit_ceil(link.existing));
+  return link;
+}
+
+Links::Ring Links::make_ring(const Link& link, std::size_t direction) const {
+  Ring ring;
+  for (Directions rest = link.adjacent[direction]; rest != 0;) {
+    const Directions next = ring.size == 0 ? rest : rest & link.adjacent[ring.mine[ring.size - 1]];
+    const auto place = static_cast<std::size_t>(std::countr_zero(next));
+    ring.mine[ring.size] = static_cast<std::uint8_t>(place);
+    ring.theirs[ring.size] = static_cast<std::uint8_t>(
+        find(minus(directions_[place].step, directions_[direction].step)));
+    ++ring.size;
+    rest &= ~bit(place);
+  }
+  return ring;
+}
+
+ClusterFacts Links::find_facts(const Link& link, Directions set) const {
+  const auto on_ring = [&](const Ring& ring) {
+    unsigned bits = 0;
+    for (std::size_t i = 0; i < ring.size; ++i) bits |= (set >> ring.mine[i] & 1) << i;
+    return bits;
+  };
+  ClusterFacts::Parts parts;
+  parts.first = component_of(link.adjacent, set);
+  for (Directions rest = set; rest != 0; ++parts.components) {
+    rest &= ~component_of(link.adjacent, rest);
+  }
+  const Directions free = link.existing & ~set;
+  parts.may_join = free != 0 && component_of(link.adjacent, free) == free;
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
+    if ((link.existing >> d & 1) == 0) continue;
+    const Ring& ring = link.rings[d];
+    const unsigned bits = on_ring(ring);
+    const RingSets& sets = ring_sets(ring.size);
+    if ((free >> d & 1) != 0 && (sets.runs >> bits & 1) == 0) parts.forbidden |= bit(d);
+    if (d >= half() && (sets.risky >> bits & 1) != 0) parts.risks |= bit(d - half());
+  }
+  const auto count_lost = [&](const std::vector<Directions>& triangles) {
+    const auto is_lost = [&](Directions corners) {
+      return ((corners & set) & ((corners & set) - 1)) != 0;  // two of them, or all
+    };
+    return static_cast<unsigned>(std::ranges::count_if(triangles, is_lost));
+  };
+  parts.lost_above = count_lost(link.above);
+  parts.lost_below = count_lost(link.below);
+  return ClusterFacts(parts);
+}
+
+bool Links::clash(unsigned parity, std::size_t direction, Directions mine,
+                  Directions theirs) const {
+  const Ring& ring = link_of(parity).rings[direction];
+  unsigned both = 0;
+  for (std::size_t i = 0; i < ring.size; ++i) {
+    both |= (mine >> ring.mine[i] & theirs >> ring.theirs[i] & 1) << i;
+  }
+  return (ring_sets(ring.size).runs >> both & 1) == 0;
+}
+
+const Links& links_of(Scheme scheme) {
+  static const Links six(Scheme::kSix);
+  static const Links five(Scheme::kFive);
+  return scheme == Scheme::kSix ? six : five;
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,154 @@
+// Which crossings around a sample may be joined into one vertex (G. M. Treece, R. W. Prager, A. H.
+// Gee, "Regularised marching tetrahedra", Computers & Graphics 23(4), 1999), by a rule that looks
+// at one sample and its neighbours alone; private to the kernels.
+//
+// The neighbours of a sample are its link, a triangulated sphere. A crossing belongs to that end of
+// its edge whose value is nearer to the iso-value, so a sample has a set of directions in which
+// crossings are its own. A connected component C of that set becomes one vertex if
+//  * C is not the whole link, and what it leaves of the link is connected;
+//  * for every direction p outside C that is crossed: on the ring of p, the neighbours of both p
+//  and
+//    the sample, C is nothing, or one run that leaves at least two places free;
+//  * for every neighbour on the same side that has such a component E: on the ring of that
+//    neighbour, what is in both C and E is nothing, or one run that leaves at least two places
+//    free. Otherwise the component of that sample goes that is later in the order of the samples,
+//    whatever becomes of the other.
+// The first two say that the crossings' patches make a disk which touches no patch around it twice,
+// the third the same of two disks next to each other. So the joined surface has the components, the
+// boundary and the genus of the surface that it comes from.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "proto/types.h"
+
+namespace isomesh::mesh {
+
+// A set of directions from a sample to its neighbours; bit d: direction d of Links::directions().
+using Directions = std::uint32_t;
+
+inline constexpr std::size_t kMostDirections = 18;
+
+// The edge from a sample to a neighbour.
+struct LinkDirection {
+  std::array<int, 3> step = {0, 0, 0};
+  // Its name in tetrahedra.h: which corner the sample is of the cell of the edge's owner, and the
+  // edge's direction there. `is_end`: the sample is the second of the edge's ends.
+  std::uint8_t corner = 0;
+  std::uint8_t place = 0;
+  bool is_end = false;
+
+  bool operator==(const LinkDirection&) const = default;
+};
+
+// What the rule says of a set of directions around a sample.
+class ClusterFacts {
+ public:
+  struct Parts {
+    Directions first = 0;
+    Directions forbidden = 0;
+    Directions risks = 0;
+    unsigned components = 0;
+    unsigned lost_above = 0;
+    unsigned lost_below = 0;
+    bool may_join = false;
+  };
+
+  ClusterFacts() = default;
+  explicit ClusterFacts(const Parts& parts)
+      : bits_(std::uint64_t{1} << 63 | std::uint64_t{parts.may_join} << 61 |
+              std::uint64_t{parts.lost_below} << 55 | std::uint64_t{parts.lost_above} << 49 |
+              std::uint64_t{parts.components} << 45 | std::uint64_t{parts.risks} << 36 |
+              std::uint64_t{parts.forbidden} << 18 | parts.first) {}
+
+  bool is_known() const { return bits_ != 0; }
+  // The component of the lowest direction.
+  Directions first() const { return field(0, 18); }
+  unsigned components() const { return field(45, 4); }
+  // Triangles that vanish from the cells of the sample's layer and of the one below when each
+  // component is one vertex.
+  unsigned lost_above() const { return field(49, 6); }
+  unsigned lost_below() const { return field(55, 6); }
+  // Bit i: whether the components may clash with those of the neighbour in the earlier direction i.
+  Directions risks() const { return field(36, 9); }
+
+  // Of one component: whether it may become a vertex if nothing in `forbidden` is crossed.
+  bool may_join() const { return field(61, 1) != 0; }
+  Directions forbidden() const { return field(18, 18); }
+
+ private:
+  Directions field(unsigned begin, unsigned count) const {
+    return static_cast<Directions>(bits_ >> begin) & ((Directions{1} << count) - 1);
+  }
+
+  std::uint64_t bits_ = 0;
+};
+
+// The links of one scheme's samples. Safe to use from several threads.
+class Links {
+ public:
+  explicit Links(Scheme scheme);
+
+  // All that a sample can have: first those to samples that come later in x-fastest order, then
+  // their opposites in the same order. With five tetrahedra, samples of odd i+j+k have those along
+  // one axis only.
+  std::span<const LinkDirection> directions() const { return directions_; }
+  std::size_t half() const { return directions_.size() / 2; }
+  // Those whose edges samples of the plane below own.
+  Directions below() const { return below_; }
+
+  // `set`: not empty, of existing directions. Found once and then remembered.
+  ClusterFacts facts(unsigned parity, Directions set) const {
+    const Link& link = link_of(parity);
+    std::atomic<ClusterFacts>& known = link.known[set];
+    ClusterFacts facts = known.load(std::memory_order_relaxed);
+    if (!facts.is_known()) {
+      facts = find_facts(link, set);
+      known.store(facts, std::memory_order_relaxed);
+    }
+    return facts;
+  }
+
+  // Whether components `mine` of a sample and `theirs` of its neighbour in a direction clash.
+  bool clash(unsigned parity, std::size_t direction, Directions mine, Directions theirs) const;
+
+ private:
+  // The directions to both a sample and one of its neighbours, in cyclic order: as the sample and
+  // as the neighbour number them.
+  struct Ring {
+    std::size_t size = 0;
+    std::array<std::uint8_t, 6> mine = {};
+    std::array<std::uint8_t, 6> theirs = {};
+  };
+
+  struct Link {
+    Directions existing = 0;
+    std::array<Directions, kMostDirections> adjacent = {};  // neighbours that are neighbours
+    std::array<Ring, kMostDirections> rings = {};
+    // Its triangles: those of tetrahedra in the sample's layer, and in the one below.
+    std::vector<Directions> above;
+    std::vector<Directions> below;
+    std::unique_ptr<std::atomic<ClusterFacts>[]> known;  // by the set
+  };
+
+  const Link& link_of(unsigned parity) const { return links_[links_.size() == 1 ? 0 : parity]; }
+  void add_directions(Scheme scheme);
+  Link make_link(Scheme scheme, unsigned parity) const;
+  Ring make_ring(const Link& link, std::size_t direction) const;
+  int find(const std::array<int, 3>& step) const;
+  ClusterFacts find_facts(const Link& link, Directions set) const;
+
+  std::vector<LinkDirection> directions_;
+  Directions below_ = 0;
+  std::vector<Link> links_;  // of even and odd samples, or of both
+};
+
+const Links& links_of(Scheme scheme);
+
+}  // namespace isomesh::mesh

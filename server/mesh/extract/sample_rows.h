@@ -1,0 +1,61 @@
+// The samples of an extraction at an iso-value behind one interface for all types, so that the walk
+// over them is compiled once and not once for each type; private to the kernels.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "server/mesh/lattice/border.h"
+#include "server/mesh/lattice/placement.h"
+#include "server/mesh/lattice/tetrahedra.h"
+
+namespace isomesh::mesh {
+
+// The samples at the ends of an edge, as offsets from the sample that names it.
+struct EdgeSamples {
+  std::ptrdiff_t from = 0;
+  std::ptrdiff_t to = 0;
+};
+
+// Crossed edges that samples of one row name. Each is a place: `places` x + its number, where
+// x - `margin` is the sample's number in the lattice's own row (y, z).
+struct RowEdges {
+  std::uint32_t y = 0;
+  std::uint32_t z = 0;
+  std::uint32_t margin = 0;
+  std::uint32_t places = 0;           // a sample, a power of two
+  unsigned parity = 0;                // of the sample x = 0
+  const EdgeSamples* ends = nullptr;  // of each number, those of even samples first
+  std::span<const std::uint32_t> edges;
+};
+
+// Immutable, so safe to read from several threads. Rows are in the lattice's own numbers.
+class SampleRows {
+ public:
+  virtual ~SampleRows() = default;
+
+  // Sets the bits of a row's samples that are inside, 64 a word, the lowest bit the smallest x. The
+  // other bits of the row's words are zero then.
+  virtual void classify(std::uint32_t y, std::uint32_t z, std::uint64_t* out) const = 0;
+
+  // The places of a row's samples [begin, begin + out.size()) in the order of nearness to the
+  // iso-value: by the distance of their values from it in single precision, and what is inside
+  // first of those that are equally near.
+  virtual void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
+                        std::span<std::int32_t> out) const = 0;
+
+  // How far the surface is along each edge from its first end, as a share of the edge.
+  virtual void shares(const RowEdges& row, double* out) const = 0;
+
+  // As BorderPlacement::place. Only for a surface that is closed.
+  virtual BorderVertex place_at_border(const BorderSample& cell, const EdgeEnds& ends) const = 0;
+};
+
+// `smallest`: the smallest value that is inside. `lattice` must outlive what is returned.
+template <class T>
+std::unique_ptr<const SampleRows> make_sample_rows(const Lattice<T>& lattice,
+                                                   const ExtractOptions& options, T smallest);
+
+}  // namespace isomesh::mesh
