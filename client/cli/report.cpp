@@ -283,8 +283,9 @@ std::string job_report(const Job& job) {
   rows.push_back({"volume", asked.volume});
   rows.push_back({"parameters",
                   subject_of(asked) + ", scheme " + std::to_string(static_cast<int>(asked.scheme)) +
-                      ", " + std::to_string(asked.passes) + " passes of " +
-                      std::string(to_string(asked.smoothing)) + (asked.close ? ", closed" : "")});
+                      (asked.regularize ? ", regularized, " : ", ") + std::to_string(asked.passes) +
+                      " passes of " + std::string(to_string(asked.smoothing)) +
+                      (asked.close ? ", closed" : "")});
   rows.push_back({"priority", std::string(to_string(asked.priority))});
   rows.push_back({"created", job.created});
   if (job.started) rows.push_back({"started", *job.started});

@@ -97,8 +97,11 @@ SurfaceSize surface_in_files(const MeshSummary& mesh) {
 
 // What tells surfaces of a volume apart beside iso-value, scheme and whether they are closed.
 std::string key_of_part(const MeshParameters& parameters) {
-  if (!parameters.labels && !parameters.crop) return {};
+  if (!parameters.labels && !parameters.crop && !parameters.regularize) return {};
   MeshParameters part;
+  part.regularize = parameters.regularize;
+  // Which vertices are joined depends on where they lie.
+  if (part.regularize) part.interpolation = parameters.interpolation;
   part.crop = parameters.crop;
   part.labels = parameters.labels;
   part.background = parameters.background;

@@ -24,7 +24,8 @@ mesh::ExtractOptions extract_options(const MeshParameters& parameters, double is
   return {.iso = iso,
           .scheme = parameters.scheme,
           .interpolation = parameters.interpolation,
-          .close = parameters.close};
+          .close = parameters.close,
+          .regularize = parameters.regularize};
 }
 
 template <class T>

@@ -71,6 +71,7 @@ struct StageCase {
   bool parallel = true;
   // Whether the midpoint rule is timed too: on every volume, or only on the real one.
   enum class Midpoint { kNever, kRealVolume, kAlways } midpoint = Midpoint::kNever;
+  bool regular = false;  // whether surfaces that are regularised are timed too
 
   bool is_for(Interpolation way, const Source& source) const {
     if (way == Interpolation::kLinear || midpoint == Midpoint::kAlways) return true;
@@ -96,11 +97,13 @@ std::vector<StageCase> stage_cases() {
   std::vector<StageCase> cases = {
       {.name = "count",
        .run = without_bytes([](Stages& stages) { benchmark::DoNotOptimize(stages.count()); }),
-       .set_up = extract},
+       .set_up = extract,
+       .regular = true},
       {.name = "extract_reused_memory",
        .run = without_bytes(extract),
        .set_up = extract,
-       .midpoint = StageCase::Midpoint::kAlways},
+       .midpoint = StageCase::Midpoint::kAlways,
+       .regular = true},
       {.name = "extract_fresh_memory",
        .run = without_bytes(extract),
        .prepare = [](Stages& stages) { stages.release_memory(); },
@@ -125,7 +128,8 @@ std::vector<StageCase> stage_cases() {
     cases.push_back({.name = "job_" + std::string(to_string(format)),
                      .run = [format](Stages& stages) { return stages.run_job(kPasses, format); },
                      .set_up = make_smooth_mesh,
-                     .midpoint = StageCase::Midpoint::kRealVolume});
+                     .midpoint = StageCase::Midpoint::kRealVolume,
+                     .regular = true});
   }
   return cases;
 }
@@ -217,6 +221,8 @@ class Registry {
           if (!stage.is_for(way, source)) continue;
           for (const int threads : threads_of(stage.parallel)) {
             add_stage(source, stage, {source.iso, scheme, way}, threads);
+            if (!stage.regular || way != Interpolation::kLinear) continue;
+            add_stage(source, stage, {source.iso, scheme, way, false, true}, threads);
           }
         }
       }
@@ -240,6 +246,7 @@ class Registry {
   void add_stage(const Source& source, const StageCase& stage, const Surface& surface,
                  int threads) {
     const std::string name = stage.name + (surface.scheme == Scheme::kSix ? "/six/" : "/five/") +
+                             (surface.regularize ? "regular/" : "") +
                              std::string(to_string(surface.interpolation)) +
                              suffix(source, threads);
     const auto body = [this, source, stage, surface, threads](benchmark::State& state) {
@@ -250,6 +257,7 @@ class Registry {
       time_runs(state, stages, stage.prepare, [&](Stages& subject) { bytes = stage.run(subject); });
       set_rates(state, stages.size(), stage.passes);
       if (bytes > 0) state.counters["bytes"] = static_cast<double>(bytes);
+      if (stage.regular) state.counters["angle"] = stages.shapes().smallest_angle_deg.mean;
     };
     configure(benchmark::RegisterBenchmark(name.c_str(), body), source);
   }

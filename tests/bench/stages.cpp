@@ -28,7 +28,8 @@ mesh::ExtractOptions options_of(const Surface& surface) {
   return {.iso = surface.iso,
           .scheme = surface.scheme,
           .interpolation = surface.interpolation,
-          .close = surface.close};
+          .close = surface.close,
+          .regularize = surface.regularize};
 }
 
 template <class T>
@@ -158,6 +159,7 @@ JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
   parameters.scheme = surface_.scheme;
   parameters.interpolation = surface_.interpolation;
   parameters.close = surface_.close;
+  parameters.regularize = surface_.regularize;
   CountingSink counting;
   const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
   const jobs::Report nobody = [](Stage, double, const Timing&) {};

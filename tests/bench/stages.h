@@ -21,6 +21,7 @@ struct Surface {
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
   bool close = false;
+  bool regularize = false;
 };
 
 struct MeshSize {

@@ -13,7 +13,7 @@ struct ExtractOptions {
   double iso = 0;  // a sample is inside when its value is >= iso
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
-  bool close = false;  // cap the surface where it meets the lattice's border
+  bool close = false;       // cap the surface where it meets the lattice's border
   bool regularize = false;  // join crossings around a sample, see links.h
 };
 

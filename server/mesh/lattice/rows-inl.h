@@ -163,8 +163,7 @@ class RowShape {
     std::array<Word, 8> crossed = {};
     for (unsigned direction = 1; direction < 8; ++direction) {
       if ((existing() >> direction & 1) == 0) continue;
-      crossed[direction] =
-          between_ends(direction, differ) & ((direction & 1) != 0 ? next_x : here);
+      crossed[direction] = between_ends(direction, differ) & ((direction & 1) != 0 ? next_x : here);
     }
     return crossed;
   }

@@ -1,5 +1,7 @@
 #include "server/jobs/estimate.h"
 
+#include <set>
+
 #include <gmock/gmock.h>
 
 #include "server/jobs/histograms.h"
@@ -33,6 +35,25 @@ TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {
   EXPECT_GT(estimate.triangles, 0U);
   EXPECT_EQ(estimate.triangles, job.mesh->triangles);
   EXPECT_EQ(estimate.vertices, job.mesh->vertices);
+}
+
+TEST_F(EstimateTest, CountsWhatIsJoined) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  const std::uint64_t plain = estimator_.estimate("", parameters).triangles;
+  parameters.regularize = true;
+  std::set<std::uint64_t> seen = {plain};
+  for (const Interpolation interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
+    parameters.interpolation = interpolation;
+    const Estimate estimate = estimator_.estimate("", parameters);
+    const Job job = run(parameters);
+    ASSERT_TRUE(job.mesh);
+    EXPECT_EQ(estimate.triangles, job.mesh->triangles);
+    EXPECT_EQ(estimate.vertices, job.mesh->vertices);
+    EXPECT_LT(3 * estimate.triangles, plain);
+    seen.insert(estimate.triangles);
+  }
+  EXPECT_EQ(seen.size(), 3U);  // none is taken for another's count
 }
 
 TEST_F(EstimateTest, IsOfTheBoxThatAJobIsCroppedTo) {

@@ -56,6 +56,30 @@ TEST_F(PipelineTest, MakesAMeshOfASphere) {
   EXPECT_TRUE(file.href.empty());
 }
 
+TEST_F(PipelineTest, JoinsVerticesAndKeepsTheTopology) {
+  const Volume volume =
+      add(test::noise<std::uint8_t>({0, 0, 1, 2}, {21, 19, 20}, 9), SampleType::kUint8);
+  for (const bool close : {false, true}) {
+    JobParameters parameters = parameters_of(volume, 0.75);
+    parameters.close = close;
+    const MeshSummary plain = run(volume, parameters).mesh;
+    parameters.regularize = true;
+    const PipelineResult joined = run(volume, parameters);
+    EXPECT_LT(joined.mesh.triangles, plain.triangles);
+    EXPECT_EQ(joined.mesh.components, plain.components);
+    EXPECT_EQ(joined.mesh.euler, plain.euler);
+    EXPECT_EQ(joined.mesh.boundary_edges, plain.boundary_edges);
+    EXPECT_TRUE(joined.mesh.quality.manifold);
+    EXPECT_TRUE(joined.mesh.quality.oriented);
+    std::set<std::string> files = {mesh_bytes(joined)};
+    for (const int threads : {1, 3, 8}) {
+      JobProcess process(job_program(ISOMESH_JOB, threads));
+      files.insert(mesh_bytes(run_pipeline(volume, parameters, {}, blobs_, process, {}, kQuiet)));
+    }
+    EXPECT_EQ(files.size(), 1U);
+  }
+}
+
 TEST_F(PipelineTest, NoPassesLeaveTheVolumeAsExtracted) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);

@@ -69,6 +69,7 @@ TEST(JobBody, RefusesWhatLabelsCannotHave) {
   EXPECT_THAT(faults_of(R"("labels": [5], "background": 5)"), ElementsAre("labels"));
   EXPECT_THAT(faults_of(R"("labels": "all", "interpolation": "linear")"),
               ElementsAre("interpolation"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "regularize": true)"), ElementsAre("regularize"));
   EXPECT_THAT(faults_of(R"("labels": "all", "components": {"keep": 1})"),
               ElementsAre("components"));
   EXPECT_THAT(faults_of(R"("labels": "all", "label_names": {"3": ""})"),
@@ -105,6 +106,7 @@ TEST(JobBody, TakesEveryMember) {
   const JobParameters unusual = {{.iso = -150,
                                   .scheme = Scheme::kFive,
                                   .interpolation = Interpolation::kMidpoint,
+                                  .regularize = true,
                                   .passes = 17,
                                   .smoothing = Smoothing::kTaubin,
                                   .lambda = 0.25,
@@ -118,8 +120,8 @@ TEST(JobBody, TakesEveryMember) {
                                  "abc",
                                  Priority::kBulk};
   EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,
-      "interpolation": "midpoint", "passes": 17, "smoothing": "taubin", "lambda": 0.25,
-      "pass_band": 0.05, "max_displacement_mm": 0.5,
+      "interpolation": "midpoint", "regularize": true, "passes": 17, "smoothing": "taubin",
+      "lambda": 0.25, "pass_band": 0.05, "max_displacement_mm": 0.5,
       "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
       "draco": {"position_bits": 11, "speed": 3}, "normals": true, "priority": "bulk"})"),
             unusual);

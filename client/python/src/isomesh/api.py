@@ -308,6 +308,9 @@ Scheme = Literal[5, 6]
 Interpolation = Literal['linear', 'midpoint']
 
 
+Regularize = bool
+
+
 Passes = int
 
 
@@ -418,6 +421,7 @@ JobParameters = TypedDict(
         'label_values': 'NotRequired[LabelValues]',
         'scheme': 'NotRequired[Scheme]',
         'interpolation': 'NotRequired[Interpolation]',
+        'regularize': 'NotRequired[Regularize]',
         'passes': 'NotRequired[Passes]',
         'smoothing': 'NotRequired[Smoothing]',
         'lambda': 'NotRequired[Lambda]',
@@ -980,6 +984,11 @@ class JobOptions(TypedDict, total=False):
         Position of a vertex on the edge between two samples. linear interpolates the two
         samples; midpoint puts every vertex half-way.
 
+    regularize
+        Join the vertices around a sample where that keeps the topology. The surface has about a
+        third as many triangles, with larger angles. It keeps its connected components, its
+        boundary and its genus. Vertices at the volume's border stay where they are.
+
     passes
         Number of smoothing passes. Vertices on the surface's boundary stay where they are. For
         labels the default is 10.
@@ -1093,6 +1102,7 @@ class JobOptions(TypedDict, total=False):
     label_values: LabelValues
     scheme: Scheme
     interpolation: Interpolation
+    regularize: Regularize
     passes: Passes
     smoothing: Smoothing
     lambda_: Lambda

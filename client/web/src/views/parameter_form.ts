@@ -42,6 +42,7 @@ const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'labe
 // The parameters that are always visible, in rows. All others are under "More".
 const front = [
   ['scheme', 'interpolation'],
+  ['regularize'],
   ['smoothing', 'passes'],
   ['max_error_mm'],
   ['triangles', 'certify'],
