@@ -22,7 +22,8 @@ inline constexpr std::size_t kFlagBits = 64;  // of a word of Mesh::on_border
 // next to it.
 //
 // As extraction at an iso-value leaves it, every vertex lies on one lattice edge and every lattice
-// edge carries at most one vertex. The surface is an oriented manifold whose boundary, if it was
+// edge carries at most one vertex; of a surface that is regularised, a vertex may be the mean of
+// those around a sample of its layer. The surface is an oriented manifold whose boundary, if it was
 // not closed, lies on the border of the volume.
 struct Mesh {
   std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
