@@ -396,10 +396,12 @@ void visit(Is<JobParameters> auto& self, auto&& parameter) {
       self.volume);
   visit(mesh_parameters(self), parameter);
   parameter(
-      Parameter{.name = "priority",
-                .title = "Priority",
-                .help = "Jobs start in order of priority, then of age.",
-                .values = {"Before all others", "After all stat jobs", "When no other job waits"}},
+      Parameter{
+          .name = "priority",
+          .title = "Priority",
+          .help = "Jobs start in order of priority. Within a priority, owners take turns by the "
+                  "time that their jobs are expected to take, and each owner's jobs start by age.",
+          .values = {"Before all others", "After all stat jobs", "When no other job waits"}},
       self.priority);
   if (is_told(self, self.certify)) {
     parameter(Parameter{.name = "certify",

@@ -471,7 +471,8 @@ class Job(TypedDict):
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
-    #: Jobs start in order of priority, then of age.
+    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
+    #: jobs are expected to take, and each owner's jobs start by age.
     priority: Priority
     created: str
     #: Null while the job is queued.
@@ -809,7 +810,8 @@ class OrderRequest(TypedDict):
     parameters: NotRequired[Mapping[str, Any]]
     #: The destinations of the mesh. May be empty.
     send: NotRequired[Sequence[SendTarget]]
-    #: Jobs start in order of priority, then of age.
+    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
+    #: jobs are expected to take, and each owner's jobs start by age.
     priority: NotRequired[Priority]
     #: As for a job. The request holds id, state, rule, job, created, finished and the type of an
     #: error. It holds no patient data.
@@ -848,7 +850,8 @@ class Order(TypedDict):
     source: OrderSource
     #: As for a job.
     parameters: Mapping[str, Any]
-    #: Jobs start in order of priority, then of age.
+    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
+    #: jobs are expected to take, and each owner's jobs start by age.
     priority: Priority
     send: Sequence[SendTarget]
     volume: Optional[str]
@@ -931,7 +934,8 @@ class SucceededJob(TypedDict):
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
-    #: Jobs start in order of priority, then of age.
+    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
+    #: jobs are expected to take, and each owner's jobs start by age.
     priority: Priority
     created: str
     started: str
@@ -1086,7 +1090,8 @@ class JobOptions(TypedDict, total=False):
         up.
 
     priority
-        Jobs start in order of priority, then of age.
+        Jobs start in order of priority. Within a priority, owners take turns by the time that
+        their jobs are expected to take, and each owner's jobs start by age.
 
     certify
         Measure how far the files are from the extracted surface, and where they intersect
