@@ -8,8 +8,8 @@ namespace isomesh {
 
 using http::ConfiguredFiles;
 
-// Throws Error kInvalidParameter that names each of them which cannot be read. `others` are those of
-// wings.
+// Throws Error kInvalidParameter that names each of them which cannot be read. `others` are those
+// of wings.
 void check_configured_files(const Options& options, const ConfiguredFiles& others);
 
 }  // namespace isomesh

@@ -178,8 +178,8 @@ std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
   if (!options.store.empty()) store::postgresql::check_url(options.store);
-  check_configured_files(options,
-                         options.hospital.empty() ? ConfiguredFiles() : hospital::check(options.hospital));
+  check_configured_files(
+      options, options.hospital.empty() ? ConfiguredFiles() : hospital::check(options.hospital));
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
   check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);

@@ -9,8 +9,8 @@
 
 namespace isomesh::hospital {
 
-// The files that the file of --hospital names. Throws Error kInvalidParameter when it has a mistake.
-// Touches nothing else.
+// The files that the file of --hospital names. Throws Error kInvalidParameter when it has a
+// mistake. Touches nothing else.
 http::ConfiguredFiles check(const std::filesystem::path& file);
 
 // A wing that is not open when no file is given. Throws as check() does, and Error kUnavailable
