@@ -35,17 +35,18 @@ const Stars& stars_of(const mesh::Dims& dims, Scheme scheme, std::uint32_t margi
                   Stars>
       known;
   const auto [place, is_new] = known.try_emplace({dims.x, dims.y, dims.z, scheme, margin});
-  if (!is_new) return place->second;
+  Stars& stars = place->second;
+  if (!is_new) return stars;
   for_each_tetrahedron(dims, scheme, margin, [&](const Tetrahedron& corners) {
     for (const Sample& centre : corners.samples) {
       for (const Sample& a : corners.samples) {
         for (const Sample& b : corners.samples) {
-          if (a != centre && b != centre && a != b) place->second[centre][a].insert(b);
+          if (a != centre && b != centre && a != b) stars[centre][a].insert(b);
         }
       }
     }
   });
-  return place->second;
+  return stars;
 }
 
 // Those of `all` that can be reached from `first` through `all`.

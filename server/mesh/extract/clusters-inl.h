@@ -264,8 +264,9 @@ class ClusterWalk {
       const Directions component = facts.first();
       if (component != own) facts = links_.facts(parity, component);
       own &= ~component;
-      const bool joins = facts.may_join() & ((facts.forbidden() & crossed) == 0);
-      kept |= joins ? component : 0;
+      const bool is_allowed = (facts.forbidden() & crossed) == 0;
+      const unsigned joins = unsigned{facts.may_join()} & unsigned{is_allowed};  // no branch
+      kept |= joins != 0 ? component : 0;
     }
     return kept;
   }
