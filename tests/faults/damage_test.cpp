@@ -130,9 +130,12 @@ TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
     const std::string whole = daemon().get(path + request).body;
     spoil(blob);
     std::filesystem::remove(file_of(volume));
-    ASSERT_TRUE(eventually([&] { return status(request) == 422; })) << request;
+    const auto becomes = [&, asked = std::string(request)](int expected) {
+      return eventually([&] { return status(asked) == expected; });
+    };
+    ASSERT_TRUE(becomes(422)) << request;
     upload(daemon(), many_labels());
-    ASSERT_TRUE(eventually([&] { return status(request) == 200; })) << request;
+    ASSERT_TRUE(becomes(200)) << request;
     EXPECT_EQ(daemon().get(path + request).body, whole) << request;
   }
 }
