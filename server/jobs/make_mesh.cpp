@@ -111,9 +111,9 @@ void Progress::enter(Stage stage, double share) {
 }
 
 void Progress::end_stage() {
-  double Timing::*elapsed = row_of(stage_).elapsed;
-  if (stage_ == Stage::kQueue) return;
-  timing_.*elapsed = std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
+  if (stage_ == Stage::kQueue) return;  // nothing has begun
+  timing_.*row_of(stage_).elapsed =
+      std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
 }
 
 mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <optional>
-#include <set>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -16,7 +14,6 @@
 #include <prometheus/text_serializer.h>
 #include <unistd.h>
 
-#include "base/mutex.h"
 #include "proto/fields.h"
 #include "server/jobs/pipeline.h"
 

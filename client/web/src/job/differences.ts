@@ -1,4 +1,4 @@
-// What tells jobs apart: the surface that each makes, and the parameters in which they differ.
+// The differences between jobs: the surface that each makes, and the parameters in which they differ.
 import type { Job, JobParameters } from '../api/types';
 import { formatValue } from '../ui/format';
 import { surfaceInWords } from './parameters';

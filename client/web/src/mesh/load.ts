@@ -9,7 +9,7 @@ import { decoders } from './pool';
 export interface LoadProgress {
   bytes: number;
   totalBytes: number;
-  // Of all blocks that are handed over; of labels more than the mesh has, since two of them share a wall.
+  // The number in all blocks. It exceeds that of the mesh for labels, because two labels share a wall.
   totalTriangles: number;
 }
 

@@ -58,7 +58,7 @@ uniform float iso;
 uniform float reach;
 // Whether what is looked through is drawn: colours and opacities of 256 values, and for each the sum of those below it.
 uniform bool isThrough;
-// Whether samples are numbers of labels, whose colours the same table has; nothing lies between two of them.
+// True if samples are numbers of labels. The same table has their colours, and no interpolation is made between them.
 uniform bool isOfLabels;
 // What of the volume is drawn.
 uniform bool isCropped;

@@ -113,7 +113,7 @@ export function segmented<T extends string>(
   );
 }
 
-// Of a row of choices, without telling `onChange`.
+// Selects a choice of a row without calling `onChange`.
 export function choose(row: HTMLElement, value: string): void {
   for (const input of row.querySelectorAll('input')) input.checked = input.value === value;
 }

@@ -181,7 +181,7 @@ class Queue {
     this.showChosen();
   }
 
-  // What the address says, as far as it is listed and can be shown.
+  // The jobs of the address that are listed and can be shown.
   restore(ids: readonly string[]): void {
     const listed = this.jobs.filter(({ id, state }) => ids.includes(id) && state === 'succeeded');
     if (listed.length === 0) return;

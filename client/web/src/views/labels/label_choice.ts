@@ -103,7 +103,7 @@ export class LabelChoice {
     this.onLook();
   }
 
-  // What is seen of the volume: the labels that are chosen. Null until they are counted.
+  // The chosen labels, which slices and preview show. Null until labels are counted.
   look(): LabelLook | null {
     return this.shown;
   }
