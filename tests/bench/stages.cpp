@@ -5,7 +5,7 @@
 #include <malloc.h>
 
 #include "server/codec/encode.h"
-#include "server/jobs/make_mesh.h"
+#include "server/jobs/making/make_mesh.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/parallel.h"

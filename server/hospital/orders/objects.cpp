@@ -11,7 +11,7 @@
 #include "proto/parameters.h"
 #include "server/hospital/objects/encapsulated_stl.h"
 #include "server/hospital/objects/uid.h"
-#include "server/jobs/label_pages.h"
+#include "server/jobs/library/label_pages.h"
 
 namespace isomesh::orders {
 namespace {

@@ -9,7 +9,7 @@
 #include "proto/json.h"
 #include "server/hospital/orders/objects.h"
 #include "server/hospital/orders/received.h"
-#include "server/jobs/settle_labels.h"
+#include "server/jobs/library/settle_labels.h"
 
 namespace isomesh::orders {
 namespace {

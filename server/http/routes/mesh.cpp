@@ -17,7 +17,7 @@
 #include "server/http/requests/import_query.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
-#include "server/jobs/label_pages.h"
+#include "server/jobs/library/label_pages.h"
 
 namespace isomesh::http {
 namespace {

@@ -1,11 +1,11 @@
-#include "server/jobs/estimate.h"
+#include "server/jobs/queue/estimate.h"
 
 #include <set>
 
 #include <gmock/gmock.h>
 
-#include "server/jobs/histograms.h"
-#include "server/jobs/workers.h"
+#include "server/jobs/library/histograms.h"
+#include "server/jobs/queue/workers.h"
 #include "tests/support/errors.h"
 #include "tests/support/jobs.h"
 #include "tests/unit/jobs/faulty_job.h"

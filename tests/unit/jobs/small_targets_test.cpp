@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/decode/decode.h"
-#include "server/jobs/pipeline.h"
+#include "server/jobs/queue/pipeline.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
