@@ -4,7 +4,7 @@
 
 #include <malloc.h>
 
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/jobs/making/make_mesh.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/measure/measure.h"

@@ -11,7 +11,7 @@
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/http/answers/sources.h"
 #include "server/http/app/outcomes.h"
 #include "server/http/requests/import_query.h"

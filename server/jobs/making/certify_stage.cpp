@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "proto/parameters.h"
-#include "server/codec/decode/decode.h"
+#include "server/codec/formats.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/measure/self_intersections.h"

@@ -8,7 +8,7 @@
 
 #include "proto/parameters.h"
 #include "server/codec/draco/grid.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 
 namespace isomesh::jobs {
 namespace {

@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "proto/samples.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/formats.h"
 #include "server/codec/zip/label_zip.h"
 #include "server/jobs/library/settle_labels.h"
 #include "server/jobs/making/certify_stage.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/mesh/labels/label_parts.h"
 #include "server/mesh/labels/separate.h"

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "proto/json.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/jobs/library/stored_samples.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/codec/decode/decode.h"
+#include "server/codec/formats.h"
 #include "server/jobs/queue/estimate.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/mesh/measure/distance.h"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/codec/decode/decode.h"
+#include "server/codec/formats.h"
 #include "server/jobs/queue/pipeline.h"
 #include "tests/unit/jobs/fixture.h"
 

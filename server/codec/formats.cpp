@@ -1,7 +1,15 @@
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
+#include <string>
+
+#include "proto/error.h"
+#include "server/codec/decode/decoders.h"
+#include "server/codec/space.h"
+#include "server/codec/zip/threemf.h"
 
 namespace isomesh::codec {
 namespace {
@@ -37,6 +45,41 @@ bool always(const MeshParameters& /*parameters*/) { return true; }
 
 bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
 
+std::optional<mesh::Topology> encode_turned_drc(const Format::Surface& surface,
+                                                const mesh::Context& context, const Sink& sink) {
+  const DracoParameters& draco = surface.provenance.parameters.draco;
+  if (surface.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
+  return encode_drc(copy_in_space(surface.mesh, surface.space), draco, context, sink);
+}
+
+template <auto encode>
+std::optional<mesh::Topology> encode_in_space(const Format::Surface& surface,
+                                              const mesh::Context& context, const Sink& sink) {
+  encode(surface.mesh, surface.space, context, sink);
+  return std::nullopt;
+}
+
+template <auto encode>
+std::optional<mesh::Topology> encode_with_provenance(const Format::Surface& surface,
+                                                     const mesh::Context& context,
+                                                     const Sink& sink) {
+  encode(surface.mesh, surface.provenance, context, sink);
+  return std::nullopt;
+}
+
+template <auto encode>
+void encode_labels_in_space(const LabelledSurface& surface, const Provenance& /*provenance*/,
+                            Space space, const mesh::Context& context, const Sink& sink) {
+  encode(surface, space, context, sink);
+}
+
+template <auto encode>
+void encode_labels_with_provenance(const LabelledSurface& surface, const Provenance& provenance,
+                                   Space /*space*/, const mesh::Context& context,
+                                   const Sink& sink) {
+  encode(surface, provenance, context, sink);
+}
+
 constexpr std::array kFormats = {
     Format{.format = MeshFormat::kDrc,
            .media_type = kUnregistered,
@@ -59,7 +102,9 @@ constexpr std::array kFormats = {
                                                           ? kOwnPerTriangle
                                                           : kLibdracoPerTriangle);
                },
-           .shows_topology = if_ours},
+           .shows_topology = if_ours,
+           .encode = encode_turned_drc,
+           .decode = decoding::decode_drc},
     Format{.format = MeshFormat::kGlb,
            .media_type = "model/gltf-binary",
            .milliseconds_per_triangle = 4.0e-5,
@@ -105,14 +150,22 @@ constexpr std::array kFormats = {
                [](const MeshParameters& parameters) {
                  return parameters.glb_codec == GlbCodec::kDraco && if_ours(parameters) &&
                         !parameters.distances;
-               }},
+               },
+           .encode =
+               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
+                 return encode_glb(surface.mesh, surface.provenance, context, sink,
+                                   surface.extracted);
+               },
+           .encode_labels = encode_labels_with_provenance<encode_labels_glb>,
+           .decode = decoding::decode_glb},
     Format{.format = MeshFormat::kStl,
            .media_type = "model/stl",
            .milliseconds_per_triangle = 3.0e-5,
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_in_space<encode_stl>},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -121,7 +174,9 @@ constexpr std::array kFormats = {
                  return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_in_space<encode_ply>,
+           .encode_labels = encode_labels_in_space<encode_labels_ply>},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
            .milliseconds_per_triangle = 2.0e-4,
@@ -130,7 +185,9 @@ constexpr std::array kFormats = {
                  return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_in_space<encode_obj>,
+           .encode_labels = encode_labels_in_space<encode_labels_obj>},
     Format{.format = MeshFormat::k3mf,
            .media_type = "model/3mf",
            .milliseconds_per_triangle = 6.5e-4,
@@ -144,7 +201,12 @@ constexpr std::array kFormats = {
                  constexpr std::uint64_t kLabelPerTriangle = 30;
                  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
                },
-           .shows_topology = always},
+           .shows_topology = always,
+           .encode =
+               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
+                 return encode_3mf(surface.mesh, surface.provenance, context, sink);
+               },
+           .encode_labels = encode_labels_with_provenance<encode_labels_3mf>},
     Format{.format = MeshFormat::kOff,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 2.0e-4,
@@ -153,7 +215,8 @@ constexpr std::array kFormats = {
                  return 100 + 28 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_in_space<encode_off>},
     Format{.format = MeshFormat::kVtk,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -163,7 +226,9 @@ constexpr std::array kFormats = {
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_in_space<encode_vtk>,
+           .encode_labels = encode_labels_in_space<encode_labels_vtk>},
     Format{.format = MeshFormat::kVtp,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -173,7 +238,9 @@ constexpr std::array kFormats = {
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_with_provenance<encode_vtp>,
+           .encode_labels = encode_labels_with_provenance<encode_labels_vtp>},
     Format{.format = MeshFormat::kGii,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 6.0e-5,
@@ -182,7 +249,8 @@ constexpr std::array kFormats = {
                  return 2500 + 16 * as_double(surface.vertices) + 16 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = encode_with_provenance<encode_gii>},
     Format{.format = MeshFormat::kZip,
            .media_type = "application/zip",
            .milliseconds_per_triangle = 3.0e-5,
@@ -205,21 +273,55 @@ constexpr std::array kFormats = {
                  }
                  return bytes;
                },
-           .shows_topology = never},
+           .shows_topology = never,
+           .encode = nullptr},
 };
 
 }  // namespace
 
+const Format& describe(MeshFormat format) {
+  const auto found = std::ranges::find(kFormats, format, &Format::format);
+  if (found == kFormats.end()) throw Error(ErrorCode::kInternal, "a format has no row");
+  return *found;
+}
+
 bool rounds(MeshFormat format, const MeshParameters& parameters) {
-  if (format != MeshFormat::kZip) return format == MeshFormat::kDrc || format == MeshFormat::kGlb;
+  if (format != MeshFormat::kZip) return describe(format).decode != nullptr;
   return std::ranges::any_of(zipped_formats(parameters),
                              [&](MeshFormat each) { return rounds(each, parameters); });
 }
 
-const Format& describe(MeshFormat format) {
-  const auto found = std::ranges::find(kFormats, format, &Format::format);
-  if (found == kFormats.end()) throw Error(ErrorCode::kInternal, "a format has no encoder");
-  return *found;
+std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
+                                     const Provenance& provenance, const mesh::Context& context,
+                                     const Sink& sink, const mesh::TriangleGrid* extracted) {
+  const Format& row = describe(format);
+  if (row.encode == nullptr) {
+    throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
+  }
+  const Space space = space_of(format, provenance.parameters);
+  return row.encode({mesh, provenance, space, extracted}, context, sink);
+}
+
+void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
+                   const mesh::Context& context, const Sink& sink) {
+  const Format& row = describe(format);
+  if (row.encode_labels == nullptr) {
+    throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
+  }
+  row.encode_labels(surface, provenance, space_of(format, provenance.parameters), context, sink);
+}
+
+DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
+                      const mesh::Context& context) {
+  context.throw_if_stopped();
+  const Format& row = describe(format);
+  if (row.decode == nullptr) decoding::refuse(format, "nothing decodes this format");
+  DecodedSurface surface = row.decode(file, context);
+  decoding::check(surface, format, context);
+  if (space == Space::kRas) {
+    for (mesh::Vec3& position : surface.positions) position = in_space(position, space);
+  }
+  return surface;
 }
 
 }  // namespace isomesh::codec
