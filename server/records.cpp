@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "base/ids.h"
-#include "server/jobs/queue/estimate.h"
+#include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/identity.h"

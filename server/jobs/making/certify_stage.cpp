@@ -66,7 +66,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
                    MeshSummary& summary) {
   if (!request.certify) return;
   const MeshParameters& parameters = request.parameters;
-  progress.enter(Stage::kCertify, shares_of(request).certify);
+  progress.enter(Stage::kCertify);
   const std::vector<MeshFormat> formats = measured_formats(parameters);
   const double part = 1.0 / static_cast<double>(formats.size() + 1);
   MeshCertificate& certificate = summary.certificate.emplace();

@@ -143,9 +143,8 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
                         std::span<const codec::Sink> sinks, Progress& progress,
                         mesh::SeparatingSurface& walls) {
   const MeshParameters& parameters = request.parameters;
-  const StageShares shares = shares_of(request);
   MeshSummary summary;
-  progress.enter(Stage::kExtract, shares.extract);
+  progress.enter(Stage::kExtract);
   const auto labels =
       mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
   separate(samples, separate_options(labels, parameters), request, progress, walls);
@@ -161,7 +160,7 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   if (is_simplified(parameters)) check_disk(walls.mesh, request);
   summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};
 
-  progress.enter(Stage::kEncode, shares.encode);
+  progress.enter(Stage::kEncode);
   const mesh::LabelTriangles triangles(walls);
   const auto measures = measure_labels(walls, triangles, progress.quiet());
   set_quality(measures, summary);

@@ -7,6 +7,7 @@
 
 #include "proto/samples.h"
 #include "proto/stages.h"
+#include "server/codec/formats.h"
 #include "server/jobs/making/certify_stage.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
@@ -101,11 +102,18 @@ void leave_out_parts(const MeshParameters& parameters, const Progress& progress,
 
 }  // namespace
 
-void Progress::enter(Stage stage, double share) {
+Progress::Progress(std::stop_token stop, const Report& report, const Timing& expected)
+    : stop_(std::move(stop)), report_(report), expected_(expected) {
+  for (const StageRow& row : kStages) {
+    if (row.elapsed != nullptr) expected_ms_ += expected.*row.elapsed;
+  }
+}
+
+void Progress::enter(Stage stage) {
   end_stage();
   stage_ = stage;
   done_before_ += share_;
-  share_ = share;
+  share_ = expected_.*row_of(stage).elapsed / expected_ms_;
   began_ = Clock::now();
   report_(stage_, done_before_, timing_);
 }
@@ -135,10 +143,9 @@ void Workspace::trim(std::size_t budget_bytes) {
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
-  const StageShares shares = shares_of(request);
   MeshSummary summary;
   summary.iso = request.iso;
-  progress.enter(Stage::kExtract, shares.extract);
+  progress.enter(Stage::kExtract);
   extract(samples, request, progress, mesh);
   leave_out_parts(parameters, progress, mesh, summary.dropped);
   if (!is_simplified(parameters)) check_disk(mesh, request);
@@ -151,7 +158,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   set_size(mesh, summary);
   if (is_simplified(parameters)) check_disk(mesh, request);
 
-  progress.enter(Stage::kEncode, shares.encode);
+  progress.enter(Stage::kEncode);
   const KeptFiles files(written, sinks);
   encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
                      summary);

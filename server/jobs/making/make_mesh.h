@@ -24,16 +24,14 @@ namespace isomesh::jobs {
 // the milliseconds of the stages that have ended.
 using Report = std::function<void(Stage stage, double progress, const Timing& timing)>;
 
-// The share of a typical job that loading the volume takes, for its progress.
-inline constexpr double kLoadShare = 0.02;
-
 // Follows a job through its stages: times each, reports its progress, passes cancellation on.
 class Progress {
  public:
-  Progress(std::stop_token stop, const Report& report) : stop_(std::move(stop)), report_(report) {}
+  // A stage's share of the job is its share of the expected times.
+  Progress(std::stop_token stop, const Report& report, const Timing& expected);
 
-  // Ends the stage before and starts this one, which takes `share` of the whole job.
-  void enter(Stage stage, double share);
+  // Ends the stage before and starts this one.
+  void enter(Stage stage);
   void end_stage();
 
   // The context of the part [from, to] of the present stage.
@@ -51,6 +49,8 @@ class Progress {
  private:
   std::stop_token stop_;
   const Report& report_;
+  const Timing expected_;
+  double expected_ms_ = 0;
   Timing timing_;
   Stage stage_ = Stage::kQueue;
   double done_before_ = 0;

@@ -53,29 +53,6 @@ void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
 
 }  // namespace
 
-StageShares shares_of(const MeshRequest& request) {
-  // Parts of the time that they take, as they were seen on a head of five million triangles.
-  constexpr double kExtract = 5;
-  constexpr double kSmooth = 8;
-  constexpr double kSimplify = 900;
-  constexpr double kSimplifyWithin = 5000;
-  constexpr double kEncode = 85;
-  constexpr double kCertify = 2500;
-  const double simplify = request.parameters.max_error_mm ? kSimplifyWithin : kSimplify;
-  StageShares shares = {.extract = kExtract,
-                        .smooth = kSmooth,
-                        .simplify = is_simplified(request.parameters) ? simplify : 0,
-                        .encode = kEncode,
-                        .certify = request.certify ? kCertify : 0};
-  const double all =
-      shares.extract + shares.smooth + shares.simplify + shares.encode + shares.certify;
-  for (double* share :
-       {&shares.extract, &shares.smooth, &shares.simplify, &shares.encode, &shares.certify}) {
-    *share *= (1 - kLoadShare) / all;
-  }
-  return shares;
-}
-
 bool is_simplified(const MeshParameters& parameters) {
   return parameters.max_error_mm || parameters.triangles;
 }
@@ -97,7 +74,7 @@ std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& param
 
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary) {
-  progress.enter(Stage::kSmooth, shares_of(request).smooth);
+  progress.enter(Stage::kSmooth);
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
@@ -116,7 +93,7 @@ void simplify_stage(const MeshRequest& request, const ExtractedSurface& extracte
                     MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
-  progress.enter(Stage::kSimplify, shares_of(request).simplify);
+  progress.enter(Stage::kSimplify);
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
     options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);

@@ -20,18 +20,6 @@
 
 namespace isomesh::jobs {
 
-// The shares of a typical job that its stages take, for its progress; of what is left after
-// loading, all of them are 1.
-struct StageShares {
-  double extract = 0;
-  double smooth = 0;
-  double simplify = 0;
-  double encode = 0;
-  double certify = 0;
-};
-
-StageShares shares_of(const MeshRequest& request);
-
 // Whether the job asks for fewer triangles.
 bool is_simplified(const MeshParameters& parameters);
 

@@ -7,76 +7,16 @@
 #include "proto/json.h"
 #include "server/codec/formats.h"
 #include "server/jobs/library/stored_samples.h"
-#include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
+#include "server/jobs/making/stage_times.h"
 
 namespace isomesh::jobs {
 namespace {
-
-// First guesses, from a 7.1 million voxel head of five million triangles on two cores.
-constexpr double kMillisecondsPerJob = 1;
-constexpr double kLoadPerSample = 1.3e-6;
-constexpr double kExtractPerSample = 1.0e-6;
-constexpr double kExtractPerTriangle = 1.6e-5;
-constexpr double kConnectivityPerTriangle = 1.0e-5;
-constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
-constexpr double kMeasurePerTriangle = 3.0e-5;
-constexpr double kSimplifyPerTriangle = 5.0e-4;
-constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
-constexpr double kLevelsPerTriangle = 7.5e-4;
-constexpr double kCertifyPerTriangle = 1.0e-3;
 
 // Calibrating looks at these many finished jobs, the youngest.
 constexpr std::size_t kJobsLookedAt = 50;
 
 double as_double(std::uint64_t count) { return static_cast<double>(count); }
-
-double load_ms(std::uint64_t samples) { return kLoadPerSample * as_double(samples); }
-
-double extract_ms(const SurfaceSize& surface, std::uint64_t samples) {
-  return kExtractPerSample * as_double(samples) +
-         kExtractPerTriangle * as_double(surface.triangles);
-}
-
-double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
-  if (parameters.passes == 0) return 0;
-  return as_double(surface.triangles) *
-         (kConnectivityPerTriangle + kSmoothPerTriangleAndPass * parameters.passes);
-}
-
-// What share of the triangles is left within an error: few of them where it is much of a sample's
-// spacing. A curve through what was seen on heads of 1 mm; jobs that have finished correct it.
-double share_within(double error_mm, double spacing_mm) {
-  constexpr double kHalf = 0.06;  // of the spacing, the error that leaves half of the triangles
-  constexpr double kSteepness = 1.16;
-  return 1 / (1 + std::pow(error_mm / spacing_mm / kHalf, kSteepness));
-}
-
-double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
-  if (!parameters.max_error_mm && !parameters.triangles) return 0;
-  return as_double(surface.triangles) *
-         (parameters.max_error_mm ? kSimplifyWithinPerTriangle : kSimplifyPerTriangle);
-}
-
-double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
-                  const JobParameters& parameters) {
-  if (!parameters.certify) return 0;
-  const auto measured = static_cast<double>(measured_formats(parameters).size());
-  return measured * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
-}
-
-// Formats are written side by side, so the slowest counts whole and the others by half.
-double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
-  double slowest = kMeasurePerTriangle;
-  double sum = kMeasurePerTriangle;
-  for (const MeshFormat format : files_of(parameters)) {
-    const double each = codec::describe(format).milliseconds_per_triangle;
-    slowest = std::max(slowest, each);
-    sum += each;
-  }
-  const double levels = parameters.lods.size() > 1 ? kLevelsPerTriangle : 0;
-  return as_double(surface.triangles) * (slowest + (sum - slowest) / 2 + levels);
-}
 
 // Files of labels have the triangles of each label's own surface.
 SurfaceSize surface_in_files(const CountedSurface& counted) {
@@ -123,11 +63,12 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
     extracted.triangles = job.mesh->simplified->triangles_before;
     extracted.vertices = extracted.triangles / 2;
   }
-  add(extract_, job.timing.extract, extract_ms(extracted, samples));
-  add(smooth_, job.timing.smooth, smooth_ms(extracted, job.parameters));
-  add(simplify_, job.timing.simplify, simplify_ms(extracted, job.parameters));
-  add(encode_, job.timing.encode, encode_ms(surface, job.parameters));
-  add(certify_, job.timing.certify, certify_ms(extracted, surface, job.parameters));
+  const Timing guessed =
+      stage_times(extracted, surface, samples, job.parameters, job.parameters.certify);
+  for (std::size_t n = 0; n < kStages.size(); ++n) {
+    const auto elapsed = kStages[n].elapsed;
+    if (elapsed != nullptr) add(stages_[n], job.timing.*elapsed, guessed.*elapsed);
+  }
   if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
     add(share_, as_double(surface.triangles),
         as_double(extracted.triangles) * share_within(*job.parameters.max_error_mm, spacing_mm));
@@ -142,11 +83,13 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
 
 double CostModel::milliseconds(const SurfaceSize& surface, const SurfaceSize& written,
                                std::uint64_t samples, const JobParameters& parameters) const {
-  return kMillisecondsPerJob + load_ms(samples) + extract_.factor() * extract_ms(surface, samples) +
-         smooth_.factor() * smooth_ms(surface, parameters) +
-         simplify_.factor() * simplify_ms(surface, parameters) +
-         encode_.factor() * encode_ms(written, parameters) +
-         certify_.factor() * certify_ms(surface, written, parameters);
+  const Timing times = stage_times(surface, written, samples, parameters, parameters.certify);
+  double sum = 0;
+  for (std::size_t n = 0; n < kStages.size(); ++n) {
+    const auto elapsed = kStages[n].elapsed;
+    if (elapsed != nullptr) sum += stages_[n].factor() * times.*elapsed;
+  }
+  return sum;
 }
 
 SurfaceSize CostModel::simplified(const SurfaceSize& surface, const MeshParameters& parameters,
@@ -169,28 +112,6 @@ std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surfac
   const double factor = (found == files_.end() ? kFewBytes : found->second).factor();
   return static_cast<std::uint64_t>(
       std::llround(factor * codec::describe(format).bytes(surface, parameters)));
-}
-
-double expected_ms(const Volume& volume, const JobParameters& parameters) {
-  // Surfaces grow with the square of a volume's length, its samples with the cube. A noisy head and
-  // a smooth body of CT have 135 and 20 times that many triangles.
-  constexpr double kTypical = 50;
-  auto samples = as_double(volume.sample_count());
-  if (parameters.crop) {
-    double part = 1;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto& [low, high] = *parameters.crop;
-      part *= std::abs(high[axis] - low[axis]) / volume.geometry.spacing[axis];
-    }
-    samples = std::min(samples, part);
-  }
-  const double triangles = kTypical * std::pow(samples, 2.0 / 3);
-  const SurfaceSize surface = {static_cast<std::uint64_t>(triangles),
-                               static_cast<std::uint64_t>(triangles / 2)};
-  const CostModel costs;
-  const double spacing_mm = std::ranges::min(volume.geometry.spacing);
-  return costs.milliseconds(surface, costs.simplified(surface, parameters, spacing_mm),
-                            static_cast<std::uint64_t>(samples), parameters);
 }
 
 Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& parameters) {

@@ -6,8 +6,10 @@
 #include <stop_token>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "base/mutex.h"
+#include "proto/stages.h"
 #include "proto/types.h"
 #include "server/jobs/library/memo.h"
 #include "server/jobs/queue/pipeline.h"
@@ -19,8 +21,8 @@ namespace isomesh::jobs {
 
 using mesh::SurfaceSize;
 
-// How a job's time and files follow from its surface: first guesses, corrected by the jobs that
-// have finished. Plain values.
+// How a job's time and files follow from its surface: the first guesses of stage_times.h and of the
+// formats, corrected by finished jobs. Plain values.
 class CostModel {
  public:
   // Takes a job that succeeded into account; `samples` is the size of its volume, and the spacing
@@ -55,18 +57,10 @@ class CostModel {
   static constexpr Correction kFewTriangles = {100'000, 100'000};
   static constexpr Correction kFewBytes = {100'000, 100'000};
 
-  Correction extract_ = kFewMilliseconds;
-  Correction smooth_ = kFewMilliseconds;
-  Correction simplify_ = kFewMilliseconds;
-  Correction encode_ = kFewMilliseconds;
-  Correction certify_ = kFewMilliseconds;
+  std::vector<Correction> stages_ = std::vector(kStages.size(), kFewMilliseconds);
   Correction share_ = kFewTriangles;        // that simplification leaves
   std::map<MeshFormat, Correction> files_;  // kFewBytes for those that are not here
 };
-
-// How long a run is expected to take before anything of its volume is read, in milliseconds: as on
-// a surface of typical size. Owners take turns in the queue by it.
-double expected_ms(const Volume& volume, const JobParameters& parameters);
 
 // Estimates jobs on stored volumes, whose surfaces a process of its own counts. Counts of the last
 // surfaces are kept. Thread safe; what it is
