@@ -43,9 +43,9 @@ class BlobEraser {
   Mutex mutex_;
   Condition changed_;
   std::deque<std::string> waiting_ ISOMESH_GUARDED_BY(mutex_);  // the first is being erased
-  // callers of finish() that are waiting
+  // Callers of finish() that are waiting.
   int hurries_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  // last, because it uses the other members
+  // Last, because it uses the other members.
   std::jthread thread_;
 };
 

@@ -16,7 +16,7 @@ namespace isomesh::jobs {
 
 struct RunnerOptions {
   process::ImportBounds bounds;
-  // further imports wait; also the number of idle processes kept ready
+  // Further imports wait; also the number of idle processes kept ready.
   std::size_t at_once = 2;
   std::filesystem::path program;  // isomesh-import
 };
