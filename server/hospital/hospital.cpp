@@ -65,7 +65,6 @@ std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital
           .station = hospital.station_name, .host = host_name(), .process = ::getpid()});
 }
 
-// A configured hospital.
 class OpenHospital {
  public:
   OpenHospital(const http::WingSettings& settings, const http::WingServices& services)

@@ -1,4 +1,3 @@
-// Routes of orders and PACS.
 #pragma once
 
 #include "server/hospital/orders/orders.h"

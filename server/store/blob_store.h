@@ -21,7 +21,6 @@
 
 namespace isomesh::store {
 
-// The name and size of a blob.
 struct Blob {
   std::string key;  // SHA-256 in hex
   std::uint64_t bytes = 0;
@@ -69,7 +68,6 @@ struct LinkedAs {
   std::chrono::seconds lasts{60};
 };
 
-// The result of a sweep.
 struct Swept {
   std::size_t quarantined = 0;
   std::size_t left = 0;  // further unnamed blobs, beyond the limit of one sweep
@@ -99,7 +97,6 @@ class BlobStore {
   // True if other daemons may use the store too.
   virtual bool is_shared() const = 0;
 
-  // True if the store has no blobs.
   virtual bool is_empty() const = 0;
 
   // A short text stored with the blobs that names the database they belong to (see Identity); empty

@@ -26,7 +26,6 @@ struct Expirable {
   Time last_used;
 };
 
-// Selects expirable records.
 struct ExpiryFilter {
   Time before;                            // last used earlier than this
   std::optional<std::string> owner = {};  // only this owner's
@@ -35,7 +34,6 @@ struct ExpiryFilter {
 // Bytes of the blobs named by each owner's records; a blob counts once per owner.
 using OwnedBytes = std::map<std::string, std::uint64_t>;
 
-// The result of expire().
 struct Expired {
   std::vector<Expirable> records = {};
   std::uint64_t bytes = 0;              // of the blobs that no record names any more

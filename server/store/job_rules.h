@@ -54,7 +54,6 @@ void give_mesh(Job& job, const MeshSummary& mesh);
 // The blobs of the mesh: its files and the file of its labels.
 std::vector<Blob> blobs_of(const MeshSummary& mesh);
 
-// True if two meshes have the same blobs.
 bool have_same_blobs(const MeshSummary& one, const MeshSummary& other);
 
 // is_there: every blob of the mesh exists with its size. is_intact: their bytes are also correct,

@@ -66,7 +66,6 @@ enum class Standing {
   kLost,    // the lease expired or another worker has it: discard this run
 };
 
-// Progress of a running job.
 struct Progress {
   Stage stage = Stage::kLoad;
   double share = 0;  // of the whole job, 0..1
@@ -111,7 +110,6 @@ struct Event {
   bool operator==(const Event&) const = default;
 };
 
-// Selects ended jobs.
 enum class Ended {
   kAll,
   kWithMesh,  // those whose expiry frees space

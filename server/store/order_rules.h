@@ -26,7 +26,6 @@ bool is_done(const LastOrder& last, const WatchedSeries& series);
 // Decides about a received series; `newest` is the time of its latest instance.
 ReceivedFate fate_of(const LastOrder& last, const WatchedSeries& series, Time newest);
 
-// Sets the order's state to cancelled.
 void cancel_order(OrderRecord& record);
 
 // Resets a failed order to its beginning. Throws Error kNotReady unless it has failed.

@@ -18,7 +18,6 @@
 
 namespace isomesh::store {
 
-// An order as stored by an engine.
 struct OrderRecord {
   std::string owner;
   Order order;
@@ -51,14 +50,12 @@ struct WatchedSeries {
   std::uint32_t instances = 0;
 };
 
-// The outcome for a received series.
 enum class ReceivedFate {
   kNew,   // an order was stored
   kOpen,  // an order is still open, or too many orders are open
   kDone,  // an order covered all instances
 };
 
-// Selects orders to list.
 struct OrderFilter {
   std::optional<OrderState> state = {};
   std::optional<std::string> rule = {};

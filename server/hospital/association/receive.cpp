@@ -83,7 +83,6 @@ bool is_among(const std::vector<std::string>& titles, const std::string& title) 
   return std::ranges::find(titles, title) != titles.end();
 }
 
-// This process's association.
 class Association {
  public:
   explicit Association(const DimseReceiving& order) : order_(order) {}

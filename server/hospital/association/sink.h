@@ -1,4 +1,3 @@
-// The file to which a received object is written.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +18,6 @@ class FileSink : public DcmConsumer {
   // Writes at most that many bytes.
   FileSink(const std::filesystem::path& path, std::uint64_t most_bytes);
 
-  // True if some bytes could not be written.
   bool has_failed() const { return has_failed_; }
 
   OFBool good() const override { return OFTrue; }

@@ -12,7 +12,6 @@ namespace isomesh::association {
 // longer needs this process.
 std::string read_order();
 
-// The descriptor of the peer's connection.
 int peer_socket();
 
 // Ends the process if the daemon has closed its socket.

@@ -91,7 +91,6 @@ Event event_of(const std::string& code) {
   throw Error(ErrorCode::kInternal, "an entry of the audit trail has an unknown event");
 }
 
-// Participants and objects of an event.
 struct Content {
   std::string participants;
   std::string objects = {};

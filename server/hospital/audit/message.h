@@ -7,7 +7,6 @@
 
 namespace isomesh::audit {
 
-// The origin of a trail.
 struct AuditSource {
   std::string station;  // AuditSourceID
   std::string host;     // HOSTNAME of syslog

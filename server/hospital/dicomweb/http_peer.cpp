@@ -31,7 +31,6 @@ std::string secret_in(const std::filesystem::path& file) {
   return secret;
 }
 
-// A running request.
 class Exchange {
  public:
   Exchange(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)

@@ -13,7 +13,6 @@
 
 namespace isomesh::dicomweb {
 
-// A request body.
 struct RequestBody {
   std::string content_type;
   std::uint64_t bytes = 0;

@@ -1,4 +1,3 @@
-// Derives UIDs from names.
 #pragma once
 
 #include <string>

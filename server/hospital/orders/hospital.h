@@ -14,7 +14,6 @@
 
 namespace isomesh::orders {
 
-// The protocol for sending objects.
 enum class SendBy { kStow, kCStore };
 
 // A PACS that is queried by DICOMweb (PS3.18), and receives by DICOMweb or DIMSE (PS3.7).

@@ -15,7 +15,6 @@
 
 namespace isomesh::orders {
 
-// An object in the blob store.
 struct MadeObject {
   std::optional<std::int64_t> label;
   std::string series_uid;

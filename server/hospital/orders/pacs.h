@@ -56,14 +56,12 @@ struct FoundSeries {
   std::optional<std::uint32_t> instances;  // empty: unknown
 };
 
-// The UIDs of an object.
 struct InstancePlace {
   std::string study;
   std::string series;
   std::string instance;
 };
 
-// An object to store.
 struct OutgoingObject {
   InstancePlace place;
   std::uint64_t bytes = 0;

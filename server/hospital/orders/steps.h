@@ -1,4 +1,3 @@
-// The steps of an order.
 #pragma once
 
 #include <chrono>
@@ -25,7 +24,6 @@ namespace isomesh::orders {
 
 using PacsByName = std::map<std::string, std::unique_ptr<Pacs>, std::less<>>;
 
-// Dependencies of orders.
 struct OrderServices {
   const store::DataFolder& folder;
   const store::BlobStore& blobs;

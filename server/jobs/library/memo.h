@@ -62,7 +62,6 @@ class Memo {
     typename std::list<Key>::iterator place;
   };
 
-  // Releases a caller's place when it goes out of scope.
   class Leave {
    public:
     explicit Leave(Memo& memo) : memo_(memo) {}

@@ -31,7 +31,6 @@ constexpr int kMostEarlyEnds = 3;
 
 }  // namespace
 
-// A running order.
 struct JobProcess::Talk {
   const JobOrder& order;
   std::span<const codec::Sink> sinks;

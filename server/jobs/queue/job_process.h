@@ -19,7 +19,6 @@
 
 namespace isomesh::jobs {
 
-// The program that makes meshes, and its setup.
 struct JobProgram {
   std::filesystem::path file;  // isomesh-job
   JobSetup setup;

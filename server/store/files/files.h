@@ -11,7 +11,6 @@
 
 namespace isomesh::store {
 
-// An open file, closed on destruction.
 class File {
  public:
   // Creates a file that must not exist. Throws Error kOutOfSpace or kInternal.

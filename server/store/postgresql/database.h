@@ -61,7 +61,6 @@ class Database : public SqlDatabase {
     }
   }
 
-  // True if the database responds now.
   bool answers();
 
   const std::string& node() const { return node_; }  // a UUID, new at each start of the process

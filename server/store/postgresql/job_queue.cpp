@@ -12,7 +12,6 @@
 
 namespace isomesh::store::postgresql {
 
-// How a run ends.
 struct PostgresJobStore::Ending {
   // Ends a run of another process; only possible if its lease has expired.
   bool ends_others = false;

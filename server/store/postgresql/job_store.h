@@ -76,7 +76,6 @@ class PostgresJobStore : public SqlJobStore {
   Messages messages_;  // last: its thread uses the other members
 };
 
-// Formats a time of the tables.
 std::string timestamp_of_us(std::int64_t us);
 
 }  // namespace isomesh::store::postgresql

@@ -7,7 +7,6 @@
 
 namespace isomesh::store::postgresql {
 
-// Numbers of the copied records.
 struct Moved {
   std::uint64_t volumes = 0;
   std::uint64_t jobs = 0;

@@ -16,7 +16,6 @@ struct S3Address {
   std::string region;
 };
 
-// True if the value of --blobs is an S3 URL.
 bool is_s3_url(std::string_view text);
 
 // Parses s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&style=path|host]. The default endpoint

@@ -15,7 +15,6 @@
 
 namespace isomesh::store {
 
-// A listed object.
 struct S3Object {
   std::string key;  // without the prefix
   std::uint64_t bytes = 0;
@@ -68,7 +67,6 @@ class S3Client {
   // Lists all objects, with as many requests as necessary.
   S3Listing list(const std::string& beginning) const;
 
-  // True if there is at least one such object.
   bool has_any(const std::string& beginning) const;
 
   // See BlobStore::link.

@@ -65,7 +65,6 @@ inline constexpr long kS3Conflict = 409;
 inline constexpr long kS3PreconditionFailed = 412;
 inline constexpr long kS3NotImplemented = 501;
 
-// The response to a request.
 struct S3Answer {
   long status = 0;                                  // 0: none, or the transfer was aborted
   std::map<std::string, std::string> headers = {};  // names in lower case

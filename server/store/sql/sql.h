@@ -97,7 +97,6 @@ class SqlConnection {
   // Runs a statement to its end; returns the number of changed rows.
   virtual std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) = 0;
 
-  // As above, with values.
   template <class... Values>
   Rows query(std::string_view sql, const Values&... values) {
     const std::array<Parameter, sizeof...(Values)> parameters{Parameter(values)...};

@@ -9,8 +9,8 @@
 
 namespace isomesh::store {
 
-// The start value of the believed clock: the last recorded time, or the clock's time if the
-// operator trusts it.
+// The start value of the believed clock: the last recorded time, or the clock's time if that is
+// later and the operator trusts it.
 Time time_to_start_with(Time last_seen, const OperatorsWord& word,
                         const BelievedClock::Options& clock);
 

@@ -96,7 +96,6 @@ std::vector<std::string> blobs_of(const fs::path& data) {
   return names;
 }
 
-// Path of a blob below the folder of blobs.
 std::string place_of(const std::string& key) { return key.substr(0, 2) + '/' + key; }
 
 class Copy {
@@ -159,7 +158,6 @@ void snapshot(const fs::path& data, const fs::path& file) {
   File::open(file).sync();
 }
 
-// The blobs named by the records.
 std::set<std::string> named_blobs(const fs::path& records) {
   Connection connection(records, Connection::Mode::kRead);
   std::set<std::string> blobs;

@@ -16,7 +16,6 @@ namespace {
 // Interval of marks while nothing is stored.
 constexpr std::chrono::minutes kBetweenIdleMarks{10};
 
-// True if there are records.
 bool has_records(Connection& connection) {
   Rows query = connection.query(
       "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
