@@ -895,7 +895,7 @@ class ProblemErrors(TypedDict):
 
 class ProblemChoices(TypedDict):
     #: The query parameter to add.
-    parameter: Literal['series', 'member', 'volume']
+    parameter: Literal['series', 'member', 'volume', 'spacing']
     value: str
     #: A description of the value, for people.
     title: str
