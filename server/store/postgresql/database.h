@@ -43,7 +43,8 @@ class Database : public SqlDatabase {
     return ask_for(options_.patience, act);
   }
 
-  // As ask(), for longer work. Repetitions again have options.patience.
+  // As ask(), but a response may take `longest`. Interrupted work is restarted only within
+  // options.patience of the call.
   template <class Act>
   auto ask_for(std::chrono::milliseconds longest, const Act& act) {
     const auto deadline = std::chrono::steady_clock::now() + options_.patience;
