@@ -194,6 +194,8 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "metaimage") return metaimage_files();
   if (name == "vti") return vti_files();
   if (name == "dicom") return dicom_files();
+  if (name == "structures") return structure_sets();
+  if (name == "ascconv") return siemens_protocols();
   if (name == "csa") return csa_headers();
   if (name == "archive") return archive_files();
   if (name == "labels") return label_texts();

@@ -1,6 +1,7 @@
 #include "tests/fuzz/targets.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -12,6 +13,7 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/import/dicom/elements/ascconv.h"
 #include "server/import/dicom/elements/csa_header.h"
 #include "server/import/import.h"
 #include "server/import/labels/label_table.h"
@@ -98,6 +100,14 @@ void import_only(std::string_view format, Bytes bytes) {
   import_bytes(bytes, {.volume = 1});
 }
 
+// A structure set needs a spacing, unless it is uploaded with images.
+void import_structures(Bytes bytes) {
+  const auto head = bytes.first(std::min(bytes.size(), import::kSniffBytes));
+  const import::Reader* reader = import::sniff(head);
+  if (reader == nullptr || reader->name != "dicom") return;
+  import_bytes(bytes, {.spacing = std::array<double, 3>{1, 1, 2}});
+}
+
 void import_anything(Bytes bytes) { import_bytes(bytes, {}); }
 
 // The description comes first, byte for byte, and then the samples.
@@ -170,6 +180,11 @@ constexpr Target kTargets[] = {
     {"metaimage", [](Bytes bytes) { import_only("metaimage", bytes); }},
     {"vti", [](Bytes bytes) { import_only("vti", bytes); }},
     {"dicom", [](Bytes bytes) { import_only("dicom", bytes); }},
+    {"structures", import_structures},
+    {"ascconv",
+     [](Bytes bytes) {
+       read_text(bytes, [](auto text) { import::dicom::protocol_slices(text); });
+     }},
     {"csa",
      [](Bytes bytes) {
        read_text(bytes, [](auto text) { import::dicom::parse_csa_header(text); });

@@ -98,10 +98,10 @@ class Note(TypedDict):
     detail: str
 
 
-NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'fractional-segments']
+NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'contours-skipped', 'contours-interpolated', 'fractional-segments']
 
 
-AcceptableNote = Literal['frame-of-reference']
+AcceptableNote = Literal['space-assumed', 'frame-of-reference']
 
 
 class Preset(TypedDict):
