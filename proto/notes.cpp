@@ -82,6 +82,16 @@ constexpr NoteDescription kNoteDescriptions[] = {
                 "combination. "
                 "A label consists of all values of its segment.",
      .is_in_mesh = true},
+    {.code = NoteCode::kContoursSkipped,
+     .name = "contours-skipped",
+     .meaning = "A DICOM structure set has contours or structures that were not drawn. The detail "
+                "says how many and why.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kContoursInterpolated,
+     .name = "contours-interpolated",
+     .meaning = "A structure of a DICOM structure set has no contours in some slices between "
+                "others. Its shape was interpolated there.",
+     .is_in_mesh = true},
     {.code = NoteCode::kFractionalSegments,
      .name = "fractional-segments",
      .meaning =

@@ -25,7 +25,9 @@ enum class NoteCode {
   kEmptyPlanes,          // DICOM: frames missing from a segmentation; filled with zeros
   kDistanceAssumed,      // DICOM: no distance between slices; taken from the thickness
   kOverlappingSegments,  // segments overlap; values number their combinations
-  kFractionalSegments,   // DICOM: segments are fractions or probabilities; thresholded at one half
+  kContoursSkipped,      // DICOM: contours or structures of a structure set that were not drawn
+  kContoursInterpolated,  // DICOM: shapes of structures in slices between their contours
+  kFractionalSegments,    // DICOM: segments are fractions or probabilities; thresholded at one half
 };
 
 struct NoteDescription {

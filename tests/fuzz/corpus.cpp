@@ -258,6 +258,8 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "vti") return vti_files();
   if (auto files = other_files(name); !files.empty()) return files;
   if (name == "dicom") return dicom_files();
+  if (name == "structures") return structure_sets();
+  if (name == "ascconv") return siemens_protocols();
   if (name == "csa") return csa_headers();
   if (name == "archive") return archive_files();
   if (name == "labels") return label_texts();

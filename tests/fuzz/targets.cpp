@@ -13,6 +13,7 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/import/dicom/elements/ascconv.h"
 #include "server/import/dicom/elements/csa_header.h"
 #include "server/import/import.h"
 #include "server/import/labels/label_table.h"
@@ -129,6 +130,12 @@ void import_beside_samples(const std::string& header, const std::string& samples
   import_archive({{header, std::string(text_of(bytes))}, {samples, std::string(24, 'x')}});
 }
 
+// A structure set needs a spacing, unless it is uploaded with images.
+void import_structures(Bytes bytes) {
+  if (!is_of("dicom", bytes)) return;
+  import_bytes(bytes, {.spacing = std::array<double, 3>{1, 1, 2}});
+}
+
 void import_anything(Bytes bytes) { import_bytes(bytes, {}); }
 
 // The description comes first, byte for byte, and then the samples.
@@ -213,6 +220,11 @@ constexpr Target kTargets[] = {
     {"afni", [](Bytes bytes) { import_beside_samples("a.HEAD", "a.BRIK", bytes); }},
     {"par", [](Bytes bytes) { import_beside_samples("a.PAR", "a.REC", bytes); }},
     {"dicom", [](Bytes bytes) { import_only("dicom", bytes); }},
+    {"structures", import_structures},
+    {"ascconv",
+     [](Bytes bytes) {
+       read_text(bytes, [](auto text) { import::dicom::protocol_slices(text); });
+     }},
     {"csa",
      [](Bytes bytes) {
        read_text(bytes, [](auto text) { import::dicom::parse_csa_header(text); });

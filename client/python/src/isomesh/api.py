@@ -101,7 +101,7 @@ class Note(TypedDict):
 VolumeFormat = Literal['nifti', 'nrrd', 'metaimage', 'vti', 'vtk', 'mgh', 'afni', 'par', 'isq', 'mrc', 'cube', 'numpy', 'hdf5', 'tiff', 'png', 'bmp', 'dicom', 'raw']
 
 
-NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'unit-angstrom', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'fractional-segments']
+NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'unit-angstrom', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'contours-skipped', 'contours-interpolated', 'fractional-segments']
 
 
 AcceptableNote = Literal['space-assumed', 'frame-of-reference']
