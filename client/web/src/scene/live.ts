@@ -24,7 +24,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
-import { blockSize, firstCrossing, firstLabel, type Preview } from '../volume/preview';
+import { blockSize, firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
 import { compile, whenDrawn } from './compile';
 import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import type { Look } from '../volume/looks';
@@ -34,10 +34,14 @@ import { firstOffset, fitDistance } from './views';
 
 const verticalAngle = 30;
 const fill = 1.02;
-// How long a frame may take while something moves, and at rest, in milliseconds.
-const movingTime = 40;
-const movingTimeOfSoftware = 110;
+// How long a frame may take while something moves, and at rest, in milliseconds. A change in the middle of a frame is
+// drawn after it, so that half a frame's time comes on top.
+const movingTime = 33;
+const movingTimeOfSoftware = 50;
 const restingTime = 1500;
+// A picture at rest is drawn in bands that take so long; a change ends it after the band that is being drawn.
+const bandTime = 50;
+const mostBands = 64;
 const settleDelay = 220;
 // How much longer a look through the volume takes than its surface, guessed for the first frame.
 const costOfLook = 3;
@@ -49,6 +53,8 @@ export interface Frame {
   took: number;
   scale: number;
   isResting: boolean;
+  // Of the surface that it shows.
+  iso: number;
 }
 
 export class LiveSurface {
@@ -93,6 +99,7 @@ export class LiveSurface {
     new LineBasicMaterial({ color: '#2ce0cb', transparent: true, opacity: 0.45, depthTest: false }),
   );
   private cursor: Vec3 | null = null;
+  private iso = NaN;
   private labelTable = new Uint8Array(0);
   private crop: readonly [Vec3, Vec3] | null = null;
   // What is drawn with fewer pixels than the canvas has. A canvas that changes its size holds the page up until
@@ -189,6 +196,7 @@ export class LiveSurface {
     this.uniforms.samples.value = samples;
     this.uniforms.blocks.value = blocks;
     this.uniforms.dims.value.set(...preview.dims);
+    this.uniforms.iso.value = inPreview(preview, this.iso);
     const [x, y, z] = preview.steps;
     const [ox, oy, oz] = preview.origin;
     this.box.matrix.set(x[0], y[0], z[0], ox, x[1], y[1], z[1], oy, x[2], y[2], z[2], oz, 0, 0, 0, 1);
@@ -220,10 +228,10 @@ export class LiveSurface {
     positions.needsUpdate = true;
   }
 
-  // In parts of the preview's window.
+  // In the volume's units, of a preview of values.
   setIso(iso: number): void {
-    if (this.uniforms.iso.value === iso) return;
-    this.uniforms.iso.value = iso;
+    if (this.iso === iso) return;
+    this.iso = iso;
     this.moved();
   }
 
@@ -383,13 +391,15 @@ export class LiveSurface {
     this.uniforms.towardsEye.value.copy(this.camera.position).sub(this.controls.target).normalize();
     this.uniforms.towardsLight.value.set(-0.35, 0.5, 1).transformDirection(this.camera.matrixWorld);
     const began = performance.now();
-    this.paint(width, height);
-    whenDrawn(this.gl, () => {
+    const { iso } = this;
+    this.paint(width, height, this.bandsOf(width * height, kind), (isWhole) => {
       const now = performance.now();
-      this.costs[kind] = 0.5 * this.costs[kind] + (0.5 * (now - began)) / (width * height);
       this.isBusy = false;
       if (this.isDisposed) return;
-      this.onFrame?.({ took: now - changedAt, scale, isResting });
+      if (isWhole) {
+        this.costs[kind] = 0.5 * this.costs[kind] + (0.5 * (now - began)) / (width * height);
+        this.onFrame?.({ took: now - changedAt, scale, isResting, iso });
+      }
       if (this.changedAt !== 0) this.changed();
       // There was time for more.
       else if (isResting && this.scaleFor(wide * high, kind) > scale) this.changed();
@@ -397,22 +407,42 @@ export class LiveSurface {
     });
   }
 
-  // With so many pixels.
-  private paint(width: number, height: number): void {
+  private bandsOf(pixels: number, kind: 'moving' | 'resting'): number {
+    return kind === 'resting' ? Math.min(mostBands, Math.ceil((this.costs.resting * pixels) / bandTime)) : 1;
+  }
+
+  // With so many pixels; false once something changes while there are bands to be drawn, and then the canvas stays as it is.
+  private paint(width: number, height: number, bands: number, then: (isWhole: boolean) => void): void {
     const { renderer, target } = this;
-    if (width === target.width) {
+    if (width === target.width && bands === 1) {
       renderer.setRenderTarget(null);
       renderer.render(this.scene, this.camera);
+      whenDrawn(this.gl, () => then(true));
       return;
     }
     target.viewport.set(0, 0, width, height);
-    renderer.setRenderTarget(target);
-    renderer.clear();
-    renderer.render(this.scene, this.camera);
-    renderer.setRenderTarget(null);
-    this.part.part.value.set(width / target.width, height / target.height);
-    this.part.last.value.set((width - 0.5) / target.width, (height - 0.5) / target.height);
-    renderer.render(this.enlarging, this.camera);
+    target.scissorTest = true;
+    const drawFrom = (band: number): void => {
+      if (this.isDisposed || (band > 0 && this.changedAt !== 0)) {
+        then(false);
+        return;
+      }
+      const low = Math.floor((height * band) / bands);
+      target.scissor.set(0, low, width, Math.floor((height * (band + 1)) / bands) - low);
+      renderer.setRenderTarget(target);
+      renderer.clear();
+      renderer.render(this.scene, this.camera);
+      if (band + 1 < bands) {
+        whenDrawn(this.gl, () => drawFrom(band + 1));
+        return;
+      }
+      renderer.setRenderTarget(null);
+      this.part.part.value.set(width / target.width, height / target.height);
+      this.part.last.value.set((width - 0.5) / target.width, (height - 0.5) / target.height);
+      renderer.render(this.enlarging, this.camera);
+      whenDrawn(this.gl, () => then(true));
+    };
+    drawFrom(0);
   }
 
   private scaleFor(pixels: number, kind: 'moving' | 'resting'): number {

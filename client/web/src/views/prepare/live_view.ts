@@ -11,7 +11,7 @@ import { toPatient } from '../../volume/geometry';
 import type { Box } from '../../volume/crop';
 import { coloursOf, LabelMap, type LabelLook } from '../../volume/label_map';
 import { lookOf, looksFor, type LookName } from '../../volume/looks';
-import { inPreview, type Preview } from '../../volume/preview';
+import type { Preview } from '../../volume/preview';
 import type { PreviewAnswer, PreviewRequest } from '../../volume/preview.worker';
 import type { Window } from '../../volume/slices';
 
@@ -175,8 +175,7 @@ export class LiveView {
   private showIso(): void {
     if (!this.surface || !this.preview || this.iso === null || Number.isNaN(this.preview.window[0])) return;
     this.showPlace(`Preview of the surface at iso-value ${formatValue(this.iso)}`);
-    this.surface.setIso(inPreview(this.preview, this.iso));
-    this.element.dataset.iso = String(this.iso);
+    this.surface.setIso(this.iso);
   }
 
   private showPlace(name: string): void {
@@ -256,7 +255,8 @@ export class LiveView {
   }
 
   private begin(surface: LiveSurface): LiveSurface {
-    surface.onFrame = ({ took, scale, isResting }) => {
+    surface.onFrame = ({ took, scale, isResting, iso }) => {
+      this.element.dataset.iso = String(iso);
       this.element.dataset.took = took.toFixed(1);
       this.element.dataset.scale = String(scale);
       // Pictures while something moves, and when it rests.
