@@ -14,26 +14,25 @@ import {
   Matrix4,
   Mesh,
   PerspectiveCamera,
-  PlaneGeometry,
   RawShaderMaterial,
   Scene,
   Vector2,
   Vector3,
   WebGLRenderer,
-  WebGLRenderTarget,
+  type WebGLRenderTarget,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import { blockSize, firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
-import { compile, whenDrawn } from './compile';
+import { compile } from './compile';
 import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import type { Look } from '../volume/looks';
-import { enlargingFragmentShader, enlargingVertexShader, fragmentShader, vertexShader } from './live_shader';
+import { fragmentShader, vertexShader } from './live_shader';
+import { Painting, type Picture } from './painting';
 import { onTap } from './tap';
-import { firstOffset, fitDistance } from './views';
+import { firstOffset, fitted } from './views';
 
 const verticalAngle = 30;
-const fill = 1.02;
 // How long a frame may take while something moves, and at rest, in milliseconds. A change in the middle of a frame is
 // drawn after it, so that half a frame's time comes on top.
 const movingTime = 33;
@@ -102,11 +101,7 @@ export class LiveSurface {
   private iso = NaN;
   private labelTable = new Uint8Array(0);
   private crop: readonly [Vec3, Vec3] | null = null;
-  // What is drawn with fewer pixels than the canvas has. A canvas that changes its size holds the page up until
-  // all that was drawn before is done.
-  private readonly target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
-  private readonly enlarging: Mesh<PlaneGeometry, RawShaderMaterial>;
-  private readonly part = { picture: { value: this.target.texture }, part: { value: new Vector2() }, last: { value: new Vector2() } };
+  private readonly painting: Painting;
   // Software draws the first, coarser one while something moves.
   private first: Drawable | null = null;
   private best: Drawable | null = null;
@@ -122,8 +117,9 @@ export class LiveSurface {
 
   // Throws where WebGL 2 is missing.
   constructor(private readonly host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: false, alpha: true, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({ antialias: false, depth: false, alpha: true, powerPreference: 'high-performance' });
     this.gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.painting = new Painting(this.renderer, this.scene, this.camera);
     this.isSoftware = isSoftware(this.gl);
     const guess = this.isSoftware ? 4e-3 : 1e-5;
     this.costs = { moving: guess, resting: 2 * guess };
@@ -146,16 +142,6 @@ export class LiveSurface {
     this.cross.geometry.setAttribute('position', new BufferAttribute(new Float32Array(18), 3));
     this.box.add(this.cross);
     this.scene.add(this.box);
-    const enlarged = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: enlargingVertexShader,
-      fragmentShader: enlargingFragmentShader,
-      uniforms: this.part,
-      depthTest: false,
-      depthWrite: false,
-    });
-    this.enlarging = new Mesh(new PlaneGeometry(2, 2), enlarged);
-    this.enlarging.frustumCulled = false;
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener('change', () => this.moved());
@@ -165,7 +151,7 @@ export class LiveSurface {
     this.resizing.observe(host);
     const shaders: [Scene | Mesh, PerspectiveCamera][] = [
       [this.scene, this.camera],
-      [this.enlarging, this.camera],
+      [this.painting.enlarging, this.camera],
     ];
     compile(this.renderer, shaders, this.over.signal, () => {
       this.isCompiled = true;
@@ -283,13 +269,11 @@ export class LiveSurface {
     const corners = this.corners();
     const low = corners[0].clone().min(corners[1]);
     const high = corners[0].clone().max(corners[1]);
-    const size = high.clone().sub(low).toArray();
     const { clientWidth: width, clientHeight: height } = this.host;
     const angle = (verticalAngle * Math.PI) / 180;
-    const distance = fill * fitDistance(size, offset, angle, width / Math.max(1, height));
-    const scale = distance / Math.hypot(...offset);
-    this.controls.target.copy(low).add(high).multiplyScalar(0.5);
-    this.camera.position.copy(this.controls.target).addScaledVector(new Vector3(...offset), scale);
+    const place = fitted([low.toArray(), high.toArray()], offset, angle, width / Math.max(1, height));
+    this.controls.target.set(...place.target);
+    this.camera.position.copy(this.controls.target).add(new Vector3(...place.offset));
     this.controls.update();
     this.moved();
   }
@@ -320,9 +304,7 @@ export class LiveSurface {
     this.box.material.dispose();
     this.cross.geometry.dispose();
     this.cross.material.dispose();
-    this.enlarging.geometry.dispose();
-    this.enlarging.material.dispose();
-    this.target.dispose();
+    this.painting.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.canvas.remove();
@@ -375,10 +357,7 @@ export class LiveSurface {
     this.uniforms.reach.value = this.isSoftware && !isResting ? 1 : 0.5;
     const ratio = Math.min(2, window.devicePixelRatio || 1);
     const [wide, high] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
-    if (this.canvas.width !== wide || this.canvas.height !== high) {
-      this.renderer.setSize(wide, high, false);
-      this.target.setSize(wide, high);
-    }
+    if (this.canvas.width !== wide || this.canvas.height !== high) this.renderer.setSize(wide, high, false);
     const scale = this.scaleFor(wide * high, kind);
     const [width, height] = [Math.max(1, Math.round(wide * scale)), Math.max(1, Math.round(high * scale))];
     this.camera.aspect = clientWidth / clientHeight;
@@ -392,7 +371,8 @@ export class LiveSurface {
     this.uniforms.towardsLight.value.set(-0.35, 0.5, 1).transformDirection(this.camera.matrixWorld);
     const began = performance.now();
     const { iso } = this;
-    this.paint(width, height, this.bandsOf(width * height, kind), (isWhole) => {
+    const isOver = (): boolean => this.isDisposed || this.changedAt !== 0;
+    this.painting.paint(this.inBands(width, height, kind), isOver, (isWhole) => {
       const now = performance.now();
       this.isBusy = false;
       if (this.isDisposed) return;
@@ -407,42 +387,14 @@ export class LiveSurface {
     });
   }
 
-  private bandsOf(pixels: number, kind: 'moving' | 'resting'): number {
-    return kind === 'resting' ? Math.min(mostBands, Math.ceil((this.costs.resting * pixels) / bandTime)) : 1;
-  }
-
-  // With so many pixels; false once something changes while there are bands to be drawn, and then the canvas stays as it is.
-  private paint(width: number, height: number, bands: number, then: (isWhole: boolean) => void): void {
-    const { renderer, target } = this;
-    if (width === target.width && bands === 1) {
-      renderer.setRenderTarget(null);
-      renderer.render(this.scene, this.camera);
-      whenDrawn(this.gl, () => then(true));
-      return;
-    }
-    target.viewport.set(0, 0, width, height);
-    target.scissorTest = true;
-    const drawFrom = (band: number): void => {
-      if (this.isDisposed || (band > 0 && this.changedAt !== 0)) {
-        then(false);
-        return;
-      }
-      const low = Math.floor((height * band) / bands);
-      target.scissor.set(0, low, width, Math.floor((height * (band + 1)) / bands) - low);
-      renderer.setRenderTarget(target);
-      renderer.clear();
-      renderer.render(this.scene, this.camera);
-      if (band + 1 < bands) {
-        whenDrawn(this.gl, () => drawFrom(band + 1));
-        return;
-      }
-      renderer.setRenderTarget(null);
-      this.part.part.value.set(width / target.width, height / target.height);
-      this.part.last.value.set((width - 0.5) / target.width, (height - 0.5) / target.height);
-      renderer.render(this.enlarging, this.camera);
-      whenDrawn(this.gl, () => then(true));
+  private inBands(width: number, height: number, kind: 'moving' | 'resting'): Picture {
+    const steps = kind === 'resting' ? Math.max(1, Math.min(mostBands, Math.ceil((this.costs.resting * width * height) / bandTime))) : 1;
+    const edge = (step: number): number => Math.floor((height * step) / steps);
+    const begin = (step: number, target: WebGLRenderTarget): void => {
+      target.scissorTest = true;
+      target.scissor.set(0, edge(step), width, edge(step + 1) - edge(step));
     };
-    drawFrom(0);
+    return { width, height, steps, begin };
   }
 
   private scaleFor(pixels: number, kind: 'moving' | 'resting'): number {
