@@ -1,0 +1,63 @@
+// Runs each import in a sandboxed process of its own, which can read little but its one file.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "server/process/import_message.h"
+#include "server/process/prepared.h"
+
+namespace isomesh::jobs {
+
+struct RunnerOptions {
+  process::ImportBounds bounds;
+  // Further imports wait; also the number of idle processes kept ready.
+  std::size_t at_once = 2;
+  std::filesystem::path program;  // isomesh-import
+};
+
+// The bounds of one import: at most `most`, and less time for a small upload, which takes long only
+// if it is malicious. Honest uploads are read at many megabytes per second.
+process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
+
+// Thread safe.
+class ImportRunner {
+ public:
+  explicit ImportRunner(const RunnerOptions& options);
+
+  // Imports as import_volume does, in a process used for this import only. The process has ended
+  // when this returns or throws, and leaves files only in the scratch folder. The returned volume
+  // has been compared with the canonical file. Throws what import_volume throws; Error
+  // kUnusableVolume if the process crashes or exceeds its bounds; kUnavailable after stop().
+  Volume run(const process::ImportTask& task);
+
+  // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
+  // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
+  process::PeersAnswer read_answer(const std::filesystem::path& file);
+
+  // Aborts running and waiting imports, and rejects further ones.
+  void stop();
+
+ private:
+  // Sends `message` to a process and returns its report. The process has ended when this returns.
+  // Throws as run() does if the report has neither a result nor an error.
+  process::ImportReport report_of(const std::string& message);
+  // Returns nothing if the process ended before it began its work.
+  std::optional<process::ImportReport> run_in(process::Child child, const std::string& message);
+  void take_place();
+  void give_place_back();
+
+  const RunnerOptions options_;
+  std::stop_source stop_;
+  std::mutex mutex_;
+  std::condition_variable_any place_free_;
+  std::size_t running_ = 0;
+  process::PreparedProcesses prepared_;
+};
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/jobs/library/memo.h"
+#include "server/mesh/labels/labels.h"
+#include "server/store/blob_store.h"
+#include "server/store/job_store.h"
+
+namespace isomesh::jobs {
+
+// Labels of the volume that stand for other values than their own number.
+LabelValues values_of(const Volume& volume);
+
+// Lists the labels in stored volumes. The first list of a volume reads all samples. The results of
+// the last kVolumes volumes are cached for each viewer, for the reason given at Histograms. Thread
+// safe; `blobs` must outlive it.
+class LabelLists {
+ public:
+  static constexpr std::size_t kVolumes = 16;  // at most 3 MB each
+  static constexpr std::size_t kLists = 4;     // at most about 10 MB each
+  static constexpr std::size_t kMostWaiting = 12;
+
+  explicit LabelLists(const store::BlobStore& blobs) : blobs_(blobs) {}
+
+  // Samples of the value `background` belong to no label. Labels without voxels are omitted. Throws
+  // Error kUnusableVolume if the samples are damaged, not integers, or have more than
+  // Volume::kMostLabels labels; kUnavailable if too many callers wait already; kInternal otherwise.
+  VolumeLabels of(const store::Viewer& viewer, const Volume& volume, std::int64_t background);
+
+  // All distinct values of the samples with their voxels, ascending, including the background.
+  // Throws as of() does.
+  std::shared_ptr<const std::vector<mesh::LabelVoxels>> counts(const store::Viewer& viewer,
+                                                               const Volume& volume);
+
+  // The first labels of that list after the label `after`, at most MeshSummary::kMostListedLabels
+  // of them. If more follow, `next` is the last label of the page as text.
+  VolumeLabels page_of(const store::Viewer& viewer, const Volume& volume, std::int64_t background,
+                       std::optional<std::int64_t> after);
+
+ private:
+  using Counts = std::vector<mesh::LabelVoxels>;
+
+  const store::BlobStore& blobs_;
+  Memo<std::pair<store::Viewer, std::string>, Counts> counts_{kVolumes, kMostWaiting};
+  // The key has the record's creation time, because the same samples may be uploaded again with
+  // other names.
+  Memo<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
+      kLists, kMostWaiting};
+};
+
+}  // namespace isomesh::jobs

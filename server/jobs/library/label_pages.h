@@ -1,0 +1,62 @@
+// The labels of a finished job, read in pages. A job with few labels has them in its record. A job
+// with more has them in a file beside its mesh: JSON pages, each with up to
+// MeshSummary::kMostListedLabels labels in ascending order, followed by an index. The index has one
+// entry per page: its first label and the offset of its first byte, each as a little-endian 64-bit
+// number.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/codec/encode.h"
+#include "server/store/blob_store.h"
+
+namespace isomesh::jobs {
+
+// Writes the file of a job's labels. `labels` must be ascending.
+void write_label_pages(std::span<const LabelSummary> labels, const codec::Sink& sink);
+
+// Reads the labels of a job that has a mesh. The job must outlive this object. Not thread safe. All
+// methods but count() throw Error kInternal if the file is damaged.
+class JobLabels {
+ public:
+  // Reads the index. Throws Error kNotFound if the file is missing, kInternal if it is damaged.
+  JobLabels(const Job& job, const store::BlobStore& blobs);
+
+  // Zero for a job at an iso-value.
+  std::uint64_t count() const { return count_; }
+
+  // The labels after `label`, or from the first one, in ascending order: between one and
+  // MeshSummary::kMostListedLabels; none at the end of the list. Their files have addresses.
+  std::vector<LabelSummary> after(std::optional<std::int64_t> label) const;
+
+  // True if more labels follow the last one that after() returned. Reads nothing.
+  bool has_after(std::int64_t last) const;
+
+  // Empty if the job has no such label. Its files may have no addresses.
+  std::optional<LabelSummary> find(std::int64_t label) const;
+
+ private:
+  struct Page {
+    std::int64_t first = 0;
+    std::uint64_t offset = 0;
+  };
+
+  void read_index(const LabelListFile& file);
+  std::vector<LabelSummary> page(std::size_t n) const;
+  // The page that contains the label if the job has it.
+  std::size_t page_of(std::int64_t label) const;
+
+  const Job& job_;
+  std::uint64_t count_ = 0;
+  std::unique_ptr<store::BlobReader> file_;  // null if the record has the labels
+  std::vector<Page> pages_;
+  std::uint64_t end_of_pages_ = 0;
+};
+
+}  // namespace isomesh::jobs

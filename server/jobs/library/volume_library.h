@@ -1,0 +1,92 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <shared_mutex>
+#include <utility>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/jobs/library/blob_eraser.h"
+#include "server/jobs/library/import_runner.h"
+#include "server/process/import_message.h"
+#include "server/store/blob_store.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/retention.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::jobs {
+
+// Adds and erases volumes so that records, blobs and the jobs that need them stay consistent.
+// Thread safe; its dependencies must outlive it.
+class VolumeLibrary {
+ public:
+  VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
+                store::VolumeStore& volumes, store::Retention& retention,
+                const volume::SizeLimits& limits, const RunnerOptions& runner)
+      : folder_(folder),
+        blobs_(blobs),
+        volumes_(volumes),
+        retention_(retention),
+        limits_(limits),
+        runner_(runner) {}
+
+  // Imports an uploaded file in a process of its own. `name` is the client's name for the upload,
+  // used if the file contains no name. Second: false if the owner already had the same samples and
+  // geometry. Then the record stays unchanged, but the returned volume has the notes and ignored
+  // files of this upload. Throws what ImportRunner::run throws, and kOutOfSpace.
+  std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
+                              const process::ImportOptions& options = {},
+                              const std::string& name = {});
+
+  // Imports a series from a PACS response. Second: the patient, study and series according to the
+  // images themselves; the record may be of an earlier upload of the same samples.
+  std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
+                                             const std::filesystem::path& answer,
+                                             const process::PeersSeries& series);
+
+  // Imports all volumes of an upload, each in a process of its own, one after the other. Each
+  // element has a volume or its error, unless that is an internal one, which is thrown. If the
+  // options choose a member or the upload has only one volume, there is one element with the chosen
+  // member, and its error is thrown.
+  std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
+                                      const process::ImportOptions& options,
+                                      const std::string& name);
+
+  // Renames the owner's volume; an empty name removes it. Throws Error kNotFound, kGone.
+  Volume rename(const std::string& owner, const std::string& id,
+                const std::optional<std::string>& name) {
+    return volumes_.rename(owner, id, name);
+  }
+
+  // Aborts running and waiting imports, and rejects further ones.
+  void stop_imports() { runner_.stop(); }
+
+  // Erases the records visible to the viewer. The samples are erased soon after the last record.
+  // Throws Error kNotFound, kGone, and kNotReady while a job needs the volume.
+  void erase(const store::Viewer& viewer, const std::string& id);
+
+  // Returns once the samples of erased volumes are gone.
+  void finish_erasing() { eraser_.finish(); }
+
+ private:
+  // Writes the canonical file of the upload into the scratch folder.
+  Volume import_file(const std::filesystem::path& upload, const process::ImportOptions& options,
+                     const store::ScratchFolder& scratch);
+  // Makes that file a blob, and adds the volume to the owner's records.
+  std::pair<Volume, bool> keep(const std::string& owner, Volume volume,
+                               const store::ScratchFolder& scratch);
+
+  const store::DataFolder& folder_;
+  const store::BlobStore& blobs_;
+  store::VolumeStore& volumes_;
+  store::Retention& retention_;
+  const volume::SizeLimits limits_;
+  ImportRunner runner_;
+  // Held while a blob and its record are added or erased together. Additions share it, so that they
+  // wait for the disk concurrently.
+  std::shared_mutex mutex_;
+  BlobEraser eraser_{blobs_, volumes_, mutex_};
+};
+
+}  // namespace isomesh::jobs

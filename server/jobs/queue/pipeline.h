@@ -1,0 +1,36 @@
+// Processes one job from a stored volume to stored meshes: the daemon's side. A process used by
+// this job alone reads the samples.
+#pragma once
+
+#include <cstdint>
+#include <stop_token>
+
+#include "proto/types.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/jobs/queue/job_process.h"
+#include "server/store/blob_store.h"
+
+namespace isomesh::jobs {
+
+struct PipelineResult {
+  MeshSummary mesh;  // the hrefs of its files are empty
+  Timing timing;     // load, extract, smooth and encode
+};
+
+struct PipelineLimits {
+  std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job
+};
+
+// Increment whenever the same volume and parameters would give different bytes than before.
+inline constexpr const char* kMesherVersion = "8";
+
+// Lets `process` load the samples, extract, smooth and encode in every format, and stores the
+// results. The same volume and parameters give the same bytes. Throws Error kCancelled if `stop` is
+// requested; kTooLarge with the estimate if the job would exceed the limits (before it allocates
+// memory); kUnusableVolume if the stored samples are corrupt; kOutOfSpace, kInternal, and
+// ProcessEnded.
+PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
+                            const PipelineLimits& limits, const store::BlobStore& blobs,
+                            JobProcess& process, std::stop_token stop, const Report& report);
+
+}  // namespace isomesh::jobs
