@@ -53,7 +53,8 @@ struct LabelSummary {
   bool operator==(const LabelSummary&) const = default;
 };
 
-// The file of a job's labels if they are too many for its record (server/jobs/label_pages.h).
+// The file of a job's labels if they are too many for its record
+// (server/jobs/library/label_pages.h).
 struct LabelListFile {
   std::uint64_t bytes = 0;
   std::string sha256;  // hex

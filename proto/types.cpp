@@ -1,7 +1,10 @@
 #include "proto/types.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include "proto/samples.h"
@@ -40,15 +43,47 @@ struct Names<Smoothing> {
                                         std::pair{Smoothing::kTaubin, "taubin"}};
 };
 
+// What client and server know of a format; the server's row is in server/codec/formats.cpp.
+struct FormatRow {
+  MeshFormat format;
+  std::string_view name;
+  // A job by labels writes one file of all labels, a file of each label in a ZIP, or both.
+  bool holds_all_labels = false;
+  bool is_zipped = true;
+  std::optional<Space> own_space = {};  // of a format that defines its space
+};
+
+constexpr std::array kFormatRows = {
+    FormatRow{.format = MeshFormat::kDrc, .name = "drc"},
+    FormatRow{.format = MeshFormat::kGlb,
+              .name = "glb",
+              .holds_all_labels = true,
+              .is_zipped = false,
+              .own_space = Space::kLps},
+    FormatRow{.format = MeshFormat::kStl, .name = "stl"},
+    FormatRow{.format = MeshFormat::kPly, .name = "ply", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kObj, .name = "obj", .holds_all_labels = true},
+    FormatRow{
+        .format = MeshFormat::k3mf, .name = "3mf", .holds_all_labels = true, .is_zipped = false},
+    FormatRow{.format = MeshFormat::kOff, .name = "off"},
+    FormatRow{.format = MeshFormat::kVtk, .name = "vtk", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kGii, .name = "gii", .own_space = Space::kRas},
+    FormatRow{.format = MeshFormat::kZip, .name = "zip", .is_zipped = false}};
+
+const FormatRow& row_of(MeshFormat format) {
+  return *std::ranges::find(kFormatRows, format, &FormatRow::format);
+}
+
 template <>
 struct Names<MeshFormat> {
-  static constexpr std::array kTable = {
-      std::pair{MeshFormat::kDrc, "drc"}, std::pair{MeshFormat::kGlb, "glb"},
-      std::pair{MeshFormat::kStl, "stl"}, std::pair{MeshFormat::kPly, "ply"},
-      std::pair{MeshFormat::kObj, "obj"}, std::pair{MeshFormat::k3mf, "3mf"},
-      std::pair{MeshFormat::kOff, "off"}, std::pair{MeshFormat::kVtk, "vtk"},
-      std::pair{MeshFormat::kVtp, "vtp"}, std::pair{MeshFormat::kGii, "gii"},
-      std::pair{MeshFormat::kZip, "zip"}};
+  static constexpr auto kTable = [] {
+    std::array<std::pair<MeshFormat, std::string_view>, kFormatRows.size()> names;
+    for (std::size_t n = 0; n < names.size(); ++n) {
+      names[n] = {kFormatRows[n].format, kFormatRows[n].name};
+    }
+    return names;
+  }();
 };
 
 template <>
@@ -151,29 +186,10 @@ JobParameters label_parameters(LabelChoice labels) {
 }
 
 Space space_of(MeshFormat format, const MeshParameters& parameters) {
-  if (format == MeshFormat::kGii) return Space::kRas;
-  if (format == MeshFormat::kGlb) return Space::kLps;
-  return parameters.space;
+  return row_of(format).own_space.value_or(parameters.space);
 }
 
-bool holds_all_labels(MeshFormat format) {
-  switch (format) {
-    case MeshFormat::kGlb:
-    case MeshFormat::kPly:
-    case MeshFormat::kObj:
-    case MeshFormat::k3mf:
-    case MeshFormat::kVtk:
-    case MeshFormat::kVtp:
-      return true;
-    case MeshFormat::kDrc:
-    case MeshFormat::kStl:
-    case MeshFormat::kOff:
-    case MeshFormat::kGii:
-    case MeshFormat::kZip:
-      break;
-  }
-  return false;
-}
+bool holds_all_labels(MeshFormat format) { return row_of(format).holds_all_labels; }
 
 std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
   if (!parameters.labels) return parameters.formats;
@@ -186,8 +202,7 @@ std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
 std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters) {
   std::vector<MeshFormat> zipped;
   for (const MeshFormat format : parameters.formats) {
-    const bool is_whole = format == MeshFormat::kGlb || format == MeshFormat::k3mf;
-    if (!is_whole && format != MeshFormat::kZip) zipped.push_back(format);
+    if (row_of(format).is_zipped) zipped.push_back(format);
   }
   const bool is_asked =
       std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();

@@ -11,7 +11,7 @@
 #include "base/log.h"
 #include "server/blobs.h"
 #include "server/http/server.h"
-#include "server/jobs/import_runner.h"
+#include "server/jobs/library/import_runner.h"
 #include "server/process/import_message.h"
 #include "server/store/job_store.h"
 #include "server/store/operators_word.h"

@@ -8,8 +8,8 @@
 #include <unistd.h>
 
 #include "base/ids.h"
-#include "server/jobs/estimate.h"
-#include "server/jobs/pipeline.h"
+#include "server/jobs/making/stage_times.h"
+#include "server/jobs/queue/pipeline.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/identity.h"
 #include "server/store/postgresql/job_store.h"

@@ -13,7 +13,6 @@
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
-#include "server/mesh/extract/extract.h"
 #include "server/mesh/measure/triangle_grid.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/topology/topology.h"
@@ -101,34 +100,5 @@ void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
 std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
                                          const mesh::Context& context, const Sink& sink,
                                          const mesh::TriangleGrid* extracted = nullptr);
-
-// A format's properties. Its name, also the suffix of its files, is in proto. Times and sizes are
-// first guesses, from a head of five million triangles on two cores.
-struct Format {
-  MeshFormat format;
-  std::string_view media_type;  // application/octet-stream if none is registered
-  double milliseconds_per_triangle;
-  // The estimated size of the file.
-  double (*bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
-  // The encoder's peak memory without the mesh; an upper estimate.
-  std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
-  // True if encoding nearly always yields the mesh's topology.
-  bool (*shows_topology)(const MeshParameters& parameters);
-};
-
-// True if a job's file of that format rounds coordinates or contains files that do: drc, glb, and a
-// ZIP of drc. All other formats hold the mesh's triangles and floats exactly, in the file's space;
-// by labels, the triangles of each label's own surface.
-bool rounds(MeshFormat format, const MeshParameters& parameters);
-
-// Constant time.
-const Format& describe(MeshFormat format);
-
-// Calls the format's encoder. Only GLB with distances uses `extracted`. Returns the mesh's topology
-// if encoding yields it. 3MF's encoder is in zip/threemf.h. Part of the target isomesh_zip.
-std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
-                                     const Provenance& provenance, const mesh::Context& context,
-                                     const Sink& sink,
-                                     const mesh::TriangleGrid* extracted = nullptr);
 
 }  // namespace isomesh::codec

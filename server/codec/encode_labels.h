@@ -58,9 +58,4 @@ void encode_labels_vtk(const LabelledSurface& surface, Space space, const mesh::
 void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
                        const mesh::Context& context, const Sink& sink);
 
-// Calls the encoder of a format that holds all labels in one file. Throws Error kInternal for other
-// formats, and as that encoder does. Part of the target isomesh_zip.
-void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
-                   const mesh::Context& context, const Sink& sink);
-
 }  // namespace isomesh::codec

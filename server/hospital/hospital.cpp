@@ -16,7 +16,7 @@
 #include "server/hospital/orders/orders.h"
 #include "server/hospital/orders/received.h"
 #include "server/hospital/routes.h"
-#include "server/jobs/import_runner.h"
+#include "server/jobs/library/import_runner.h"
 #include "server/process/prepared.h"
 
 namespace isomesh::hospital {

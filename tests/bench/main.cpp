@@ -13,7 +13,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "server/jobs/memory.h"
+#include "server/jobs/making/memory.h"
 #include "tests/bench/accuracy.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/cluster.h"

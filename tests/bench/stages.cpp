@@ -4,8 +4,9 @@
 
 #include <malloc.h>
 
-#include "server/codec/encode.h"
-#include "server/jobs/make_mesh.h"
+#include "server/codec/formats.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/stage_times.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/parallel.h"
@@ -163,7 +164,7 @@ JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
   CountingSink counting;
   const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
   const jobs::Report nobody = [](Stage, double, const Timing&) {};
-  jobs::Progress progress({}, nobody);
+  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, 0, parameters, certify));
   const auto& [x, y, z] = samples_.dims;
   const Volume volume;
   JobFigures figures;

@@ -6,8 +6,7 @@
 #include <utility>
 
 #include "proto/error.h"
-#include "server/codec/decode/formats.h"
-#include "server/codec/space.h"
+#include "server/codec/decode/decoders.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::codec {
@@ -27,6 +26,8 @@ bool all_of(const mesh::Buffer<T>& elements, const mesh::Context& context, const
   return std::ranges::all_of(fine, [](char is_fine) { return is_fine != 0; });
 }
 
+}  // namespace
+
 void check(const DecodedSurface& surface, MeshFormat format, const mesh::Context& context) {
   const std::size_t vertices = surface.positions.size();
   const bool is_finite = all_of(surface.positions, context, [](const mesh::Vec3& position) {
@@ -39,31 +40,12 @@ void check(const DecodedSurface& surface, MeshFormat format, const mesh::Context
   if (!is_there) refuse(format, "a triangle names a vertex that does not exist");
 }
 
-DecodedSurface decode_unchecked(Bytes file, MeshFormat format, const mesh::Context& context) {
-  if (format == MeshFormat::kDrc) return decode_drc(file);
-  if (format == MeshFormat::kGlb) return decode_glb(file, context);
-  refuse(format, "nothing decodes this format");
-}
-
-}  // namespace
-
 void refuse(MeshFormat format, const std::string& why) {
   throw Error(ErrorCode::kInternal, "the " + std::string(to_string(format)) +
                                         " file that was written cannot be read: " + why);
 }
 
 }  // namespace decoding
-
-DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
-                      const mesh::Context& context) {
-  context.throw_if_stopped();
-  DecodedSurface surface = decoding::decode_unchecked(file, format, context);
-  decoding::check(surface, format, context);
-  if (space == Space::kRas) {
-    for (mesh::Vec3& position : surface.positions) position = in_space(position, space);
-  }
-  return surface;
-}
 
 DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& context) {
   if (parts.size() == 1) return std::move(parts.front());

@@ -3,7 +3,7 @@
 #include <draco/compression/decode.h>
 #include <draco/mesh/mesh.h>
 
-#include "server/codec/decode/formats.h"
+#include "server/codec/decode/decoders.h"
 
 namespace isomesh::codec::decoding {
 namespace {
@@ -52,7 +52,7 @@ DecodedSurface decode_draco_stream(Bytes stream, int position_id) {
   return surface;
 }
 
-DecodedSurface decode_drc(Bytes file) {
+DecodedSurface decode_drc(Bytes file, const mesh::Context& /*context*/) {
   constexpr int kFirstOfPositions = -1;
   return decode_draco_stream(file, kFirstOfPositions);
 }

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/error.h"
-#include "server/codec/decode/formats.h"
+#include "server/codec/decode/decoders.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::codec::decoding {

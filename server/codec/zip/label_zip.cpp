@@ -11,6 +11,7 @@
 #include "proto/error.h"
 #include "server/codec/draco/grid.h"
 #include "server/codec/space.h"
+#include "server/codec/formats.h"
 #include "server/codec/zip/zip_writer.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"

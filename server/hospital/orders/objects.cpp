@@ -11,7 +11,7 @@
 #include "proto/parameters.h"
 #include "server/hospital/objects/encapsulated_stl.h"
 #include "server/hospital/objects/uid.h"
-#include "server/jobs/label_pages.h"
+#include "server/jobs/library/label_pages.h"
 
 namespace isomesh::orders {
 namespace {
@@ -251,11 +251,17 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
 }
 
 bool can_make_objects(const Job& job, const store::BlobStore& blobs) {
-  const auto& list = job.mesh ? job.mesh->label_list : std::nullopt;
-  if (list && !store::is_there_and_intact(blobs, list->sha256, {})) return false;
-  const std::vector<Part> parts = parts_of(job, blobs);
-  return std::ranges::all_of(
-      parts, [&](const Part& part) { return store::is_there_and_intact(blobs, part.blob, {}); });
+  if (!job.mesh) return true;
+  const auto is_intact = [&](const std::string& key) {
+    return store::is_there_and_intact(blobs, key, {});
+  };
+  const auto& list = job.mesh->label_list;
+  return (!list || is_intact(list->sha256)) &&
+         std::ranges::all_of(job.mesh->files, [&](const auto& file) {
+           const auto& [format, entry] = file;
+           return (format != MeshFormat::kStl && format != MeshFormat::kZip) ||
+                  is_intact(entry.sha256);
+         });
 }
 
 }  // namespace isomesh::orders

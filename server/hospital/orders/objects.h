@@ -23,6 +23,10 @@ struct MadeObject {
   store::Blob blob;
 };
 
+// The most objects of an order, over all PACS that they are sent to: they are listed in its record
+// and in its JSON.
+inline constexpr std::size_t kMostObjects = 500;
+
 // Makes an object of each of the job's STL files: of the only one, or of each label's. Their UIDs
 // follow from what they are, so that objects of the same images with the same mesh have the same,
 // whoever makes them when. The blobs are not settled (BlobStore::settle). Throws Error

@@ -9,7 +9,7 @@
 #include "proto/json.h"
 #include "server/hospital/orders/objects.h"
 #include "server/hospital/orders/received.h"
-#include "server/jobs/settle_labels.h"
+#include "server/jobs/library/settle_labels.h"
 
 namespace isomesh::orders {
 namespace {
@@ -41,6 +41,16 @@ void simplify(const OrderWork& work, JobParameters& parameters) {
   parameters.max_error_mm =
       std::min(*work.max_error_mm, parameters.max_error_mm.value_or(*work.max_error_mm));
   parameters.certify = true;
+}
+
+void check_count_of_objects(const Order& order, const Job& job) {
+  const std::uint64_t labels = job.mesh ? job.mesh->labels_count.value_or(1) : 0;
+  if (labels * order.send.size() <= kMostObjects) return;
+  throw Error(ErrorCode::kTooLarge,
+              "the mesh has " + std::to_string(labels) + " labels for " +
+                  std::to_string(order.send.size()) +
+                  " PACS, each an object of its own, but an order makes at most " +
+                  std::to_string(kMostObjects) + " objects; order fewer labels");
 }
 
 // Forgets the list of instances, the images, and all that was made of them.
@@ -252,6 +262,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       throw empty_surface(*job.mesh,
                           services_.volumes.get(record.owner, *record.order.volume).range);
     }
+    check_count_of_objects(record.order, job);
     if (!can_make_objects(job, services_.blobs)) {
       record.order.job = services_.jobs.remake(job.id).id;
       record.work.failed_in = OrderState::kSending;

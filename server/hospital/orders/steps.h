@@ -11,8 +11,8 @@
 
 #include "server/hospital/orders/hospital.h"
 #include "server/hospital/orders/pacs.h"
-#include "server/jobs/label_lists.h"
-#include "server/jobs/volume_library.h"
+#include "server/jobs/library/label_lists.h"
+#include "server/jobs/library/volume_library.h"
 #include "server/store/audit_trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"

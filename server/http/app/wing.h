@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "server/http/observe/metrics.h"
-#include "server/jobs/label_lists.h"
-#include "server/jobs/volume_library.h"
+#include "server/jobs/library/label_lists.h"
+#include "server/jobs/library/volume_library.h"
 #include "server/store/audit_trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/expiry.h"

@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 #include "proto/fields.h"
-#include "server/jobs/pipeline.h"
+#include "server/jobs/queue/pipeline.h"
 
 namespace isomesh::http {
 namespace {

@@ -6,7 +6,7 @@
 #include "proto/json.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
-#include "server/jobs/stored_samples.h"
+#include "server/jobs/library/stored_samples.h"
 #include "server/volume/preview.h"
 #include "server/volume/slice.h"
 

@@ -11,13 +11,13 @@
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/http/answers/sources.h"
 #include "server/http/app/outcomes.h"
 #include "server/http/requests/import_query.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
-#include "server/jobs/label_pages.h"
+#include "server/jobs/library/label_pages.h"
 
 namespace isomesh::http {
 namespace {

@@ -9,8 +9,8 @@
 #include "base/text.h"
 #include "proto/json.h"
 #include "server/http/requests/upload.h"
-#include "server/jobs/crop.h"
-#include "server/jobs/settle_labels.h"
+#include "server/jobs/library/settle_labels.h"
+#include "server/jobs/making/crop.h"
 
 namespace isomesh::http {
 namespace {

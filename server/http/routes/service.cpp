@@ -3,7 +3,7 @@
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/openapi.h"
 #include "server/http/routes/routes.h"
-#include "server/jobs/pipeline.h"
+#include "server/jobs/queue/pipeline.h"
 
 namespace isomesh::http {
 

@@ -1,5 +1,3 @@
-#include "server/codec/encode.h"
-
 #include <algorithm>
 #include <array>
 #include <span>
@@ -8,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/codec/formats.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/meshes.h"

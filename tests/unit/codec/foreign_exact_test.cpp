@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/mesh/labels/label_surface.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/foreign_cgal.h"

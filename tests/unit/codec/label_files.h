@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/codec/encode_labels.h"
+#include "server/codec/formats.h"
 #include "server/codec/zip/label_zip.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/unit/mesh/separated.h"

@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "server/codec/formats.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
 

@@ -8,8 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/codec/decode/decode.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/label_files.h"

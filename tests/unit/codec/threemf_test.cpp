@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "server/mesh/topology/topology.h"
 #include "tests/unit/codec/foreign_3mf.h"
 #include "tests/unit/codec/meshes.h"

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/draco_chunk.h"
-#include "server/codec/encode.h"
+#include "server/codec/formats.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/made_up_meshes.h"
 #include "tests/unit/codec/meshes.h"

@@ -1,4 +1,4 @@
-#include "server/jobs/crop.h"
+#include "server/jobs/making/crop.h"
 
 #include <array>
 #include <cstdint>

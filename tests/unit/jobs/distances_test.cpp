@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/jobs/mesh_cost.h"
-#include "server/jobs/pipeline.h"
+#include "server/jobs/making/mesh_cost.h"
+#include "server/jobs/queue/pipeline.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {

@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/codec/decode/decode.h"
-#include "server/jobs/estimate.h"
-#include "server/jobs/pipeline.h"
+#include "server/codec/formats.h"
+#include "server/jobs/queue/estimate.h"
+#include "server/jobs/queue/pipeline.h"
 #include "server/mesh/measure/distance.h"
 #include "tests/support/errors.h"
 #include "tests/unit/jobs/fixture.h"

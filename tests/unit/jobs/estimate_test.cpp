@@ -1,11 +1,13 @@
-#include "server/jobs/estimate.h"
+#include "server/jobs/queue/estimate.h"
 
 #include <set>
 
 #include <gmock/gmock.h>
 
-#include "server/jobs/histograms.h"
-#include "server/jobs/workers.h"
+#include "server/jobs/library/histograms.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/stage_times.h"
+#include "server/jobs/queue/workers.h"
 #include "tests/support/errors.h"
 #include "tests/support/jobs.h"
 #include "tests/unit/jobs/faulty_job.h"
@@ -244,6 +246,27 @@ TEST(ExpectedTime, GrowsWithTheVolumeAndWithWhatIsAsked) {
   EXPECT_EQ(all_of_it, least);
   volume.dims = {200, 200, 200};
   EXPECT_GT(expected_ms(volume, {}), 3 * least);
+}
+
+// Estimates, turns and progress have one model.
+TEST(Progress, AStageHasItsShareOfTheExpectedTime) {
+  Volume volume;
+  volume.dims = {100, 100, 100};
+  JobParameters parameters;
+  parameters.certify = true;
+  const Timing expected = expected_times(volume, parameters, parameters.certify);
+  double done = 0;
+  const Report report = [&](Stage, double share, const Timing&) { done = share; };
+  Progress progress({}, report, expected);
+  progress.enter(Stage::kLoad);
+  progress.enter(Stage::kExtract);
+  EXPECT_NEAR(done, expected.load / expected_ms(volume, parameters), 1e-9);
+  progress.enter(Stage::kSmooth);
+  progress.enter(Stage::kEncode);
+  progress.enter(Stage::kCertify);
+  EXPECT_NEAR(done, 1 - expected.certify / expected_ms(volume, parameters), 1e-9);
+  progress.context().progress(1);
+  EXPECT_NEAR(done, 1, 1e-9);
 }
 
 TEST(CostModel, LevelsOfDetailTakeTime) {

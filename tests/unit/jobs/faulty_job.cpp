@@ -8,7 +8,7 @@
 
 #include <unistd.h>
 
-#include "server/jobs/job_message.h"
+#include "server/jobs/making/job_message.h"
 #include "server/process/child.h"
 
 namespace {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/jobs/job_process.h"
-#include "server/jobs/volume_library.h"
+#include "server/jobs/library/volume_library.h"
+#include "server/jobs/queue/job_process.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"

@@ -1,4 +1,4 @@
-#include "server/jobs/import_runner.h"
+#include "server/jobs/library/import_runner.h"
 
 #include <csignal>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "server/jobs/job_process.h"
+#include "server/jobs/queue/job_process.h"
 
 #include <algorithm>
 #include <csignal>

@@ -10,11 +10,11 @@
 
 #include "base/sha256.h"
 #include "proto/json.h"
-#include "server/jobs/estimate.h"
-#include "server/jobs/label_lists.h"
-#include "server/jobs/label_pages.h"
-#include "server/jobs/pipeline.h"
-#include "server/jobs/settle_labels.h"
+#include "server/jobs/library/label_lists.h"
+#include "server/jobs/library/label_pages.h"
+#include "server/jobs/library/settle_labels.h"
+#include "server/jobs/queue/estimate.h"
+#include "server/jobs/queue/pipeline.h"
 #include "tests/support/errors.h"
 #include "tests/unit/jobs/fixture.h"
 

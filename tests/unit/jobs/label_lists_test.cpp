@@ -1,4 +1,4 @@
-#include "server/jobs/label_lists.h"
+#include "server/jobs/library/label_lists.h"
 
 #include <map>
 #include <random>

@@ -1,5 +1,5 @@
 // Labels of a job in pages: from its record, and from a file that may be damaged.
-#include "server/jobs/label_pages.h"
+#include "server/jobs/library/label_pages.h"
 
 #include <functional>
 #include <string>

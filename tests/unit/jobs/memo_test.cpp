@@ -1,4 +1,4 @@
-#include "server/jobs/memo.h"
+#include "server/jobs/library/memo.h"
 
 #include <atomic>
 #include <latch>

@@ -1,4 +1,4 @@
-#include "server/jobs/memory.h"
+#include "server/jobs/making/memory.h"
 
 #include <string>
 

@@ -1,4 +1,4 @@
-#include "server/jobs/pipeline.h"
+#include "server/jobs/queue/pipeline.h"
 
 #include <algorithm>
 #include <atomic>

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/codec/decode/decode.h"
-#include "server/jobs/pipeline.h"
+#include "server/codec/formats.h"
+#include "server/jobs/queue/pipeline.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {

@@ -1,4 +1,4 @@
-#include "server/jobs/volume_library.h"
+#include "server/jobs/library/volume_library.h"
 
 #include <array>
 #include <atomic>

@@ -1,4 +1,4 @@
-#include "server/jobs/workers.h"
+#include "server/jobs/queue/workers.h"
 
 #include <algorithm>
 #include <functional>

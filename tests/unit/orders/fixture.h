@@ -268,6 +268,7 @@ class OrdersTest : public test::JobsFixture {
     store::Outcome outcome;
     outcome.mesh.emplace().triangles = triangles;
     if (triangles == 0) outcome.mesh->iso = 1000;
+    outcome.mesh->labels_count = labels_of_mesh_;
     outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
     const bool is_done = jobs_.finish(*lease, outcome);
     before_told(lease->id);
@@ -284,6 +285,7 @@ class OrdersTest : public test::JobsFixture {
   WatchedOrders store_{database_};
   store::SqlAuditTrail audit_{database_};
   WatchedReceived received_{database_};
+  std::optional<std::uint64_t> labels_of_mesh_;
   JobParameters last_parameters_;  // of the job that was finished last
   std::unique_ptr<Orders> orders_;
 };

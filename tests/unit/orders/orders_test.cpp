@@ -47,6 +47,19 @@ TEST_F(OrdersTest, AnEmptySurfaceIsToldWithTheRangeOfTheSamples) {
             "to 257");
 }
 
+// Each label is an object, and each object an entry of the order's results.
+TEST_F(OrdersTest, OfMoreLabelsThanAnOrderMayHaveObjectsFail) {
+  labels_of_mesh_ = 501;
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(id, OrderState::kFailed));
+  const Order order = get(id);
+  EXPECT_EQ(order.error->type, "urn:isomesh:problem:too-large");
+  EXPECT_THAT(order.error->detail, testing::HasSubstr("501 labels"));
+  EXPECT_TRUE(order.results.empty());
+  EXPECT_EQ(main_->stores, 0);
+}
+
 class FittingOrdersTest : public OrdersTest {
  protected:
   FittingOrdersTest() {

@@ -1,0 +1,327 @@
+#include "server/codec/formats.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "proto/error.h"
+#include "server/codec/decode/decoders.h"
+#include "server/codec/space.h"
+#include "server/codec/zip/threemf.h"
+
+namespace isomesh::codec {
+namespace {
+
+using mesh::SurfaceSize;
+
+constexpr std::string_view kUnregistered = "application/octet-stream";
+
+double as_double(std::uint64_t count) { return static_cast<double>(count); }
+
+// Bytes per vertex in Draco, which are `usual` at the default number of bits. Another bit per
+// coordinate adds about one bit per coordinate and vertex.
+double draco_bytes_per_vertex(double usual, const MeshParameters& parameters) {
+  constexpr double kSmallest = 1;
+  const double more_bits = parameters.draco.position_bits - DracoParameters{}.position_bits;
+  return std::max(kSmallest, usual + 3 * more_bits / 8);
+}
+
+// The triangles of all levels of detail, relative to the finest.
+double levels_of(const MeshParameters& parameters) {
+  return parameters.lods.empty()
+             ? 1
+             : std::accumulate(parameters.lods.begin(), parameters.lods.end(), 0.0);
+}
+
+std::uint64_t no_memory(const SurfaceSize& /*surface*/, const MeshParameters& /*parameters*/) {
+  return 0;
+}
+
+bool never(const MeshParameters& /*parameters*/) { return false; }
+
+bool always(const MeshParameters& /*parameters*/) { return true; }
+
+bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
+
+std::optional<mesh::Topology> encode_turned_drc(const Format::Surface& surface,
+                                                const mesh::Context& context, const Sink& sink) {
+  const DracoParameters& draco = surface.provenance.parameters.draco;
+  if (surface.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
+  return encode_drc(copy_in_space(surface.mesh, surface.space), draco, context, sink);
+}
+
+template <auto encode>
+std::optional<mesh::Topology> encode_in_space(const Format::Surface& surface,
+                                              const mesh::Context& context, const Sink& sink) {
+  encode(surface.mesh, surface.space, context, sink);
+  return std::nullopt;
+}
+
+template <auto encode>
+std::optional<mesh::Topology> encode_with_provenance(const Format::Surface& surface,
+                                                     const mesh::Context& context,
+                                                     const Sink& sink) {
+  encode(surface.mesh, surface.provenance, context, sink);
+  return std::nullopt;
+}
+
+template <auto encode>
+void encode_labels_in_space(const LabelledSurface& surface, const Provenance& /*provenance*/,
+                            Space space, const mesh::Context& context, const Sink& sink) {
+  encode(surface, space, context, sink);
+}
+
+template <auto encode>
+void encode_labels_with_provenance(const LabelledSurface& surface, const Provenance& provenance,
+                                   Space /*space*/, const mesh::Context& context,
+                                   const Sink& sink) {
+  encode(surface, provenance, context, sink);
+}
+
+constexpr std::array kFormats = {
+    Format{.format = MeshFormat::kDrc,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 6.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 return 100 + as_double(surface.vertices) * draco_bytes_per_vertex(2.6, parameters);
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // Measured: libdraco at its slowest speed, and our own encoder in the worst case,
+                 // all vertices in two layers.
+                 constexpr std::uint64_t kLibdracoPerTriangle = 100;
+                 constexpr std::uint64_t kOwnPerTriangle = 75;
+                 const std::uint64_t turned = parameters.space == Space::kLps
+                                                  ? 0
+                                                  : surface.triangles * sizeof(mesh::Triangle) +
+                                                        surface.vertices * sizeof(mesh::Vec3);
+                 return turned + surface.triangles * (is_own_draco(parameters.draco)
+                                                          ? kOwnPerTriangle
+                                                          : kLibdracoPerTriangle);
+               },
+           .shows_topology = if_ours,
+           .encode = encode_turned_drc,
+           .decode = decoding::decode_drc},
+    Format{.format = MeshFormat::kGlb,
+           .media_type = "model/gltf-binary",
+           .milliseconds_per_triangle = 4.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // Per vertex; measured.
+                 constexpr double kNormalBytes = 1.5;
+                 constexpr double kDistanceBytes = 1.5;
+                 constexpr double kMeshoptBytes = 7;
+                 double more = 0;
+                 if (parameters.normals) more += kNormalBytes;
+                 if (parameters.distances) more += kDistanceBytes;
+                 const double surface_bytes = parameters.glb_codec == GlbCodec::kMeshopt
+                                                  ? kMeshoptBytes
+                                                  : draco_bytes_per_vertex(2.7, parameters);
+                 return 2000 + as_double(surface.vertices) * levels_of(parameters) *
+                                   (surface_bytes + more);
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // Measured: its blocks and their bytes.
+                 constexpr std::uint64_t kPerTriangle = 15;
+                 constexpr std::uint64_t kNormalsPerTriangle = 8;
+                 // Arrays of all vertices and triangles of a primitive.
+                 constexpr std::uint64_t kMeshoptPerTriangle = 40;
+                 constexpr std::uint64_t kMergedPerTriangle = 75;
+                 // A copy of the surface and its simplification.
+                 constexpr std::uint64_t kLevelsPerTriangle = 130;
+                 std::uint64_t bytes = surface.triangles * kPerTriangle;
+                 if (parameters.normals) {
+                   bytes += surface.vertices * sizeof(mesh::Vec3) +
+                            surface.triangles * kNormalsPerTriangle;
+                 }
+                 if (parameters.glb_codec == GlbCodec::kMeshopt) {
+                   bytes += surface.triangles * kMeshoptPerTriangle;
+                 }
+                 if (parameters.merge) bytes += surface.triangles * kMergedPerTriangle;
+                 if (parameters.distances) bytes += surface.vertices * 2 * sizeof(float);
+                 if (parameters.lods.size() > 1) bytes += surface.triangles * kLevelsPerTriangle;
+                 return bytes;
+               },
+           .shows_topology =
+               [](const MeshParameters& parameters) {
+                 return parameters.glb_codec == GlbCodec::kDraco && if_ours(parameters) &&
+                        !parameters.distances;
+               },
+           .encode =
+               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
+                 return encode_glb(surface.mesh, surface.provenance, context, sink,
+                                   surface.extracted);
+               },
+           .encode_labels = encode_labels_with_provenance<encode_labels_glb>,
+           .decode = decoding::decode_glb},
+    Format{.format = MeshFormat::kStl,
+           .media_type = "model/stl",
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes = [](const SurfaceSize& surface,
+                       const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_in_space<encode_stl>},
+    Format{.format = MeshFormat::kPly,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_in_space<encode_ply>,
+           .encode_labels = encode_labels_in_space<encode_labels_ply>},
+    Format{.format = MeshFormat::kObj,
+           .media_type = "model/obj",
+           .milliseconds_per_triangle = 2.0e-4,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_in_space<encode_obj>,
+           .encode_labels = encode_labels_in_space<encode_labels_obj>},
+    Format{.format = MeshFormat::k3mf,
+           .media_type = "model/3mf",
+           .milliseconds_per_triangle = 6.5e-4,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 2000 + 18 * as_double(surface.vertices) + 7 * as_double(surface.triangles);
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // One label's surface can be almost everything.
+                 constexpr std::uint64_t kLabelPerTriangle = 30;
+                 return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
+               },
+           .shows_topology = always,
+           .encode =
+               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
+                 return encode_3mf(surface.mesh, surface.provenance, context, sink);
+               },
+           .encode_labels = encode_labels_with_provenance<encode_labels_3mf>},
+    Format{.format = MeshFormat::kOff,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 2.0e-4,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 100 + 28 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_in_space<encode_off>},
+    Format{.format = MeshFormat::kVtk,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 return 200 + 12 * as_double(surface.vertices) +
+                        (parameters.labels ? 20 : 16) * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_in_space<encode_vtk>,
+           .encode_labels = encode_labels_in_space<encode_labels_vtk>},
+    Format{.format = MeshFormat::kVtp,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 return 4000 + 12 * as_double(surface.vertices) +
+                        (parameters.labels ? 20 : 16) * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_with_provenance<encode_vtp>,
+           .encode_labels = encode_labels_with_provenance<encode_labels_vtp>},
+    Format{.format = MeshFormat::kGii,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 6.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 2500 + 16 * as_double(surface.vertices) + 16 * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never,
+           .encode = encode_with_provenance<encode_gii>},
+    Format{.format = MeshFormat::kZip,
+           .media_type = "application/zip",
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 double bytes = 22;
+                 for (const MeshFormat format : zipped_formats(parameters)) {
+                   bytes += describe(format).bytes(surface, parameters);
+                 }
+                 return bytes;
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // Encoder memory and output of the labels in progress.
+                 std::uint64_t bytes = 0;
+                 for (const MeshFormat format : zipped_formats(parameters)) {
+                   const Format& row = describe(format);
+                   bytes += row.memory_bytes(surface, parameters) +
+                            static_cast<std::uint64_t>(row.bytes(surface, parameters));
+                 }
+                 return bytes;
+               },
+           .shows_topology = never,
+           .encode = nullptr},
+};
+
+}  // namespace
+
+const Format& describe(MeshFormat format) {
+  const auto found = std::ranges::find(kFormats, format, &Format::format);
+  if (found == kFormats.end()) throw Error(ErrorCode::kInternal, "a format has no row");
+  return *found;
+}
+
+bool rounds(MeshFormat format, const MeshParameters& parameters) {
+  if (format != MeshFormat::kZip) return describe(format).decode != nullptr;
+  return std::ranges::any_of(zipped_formats(parameters),
+                             [&](MeshFormat each) { return rounds(each, parameters); });
+}
+
+std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
+                                     const Provenance& provenance, const mesh::Context& context,
+                                     const Sink& sink, const mesh::TriangleGrid* extracted) {
+  const Format& row = describe(format);
+  if (row.encode == nullptr) {
+    throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
+  }
+  const Space space = space_of(format, provenance.parameters);
+  return row.encode({mesh, provenance, space, extracted}, context, sink);
+}
+
+void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
+                   const mesh::Context& context, const Sink& sink) {
+  const Format& row = describe(format);
+  if (row.encode_labels == nullptr) {
+    throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
+  }
+  row.encode_labels(surface, provenance, space_of(format, provenance.parameters), context, sink);
+}
+
+DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
+                      const mesh::Context& context) {
+  context.throw_if_stopped();
+  const Format& row = describe(format);
+  if (row.decode == nullptr) decoding::refuse(format, "nothing decodes this format");
+  DecodedSurface surface = row.decode(file, context);
+  decoding::check(surface, format, context);
+  if (space == Space::kRas) {
+    for (mesh::Vec3& position : surface.positions) position = in_space(position, space);
+  }
+  return surface;
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,181 @@
+#include "server/jobs/library/import_runner.h"
+
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/log.h"
+#include "proto/error.h"
+#include "server/process/sandbox.h"
+#include "server/volume/canonical.h"
+#include "server/volume/labels.h"
+#include "server/volume/unusable.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kEnd{2000};  // how long a process may go on after it has closed its end
+constexpr std::size_t kMostAnswerBytes = std::size_t{16} << 20;
+
+std::string while_reading(const process::ImportReport& report) {
+  return report.reading.empty() ? "" : " while reading " + report.reading;
+}
+
+[[noreturn]] void refuse_dead(const std::string& how, const process::ImportReport& report) {
+  const std::string what = "The import ended " + how + while_reading(report);
+  log_error("{}", what);
+  volume::throw_unusable(what + "; the file is damaged or malicious.");
+}
+
+[[noreturn]] void throw_lying() {
+  throw Error(ErrorCode::kInternal, "An import's response does not match its canonical file.");
+}
+
+// The process may have been taken over by the file that it read, so its answer is compared with the
+// canonical file.
+void check(const Volume& volume, const process::ImportTask& task) {
+  if (!std::filesystem::exists(task.target)) throw_lying();
+  for (const Note& note : volume.notes) {
+    if (find_note(note.code) == nullptr) throw_lying();
+  }
+  if (!volume::is_label_table(volume.labels)) throw_lying();
+  const volume::CanonicalFile canonical(task.target);
+  const volume::CanonicalHeader& header = canonical.header();
+  const auto [low, high] = volume.range;
+  if (header.dims != volume.dims || header.type != volume.type ||
+      header.geometry != volume.geometry || header.sample_bytes() != volume.bytes ||
+      volume.bytes > task.limits.max_sample_bytes || !(low <= high) || !std::isfinite(low) ||
+      !std::isfinite(high) || !std::isfinite(volume.suggested_iso)) {
+    throw_lying();
+  }
+}
+
+Volume volume_of(process::ImportReport report, const process::ImportTask& task) {
+  if (report.error) {
+    log_info("an import was rejected{}: {}", while_reading(report),
+             describe(report.error->code()).name);
+    throw *report.error;
+  }
+  if (!report.volume) throw_lying();
+  check(*report.volume, task);
+  report.volume->id.clear();
+  report.volume->created.clear();
+  return *std::move(report.volume);
+}
+
+// Of a file that is not there, nothing: the import says so.
+std::uint64_t size_of(const std::filesystem::path& upload) {
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(upload, absent);
+  return absent ? 0 : bytes;
+}
+
+}  // namespace
+
+process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most) {
+  constexpr std::uint64_t kBytesPerSecond = 64 * 1024;
+  constexpr std::uint64_t kSecondsAtLeast = 20;
+  process::ImportBounds bounds = most;
+  const std::uint64_t seconds = kSecondsAtLeast + upload_bytes / kBytesPerSecond;
+  bounds.time = std::chrono::seconds(std::min<std::uint64_t>(
+      seconds, static_cast<std::uint64_t>(std::max<std::int64_t>(most.time.count(), 0))));
+  return bounds;
+}
+
+ImportRunner::ImportRunner(const RunnerOptions& options)
+    : options_(options), prepared_(options.program, options.at_once) {
+  if (!process::has_landlock()) {
+    log_warning("this kernel has no Landlock: imports and jobs could read this user's files");
+  }
+}
+
+Volume ImportRunner::run(const process::ImportTask& task) {
+  // Checked here, because a message of JSON cannot carry numbers that are not finite.
+  if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
+  const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
+  return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds})), task);
+}
+
+process::PeersAnswer ImportRunner::read_answer(const std::filesystem::path& file) {
+  const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
+  try {
+    process::ImportReport report =
+        report_of(process::to_message(process::AnswerOrder{{file}, bounds}));
+    if (report.error) throw *report.error;
+    if (!report.answer) throw_lying();
+    return *std::move(report.answer);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS cannot be read");
+  }
+}
+
+process::ImportReport ImportRunner::report_of(const std::string& message) {
+  take_place();
+  const struct Leave {
+    ImportRunner& runner;
+    ~Leave() { runner.give_place_back(); }
+  } leave{*this};
+
+  const auto deadline = Clock::now() + options_.bounds.time;
+  // One that has died while it waited has not touched the file. More than one is no accident.
+  constexpr int kMostIdleDeaths = 3;
+  for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
+    if (auto report = run_in(prepared_.take(deadline), message)) return *std::move(report);
+    log_warning("a prepared import process ended before its import began; another one takes over");
+  }
+  throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");
+}
+
+std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
+                                                          const std::string& message) {
+  using Ending = process::Heard::Ending;
+  child.tell(message);
+  const auto deadline = Clock::now() + options_.bounds.time;
+  const process::Heard heard = child.listen(kMostAnswerBytes, deadline, stop_.get_token());
+  if (heard.ending == Ending::kStopped) {
+    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  }
+  process::ImportReport report = process::report_from(heard.text);
+  if (heard.ending == Ending::kTooLong) {
+    refuse_dead("after " + std::to_string(options_.bounds.time.count()) + " seconds", report);
+  }
+  const bool is_answered = report.volume || report.answer || report.error;
+  if (heard.ending == Ending::kTooMuch || !is_answered) {
+    const auto status = child.ended_within(kEnd);
+    if (heard.ending == Ending::kClosed && !report.begun) return std::nullopt;
+    prepared_.renew();
+    refuse_dead(process::how_it_ended(status), report);
+  }
+  // Ended before the file is checked, so that nothing can change it afterwards.
+  child.end();
+  return report;
+}
+
+void ImportRunner::stop() {
+  stop_.request_stop();
+  prepared_.stop();
+}
+
+void ImportRunner::take_place() {
+  std::unique_lock lock(mutex_);
+  const bool free =
+      place_free_.wait(lock, stop_.get_token(), [&] { return running_ < options_.at_once; });
+  if (!free || stop_.stop_requested()) {
+    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  }
+  ++running_;
+}
+
+void ImportRunner::give_place_back() {
+  const std::scoped_lock lock(mutex_);
+  --running_;
+  place_free_.notify_one();
+}
+
+}  // namespace isomesh::jobs

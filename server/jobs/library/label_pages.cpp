@@ -1,0 +1,159 @@
+#include "server/jobs/library/label_pages.h"
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "proto/error.h"
+#include "proto/json.h"
+
+namespace isomesh::jobs {
+namespace {
+
+constexpr std::size_t kPerPage = MeshSummary::kMostListedLabels;
+constexpr std::size_t kNumberBytes = 8;
+constexpr std::size_t kEntryBytes = 2 * kNumberBytes;
+// Far more than a page with long names and a file in every format has.
+constexpr std::uint64_t kMostPageBytes = std::uint64_t{64} << 20;
+
+[[noreturn]] void throw_damaged() {
+  throw Error(ErrorCode::kInternal, "the stored list of a job's labels is damaged");
+}
+
+void append(std::uint64_t number, std::vector<std::byte>& bytes) {
+  for (std::size_t n = 0; n < kNumberBytes; ++n) {
+    bytes.push_back(static_cast<std::byte>(number >> (8 * n)));
+  }
+}
+
+std::uint64_t number_at(std::span<const std::byte> bytes) {
+  std::uint64_t number = 0;
+  for (std::size_t n = 0; n < kNumberBytes; ++n) {
+    number |= std::to_integer<std::uint64_t>(bytes[n]) << (8 * n);
+  }
+  return number;
+}
+
+void read(const store::BlobReader& file, std::uint64_t offset, std::span<std::byte> bytes) {
+  while (!bytes.empty()) {
+    const std::size_t count = file.read_at(offset, bytes);
+    if (count == 0) throw_damaged();
+    offset += count;
+    bytes = bytes.subspan(count);
+  }
+}
+
+std::vector<LabelSummary> labels_in(const std::string& text) {
+  try {
+    return labels_from_json(text);
+  } catch (const Error&) {
+    throw_damaged();
+  }
+}
+
+void set_addresses(const std::string& job, std::vector<LabelSummary>& labels) {
+  for (LabelSummary& label : labels) {
+    for (auto& [format, file] : label.files) file.href = mesh_path(job, format, label.label);
+  }
+}
+
+}  // namespace
+
+void write_label_pages(std::span<const LabelSummary> labels, const codec::Sink& sink) {
+  std::vector<std::byte> index;
+  std::uint64_t offset = 0;
+  for (std::size_t begin = 0; begin < labels.size(); begin += kPerPage) {
+    const auto page = labels.subspan(begin, std::min(kPerPage, labels.size() - begin));
+    const std::string text = to_json(std::vector(page.begin(), page.end()), "");
+    append(static_cast<std::uint64_t>(page.front().label), index);
+    append(offset, index);
+    sink(std::as_bytes(std::span(text)));
+    offset += text.size();
+  }
+  sink(index);
+}
+
+JobLabels::JobLabels(const Job& job, const store::BlobStore& blobs)
+    : job_(job), count_(job.mesh->labels.size()) {
+  if (!job.mesh->label_list) return;
+  count_ = job.mesh->labels_count.value_or(0);
+  file_ = blobs.open(job.mesh->label_list->sha256);
+  read_index(*job.mesh->label_list);
+}
+
+void JobLabels::read_index(const LabelListFile& file) {
+  const bool is_possible = count_ > 0 && count_ <= Volume::kMostLabels;
+  const std::uint64_t pages = is_possible ? (count_ + kPerPage - 1) / kPerPage : 0;
+  if (pages == 0 || file_->size() != file.bytes || file.bytes <= pages * kEntryBytes) {
+    throw_damaged();
+  }
+  end_of_pages_ = file.bytes - pages * kEntryBytes;
+  std::vector<std::byte> index(pages * kEntryBytes);
+  read(*file_, end_of_pages_, index);
+  for (std::size_t at = 0; at < index.size(); at += kEntryBytes) {
+    const auto entry = std::span(index).subspan(at, kEntryBytes);
+    const Page page = {static_cast<std::int64_t>(number_at(entry)),
+                       number_at(entry.subspan(kNumberBytes))};
+    const bool follows =
+        pages_.empty() ? page.offset == 0
+                       : page.first > pages_.back().first && page.offset > pages_.back().offset;
+    if (!follows || page.offset >= end_of_pages_) throw_damaged();
+    pages_.push_back(page);
+  }
+}
+
+std::vector<LabelSummary> JobLabels::page(std::size_t n) const {
+  const std::uint64_t begin = pages_[n].offset;
+  const std::uint64_t end = n + 1 < pages_.size() ? pages_[n + 1].offset : end_of_pages_;
+  if (end - begin > kMostPageBytes) throw_damaged();
+  std::string text(end - begin, '\0');
+  read(*file_, begin, std::as_writable_bytes(std::span(text)));
+  std::vector<LabelSummary> labels = labels_in(text);
+  const std::size_t expected = std::min<std::uint64_t>(kPerPage, count_ - n * kPerPage);
+  const auto is_out_of_order = [](const LabelSummary& one, const LabelSummary& next) {
+    return one.label >= next.label;
+  };
+  if (labels.size() != expected || labels.front().label != pages_[n].first ||
+      std::ranges::adjacent_find(labels, is_out_of_order) != labels.end()) {
+    throw_damaged();
+  }
+  return labels;
+}
+
+std::size_t JobLabels::page_of(std::int64_t label) const {
+  const auto next = std::ranges::upper_bound(pages_, label, {}, &Page::first);
+  return next == pages_.begin() ? 0 : static_cast<std::size_t>(next - pages_.begin()) - 1;
+}
+
+std::vector<LabelSummary> JobLabels::after(std::optional<std::int64_t> label) const {
+  const auto is_behind = [&](const LabelSummary& each) { return !label || each.label > *label; };
+  std::vector<LabelSummary> labels;
+  if (!file_) {
+    const auto& all = job_.mesh->labels;
+    const auto begin = std::ranges::partition_point(all, std::not_fn(is_behind));
+    const auto count = std::min<std::ptrdiff_t>(kPerPage, all.end() - begin);
+    labels.assign(begin, begin + count);
+  } else {
+    for (std::size_t n = label ? page_of(*label) : 0; labels.empty() && n < pages_.size(); ++n) {
+      labels = page(n);
+      std::erase_if(labels, std::not_fn(is_behind));
+    }
+  }
+  set_addresses(job_.id, labels);
+  return labels;
+}
+
+bool JobLabels::has_after(std::int64_t last) const {
+  return file_ ? page_of(last) + 1 < pages_.size() : job_.mesh->labels.back().label > last;
+}
+
+std::optional<LabelSummary> JobLabels::find(std::int64_t label) const {
+  const auto found_in = [&](const std::vector<LabelSummary>& labels) {
+    const auto found = std::ranges::lower_bound(labels, label, {}, &LabelSummary::label);
+    const bool is_there = found != labels.end() && found->label == label;
+    return is_there ? std::optional(*found) : std::nullopt;
+  };
+  return file_ ? found_in(page(page_of(label))) : found_in(job_.mesh->labels);
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,104 @@
+#include "server/jobs/library/volume_library.h"
+
+#include "base/clock.h"
+#include "proto/error.h"
+
+namespace isomesh::jobs {
+namespace {
+
+// Whether the upload was refused only because it holds several volumes.
+bool leaves_members_open(const Error& error, const process::ImportOptions& options) {
+  const std::vector<Choice>& choices = error.remedy().choices;
+  return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
+}
+
+std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
+  return scratch.path() / "canonical";
+}
+
+}  // namespace
+
+std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
+                                           const std::filesystem::path& upload,
+                                           const process::ImportOptions& options,
+                                           const std::string& name) {
+  const store::ScratchFolder scratch(folder_.scratch());
+  Volume volume = import_file(upload, options, scratch);
+  if (!volume.name && !name.empty()) volume.name = name;
+  return keep(owner, std::move(volume), scratch);
+}
+
+std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& owner,
+                                                          const std::filesystem::path& answer,
+                                                          const process::PeersSeries& series) {
+  const store::ScratchFolder scratch(folder_.scratch());
+  Volume volume = import_file(answer, {.peers = series}, scratch);
+  if (!volume.dicom) throw Error(ErrorCode::kInternal, "images from a PACS have no DICOM identity");
+  DicomIdentity identity = *volume.dicom;
+  return {keep(owner, std::move(volume), scratch).first, std::move(identity)};
+}
+
+Volume VolumeLibrary::import_file(const std::filesystem::path& upload,
+                                  const process::ImportOptions& options,
+                                  const store::ScratchFolder& scratch) {
+  return runner_.run({.source = upload,
+                      .scratch = scratch.path(),
+                      .target = canonical_in(scratch),
+                      .options = options,
+                      .limits = limits_});
+}
+
+std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume volume,
+                                            const store::ScratchFolder& scratch) {
+  const store::Blob blob = store::digest_of(canonical_in(scratch));
+  const std::shared_lock lock(mutex_);
+  // Also for what another owner has: whether there was room for it would tell.
+  if (!volumes_.contains(owner, blob.key)) retention_.make_room(blob.bytes);
+  blobs_.adopt(canonical_in(scratch), blob);
+  volume.id = blob.key;
+  volume.created = timestamp();
+  auto [stored, is_new] = volumes_.add(owner, volume);
+  blobs_.settle(blob.key);
+  // They are of the file that has been read, which may be another one than the first.
+  stored.notes = std::move(volume.notes);
+  stored.ignored = std::move(volume.ignored);
+  return {std::move(stored), is_new};
+}
+
+std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
+                                                   const std::filesystem::path& upload,
+                                                   const process::ImportOptions& options,
+                                                   const std::string& name) {
+  const auto add_one = [&](const process::ImportOptions& how) {
+    auto [volume, is_new] = add(owner, upload, how, name);
+    return UploadedVolume{.member = how.member, .status = is_new ? 201 : 200, .volume = volume};
+  };
+  std::vector<Choice> members;
+  try {
+    return {add_one(options)};
+  } catch (const Error& error) {
+    if (!leaves_members_open(error, options)) throw;
+    members = error.remedy().choices;
+  }
+  std::vector<UploadedVolume> volumes;
+  for (const Choice& member : members) {
+    process::ImportOptions how = options;
+    how.member = member.value;
+    try {
+      volumes.push_back(add_one(how));
+    } catch (const Error& error) {
+      if (describe(error.code()).status >= 500) throw;
+      const Problem problem = to_problem(error, "");
+      volumes.push_back({.member = member.value, .status = problem.status, .problem = problem});
+    }
+  }
+  return volumes;
+}
+
+void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
+  const std::scoped_lock lock(mutex_);
+  volumes_.erase(viewer, id);
+  eraser_.erase(id);
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,101 @@
+#include "server/jobs/making/certify_stage.h"
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "proto/parameters.h"
+#include "server/codec/formats.h"
+#include "server/jobs/making/error_budget.h"
+#include "server/mesh/measure/distance.h"
+#include "server/mesh/measure/self_intersections.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::jobs {
+namespace {
+
+// What other programs find in the file of that format, or in all labels' files of it.
+codec::DecodedSurface decoded(const KeptFiles& files, MeshFormat format,
+                              const MeshParameters& parameters,
+                              const std::vector<LabelSummary>& labels,
+                              const mesh::Context& context) {
+  const Space space = space_of(format, parameters);
+  if (!parameters.labels || holds_all_labels(format)) {
+    return codec::decode(files.bytes(format), format, space, context);
+  }
+  const std::span<const std::byte> zip = files.bytes(MeshFormat::kZip);
+  std::vector<codec::DecodedSurface> parts(labels.size());
+  mesh::parallel_for(context, parts.size(), [&](std::size_t n) {
+    const LabelFile& file = labels[n].files.at(format);
+    parts[n] = codec::decode(zip.subspan(file.offset, file.bytes), format, space, context);
+  });
+  return codec::join(std::move(parts), context);
+}
+
+SelfIntersections summary_of(const mesh::SelfIntersections& found) {
+  SelfIntersections summary = {.pairs = found.pairs, .triangles = found.triangles};
+  for (const mesh::IntersectingPair& pair : found.places) summary.places.push_back(pair.place);
+  return summary;
+}
+
+ErrorBudget budget_of(const MeshParameters& parameters, const mesh::Mesh& mesh,
+                      const MeshSummary& summary) {
+  ErrorBudget budget = {.smoothing = summary.displacement_mm.max,
+                        .quantisation = quantisation_mm(parameters, mesh)};
+  budget.simplification = *parameters.max_error_mm - budget.smoothing - budget.quantisation;
+  return budget;
+}
+
+}  // namespace
+
+KeptFiles::KeptFiles(const MeshRequest& request, std::span<const codec::Sink> sinks)
+    : sinks_(sinks.begin(), sinks.end()) {
+  if (!request.certify) return;
+  const std::vector<MeshFormat> files = files_of(request.parameters);
+  for (std::size_t i = 0; i < sinks.size(); ++i) {
+    if (!codec::rounds(files[i], request.parameters)) continue;
+    sinks_[i] = [&kept = bytes_[files[i]], &sink = sinks[i]](std::span<const std::byte> bytes) {
+      kept.insert(kept.end(), bytes.begin(), bytes.end());
+      sink(bytes);
+    };
+  }
+}
+
+void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
+                   const KeptFiles& files, Progress& progress, const mesh::Mesh& mesh,
+                   MeshSummary& summary) {
+  if (!request.certify) return;
+  const MeshParameters& parameters = request.parameters;
+  progress.enter(Stage::kCertify);
+  const std::vector<MeshFormat> formats = measured_formats(parameters);
+  const double part = 1.0 / static_cast<double>(formats.size() + 1);
+  MeshCertificate& certificate = summary.certificate.emplace();
+  for (std::size_t i = 0; i < formats.size(); ++i) {
+    std::optional<codec::DecodedSurface> file;
+    if (codec::rounds(formats[i], parameters)) {
+      file = decoded(files, formats[i], parameters, summary.labels, progress.quiet());
+    }
+    const double begin = part * static_cast<double>(i);
+    const mesh::Certificate measured =
+        mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
+                      progress.context(begin, begin + part));
+    if (i > 0 && measured.max_mm() <= certificate.max_mm) continue;
+    certificate.file = formats[i];
+    certificate.max_mm = measured.max_mm();
+    certificate.from_mesh = measured.from_mesh;
+    certificate.from_extracted = measured.from_reference;
+  }
+  if (parameters.max_error_mm) {
+    if (certificate.max_mm > *parameters.max_error_mm) {
+      throw Error(ErrorCode::kInternal,
+                  "the " + std::string(to_string(certificate.file)) + " file is " +
+                      number_text(certificate.max_mm) +
+                      " mm from the extracted surface, which is more than max_error_mm");
+    }
+    certificate.budget_mm = budget_of(parameters, mesh, summary);
+  }
+  summary.quality.self_intersections =
+      summary_of(find_self_intersections(mesh, progress.context(1 - part, 1)));
+}
+
+}  // namespace isomesh::jobs

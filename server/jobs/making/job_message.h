@@ -1,0 +1,76 @@
+// What the daemon and a process that makes meshes for it tell each other over a socket, in lines of
+// JSON. The daemon sends one set-up, then orders, one after the other, and may ask to cancel the
+// one that is under way. The process answers an order with progress, first of all, with the bytes
+// of the files as they are made, and with one end.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "proto/error.h"
+#include "proto/types.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/mesh/extract/extract.h"
+
+namespace isomesh::jobs {
+
+// What holds for all orders of a process.
+struct JobSetup {
+  int threads = 1;  // of the kernels
+};
+
+struct JobOrder {
+  enum class Work {
+    kMesh,
+    kCount,  // only how large the surface is
+  };
+
+  Work work = Work::kMesh;
+  // Of the volume: canonical, and found intact. The process gets it open, with the first bytes of
+  // the line, and not its path.
+  std::filesystem::path file;
+  Volume volume;  // its id and notes
+  MeshParameters parameters;
+  double iso = 0;  // whatever the parameters say of it
+  bool certify = false;
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t disk_bytes = 0;  // of all files together
+};
+
+struct JobProgress {
+  Stage stage = Stage::kLoad;
+  double share = 0;
+  Timing timing;  // of the stages that have ended
+};
+
+// Tells that so many bytes follow the line, which are the next ones of a file.
+struct JobPiece {
+  std::size_t file = 0;  // of files_of(parameters); behind the last: the file of the labels
+  std::size_t bytes = 0;
+};
+
+struct MadeMesh {
+  MeshSummary summary;  // without files; many labels are counted only
+  Timing timing;
+};
+
+// The last three end the order.
+using JobAnswer = std::variant<JobProgress, JobPiece, MadeMesh, CountedSurface, Error>;
+
+inline constexpr std::string_view kCancelMessage = "{\"cancel\":true}\n";
+
+// Each is one line with its break. The readers throw Error kInternal for a line of another form.
+std::string to_line(const JobSetup& setup);
+std::string to_line(const JobOrder& order);
+std::string to_line(const JobAnswer& answer);
+JobSetup setup_from(std::string_view line);
+// Empty when the line asks to cancel.
+std::optional<JobOrder> order_from(std::string_view line);
+JobAnswer answer_from(std::string_view line);
+
+}  // namespace isomesh::jobs

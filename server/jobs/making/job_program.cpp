@@ -1,0 +1,292 @@
+// isomesh-job: makes the meshes of one worker, one after the other, in memory that stays mapped. It
+// reads the volumes that it is given open and writes nothing: what it makes goes to the daemon over
+// the socket.
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <new>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <typeinfo>
+#include <utility>
+#include <vector>
+
+#include <unistd.h>
+
+#include "base/descriptor.h"
+#include "base/files.h"
+#include "base/mutex.h"
+#include "base/niceness.h"
+#include "server/jobs/library/label_pages.h"
+#include "server/jobs/making/crop.h"
+#include "server/jobs/making/job_message.h"
+#include "server/jobs/making/make_labels.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/memory.h"
+#include "server/jobs/making/stage_times.h"
+#include "server/mesh/parallel.h"
+#include "server/process/child.h"
+#include "server/process/passing.h"
+#include "server/process/sandbox.h"
+#include "server/volume/canonical.h"
+
+namespace {
+
+using namespace isomesh;
+using namespace isomesh::jobs;
+
+// What is kept between jobs: enough for a surface of some twenty million triangles, and a share of
+// what a job may take.
+constexpr std::uint64_t kMostKeptBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kKeptShare = 4;
+// Beside what a job takes: for the C library, and for the stacks and the like of each thread.
+constexpr std::uint64_t kHeadroomBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kThreadBytes = std::uint64_t{16} << 20;
+constexpr std::chrono::milliseconds kBetweenReports{20};
+// Of 64^3 samples; jobs side by side keep the processors busy.
+constexpr std::uint64_t kFewSampleBytes = std::uint64_t{1} << 18;
+
+// The socket's other end. Lines and pieces come whole, from whichever thread. Thread safe.
+class Speaker {
+ public:
+  void say(const JobAnswer& answer, std::span<const std::byte> piece = {}) {
+    const std::string line = to_line(answer);
+    const Lock lock(mutex_);
+    write(std::as_bytes(std::span(line)));
+    write(piece);
+  }
+
+ private:
+  static void write(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+      const ssize_t count = ::write(process::kChildDescriptor, bytes.data(), bytes.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) std::_Exit(EXIT_FAILURE);  // the daemon is gone
+      bytes = bytes.subspan(static_cast<std::size_t>(count));
+    }
+  }
+
+  Mutex mutex_;
+};
+
+// The lines that come, and the files with them. At the end of the other side, so with the daemon
+// however that ends, the process ends. Not thread safe.
+class Lines {
+ public:
+  std::string next() {
+    std::array<char, 4096> piece;
+    for (;;) {
+      if (const std::size_t end = text_.find('\n'); end != std::string::npos) {
+        std::string line = text_.substr(0, end);
+        text_.erase(0, end + 1);
+        return line;
+      }
+      process::Received received = process::receive(process::kChildDescriptor, piece);
+      if (received.count < 0 && errno == EINTR) continue;
+      if (received.count <= 0) std::_Exit(EXIT_SUCCESS);
+      text_.append(piece.data(), static_cast<std::size_t>(received.count));
+      if (received.passed.number() >= 0) file_ = std::move(received.passed);
+    }
+  }
+
+  // The file that came last, once.
+  Descriptor take_file() { return std::move(file_); }
+
+ private:
+  std::string text_;
+  Descriptor file_;
+};
+
+// An order and the volume that it is of.
+struct Task {
+  JobOrder order;
+  Descriptor file;
+};
+
+// What the thread that reads has for the one that works. Thread safe.
+class Desk {
+ public:
+  void put(Task task) {
+    const Lock lock(mutex_);
+    task_ = std::move(task);
+    stop_ = std::stop_source();
+    came_.notify_one();
+  }
+  void cancel() {
+    const Lock lock(mutex_);
+    stop_.request_stop();
+  }
+  std::pair<Task, std::stop_token> take() {
+    Lock lock(mutex_);
+    came_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return task_.has_value(); });
+    std::pair<Task, std::stop_token> taken = {*std::move(task_), stop_.get_token()};
+    task_.reset();
+    return taken;
+  }
+
+ private:
+  Mutex mutex_;
+  Condition came_;
+  std::optional<Task> task_ ISOMESH_GUARDED_BY(mutex_);
+  std::stop_source stop_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+// Tells how far a job is: each stage, and within one a few times a second. Thread safe.
+class Reporter {
+ public:
+  explicit Reporter(Speaker& speaker) : speaker_(speaker) {}
+
+  void tell(Stage stage, double share, const Timing& timing) {
+    const auto now = std::chrono::steady_clock::now();
+    {
+      const Lock lock(mutex_);
+      if (stage == stage_ && now - told_ < kBetweenReports) return;
+      stage_ = stage;
+      told_ = now;
+    }
+    speaker_.say(JobProgress{stage, share, timing});
+  }
+
+ private:
+  Speaker& speaker_;
+  Mutex mutex_;
+  Stage stage_ ISOMESH_GUARDED_BY(mutex_) = Stage::kQueue;
+  std::chrono::steady_clock::time_point told_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+SampleArray array_of(const volume::CanonicalVolume& canonical) {
+  const volume::CanonicalHeader& header = canonical.header();
+  return {header.type, header.dims, header.geometry, canonical.samples().data()};
+}
+
+codec::Sink sink_of(Speaker& speaker, std::size_t file) {
+  return [&speaker, file](std::span<const std::byte> bytes) {
+    speaker.say(JobPiece{file, bytes.size()}, bytes);
+  };
+}
+
+// Sends many labels as a file, since a job's record is read often.
+void send_many_labels(Speaker& speaker, std::size_t file, MeshSummary& summary) {
+  if (summary.labels.size() <= MeshSummary::kMostListedLabels) return;
+  write_label_pages(summary.labels, sink_of(speaker, file));
+  summary.labels_count = summary.labels.size();
+  summary.labels.clear();
+}
+
+MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+  const JobOrder& order = task.order;
+  Reporter reporter(speaker);
+  const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
+    reporter.tell(stage, share, timing);
+  };
+  Progress progress(stop, report, expected_times(order.volume, order.parameters, order.certify));
+  progress.enter(Stage::kLoad);
+  const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
+  canonical.preload();
+  std::vector<codec::Sink> sinks;
+  for (std::size_t i = 0; i < files_of(order.parameters).size(); ++i) {
+    sinks.push_back(sink_of(speaker, i));
+  }
+  std::optional<mesh::OneThread> alone;
+  if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
+  MadeMesh made;
+  const MeshRequest request = {.volume = order.volume,
+                               .parameters = order.parameters,
+                               .iso = order.iso,
+                               .certify = order.certify,
+                               .memory_bytes = order.memory_bytes,
+                               .disk_bytes = order.disk_bytes};
+  const CroppedSamples cropped(array_of(canonical), order.parameters);
+  const SampleArray& samples = cropped.array();
+  made.summary = order.parameters.labels
+                     ? make_labels(samples, request, sinks, progress, workspace.walls)
+                     : make_mesh(samples, request, sinks, progress, workspace.mesh);
+  send_many_labels(speaker, sinks.size(), made.summary);
+  progress.end_stage();
+  made.timing = progress.timing();
+  return made;
+}
+
+CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
+  speaker.say(JobProgress{});  // it has begun
+  const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
+  const MeshParameters& parameters = task.order.parameters;
+  const CroppedSamples cropped(array_of(canonical), parameters);
+  const SampleArray& samples = cropped.array();
+  if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
+  return {count_surface(samples, parameters, task.order.iso, {stop, nullptr})};
+}
+
+struct Ending {
+  JobAnswer answer;
+  bool is_last = false;  // what the process has been through is not to be trusted with another job
+};
+
+// Every exception becomes a message here, because nothing else leaves this process.
+Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+  const std::uint64_t memory_bytes = task.order.memory_bytes;
+  try {
+    if (task.order.work == JobOrder::Work::kCount) return {count(std::move(task), stop, speaker)};
+    return {make(std::move(task), stop, speaker, workspace)};
+  } catch (const Error& error) {
+    return {error};
+  } catch (const std::bad_alloc&) {
+    constexpr std::uint64_t kMebibyte = 1 << 20;
+    return {Error(ErrorCode::kTooLarge, "the job needs more than the " +
+                                            std::to_string(memory_bytes / kMebibyte) +
+                                            " MiB of memory that it may use"),
+            true};
+  } catch (const std::exception& error) {
+    return {Error(ErrorCode::kInternal,
+                  std::string("A job ended with an exception: ") + typeid(error).name()),
+            true};
+  }
+}
+
+void read_orders(Lines& lines, Desk& desk) {
+  for (;;) {
+    if (auto order = order_from(lines.next())) {
+      desk.put({*std::move(order), lines.take_file()});
+    } else {
+      desk.cancel();
+    }
+  }
+}
+
+}  // namespace
+
+#if defined(__SANITIZE_THREAD__)
+// What the sanitizer finds is read by nobody here, so it has to end the process.
+extern "C" const char* __tsan_default_options();  // NOLINT: the name that it looks for
+
+const char* __tsan_default_options() { return "halt_on_error=1"; }
+#endif
+
+int main() {
+  be_nicer(kJobNiceness);
+  keep_freed_memory();
+  Lines lines;
+  const JobSetup setup = setup_from(lines.next());
+  const std::uint64_t headroom =
+      kHeadroomBytes + kThreadBytes * static_cast<std::uint64_t>(setup.threads);
+  const process::MemoryLimit memory;
+  process::confine_job();
+  mesh::set_thread_count(setup.threads);
+  Desk desk;
+  const std::jthread reader([&] { read_orders(lines, desk); });
+  Speaker speaker;
+  Workspace workspace;
+  for (;;) {
+    auto [task, stop] = desk.take();
+    const std::uint64_t memory_bytes = task.order.memory_bytes;
+    memory.set(memory_bytes + headroom);
+    const Ending ending = work(std::move(task), stop, speaker, workspace);
+    if (!ending.is_last) workspace.trim(std::min(kMostKeptBytes, memory_bytes / kKeptShare));
+    speaker.say(ending.answer);
+    if (ending.is_last) std::_Exit(EXIT_SUCCESS);
+  }
+}

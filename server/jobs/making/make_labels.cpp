@@ -1,0 +1,180 @@
+#include "server/jobs/making/make_labels.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <type_traits>
+
+#include "proto/samples.h"
+#include "server/codec/formats.h"
+#include "server/codec/zip/label_zip.h"
+#include "server/jobs/library/settle_labels.h"
+#include "server/jobs/making/certify_stage.h"
+#include "server/jobs/making/error_budget.h"
+#include "server/jobs/making/mesh_cost.h"
+#include "server/jobs/making/mesh_stages.h"
+#include "server/mesh/labels/label_surface.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::jobs {
+namespace {
+
+// Calls use(a sample of the type) and returns what that returns. Throws Error kInvalidParameter for
+// the two types that are no integers.
+template <class Use>
+auto with_label(SampleType type, const Use& use) {
+  using Result = decltype(use(std::uint8_t{}));
+  return with_sample(type, [&](auto sample) -> Result {
+    if constexpr (std::is_integral_v<decltype(sample)>) {
+      return use(sample);
+    } else {
+      throw_no_labels(type);
+    }
+  });
+}
+
+mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& labels,
+                                       const MeshParameters& parameters) {
+  mesh::SeparateOptions options = {
+      .labels = {}, .scheme = parameters.scheme, .close = parameters.close};
+  for (const mesh::LabelVoxels& label : labels) {
+    options.labels.push_back(label.label);
+    const auto values = parameters.label_values.find(label.label);
+    if (values != parameters.label_values.end()) options.values.insert(*values);
+  }
+  return options;
+}
+
+void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
+              const MeshRequest& request, const Progress& progress,
+              mesh::SeparatingSurface& walls) {
+  with_label(samples.type, [&](auto sample) {
+    const auto lattice = lattice_of<decltype(sample)>(samples);
+    const mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
+    check_memory(size_of(count), request);
+    extract_walls(lattice, options, count, progress.context(0.4, 1), walls);
+  });
+}
+
+std::optional<std::string> text_of(const LabelTexts& texts, std::int64_t label) {
+  const auto found = texts.find(label);
+  return found == texts.end() ? std::nullopt : std::optional(found->second);
+}
+
+LabelSummary summary_of(const mesh::LabelVoxels& voxels, const mesh::LabelMeasure& measure,
+                        const MeshParameters& parameters) {
+  return {.label = voxels.label,
+          .name = text_of(parameters.label_names, voxels.label),
+          .color = text_of(parameters.label_colors, voxels.label),
+          .voxels = voxels.voxels,
+          .voxels_mm3 = voxels.volume_mm3,
+          .triangles = measure.triangles,
+          .vertices = measure.vertices,
+          .closed = measure.is_closed(),
+          .manifold = measure.topology.manifold,
+          .oriented = measure.topology.oriented,
+          .components = measure.topology.components,
+          .area_mm2 = measure.extent.area_mm2,
+          .volume_mm3 = measure.extent.volume_mm3};
+}
+
+// What holds for the own surfaces of all labels.
+void set_quality(const std::vector<mesh::LabelMeasure>& measures, MeshSummary& summary) {
+  MeshQuality& quality = summary.quality;
+  quality.manifold = true;
+  quality.oriented = true;
+  for (const mesh::LabelMeasure& measure : measures) {
+    summary.boundary_edges += measure.topology.boundary_edges;
+    summary.components += measure.topology.components;
+    summary.euler += measure.topology.euler;
+    quality.manifold = quality.manifold && measure.topology.manifold;
+    quality.oriented = quality.oriented && measure.topology.oriented;
+  }
+  conclude_quality(summary);
+}
+
+void encode_all(const codec::LabelledSurface& surface, const codec::Provenance& provenance,
+                std::span<const codec::Sink> sinks, const Progress& progress,
+                MeshSummary& summary) {
+  const MeshParameters& parameters = provenance.parameters;
+  const std::vector<MeshFormat> files = files_of(parameters);
+  std::vector<codec::LabelFiles> zipped;
+  SharedProgress shared(progress, files.size());
+  const auto encode = [&](std::size_t i) {
+    const mesh::Context context = shared.context(i);
+    if (files[i] != MeshFormat::kZip) {
+      return codec::encode_labels(surface, files[i], provenance, context, sinks[i]);
+    }
+    zipped = encode_labels_zip(surface, zipped_formats(parameters), provenance, context, sinks[i]);
+  };
+  mesh::parallel_for(progress.quiet(), files.size() + 1, [&](std::size_t task) {
+    if (task < files.size()) return encode(task);
+    measure_final_shapes(parameters, progress, surface.walls.mesh, summary.quality);
+  });
+  for (std::size_t n = 0; n < zipped.size(); ++n) summary.labels[n].files = std::move(zipped[n]);
+}
+
+}  // namespace
+
+std::vector<mesh::LabelVoxels> count_values(const SampleArray& samples,
+                                            const mesh::Context& context) {
+  return with_label(samples.type, [&](auto sample) {
+    return mesh::count_labels(lattice_of<decltype(sample)>(samples), context);
+  });
+}
+
+CountedSurface count_labels(const SampleArray& samples, const MeshParameters& parameters,
+                            const mesh::Context& context) {
+  const auto options =
+      separate_options(mesh::chosen_labels(count_values(samples, context), parameters), parameters);
+  return with_label(samples.type, [&](auto sample) {
+    const auto lattice = lattice_of<decltype(sample)>(samples);
+    CountedSurface counted = {.size = size_of(count_walls(lattice, options, context)),
+                              .labels = {}};
+    const auto triangles = count_label_triangles(lattice, options, context);
+    for (std::size_t n = 0; n < options.labels.size(); ++n) {
+      counted.labels.push_back({options.labels[n], triangles[n + 1]});
+    }
+    return counted;
+  });
+}
+
+MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
+                        std::span<const codec::Sink> sinks, Progress& progress,
+                        mesh::SeparatingSurface& walls) {
+  const MeshParameters& parameters = request.parameters;
+  MeshSummary summary;
+  progress.enter(Stage::kExtract);
+  const auto labels =
+      mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
+  separate(samples, separate_options(labels, parameters), request, progress, walls);
+  if (!is_simplified(parameters)) check_disk(walls.mesh, request);
+  const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
+  const ExtractedSurface extracted(request, walls.mesh);
+
+  smooth_stage(samples, request, progress, walls.mesh, summary);
+  const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
+  const MeshRequest written = request.with(as_written);
+  simplify_stage(written, extracted, progress, walls.mesh, &walls, summary);
+  set_size(walls.mesh, summary);
+  if (is_simplified(parameters)) check_disk(walls.mesh, request);
+  summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};
+
+  progress.enter(Stage::kEncode);
+  const mesh::LabelTriangles triangles(walls);
+  const auto measures = measure_labels(walls, triangles, progress.quiet());
+  set_quality(measures, summary);
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    summary.labels.push_back(summary_of(labels[n], measures[n], parameters));
+  }
+  const KeptFiles files(written, sinks);
+  {
+    const auto grid = grid_for_distances(parameters, extracted, progress);
+    encode_all({walls, triangles, summary.labels, grid ? &*grid : nullptr},
+               provenance_of(samples, written), files.sinks(), progress, summary);
+  }
+  certify_stage(written, extracted, files, progress, walls.mesh, summary);
+  return summary;
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,169 @@
+#include "server/jobs/making/make_mesh.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "proto/samples.h"
+#include "proto/stages.h"
+#include "server/codec/formats.h"
+#include "server/jobs/making/certify_stage.h"
+#include "server/jobs/making/error_budget.h"
+#include "server/jobs/making/mesh_cost.h"
+#include "server/jobs/making/mesh_stages.h"
+#include "server/mesh/measure/cavities.h"
+#include "server/mesh/parallel.h"
+#include "server/mesh/topology/components.h"
+#include "server/mesh/topology/topology.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
+  return {.iso = iso,
+          .scheme = parameters.scheme,
+          .interpolation = parameters.interpolation,
+          .close = parameters.close,
+          .regularize = parameters.regularize};
+}
+
+template <class T>
+void extract_as(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
+                mesh::Mesh& mesh) {
+  const mesh::Lattice<T> lattice = lattice_of<T>(samples);
+  const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
+  const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
+  check_memory(size_of(count), request);
+  extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
+}
+
+void extract(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
+             mesh::Mesh& mesh) {
+  with_sample(samples.type,
+              [&](auto sample) { extract_as<decltype(sample)>(samples, request, progress, mesh); });
+}
+
+void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
+  summary.boundary_edges = topology.boundary_edges;
+  summary.components = topology.components;
+  summary.euler = topology.euler;
+  summary.quality.manifold = topology.manifold;
+  summary.quality.oriented = topology.oriented;
+  conclude_quality(summary);
+}
+
+bool shows_topology(const MeshParameters& parameters) {
+  return std::ranges::any_of(parameters.formats, [&](MeshFormat format) {
+    return codec::describe(format).shows_topology(parameters);
+  });
+}
+
+// Encodes every format and measures the mesh, all side by side: few of them have work for every
+// thread all the time. The topology is measured where no encoder shows it.
+void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
+                        const ExtractedSurface& extracted, const Progress& progress,
+                        const mesh::Mesh& mesh, MeshSummary& summary) {
+  const MeshParameters& parameters = provenance.parameters;
+  const auto grid = grid_for_distances(parameters, extracted, progress);
+  const std::vector<MeshFormat>& formats = parameters.formats;
+  std::vector<std::optional<mesh::Topology>> shown(formats.size() + 1);
+  SharedProgress shared(progress, formats.size());
+  const auto encode = [&](std::size_t i) {
+    shown[i] = codec::encode(mesh, formats[i], provenance, shared.context(i), sinks[i],
+                             grid ? &*grid : nullptr);
+  };
+  const auto measure = [&] {
+    measure_final_shapes(parameters, progress, mesh, summary.quality);
+    if (!shows_topology(parameters)) shown.back() = measure_topology(mesh, progress.quiet());
+  };
+  mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
+    if (task < formats.size()) return encode(task);
+    measure();
+  });
+  const auto found = std::ranges::find_if(shown, [](const auto& one) { return one.has_value(); });
+  set_topology(found != shown.end() ? **found : measure_topology(mesh, progress.quiet()), summary);
+}
+
+// What the parameters do not keep of the surface's parts.
+void leave_out_parts(const MeshParameters& parameters, const Progress& progress, mesh::Mesh& mesh,
+                     MeshSummary::Dropped& dropped) {
+  const auto add = [&](const mesh::Dropped& more) {
+    dropped.components += more.components;
+    dropped.triangles += more.triangles;
+  };
+  if (parameters.fill_cavities) add(fill_cavities(progress.quiet(), mesh));
+  if (!parameters.components.keeps_all()) {
+    add(keep_components(parameters.components, progress.quiet(), mesh));
+  }
+}
+
+}  // namespace
+
+Progress::Progress(std::stop_token stop, const Report& report, const Timing& expected)
+    : stop_(std::move(stop)), report_(report), expected_(expected) {
+  for (const StageRow& row : kStages) {
+    if (row.elapsed != nullptr) expected_ms_ += expected.*row.elapsed;
+  }
+}
+
+void Progress::enter(Stage stage) {
+  end_stage();
+  stage_ = stage;
+  done_before_ += share_;
+  share_ = expected_.*row_of(stage).elapsed / expected_ms_;
+  began_ = Clock::now();
+  report_(stage_, done_before_, timing_);
+}
+
+void Progress::end_stage() {
+  if (stage_ == Stage::kQueue) return;  // nothing has begun
+  timing_.*row_of(stage_).elapsed =
+      std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
+}
+
+mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
+                                double iso, const mesh::Context& context) {
+  return with_sample(samples.type, [&](auto sample) {
+    return size_of(count_surface(lattice_of<decltype(sample)>(samples),
+                                 extract_options(parameters, iso), context));
+  });
+}
+
+void Workspace::trim(std::size_t budget_bytes) {
+  std::size_t held = walls.sides.capacity_bytes();
+  for (const mesh::Mesh& each : {std::cref(mesh), std::cref(walls.mesh)}) {
+    held += each.positions.capacity_bytes() + each.triangles.capacity_bytes();
+  }
+  if (held > budget_bytes) *this = {};
+}
+
+MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
+                      std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
+  const MeshParameters& parameters = request.parameters;
+  MeshSummary summary;
+  summary.iso = request.iso;
+  progress.enter(Stage::kExtract);
+  extract(samples, request, progress, mesh);
+  leave_out_parts(parameters, progress, mesh, summary.dropped);
+  if (!is_simplified(parameters)) check_disk(mesh, request);
+  const ExtractedSurface extracted(request, mesh);
+
+  smooth_stage(samples, request, progress, mesh, summary);
+  const MeshParameters as_written = with_bits_for(parameters, mesh);
+  const MeshRequest written = request.with(as_written);
+  simplify_stage(written, extracted, progress, mesh, nullptr, summary);
+  set_size(mesh, summary);
+  if (is_simplified(parameters)) check_disk(mesh, request);
+
+  progress.enter(Stage::kEncode);
+  const KeptFiles files(written, sinks);
+  encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
+                     summary);
+  certify_stage(written, extracted, files, progress, mesh, summary);
+  return summary;
+}
+
+}  // namespace isomesh::jobs

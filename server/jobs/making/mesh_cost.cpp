@@ -1,0 +1,111 @@
+#include "server/jobs/making/mesh_cost.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "server/codec/formats.h"
+#include "server/jobs/making/error_budget.h"
+#include "server/mesh/labels/label_parts.h"
+#include "server/mesh/labels/separate.h"
+
+namespace isomesh::jobs {
+namespace {
+
+std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
+  return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle);
+}
+
+// What labels take beside their walls: whose sides the triangles are, which triangles are whose,
+// and, at worst, all labels' own surfaces at once. A triangle is in two of them at most.
+std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
+  return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
+         2 * mesh_bytes(surface);
+}
+
+// What simplifying and certifying take, one after the other, beside what the job has anyway: the
+// surface as it was extracted, grids of triangles, and files that round coordinates, as bytes and
+// as what they decode to.
+std::uint64_t error_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                          bool certify) {
+  // What simplify.h and triangle_grid.h say that they take, and a little more.
+  constexpr std::uint64_t kSimplifyBytesPerTriangle = 200;
+  constexpr std::uint64_t kGridsPerTriangle = 130;
+  std::uint64_t simplifying = 0;
+  if (parameters.max_error_mm || parameters.triangles) {
+    simplifying = surface.triangles * kSimplifyBytesPerTriangle;
+  }
+  const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
+  // While files are encoded.
+  const std::uint64_t grid = parameters.distances ? surface.triangles * kGridsPerTriangle : 0;
+  if (!certify) return std::max(simplifying, grid) + (keeps_extracted ? mesh_bytes(surface) : 0);
+  double files = 0;
+  for (const MeshFormat format : files_of(parameters)) {
+    if (!codec::rounds(format, parameters)) continue;
+    files += 2 * codec::describe(format).bytes(surface, parameters);  // a vector that grows
+  }
+  const std::uint64_t certifying = static_cast<std::uint64_t>(files) +
+                                   (files > 0 ? 3 * mesh_bytes(surface) : 0) +
+                                   surface.triangles * kGridsPerTriangle;
+  return mesh_bytes(surface) + std::max({simplifying, certifying, grid});
+}
+
+// What the files take at least.
+std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  double bytes = 0;
+  for (const MeshFormat format : files_of(parameters)) {
+    const double guess = codec::describe(format).bytes(surface, parameters);
+    bytes += format == MeshFormat::kStl ? guess : guess / 2;
+  }
+  return static_cast<std::uint64_t>(bytes);
+}
+
+}  // namespace
+
+mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
+  const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
+  const double lambda = parameters.lambda.value_or(default_lambda(parameters));
+  return {.passes = parameters.passes,
+          .lambda = lambda,
+          .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
+          .max_displacement_mm = most_displacement(parameters)};
+}
+
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                              bool certify) {
+  std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
+  for (const MeshFormat format : files_of(parameters)) {
+    encoding += codec::describe(format).memory_bytes(surface, parameters);
+  }
+  const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
+  return mesh_bytes(surface) + smoothing +
+         (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding) +
+         error_bytes(surface, parameters, certify);
+}
+
+void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request) {
+  const std::uint64_t needed = estimate_memory(surface, request.parameters, request.certify);
+  const std::uint64_t allowed_bytes = request.memory_bytes;
+  if (needed <= allowed_bytes) return;
+  constexpr std::uint64_t kMebibyte = 1 << 20;
+  throw Error(ErrorCode::kTooLarge,
+              "the surface has " + std::to_string(surface.triangles) + " triangles and " +
+                  std::to_string(surface.vertices) + " vertices; the job would need about " +
+                  std::to_string(needed / kMebibyte) + " MiB of memory, but " +
+                  std::to_string(allowed_bytes / kMebibyte) + " MiB are allowed");
+}
+
+void check_disk(const mesh::Mesh& mesh, const MeshRequest& request) {
+  const mesh::SurfaceSize surface = {mesh.triangles.size(), mesh.positions.size()};
+  const std::uint64_t needed = least_file_bytes(surface, request.parameters);
+  const std::uint64_t allowed_bytes = request.disk_bytes;
+  if (needed <= allowed_bytes) return;
+  constexpr std::uint64_t kKibibyte = 1 << 10;
+  throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(surface.triangles) +
+                                        " triangles; its files would need at least " +
+                                        std::to_string(needed / kKibibyte) +
+                                        " KiB, but the disk can hold at most " +
+                                        std::to_string(allowed_bytes / kKibibyte) + " KiB of them");
+}
+
+}  // namespace isomesh::jobs

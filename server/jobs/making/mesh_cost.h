@@ -1,0 +1,28 @@
+// What making a mesh takes, as it follows from the size of its surface.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/types.h"
+#include "server/jobs/making/make_mesh.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/smooth/smooth.h"
+
+namespace isomesh::jobs {
+
+mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
+
+// How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
+// mesh, smoothing, encoders. An upper estimate.
+// Simplifying and certifying take the most, where the job does so.
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                              bool certify);
+
+// Throws Error kTooLarge with the estimate when that is more than is allowed.
+void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request);
+
+// Throws Error kTooLarge when the files of a mesh could never have room. STL's size is known; of
+// the others', which are guesses, half counts. To be asked of the mesh as it is written.
+void check_disk(const mesh::Mesh& mesh, const MeshRequest& request);
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,126 @@
+#include "server/jobs/making/stage_times.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "proto/stages.h"
+#include "server/codec/formats.h"
+#include "server/jobs/making/error_budget.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using mesh::SurfaceSize;
+
+// Milliseconds.
+constexpr double kMillisecondsPerJob = 1;
+constexpr double kLoadPerSample = 1.3e-6;
+constexpr double kExtractPerSample = 1.0e-6;
+constexpr double kExtractPerTriangle = 1.6e-5;
+constexpr double kConnectivityPerTriangle = 1.0e-5;
+constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
+constexpr double kMeasurePerTriangle = 3.0e-5;
+constexpr double kSimplifyPerTriangle = 5.0e-4;
+constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
+constexpr double kLevelsPerTriangle = 7.5e-4;
+constexpr double kCertifyPerTriangle = 1.0e-3;
+
+double as_double(std::uint64_t count) { return static_cast<double>(count); }
+
+double extract_ms(const SurfaceSize& surface, std::uint64_t samples) {
+  return kExtractPerSample * as_double(samples) +
+         kExtractPerTriangle * as_double(surface.triangles);
+}
+
+double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
+  if (parameters.passes == 0) return 0;
+  return as_double(surface.triangles) *
+         (kConnectivityPerTriangle + kSmoothPerTriangleAndPass * parameters.passes);
+}
+
+double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
+  if (!parameters.max_error_mm && !parameters.triangles) return 0;
+  return as_double(surface.triangles) *
+         (parameters.max_error_mm ? kSimplifyWithinPerTriangle : kSimplifyPerTriangle);
+}
+
+double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
+                  const MeshParameters& parameters) {
+  const auto measured = static_cast<double>(measured_formats(parameters).size());
+  return measured * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
+}
+
+// Formats are written side by side, so the slowest counts whole and the others by half.
+double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
+  double slowest = kMeasurePerTriangle;
+  double sum = kMeasurePerTriangle;
+  for (const MeshFormat format : files_of(parameters)) {
+    const double each = codec::describe(format).milliseconds_per_triangle;
+    slowest = std::max(slowest, each);
+    sum += each;
+  }
+  const double levels = parameters.lods.size() > 1 ? kLevelsPerTriangle : 0;
+  return as_double(surface.triangles) * (slowest + (sum - slowest) / 2 + levels);
+}
+
+}  // namespace
+
+Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written, std::uint64_t samples,
+                   const MeshParameters& parameters, bool certify) {
+  Timing times;
+  times.load = kMillisecondsPerJob + kLoadPerSample * as_double(samples);
+  times.extract = extract_ms(extracted, samples);
+  times.smooth = smooth_ms(extracted, parameters);
+  times.simplify = simplify_ms(extracted, parameters);
+  times.encode = encode_ms(written, parameters);
+  if (certify) times.certify = certify_ms(extracted, written, parameters);
+  return times;
+}
+
+double share_within(double error_mm, double spacing_mm) {
+  // A curve through what was seen on heads of 1 mm.
+  constexpr double kHalf = 0.06;  // of the spacing, the error that leaves half of the triangles
+  constexpr double kSteepness = 1.16;
+  return 1 / (1 + std::pow(error_mm / spacing_mm / kHalf, kSteepness));
+}
+
+SurfaceSize typical_surface(double samples) {
+  // Surfaces grow with the square of a volume's length, its samples with the cube. A noisy head and
+  // a smooth body of CT have 135 and 20 times that many triangles.
+  constexpr double kTypical = 50;
+  const double triangles = kTypical * std::pow(samples, 2.0 / 3);
+  return {static_cast<std::uint64_t>(triangles), static_cast<std::uint64_t>(triangles / 2)};
+}
+
+Timing expected_times(const Volume& volume, const MeshParameters& parameters, bool certify) {
+  auto samples = as_double(volume.sample_count());
+  if (parameters.crop) {
+    double part = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto& [low, high] = *parameters.crop;
+      part *= std::abs(high[axis] - low[axis]) / volume.geometry.spacing[axis];
+    }
+    samples = std::min(samples, part);
+  }
+  const SurfaceSize extracted = typical_surface(samples);
+  SurfaceSize written = extracted;
+  double triangles = as_double(extracted.triangles);
+  if (parameters.max_error_mm) {
+    triangles *= share_within(*parameters.max_error_mm, std::ranges::min(volume.geometry.spacing));
+  }
+  if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
+  written.triangles = static_cast<std::uint64_t>(triangles);
+  written.vertices = std::min(extracted.vertices, written.triangles / 2);
+  return stage_times(extracted, written, static_cast<std::uint64_t>(samples), parameters, certify);
+}
+
+double expected_ms(const Volume& volume, const JobParameters& parameters) {
+  const Timing times = expected_times(volume, parameters, parameters.certify);
+  double sum = 0;
+  for (const StageRow& row : kStages) {
+    if (row.elapsed != nullptr) sum += times.*row.elapsed;
+  }
+  return sum;
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,192 @@
+#include "server/jobs/queue/estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "proto/json.h"
+#include "server/codec/formats.h"
+#include "server/jobs/library/stored_samples.h"
+#include "server/jobs/making/mesh_cost.h"
+#include "server/jobs/making/stage_times.h"
+
+namespace isomesh::jobs {
+namespace {
+
+// Calibrating looks at these many finished jobs, the youngest.
+constexpr std::size_t kJobsLookedAt = 50;
+
+double as_double(std::uint64_t count) { return static_cast<double>(count); }
+
+// Files of labels have the triangles of each label's own surface.
+SurfaceSize surface_in_files(const CountedSurface& counted) {
+  if (counted.labels.empty()) return counted.size;
+  SurfaceSize all;
+  for (const Estimate::Label& label : counted.labels) all.triangles += label.triangles;
+  all.vertices = all.triangles / 2;
+  return all;
+}
+
+SurfaceSize surface_in_files(const MeshSummary& mesh) {
+  CountedSurface counted = {.size = {mesh.triangles, mesh.vertices}};
+  for (const LabelSummary& label : mesh.labels) {
+    counted.labels.push_back({label.label, label.triangles});
+  }
+  return surface_in_files(counted);
+}
+
+// What tells surfaces of a volume apart beside iso-value, scheme and whether they are closed.
+std::string key_of_part(const MeshParameters& parameters) {
+  if (!parameters.labels && !parameters.crop && !parameters.regularize) return {};
+  MeshParameters part;
+  part.regularize = parameters.regularize;
+  // Which vertices are joined depends on where they lie.
+  if (part.regularize) part.interpolation = parameters.interpolation;
+  part.crop = parameters.crop;
+  part.labels = parameters.labels;
+  part.background = parameters.background;
+  part.label_values = parameters.label_values;
+  return to_json(part);
+}
+
+}  // namespace
+
+void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) {
+  if (!job.mesh || job.timing.encode <= 0) return;
+  const SurfaceSize surface = {job.mesh->triangles, job.mesh->vertices};
+  const auto add = [](Correction& correction, double seen, double guessed) {
+    correction.seen += seen;
+    correction.guessed += guessed;
+  };
+  SurfaceSize extracted = surface;
+  if (job.mesh->simplified) {
+    extracted.triangles = job.mesh->simplified->triangles_before;
+    extracted.vertices = extracted.triangles / 2;
+  }
+  const Timing guessed =
+      stage_times(extracted, surface, samples, job.parameters, job.parameters.certify);
+  for (std::size_t n = 0; n < kStages.size(); ++n) {
+    const auto elapsed = kStages[n].elapsed;
+    if (elapsed != nullptr) add(stages_[n], job.timing.*elapsed, guessed.*elapsed);
+  }
+  if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
+    add(share_, as_double(surface.triangles),
+        as_double(extracted.triangles) * share_within(*job.parameters.max_error_mm, spacing_mm));
+  }
+  if (job.mesh->labels_count) return;  // how many triangles their files have is not in the record
+  const SurfaceSize in_files = surface_in_files(*job.mesh);
+  for (const auto& [format, file] : job.mesh->files) {
+    add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),
+        codec::describe(format).bytes(in_files, job.parameters));
+  }
+}
+
+double CostModel::milliseconds(const SurfaceSize& surface, const SurfaceSize& written,
+                               std::uint64_t samples, const JobParameters& parameters) const {
+  const Timing times = stage_times(surface, written, samples, parameters, parameters.certify);
+  double sum = 0;
+  for (std::size_t n = 0; n < kStages.size(); ++n) {
+    const auto elapsed = kStages[n].elapsed;
+    if (elapsed != nullptr) sum += stages_[n].factor() * times.*elapsed;
+  }
+  return sum;
+}
+
+SurfaceSize CostModel::simplified(const SurfaceSize& surface, const MeshParameters& parameters,
+                                  double spacing_mm) const {
+  double share = 1;
+  if (parameters.max_error_mm) {
+    share = std::min(1.0, share_.factor() * share_within(*parameters.max_error_mm, spacing_mm));
+  }
+  double triangles = share * as_double(surface.triangles);
+  if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
+  SurfaceSize result = surface;
+  result.triangles = static_cast<std::uint64_t>(std::llround(triangles));
+  result.vertices = std::min(surface.vertices, result.triangles / 2);
+  return result;
+}
+
+std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surface,
+                                    const MeshParameters& parameters) const {
+  const auto found = files_.find(format);
+  const double factor = (found == files_.end() ? kFewBytes : found->second).factor();
+  return static_cast<std::uint64_t>(
+      std::llround(factor * codec::describe(format).bytes(surface, parameters)));
+}
+
+Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& parameters) {
+  const Volume volume = volumes_.get(viewer, parameters.volume);
+  Estimate estimate;
+  estimate.volume = volume.id;
+  const double iso = parameters.iso.value_or(volume.suggested_iso);
+  if (!parameters.labels) estimate.iso = iso;
+  estimate.scheme = parameters.scheme;
+  const CountedSurface counted = count(viewer, volume, parameters, iso);
+  const SurfaceSize& surface = counted.size;
+  if (counted.labels.size() <= MeshSummary::kMostListedLabels) {
+    estimate.labels = counted.labels;
+  } else {
+    estimate.labels_count = counted.labels.size();
+  }
+  estimate.triangles = surface.triangles;
+  estimate.vertices = surface.vertices;
+  estimate.memory_bytes = estimate_memory(surface, parameters, parameters.certify);
+  estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
+  const CostModel costs = model(viewer);
+  const double spacing_mm = std::ranges::min(volume.geometry.spacing);
+  const bool is_simplified = parameters.max_error_mm || parameters.triangles;
+  const SurfaceSize written =
+      is_simplified ? costs.simplified(surface, parameters, spacing_mm) : surface;
+  if (is_simplified) estimate.simplified_triangles = written.triangles;
+  estimate.milliseconds = costs.milliseconds(surface, written, volume.sample_count(), parameters);
+  SurfaceSize in_files = surface_in_files(counted);
+  if (is_simplified) in_files = costs.simplified(in_files, parameters, spacing_mm);
+  for (const MeshFormat format : files_of(parameters)) {
+    estimate.bytes[format] = costs.file_bytes(format, in_files, parameters);
+  }
+  const store::QueueDepth depth = jobs_.depth(viewer);
+  estimate.queue = {depth.all_queued(), depth.running};
+  return estimate;
+}
+
+CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volume,
+                                const MeshParameters& parameters, double iso) {
+  const auto find = [&] {
+    const std::stop_token stop = stop_.get_token();
+    const store::LocalBlob file = stored_samples(blobs_, volume.id, stop);
+    const JobOrder order = {.work = JobOrder::Work::kCount,
+                            .file = file.path,
+                            .volume = volume,
+                            .parameters = parameters,
+                            .iso = iso,
+                            .memory_bytes = limits_.memory_bytes};
+    return made_of_intact(blobs_, volume.id, stop, [&] {
+      const Lock lock(process_mutex_);
+      return process_.count(order, stop);
+    });
+  };
+  return *counts_.get(
+      {viewer, volume.id, iso, key_of_part(parameters), parameters.scheme, parameters.close}, find);
+}
+
+CostModel Estimator::model(const store::Viewer& viewer) const {
+  CostModel costs;
+  struct Known {
+    std::uint64_t samples = 0;
+    double spacing_mm = 1;
+  };
+  std::map<std::string, Known> samples;
+  for (const Job& job : jobs_.list(viewer, JobState::kSucceeded, "", kJobsLookedAt)) {
+    const std::string& id = job.parameters.volume;
+    if (!volumes_.contains(viewer, id)) continue;
+    const auto [known, is_new] = samples.try_emplace(id);
+    if (is_new) {
+      const Volume volume = volumes_.get(viewer, id);
+      known->second = {volume.sample_count(), std::ranges::min(volume.geometry.spacing)};
+    }
+    costs.learn(job, known->second.samples, known->second.spacing_mm);
+  }
+  return costs;
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,76 @@
+#include "server/jobs/queue/pipeline.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/jobs/library/stored_samples.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+// What the disk could hold of the files: the volume has to be there too.
+std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume) {
+  const std::uint64_t capacity = blobs.capacity();
+  return capacity - std::min(capacity, blobs.size(volume.id).value_or(0));
+}
+
+}  // namespace
+
+PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
+                            const PipelineLimits& limits, const store::BlobStore& blobs,
+                            JobProcess& process, std::stop_token stop, const Report& report) {
+  const auto began = Clock::now();
+  report(Stage::kLoad, 0, {});
+  const store::LocalBlob file = stored_samples(blobs, volume.id, stop);
+  const double checking = milliseconds_since(began);
+
+  // Committed together at the end: a job that ends on the way leaves no file of it.
+  std::vector<std::unique_ptr<store::BlobWriter>> writers;
+  std::vector<codec::Sink> sinks;
+  const std::vector<MeshFormat> files = files_of(parameters);
+  // One more than files: for the labels, if they are many.
+  for (std::size_t i = 0; i <= files.size(); ++i) {
+    store::BlobWriter& writer = *writers.emplace_back(blobs.begin());
+    sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
+  }
+  const auto with_checking = [&](Timing timing) {
+    timing.load += checking;
+    return timing;
+  };
+  const auto pass_on = [&](Stage stage, double share, const Timing& timing) {
+    report(stage, share, with_checking(timing));
+  };
+  const JobOrder order = {.file = file.path,
+                          .volume = volume,
+                          .parameters = parameters,
+                          .iso = parameters.iso.value_or(volume.suggested_iso),
+                          .certify = parameters.certify,
+                          .memory_bytes = limits.memory_bytes,
+                          .disk_bytes = disk_for_files(blobs, volume)};
+  MadeMesh made = made_of_intact(blobs, volume.id, stop,
+                                 [&] { return process.make(order, sinks, stop, pass_on); });
+  const auto stored = Clock::now();
+  PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const store::Blob blob = writers[i]->commit();
+    result.mesh.files[files[i]] = {blob.bytes, blob.key, ""};
+  }
+  if (result.mesh.labels_count) {
+    const store::Blob blob = writers.back()->commit();
+    result.mesh.label_list = {blob.bytes, blob.key};
+  }
+  result.timing.encode += milliseconds_since(stored);
+  report(Stage::kEncode, 1, result.timing);
+  return result;
+}
+
+}  // namespace isomesh::jobs

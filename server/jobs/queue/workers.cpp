@@ -1,0 +1,293 @@
+#include "server/jobs/queue/workers.h"
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include <unistd.h>
+
+#include "base/log.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+// How often a running job tells how far it is and learns that it is to stop.
+constexpr milliseconds kBetweenRenewals{100};
+constexpr milliseconds kBetweenReaps{1000};
+constexpr milliseconds kLongestIdle{1000};
+// How long a job that found the disk full waits before it is run again: the first time, and at
+// most. It doubles each time.
+constexpr milliseconds kFullDiskDelay{5000};
+constexpr milliseconds kLongestFullDiskDelay{60'000};
+// The same of one that found no descriptor or memory.
+constexpr milliseconds kExhaustedDelay{5000};
+// How long until a job's end that the queue could not take is told it again.
+constexpr milliseconds kEndRetry{500};
+
+// Why a run was asked to stop.
+enum class Reason { kNone, kCancelled, kLost, kTooLong, kFullDisk, kExhausted, kEnding };
+
+std::string worker_name(std::size_t thread) {
+  std::array<char, 256> host = {};
+  ::gethostname(host.data(), host.size() - 1);
+  return std::string(host.data()) + ':' + std::to_string(::getpid()) + ':' + std::to_string(thread);
+}
+
+void pause(const std::stop_token& stop, milliseconds time) {
+  Mutex mutex;
+  Lock lock(mutex);
+  Condition().wait_for(lock, stop, time, [] { return false; });
+}
+
+}  // namespace
+
+// A job under way, as its worker and the thread that looks after leases share it. Thread safe.
+class Workers::Run {
+ public:
+  explicit Run(const store::Lease& lease) : lease_(lease) {}
+
+  const store::Lease& lease() const { return lease_; }
+  std::stop_token token() const { return stop_.get_token(); }
+  Reason reason() const { return reason_; }
+  Clock::duration age() const { return Clock::now() - began_; }
+
+  // Only the first reason counts.
+  void stop(Reason reason) {
+    Reason none = Reason::kNone;
+    reason_.compare_exchange_strong(none, reason);
+    stop_.request_stop();
+  }
+
+  // True when it is in another stage than before.
+  bool advance(const store::Progress& progress) {
+    const Lock lock(mutex_);
+    const bool is_other_stage = progress.stage != progress_.stage;
+    progress_ = progress;
+    return is_other_stage;
+  }
+
+  // Prolongs the lease unless the run is over, and stops the run when it is not to go on.
+  void renew(store::JobStore& jobs, milliseconds lease) {
+    const Lock renewing(renewal_);
+    if (is_over_) return;
+    const store::Standing standing = jobs.renew(lease_, progress(), lease);
+    if (standing == store::Standing::kCancel) stop(Reason::kCancelled);
+    if (standing == store::Standing::kLost) stop(Reason::kLost);
+  }
+
+  // No renewal is under way any more, and none begins.
+  void end() {
+    const Lock renewing(renewal_);
+    is_over_ = true;
+  }
+
+ private:
+  store::Progress progress() const {
+    const Lock lock(mutex_);
+    return progress_;
+  }
+
+  const store::Lease lease_;
+  const Clock::time_point began_ = Clock::now();
+  std::stop_source stop_;
+  std::atomic<Reason> reason_ = Reason::kNone;
+  mutable Mutex mutex_;
+  store::Progress progress_ ISOMESH_GUARDED_BY(mutex_);
+  Mutex renewal_;
+  bool is_over_ ISOMESH_GUARDED_BY(renewal_) = false;
+};
+
+Workers::Workers(const WorkerOptions& options, store::JobStore& jobs,
+                 const store::VolumeStore& volumes, const store::BlobStore& blobs)
+    : options_(options), jobs_(jobs), volumes_(volumes), blobs_(blobs), alive_(options.threads) {
+  try {
+    for (std::size_t i = 0; i < options.threads; ++i) {
+      threads_.emplace_back([this, i] { work(claims_.get_token(), worker_name(i)); });
+    }
+    leases_ = std::jthread([this](const std::stop_token& stop) { look_after_leases(stop); });
+  } catch (...) {
+    end_threads();  // or those that did start would work on
+    throw;
+  }
+}
+
+Workers::~Workers() { end_threads(); }
+
+void Workers::end_threads() {
+  claims_.request_stop();
+  running_.request_stop();
+  threads_.clear();  // the leases are looked after until the last has ended
+}
+
+bool Workers::drain(milliseconds wait) {
+  claims_.request_stop();
+  Lock lock(alive_mutex_);
+  return ended_.wait_for(lock, wait,
+                         [this]() ISOMESH_REQUIRES(alive_mutex_) { return alive_ == 0; });
+}
+
+void Workers::work(const std::stop_token& stop, const std::string& name) {
+  JobProcess process(options_.program);
+  while (!stop.stop_requested()) {
+    try {
+      if (!blobs_.has_room()) {
+        pause(stop, kLongestIdle);
+      } else if (const auto lease = jobs_.claim(name, options_.lease)) {
+        run(*lease, process);
+      } else {
+        jobs_.wait_for_work(stop, kLongestIdle);
+      }
+    } catch (const std::exception& error) {
+      log_error("the queue cannot be read and is retried: {}", error.what());
+      pause(stop, kLongestIdle);
+    }
+  }
+  const Lock lock(alive_mutex_);
+  --alive_;
+  ended_.notify_all();
+}
+
+void Workers::run(const store::Lease& lease, JobProcess& process) {
+  const auto run = std::make_shared<Run>(lease);
+  {
+    const Lock lock(runs_mutex_);
+    runs_.push_back(run);
+  }
+  const std::stop_callback on_end(running_.get_token(), [&] { run->stop(Reason::kEnding); });
+  const std::string path = "/v1/jobs/" + lease.id;
+  store::Outcome outcome;
+  try {
+    const Volume volume = volumes_.get(lease.owner, lease.parameters.volume);
+    PipelineResult result =
+        run_pipeline(volume, lease.parameters, options_.limits, blobs_, process, run->token(),
+                     [&](Stage stage, double share, const Timing& so_far) {
+                       if (run->advance({stage, share, so_far})) renew(*run);
+                     });
+    outcome.mesh = std::move(result.mesh);
+    outcome.timing = result.timing;
+  } catch (const ProcessEnded& end) {
+    outcome.error = to_problem(end, path);
+    outcome.error->detail = end.what();  // of the job rather than of the service, so it is told
+    outcome.may_retry = true;
+    log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, end.what());
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kOutOfSpace) run->stop(Reason::kFullDisk);
+    if (error.code() == ErrorCode::kUnavailable) run->stop(Reason::kExhausted);
+    if (error.code() != ErrorCode::kCancelled) {
+      outcome.error = to_problem(error, path);
+      outcome.may_retry = error.code() == ErrorCode::kInternal;
+      log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
+    }
+  } catch (const std::bad_alloc&) {
+    // The service's memory, not the job's.
+    run->stop(Reason::kExhausted);
+    log_error("job {}, attempt {} failed: the service is out of memory", lease.id, lease.attempt);
+  } catch (const std::exception& error) {
+    outcome.error = to_problem({ErrorCode::kInternal, error.what()}, path);
+    outcome.may_retry = true;
+    log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
+  }
+  run->end();
+  {
+    const Lock lock(runs_mutex_);
+    std::erase(runs_, run);
+    if (run->reason() != Reason::kFullDisk) full_disk_delays_.erase(lease.id);
+  }
+  conclude(*run, outcome);
+}
+
+// Tells the queue how the run ended, and again while its disk has no room for that or it does not
+// answer.
+void Workers::conclude(const Run& run, store::Outcome outcome) {
+  const store::Lease& lease = run.lease();
+  const bool was_stopped = !outcome.mesh && !outcome.error;
+  if (was_stopped && run.reason() == Reason::kTooLong) {
+    const std::string minutes = std::to_string(options_.longest_job.count());
+    outcome.error = to_problem(
+        {ErrorCode::kTooLarge, "the job took longer than the " + minutes + " minutes allowed"},
+        "/v1/jobs/" + lease.id);
+  }
+  const auto tell = [&] {
+    // Without an outcome it would end cancelled, should the lease hold after all.
+    if (was_stopped && run.reason() == Reason::kLost) return false;
+    if (was_stopped && run.reason() == Reason::kEnding) {
+      return jobs_.put_back(lease, milliseconds(0));
+    }
+    if (!outcome.mesh && run.reason() == Reason::kFullDisk) {
+      const milliseconds delay = full_disk_delay(lease.id);
+      log_warning("job {} waits {} s for disk space", lease.id, delay.count() / 1000);
+      return jobs_.put_back(lease, delay, WaitingFor::kDisk);
+    }
+    if (!outcome.mesh && run.reason() == Reason::kExhausted) {
+      return jobs_.put_back(lease, kExhaustedDelay);
+    }
+    return jobs_.finish(lease, outcome);
+  };
+  while (true) {
+    try {
+      if (!tell()) log_warning("job {} lost its lease; its result is discarded", lease.id);
+      return;
+    } catch (const Error& error) {
+      const bool may_pass =
+          error.code() == ErrorCode::kOutOfSpace || error.code() == ErrorCode::kUnavailable;
+      if (!may_pass || running_.stop_requested()) throw;
+      log_error("the end of job {} could not be recorded and is retried: {}", lease.id,
+                error.what());
+    }
+    pause(running_.get_token(), kEndRetry);
+  }
+}
+
+// Known to this process only: after a restart it is tried again soon.
+milliseconds Workers::full_disk_delay(const std::string& job) {
+  const Lock lock(runs_mutex_);
+  milliseconds& next = full_disk_delays_.try_emplace(job, kFullDiskDelay).first->second;
+  const milliseconds delay = next;
+  next = std::min(2 * next, kLongestFullDiskDelay);
+  return delay;
+}
+
+void Workers::renew(Run& run) {
+  try {
+    run.renew(jobs_, options_.lease);
+  } catch (const std::exception& error) {
+    log_error("the lease of job {} could not be renewed: {}", run.lease().id, error.what());
+  }
+}
+
+void Workers::look_after_leases(const std::stop_token& stop) {
+  auto last_reap = Clock::now();
+  while (!stop.stop_requested()) {
+    std::vector<std::shared_ptr<Run>> runs;
+    {
+      const Lock lock(runs_mutex_);
+      runs = runs_;
+    }
+    for (const auto& run : runs) {
+      if (run->age() > options_.longest_job) run->stop(Reason::kTooLong);
+      renew(*run);
+    }
+    if (Clock::now() - last_reap > kBetweenReaps) {
+      last_reap = Clock::now();
+      reap();
+    }
+    pause(stop, kBetweenRenewals);
+  }
+}
+
+void Workers::reap() {
+  try {
+    if (const std::size_t count = jobs_.reap())
+      log_warning("{} leases expired; their jobs are run again", count);
+  } catch (const std::exception& error) {
+    log_error("expired leases could not be released and are retried: {}", error.what());
+  }
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/mutex.h"
+#include "server/jobs/queue/pipeline.h"
+#include "server/store/blob_store.h"
+#include "server/store/job_store.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::jobs {
+
+struct WorkerOptions {
+  std::size_t threads = 2;
+  JobProgram program = {};
+  PipelineLimits limits = {};
+  std::chrono::milliseconds lease{30'000};  // how soon a dead worker's job is run again
+  std::chrono::minutes longest_job{60};     // one that runs longer fails
+};
+
+// The threads that run jobs, one job each at a time, in a process that each keeps. One more thread
+// prolongs their leases and looks after those that ran out. The stores must outlive it. Thread
+// safe.
+class Workers {
+ public:
+  Workers(const WorkerOptions& options, store::JobStore& jobs, const store::VolumeStore& volumes,
+          const store::BlobStore& blobs);
+
+  // Running jobs are stopped and put back; returns when all threads have ended.
+  ~Workers();
+
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  // No job is begun any more; returns when no job runs or `wait` is over. True when none runs.
+  bool drain(std::chrono::milliseconds wait);
+
+ private:
+  class Run;
+
+  void work(const std::stop_token& stop, const std::string& name);
+  void run(const store::Lease& lease, JobProcess& process);
+  void conclude(const Run& run, store::Outcome outcome);
+  std::chrono::milliseconds full_disk_delay(const std::string& job);
+  void renew(Run& run);
+  void look_after_leases(const std::stop_token& stop);
+  void reap();
+  void end_threads();
+
+  const WorkerOptions options_;
+  store::JobStore& jobs_;
+  const store::VolumeStore& volumes_;
+  const store::BlobStore& blobs_;
+  std::stop_source claims_;   // ends the taking of jobs
+  std::stop_source running_;  // interrupts those that run
+  Mutex alive_mutex_;
+  Condition ended_;
+  std::size_t alive_ ISOMESH_GUARDED_BY(alive_mutex_);  // threads that may still run a job
+  Mutex runs_mutex_;
+  std::vector<std::shared_ptr<Run>> runs_ ISOMESH_GUARDED_BY(runs_mutex_);  // under way
+  // How long jobs that wait for room on the disk wait the next time.
+  std::map<std::string, std::chrono::milliseconds> full_disk_delays_
+      ISOMESH_GUARDED_BY(runs_mutex_);
+  std::vector<std::jthread> threads_;
+  std::jthread leases_;  // last: joined first
+};
+
+}  // namespace isomesh::jobs
