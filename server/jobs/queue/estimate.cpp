@@ -16,8 +16,6 @@ namespace {
 // Calibrating looks at these many finished jobs, the youngest.
 constexpr std::size_t kJobsLookedAt = 50;
 
-double as_double(std::uint64_t count) { return static_cast<double>(count); }
-
 // Files of labels have the triangles of each label's own surface.
 SurfaceSize surface_in_files(const CountedSurface& counted) {
   if (counted.labels.empty()) return counted.size;
@@ -70,13 +68,14 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
     if (elapsed != nullptr) add(stages_[n], job.timing.*elapsed, guessed.*elapsed);
   }
   if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
-    add(share_, as_double(surface.triangles),
-        as_double(extracted.triangles) * share_within(*job.parameters.max_error_mm, spacing_mm));
+    add(share_, static_cast<double>(surface.triangles),
+        static_cast<double>(extracted.triangles) *
+            share_within(*job.parameters.max_error_mm, spacing_mm));
   }
   if (job.mesh->labels_count) return;  // how many triangles their files have is not in the record
   const SurfaceSize in_files = surface_in_files(*job.mesh);
   for (const auto& [format, file] : job.mesh->files) {
-    add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),
+    add(files_.try_emplace(format, kFewBytes).first->second, static_cast<double>(file.bytes),
         codec::describe(format).bytes(in_files, job.parameters));
   }
 }
@@ -98,7 +97,7 @@ SurfaceSize CostModel::simplified(const SurfaceSize& surface, const MeshParamete
   if (parameters.max_error_mm) {
     share = std::min(1.0, share_.factor() * share_within(*parameters.max_error_mm, spacing_mm));
   }
-  double triangles = share * as_double(surface.triangles);
+  double triangles = share * static_cast<double>(surface.triangles);
   if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
   SurfaceSize result = surface;
   result.triangles = static_cast<std::uint64_t>(std::llround(triangles));
