@@ -22,7 +22,7 @@ struct PipelineLimits {
 };
 
 // Changes whenever the same volume and parameters would give other bytes than before.
-inline constexpr const char* kMesherVersion = "8";
+inline constexpr const char* kMesherVersion = "9";
 
 // Has `process` load the volume's samples, extract, smooth and encode in every format, and stores
 // the results. The mesh is the same to the byte for the same volume and parameters. Throws Error

@@ -55,7 +55,9 @@ struct WallSides {
 };
 
 // The walls between all labels. `mesh` has the layers that mesh.h tells of; it is no manifold where
-// three labels meet: mesh.on_line are the vertices in faces and centres. Of a closed surface,
+// three labels meet: mesh.on_line are the vertices in faces and centres, and those that such
+// vertices were joined in. An edge between two of them lies on a curve if three triangles have it;
+// two do if it crosses a wall, which happens where vertices were joined. Of a closed surface,
 // mesh.on_border are the vertices of the caps and all others in the faces of the box of the
 // samples. The walls around one label alone are an oriented manifold: see label_surface.h.
 struct SeparatingSurface {
