@@ -173,18 +173,17 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
             .jobs = JobKind::kAtIso,
             .may_be_absent = true},
         self.interpolation);
-    parameter(
-        Parameter{
-            .name = "regularize",
-            .title = "Join nearby vertices",
-            .help = "Join the vertices around a sample where that keeps the topology.",
-            .more = "The surface has about a third as many triangles, with larger angles. It keeps "
-                    "its connected components, its boundary and its genus. Vertices at the "
-                    "volume's border stay where they are.",
-            .jobs = JobKind::kAtIso,
-            .may_be_absent = true},
-        self.regularize);
   }
+  parameter(
+      Parameter{.name = "regularize",
+                .title = "Join nearby vertices",
+                .help = "Join the vertices around a sample where that keeps the topology.",
+                .more = "The surface has about a third as many triangles, with larger angles. It "
+                        "keeps its connected components, its boundary and its genus. Vertices at "
+                        "the volume's border stay where they are. The same holds for the own "
+                        "surface of each label.",
+                .may_be_absent = true},
+      self.regularize);
   parameter(Parameter{.name = "passes",
                       .title = "Passes",
                       .help = "Number of smoothing passes.",

@@ -203,7 +203,6 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   refuse_if(json.contains("interpolation") && parameters.interpolation == Interpolation::kLinear,
             "interpolation",
             "must be \"midpoint\" for labels: there are no values between two labels");
-  refuse_if(parameters.regularize, "regularize", "cannot be combined with labels");
   refuse_if(!parameters.components.keeps_all(), "components",
             "cannot be combined with labels: a dropped component would leave a hole in its "
             "neighbours");

@@ -371,7 +371,6 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
   for (const Parameter& parameter : added) relate(parameter, options);
   CLI::Option* const labels = options.at("labels");
   options.at("interpolation")->excludes(labels);  // vertices of labels lie half-way
-  options.at("regularize")->excludes(labels);
   app.parse_complete_callback(
       [&parameters, kept, labels, iso = options.at("iso"), passes = options.at("passes")] {
         if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");

@@ -311,6 +311,13 @@ testing::AssertionResult matches(const mesh::SeparatingSurface& surface,
   return testing::AssertionFailure() << complaint;
 }
 
+std::vector<std::uint32_t> names_of_vertices(const mesh::Mesh& mesh,
+                                             const LabelReference& reference) {
+  std::vector<std::uint32_t> names;
+  name_vertices(mesh, reference, names);
+  return names;
+}
+
 template LabelReference label_reference(const mesh::Lattice<std::uint8_t>&,
                                         const mesh::SeparateOptions&);
 template LabelReference label_reference(const mesh::Lattice<std::int8_t>&,

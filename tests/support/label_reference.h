@@ -51,4 +51,9 @@ LabelReference label_reference(const mesh::Lattice<T>& lattice,
 testing::AssertionResult matches(const mesh::SeparatingSurface& surface,
                                  const LabelReference& reference);
 
+// The reference's vertex in the place of each vertex of a mesh that matches it; fewer if one is not
+// there.
+std::vector<std::uint32_t> names_of_vertices(const mesh::Mesh& mesh,
+                                             const LabelReference& reference);
+
 }  // namespace isomesh::test

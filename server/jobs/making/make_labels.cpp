@@ -35,8 +35,10 @@ auto with_label(SampleType type, const Use& use) {
 
 mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& labels,
                                        const MeshParameters& parameters) {
-  mesh::SeparateOptions options = {
-      .labels = {}, .scheme = parameters.scheme, .close = parameters.close};
+  mesh::SeparateOptions options = {.labels = {},
+                                   .scheme = parameters.scheme,
+                                   .close = parameters.close,
+                                   .regularize = parameters.regularize};
   for (const mesh::LabelVoxels& label : labels) {
     options.labels.push_back(label.label);
     const auto values = parameters.label_values.find(label.label);

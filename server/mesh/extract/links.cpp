@@ -200,6 +200,23 @@ bool Links::clash(unsigned parity, std::size_t direction, Directions mine,
   return (ring_sets(ring.size).runs >> both & 1) == 0;
 }
 
+Directions Links::clashing(unsigned parity, std::size_t direction, Directions mine,
+                           Directions theirs) const {
+  const auto& step = directions_[direction].step;
+  const unsigned there = (parity + static_cast<unsigned>(step[0] + step[1] + step[2])) & 1;
+  Directions found = 0;
+  for (Directions rest = mine; rest != 0;) {
+    const Directions one = facts(parity, rest).first();
+    rest &= ~one;
+    for (Directions others = theirs; others != 0;) {
+      const Directions other = facts(there, others).first();
+      others &= ~other;
+      if (clash(parity, direction, one, other)) found |= one;
+    }
+  }
+  return found;
+}
+
 const Links& links_of(Scheme scheme) {
   static const Links six(Scheme::kSix);
   static const Links five(Scheme::kFive);

@@ -118,7 +118,11 @@ class Links {
   // Whether components `mine` of a sample and `theirs` of its neighbour in a direction clash.
   bool clash(unsigned parity, std::size_t direction, Directions mine, Directions theirs) const;
 
- private:
+  // Those of the components in `mine` of a sample that clash with one in `theirs` of its neighbour
+  // in a direction.
+  Directions clashing(unsigned parity, std::size_t direction, Directions mine,
+                      Directions theirs) const;
+
   // The directions to both a sample and one of its neighbours, in cyclic order: as the sample and
   // as the neighbour number them.
   struct Ring {
@@ -127,6 +131,16 @@ class Links {
     std::array<std::uint8_t, 6> theirs = {};
   };
 
+  const Ring& ring(unsigned parity, std::size_t direction) const {
+    return link_of(parity).rings[direction];
+  }
+
+  // The triangles of a sample's link, three directions each, one for each tetrahedron around the
+  // sample: of those in its own layer, and in the layer below.
+  std::span<const Directions> above(unsigned parity) const { return link_of(parity).above; }
+  std::span<const Directions> below(unsigned parity) const { return link_of(parity).below; }
+
+ private:
   struct Link {
     Directions existing = 0;
     std::array<Directions, kMostDirections> adjacent = {};  // neighbours that are neighbours

@@ -19,6 +19,7 @@
 
 #include <hwy/highway.h>
 
+#include "server/mesh/extract/joined_rows-inl.h"
 #include "server/mesh/extract/links.h"
 #include "server/mesh/extract/signs-inl.h"
 #include "server/mesh/extract/slabs.h"
@@ -52,28 +53,10 @@ class RegularCellWriter {
   HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const SignCells& cells,
                              const std::uint32_t* places, Triangle* out) const {
     const CellCase& cell = splits_[row_.parity_at(x)].cases[cells.cases[bit]];
-    if (end_ - out > static_cast<std::ptrdiff_t>(kMostTriangles)) return keep(cell, places, out);
-    std::array<Triangle, kMostTriangles + 1> all;
-    const Triangle* last = keep(cell, places, all.data());
-    return std::copy(static_cast<const Triangle*>(all.data()), last, out);
+    return write_kept(cell, places, offsets_, end_, out);
   }
 
  private:
-  // One more than is kept may be written. No branch tells which those are: none could be foreseen.
-  HWY_INLINE Triangle* keep(const CellCase& cell, const std::uint32_t* places,
-                            Triangle* out) const {
-    for (std::size_t t = 0; t < cell.triangles; ++t) {
-      const auto& [first, second, third] = cell.edges[t];
-      const std::uint32_t a = places[offsets_[first]];
-      const std::uint32_t b = places[offsets_[second]];
-      const std::uint32_t c = places[offsets_[third]];
-      *out = {a, b, c};
-      out += static_cast<unsigned>(a != b) & static_cast<unsigned>(b != c) &
-             static_cast<unsigned>(c != a);
-    }
-    return out;
-  }
-
   const std::array<CellSplit, 2>& splits_;
   const SignRow row_;
   const EdgeOffsets& offsets_;
@@ -90,9 +73,7 @@ class RegularField : public SignField {
         extraction_(extraction),
         dims_(extraction.dims),
         links_(links_of(extraction.scheme)),
-        rows_(std::size_t{dims_.y} + 2),
-        joined_(rows_ * dims_.x),
-        next_row_(std::size_t{first} * dims_.y),
+        joined_(dims_, first),
         edges_(std::size_t{dims_.x} * kMostDirections),
         sizes_(edges_.size()) {
     const auto directions = links_.directions();
@@ -103,7 +84,7 @@ class RegularField : public SignField {
         const unsigned owner = parity ^ (std::popcount(direction.corner) & 1U);
         const EdgeEnds ends = extraction.splits[owner].ends[direction.place];
         const std::ptrdiff_t to_owner = -sample_offset(extraction.inner, direction.corner);
-        steps_[d] = {static_cast<std::uint8_t>(direction.corner >> 1),
+        names_[d] = {static_cast<std::uint8_t>(direction.corner >> 1),
                      static_cast<std::uint8_t>(direction.corner & 1), direction.place};
         const std::size_t place = parity * kClusterPlaces + d;
         ends_[place] = {to_owner + sample_offset(extraction.inner, ends.from),
@@ -115,7 +96,7 @@ class RegularField : public SignField {
   }
 
   RegularRow row(std::uint32_t y, std::uint32_t z) const {
-    return {SignField::row(y, z), &joined_[joined_row(std::size_t{z} * dims_.y + y)]};
+    return {SignField::row(y, z), joined_.row(y, z)};
   }
 
   RegularCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
@@ -126,70 +107,50 @@ class RegularField : public SignField {
 
   // Gives the clusters of a row the vertices from `vertex` on and writes those to the edges that
   // are joined; `rows` are the indices of the samples of the rows (y, z), (y - 1, z), (y, z - 1)
-  // and (y - 1, z - 1). Places the vertices unless `positions` is null. Returns the vertex behind
+  // and (y - 1, z - 1). Places the vertices in `mesh` unless it is null. Returns the vertex behind
   // them. Afterwards row(y, z) can be asked for. To be called row by row.
   std::uint32_t number_clusters(std::uint32_t y, std::uint32_t z,
                                 const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
-                                Vec3* positions) {
-    mark_joined(y, z);
+                                Mesh* mesh) {
+    joined_.mark(extraction_.clusters, y, z,
+                 [&](const JoiningSample& sample, std::uint32_t /*y*/, std::uint32_t /*z*/,
+                     const JoinedPoints* /*none*/, auto visit) {
+                   for (Directions rest = sample.directions & ~JoiningSample::kFlags; rest != 0;
+                        rest &= rest - 1) {
+                     visit(names_[static_cast<unsigned>(std::countr_zero(rest))]);
+                   }
+                 });
+    const std::uint32_t first = vertex;
     std::uint32_t* edge = edges_.data();
     std::uint8_t* size = sizes_.data();
-    visit_clusters(y, z, [&](std::size_t x, Directions joined) {
-      const bool is_one = (joined & JoiningSample::kSeveral) == 0;
-      joined &= ~JoiningSample::kSeveral;
-      while (joined != 0) {
-        const Directions component =
-            is_one ? joined : links_.facts(extraction_.parity(x, y, z), joined).first();
-        joined &= ~component;
-        *size++ = static_cast<std::uint8_t>(std::popcount(component));
-        for (Directions rest = component; rest != 0; rest &= rest - 1) {
-          const auto d = static_cast<unsigned>(std::countr_zero(rest));
-          const Step& step = steps_[d];
-          rows[step.row][(x - step.before) * kEdgePlaces + step.place] = vertex;
-          *edge++ = static_cast<std::uint32_t>(x) * kClusterPlaces + d;
-        }
-        ++vertex;
-      }
-    });
+    visit_joining(
+        extraction_.clusters, y, z, [&](const JoiningSample& sample, const JoinedPoints* /*none*/) {
+          const std::size_t x = sample.x;
+          const bool is_one = (sample.directions & JoiningSample::kSeveral) == 0;
+          Directions joined = sample.directions & ~JoiningSample::kFlags;
+          while (joined != 0) {
+            const Directions component =
+                is_one ? joined : links_.facts(extraction_.parity(x, y, z), joined).first();
+            joined &= ~component;
+            *size++ = static_cast<std::uint8_t>(std::popcount(component));
+            for (Directions rest = component; rest != 0; rest &= rest - 1) {
+              const auto d = static_cast<unsigned>(std::countr_zero(rest));
+              const JoinedName& name = names_[d];
+              rows[name.row][(x - name.before) * kEdgePlaces + name.place] = vertex;
+              *edge++ = static_cast<std::uint32_t>(x) * kClusterPlaces + d;
+            }
+            ++vertex;
+          }
+        });
     clusters_ = static_cast<std::size_t>(size - sizes_.data());
-    if (positions != nullptr && clusters_ != 0) {
-      place_clusters(y, z, {edges_.data(), edge}, positions);
+    if (mesh != nullptr && clusters_ != 0) {
+      place_clusters(y, z, {edges_.data(), edge}, mesh->positions.data() + first);
     }
     return vertex;
   }
 
  private:
   static constexpr std::uint32_t kClusterPlaces = 32;  // a sample, for its directions
-
-  // Where the edge of a direction is: in which of the rows (y, z), (y - 1, z), (y, z - 1) and
-  // (y - 1, z - 1), how many samples before, and its own direction.
-  struct Step {
-    std::uint8_t row = 0;
-    std::uint8_t before = 0;
-    std::uint8_t place = 0;
-  };
-
-  // Marks what the clusters of the rows around (y, z) join: the rest of the edges of that row then
-  // have vertices of their own.
-  void mark_joined(std::uint32_t y, std::uint32_t z) {
-    const std::size_t last = std::size_t{z + 1} * dims_.y + y + 1;
-    for (; next_row_ <= last; ++next_row_) {
-      std::uint8_t* here = &joined_[joined_row(next_row_)];
-      std::fill_n(here, dims_.x, std::uint8_t{0});
-      const auto row_z = static_cast<std::uint32_t>(next_row_ / dims_.y);
-      const auto row_y = static_cast<std::uint32_t>(next_row_ % dims_.y);
-      visit_clusters(row_y, row_z, [&](std::size_t x, Directions joined) {
-        const std::array<std::uint8_t*, 4> rows = {here, &joined_[joined_row(next_row_ - 1)],
-                                                   &joined_[joined_row(next_row_ - dims_.y)],
-                                                   &joined_[joined_row(next_row_ - dims_.y - 1)]};
-        for (Directions rest = joined & ~JoiningSample::kSeveral; rest != 0; rest &= rest - 1) {
-          const Step& step = steps_[static_cast<unsigned>(std::countr_zero(rest))];
-          std::uint8_t& edges = rows[step.row][x - step.before];
-          edges = static_cast<std::uint8_t>(edges | 1U << step.place);
-        }
-      });
-    }
-  }
 
   // The means of the crossings of each cluster.
   void place_clusters(std::uint32_t y, std::uint32_t z, std::span<const std::uint32_t> edges,
@@ -218,27 +179,13 @@ class RegularField : public SignField {
     }
   }
 
-  // Calls visit(x, the directions in which it joins crossings) for the samples of a row.
-  template <class Visit>
-  void visit_clusters(std::uint32_t y, std::uint32_t z, Visit visit) const {
-    if (z >= extraction_.clusters.size() || extraction_.clusters[z].samples.empty()) return;
-    const ClusterLayer& layer = extraction_.clusters[z];
-    for (std::uint32_t i = layer.row_begin[y]; i < layer.row_begin[y + 1]; ++i) {
-      visit(std::size_t{layer.samples[i].x}, layer.samples[i].directions);
-    }
-  }
-
-  std::size_t joined_row(std::size_t row) const { return row % rows_ * dims_.x; }
-
   const Extraction& extraction_;
   const Dims dims_;
   const Links& links_;
-  const std::size_t rows_;
-  std::vector<std::uint8_t> joined_;  // of each sample of the last rows that were marked
-  std::size_t next_row_;              // the first that is not
+  JoinedRows<std::uint8_t> joined_;
   std::array<EdgeSamples, std::size_t{2}* kClusterPlaces> ends_ = {};  // by parity and direction
   std::array<EdgeFrame, std::size_t{2}* kClusterPlaces> frames_ = {};
-  std::array<Step, kMostDirections> steps_ = {};
+  std::array<JoinedName, kMostDirections> names_ = {};
   // Of the row that is numbered: the edges of its clusters, one after the other, as
   // kClusterPlaces * x + direction, and how many each has.
   std::vector<std::uint32_t> edges_;

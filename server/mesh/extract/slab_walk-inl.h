@@ -9,7 +9,6 @@
 #endif
 
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -110,8 +109,8 @@ class SlabWriter {
       // Some edges of a cluster belong to samples of the rows behind and below.
       const std::array rows = {rows_.indices(y, z), rows_.indices(y - 1, z),
                                rows_.indices(y, z - 1), rows_.indices(y - 1, z - 1)};
-      Vec3* positions = z < slab_.end ? mesh_.positions.data() + vertex : nullptr;
-      vertex = field_.number_clusters(y, z, rows, vertex, positions);
+      Output* output = z < slab_.end ? &output_ : nullptr;
+      vertex = field_.number_clusters(y, z, rows, vertex, output);
     }
     find_vertices(y, z);
     std::uint32_t* indices = rows_.indices(y, z);
@@ -201,12 +200,6 @@ class SlabWriter {
     for (std::size_t i = 0; i < vertices_found_; ++i) {
       if (vertices_[i] % kPlaces >= kEdgePlaces) set_flag(mesh_.on_line, vertex + i);
     }
-  }
-
-  // Another slab may have its vertices' bits in the same word.
-  static void set_flag(std::vector<std::uint64_t>& flags, std::size_t vertex) {
-    std::atomic_ref(flags[vertex / kFlagBits])
-        .fetch_or(Word{1} << (vertex % kFlagBits), std::memory_order_relaxed);
   }
 
   Triangle* write_triangles(std::uint32_t y, std::uint32_t z, Triangle* out) {

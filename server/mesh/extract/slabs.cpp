@@ -9,8 +9,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "server/mesh/extract/clusters-inl.h"
 #include "server/mesh/extract/regular-inl.h"
+#include "server/mesh/extract/sign_clusters-inl.h"
 #include "server/mesh/extract/signs-inl.h"
 #include "server/mesh/extract/slab_walk-inl.h"
 
@@ -18,7 +18,7 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
 void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
-  if (extraction.regularize) return ClusterWalk(extraction, slab, count).count();
+  if (extraction.regularize) return ClusterWalk<SignClusters>(extraction, slab, count).count();
   count_slab_of<SignField>(extraction, slab, count);
 }
 

@@ -31,6 +31,9 @@ class LabelParts {
 
   std::size_t labels() const { return labels_; }
 
+  // Whether some part belongs to several labels, or some label has several parts.
+  bool overlap() const { return !members_.empty(); }
+
   // Calls visit(number of the label, whether `front` belongs to it) for each label that one of the
   // two parts belongs to and the other does not: those between which a wall is. From 1 on.
   template <class Visit>

@@ -84,6 +84,13 @@ HWY_INLINE Word differing(const PartNumber* a, const PartNumber* b) {
   return pack_word(flags);
 }
 
+// Those that have a larger one in `a` than in `b`.
+HWY_INLINE Word larger(const PartNumber* a, const PartNumber* b) {
+  std::array<std::uint8_t, kWordBits> flags;
+  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] > b[x] ? 1 : 0;
+  return pack_word(flags);
+}
+
 }  // namespace isomesh::mesh::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -6,23 +6,39 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "server/mesh/extract/clusters-inl.h"
+#include "server/mesh/extract/slab_passes.h"
 #include "server/mesh/extract/slab_walk-inl.h"
+#include "server/mesh/labels/label_clusters-inl.h"
 #include "server/mesh/labels/labels-inl.h"
+#include "server/mesh/labels/regular_labels-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
 void count_labels(const Separation& separation, const Slab& slab, SurfaceCount& count) {
+  if (separation.regularize) return ClusterWalk<LabelClusters>(separation, slab, count).count();
   count_slab_of<LabelField>(separation, slab, count);
 }
 
 void tally_labels(const Separation& separation, const Slab& slab,
                   std::span<std::uint64_t> triangles) {
   tally_slab_of(separation, slab, triangles);
+  if (!separation.regularize) return;
+  // A sample's clusters take triangles from two layers, so a part of this may be less than zero;
+  // the sum of all parts is not.
+  SurfaceCount count = empty_count(separation.dims.z);
+  count.clusters.resize(separation.dims.z);
+  ClusterWalk<LabelClusters> walk(separation, slab, count);
+  walk.rule().tally_into(triangles);
+  walk.count();
 }
 
 void write_labels(const Separation& separation, const Slab& slab, IndexMemory& memory,
                   SeparatingSurface& surface) {
+  if (separation.regularize) {
+    return write_slab_of<RegularLabelField>(separation, slab, memory, surface);
+  }
   write_slab_of<LabelField>(separation, slab, memory, surface);
 }
 

@@ -18,14 +18,17 @@ struct Separation : Marching {
   template <class T>
   Separation(const Lattice<T>& lattice, const SeparateOptions& options)
       : Marching(lattice.dims, lattice.to_space, options.scheme, options.close),
+        regularize(options.regularize),
         parts(options.labels, options.values),
         samples(std::make_unique<PartsOf<T>>(lattice, parts)),
         walls({make_wall_cases(options.scheme, false, to_space.determinant() < 0),
                make_wall_cases(options.scheme, true, to_space.determinant() < 0)}) {}
 
+  bool regularize;
   LabelParts parts;
   std::unique_ptr<const SampleParts> samples;
-  std::array<WallCases, 2> walls;  // by parity, wound for the lattice
+  std::array<WallCases, 2> walls;          // by parity, wound for the lattice
+  std::span<const ClusterLayer> clusters;  // of walls that are regularised, when they are written
 };
 
 void count_slab(const Separation& separation, const Slab& slab, SurfaceCount& count);

@@ -82,17 +82,20 @@ class LabelRow : public RowShape {
   // returned are valid.
   HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const LabelCells& cells,
                                  std::uint32_t* next) const {
-    const auto first = static_cast<std::uint32_t>(x * kSlotPlaces);
-    if ((cells.several >> bit & 1) == 0) {
-      const unsigned directions = splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x);
-      const auto& members = kMembers[directions];
-      for (std::size_t i = 0; i < members.size(); ++i) next[i] = first + members[i];
-      return next + std::popcount(directions);
-    }
-    for (std::uint32_t slots = slots_at(x); slots != 0; slots &= slots - 1) {
-      *next++ = first + static_cast<std::uint32_t>(std::countr_zero(slots));
-    }
-    return next;
+    return list_without(0, x, bit, cells, next);
+  }
+
+  // Word d: the samples whose edge of direction d is crossed.
+  std::array<Word, 8> crossed_edges(std::size_t w) const {
+    return crossed_edges(w, differing_corners(w));
+  }
+
+  // The samples whose edge of a direction has the larger label at its first end.
+  Word first_is_larger(std::size_t w, unsigned direction) const {
+    return between_ends(direction, [&](unsigned a, unsigned b) {
+      const std::size_t x = w * kWordBits;
+      return larger(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1));
+    });
   }
 
   WordCount count(std::size_t w) const {
@@ -145,6 +148,24 @@ class LabelRow : public RowShape {
     std::array<PartNumber, 8> labels;
     for (unsigned corner = 0; corner < 8; ++corner) labels[corner] = label(corner, x);
     return labels;
+  }
+
+ protected:
+  // As list, but for the vertices in the slots `left_out`.
+  HWY_INLINE std::uint32_t* list_without(std::uint32_t left_out, std::size_t x, unsigned bit,
+                                         const LabelCells& cells, std::uint32_t* next) const {
+    const auto first = static_cast<std::uint32_t>(x * kSlotPlaces);
+    if ((cells.several >> bit & 1) == 0) {
+      const unsigned directions =
+          splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x) & ~left_out;
+      const auto& members = kMembers[directions];
+      for (std::size_t i = 0; i < members.size(); ++i) next[i] = first + members[i];
+      return next + std::popcount(directions);
+    }
+    for (std::uint32_t slots = slots_at(x) & ~left_out; slots != 0; slots &= slots - 1) {
+      *next++ = first + static_cast<std::uint32_t>(std::countr_zero(slots));
+    }
+    return next;
   }
 
  private:
@@ -205,15 +226,18 @@ class LabelRow : public RowShape {
   std::array<const std::int32_t*, 4> wholes_;
 };
 
-// Writes the triangles of the cells of one row, and what is on their sides.
+// Writes the triangles of the cells of one row, and what is on their sides. Where there are
+// clusters, it leaves triangles out of which two corners are one vertex.
+template <bool kHasClusters>
 class LabelCellWriter {
  public:
   LabelCellWriter(const Separation& separation, const LabelRow& row, const EdgeOffsets& offsets,
-                  SeparatingSurface& surface)
+                  std::uint32_t z, SeparatingSurface& surface)
       : separation_(separation),
         row_(row),
         offsets_(offsets),
         triangles_(surface.mesh.triangles.data()),
+        end_(triangles_ + surface.mesh.layer_triangles[z + 1]),
         sides_(surface.sides.data()) {}
 
   // Of the cell at x, which is `bit` of the word that `cells` are of.
@@ -221,8 +245,13 @@ class LabelCellWriter {
                              const std::uint32_t* places, Triangle* out) const {
     if ((cells.several >> bit & 1) != 0) return write_several(x, places, out);
     const unsigned inside = cells.cases[bit];
-    Triangle* end =
-        write_case(separation_.splits[row_.parity_at(x)].cases[inside], places, offsets_, out);
+    const CellCase& cell = separation_.splits[row_.parity_at(x)].cases[inside];
+    Triangle* end = nullptr;
+    if constexpr (kHasClusters) {
+      end = write_kept(cell, places, offsets_, end_, out);
+    } else {
+      end = write_case(cell, places, offsets_, out);
+    }
     const WallSides sides = {row_.label(static_cast<unsigned>(std::countr_one(inside)), x),
                              row_.label(static_cast<unsigned>(std::countr_zero(inside)), x)};
     std::fill(sides_ + (out - triangles_), sides_ + (end - triangles_), sides);
@@ -246,6 +275,8 @@ class LabelCellWriter {
         Triangle triangle = {index(wall.vertices[0]), index(wall.vertices[1]),
                              index(wall.vertices[2])};
         WallSides sides = {labels[wall.front], labels[wall.back]};
+        const auto& [a, b, c] = triangle;
+        if (kHasClusters && (a == b || b == c || c == a)) continue;
         if (sides.front > sides.back) {
           std::swap(sides.front, sides.back);
           std::swap(triangle[1], triangle[2]);
@@ -261,6 +292,7 @@ class LabelCellWriter {
   const LabelRow row_;
   const EdgeOffsets& offsets_;
   Triangle* triangles_;
+  const Triangle* end_;  // of the layer's triangles
   WallSides* sides_;
 };
 
@@ -298,6 +330,11 @@ class LabelField {
             planes_[z % kPlanes],
             planes_[above % kPlanes],
             y};
+  }
+
+  // The numbers of the labels of a row of plane z - 1, z or z + 1.
+  const PartNumber* labels(std::uint32_t y, std::uint32_t z) const {
+    return planes_[z % kPlanes].row(y);
   }
 
   static Mesh& mesh_of(SeparatingSurface& surface) { return surface.mesh; }
@@ -362,9 +399,9 @@ class LabelField {
     return vertex;
   }
 
-  LabelCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
-                              SeparatingSurface& surface) const {
-    return {separation_, row(y, z), offsets, surface};
+  LabelCellWriter<false> cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
+                                     SeparatingSurface& surface) const {
+    return {separation_, row(y, z), offsets, z, surface};
   }
 
  private:

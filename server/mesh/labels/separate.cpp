@@ -42,7 +42,9 @@ SurfaceCount count_walls(const Lattice<T>& lattice, const SeparateOptions& optio
     context.throw_if_stopped();
     return count;
   }
-  count_all(Separation(lattice, options), context, count);
+  const Separation separation(lattice, options);
+  if (options.regularize) count.clusters.resize(separation.dims.z);
+  count_all(separation, context, count);
   return count;
 }
 
@@ -70,7 +72,9 @@ void extract_walls(const Lattice<T>& lattice, const SeparateOptions& options,
   surface.parts = LabelParts(options.labels, options.values);
   if (count.vertices() == 0) return context.throw_if_stopped();
 
-  write_all(Separation(lattice, options), context, surface);
+  Separation separation(lattice, options);
+  separation.clusters = count.clusters;
+  write_all(separation, context, surface);
 }
 
 #define ISOMESH_INSTANTIATE(T)                                                                  \

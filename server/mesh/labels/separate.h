@@ -36,7 +36,8 @@ struct SeparateOptions {
   // whole whatever its neighbours are, and between two values that are not listed there is no wall.
   std::vector<std::int64_t> labels;
   Scheme scheme = Scheme::kSix;
-  bool close = false;  // cap labels where they meet the lattice's border
+  bool close = false;       // cap labels where they meet the lattice's border
+  bool regularize = false;  // join the vertices around a sample, see label_clusters-inl.h
   // Of labels that are not the samples of their own value: all values whose samples belong to them.
   // One value may belong to several labels; what overlaps is separated from what does not.
   std::map<std::int64_t, std::vector<std::int64_t>> values = {};
@@ -54,7 +55,9 @@ struct WallSides {
 };
 
 // The walls between all labels. `mesh` has the layers that mesh.h tells of; it is no manifold where
-// three labels meet: mesh.on_line are the vertices in faces and centres. Of a closed surface,
+// three labels meet: mesh.on_line are the vertices in faces and centres, and those that such
+// vertices were joined in. An edge between two of them lies on a curve if three triangles have it;
+// two do if it crosses a wall, which happens where vertices were joined. Of a closed surface,
 // mesh.on_border are the vertices of the caps and all others in the faces of the box of the
 // samples. The walls around one label alone are an oriented manifold: see label_surface.h.
 struct SeparatingSurface {

@@ -7,11 +7,14 @@
 #define ISOMESH_ROWS_INL_H_
 #endif
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <vector>
 
 #include <hwy/highway.h>
 
@@ -204,6 +207,12 @@ struct EdgeFrame {
 // For each edge of a cell, where its vertex's index lies from corner 0's first place on.
 using EdgeOffsets = std::array<std::ptrdiff_t, 64>;
 
+// Another task may set flags in the same word.
+inline void set_flag(std::vector<std::uint64_t>& flags, std::size_t vertex) {
+  std::atomic_ref(flags[vertex / kFlagBits])
+      .fetch_or(Word{1} << (vertex % kFlagBits), std::memory_order_relaxed);
+}
+
 // Writes the triangles of one case of the tables. Returns where the next one goes.
 HWY_INLINE Triangle* write_case(const CellCase& cell, const std::uint32_t* places,
                                 const EdgeOffsets& offsets, Triangle* out) {
@@ -212,6 +221,28 @@ HWY_INLINE Triangle* write_case(const CellCase& cell, const std::uint32_t* place
     *out++ = {places[offsets[a]], places[offsets[b]], places[offsets[c]]};
   }
   return out;
+}
+
+// The same without triangles of which two corners are one vertex. Nothing is written from `end` on.
+HWY_INLINE Triangle* write_kept(const CellCase& cell, const std::uint32_t* places,
+                                const EdgeOffsets& offsets, const Triangle* end, Triangle* out) {
+  // One more than is kept may be written. No branch tells which those are: none could be foreseen.
+  const auto keep = [&](Triangle* to) {
+    for (std::size_t t = 0; t < cell.triangles; ++t) {
+      const auto& [first, second, third] = cell.edges[t];
+      const std::uint32_t a = places[offsets[first]];
+      const std::uint32_t b = places[offsets[second]];
+      const std::uint32_t c = places[offsets[third]];
+      *to = {a, b, c};
+      to += static_cast<unsigned>(a != b) & static_cast<unsigned>(b != c) &
+            static_cast<unsigned>(c != a);
+    }
+    return to;
+  };
+  if (end - out > static_cast<std::ptrdiff_t>(kMostTriangles)) return keep(out);
+  std::array<Triangle, kMostTriangles + 1> all;
+  const Triangle* last = keep(all.data());
+  return std::copy(static_cast<const Triangle*>(all.data()), last, out);
 }
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

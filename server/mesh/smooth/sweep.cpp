@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include "server/mesh/buffer.h"
 
@@ -45,17 +47,15 @@ class Links {
     return true;
   }
 
-  // A neighbour along a line where walls meet, as a triangle at that line names it.
-  bool add_on_line(Place place) {
-    const auto count = static_cast<std::size_t>(fan_++);
-    if (count >= kUsualNeighbors) return false;
-    neighbors_[count] = place;
-    return true;
+  // The two neighbours along a line where walls meet.
+  void set_line(Place one, Place other) {
+    neighbors_[0] = one;
+    neighbors_[1] = other;
+    fan_ = 2;
   }
 
-  // On a line three walls meet, so each of its triangles names a neighbour along it, three times
-  // for each. A vertex where a line ends or lines meet has not two such neighbours.
-  bool is_within_line() const { return fan_ == 6; }
+  // Of a vertex on a line.
+  bool has_line() const { return fan_ == 2; }
 
   // In an oriented manifold the triangles name each neighbour once as the next corner and once as
   // the previous one, and the sum of the differences is zero, unless the vertex lies on the
@@ -85,6 +85,7 @@ struct LayerLinks {
   Place first_place = 0;        // in every ring
   std::size_t first_index = 0;  // in the array of links
   std::vector<MoreNeighbor>* more = nullptr;
+  std::vector<MoreNeighbor>* on_line = nullptr;  // of vertices on lines, once for each triangle
 };
 
 // Lists, for the vertices of two layers, the corners that follow them in the triangles that name
@@ -106,9 +107,9 @@ void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
     if constexpr (kHasLines) {
       if (is_on_line(vertex)) {
         for (const std::uint32_t other : {next, previous}) {
-          if (!is_on_line(other) || links[index].add_on_line(place_of(other))) continue;
+          if (!is_on_line(other)) continue;
           const LayerLinks& layer = is_upper ? upper : lower;
-          layer.more->push_back({vertex - layer.first, place_of(other)});
+          layer.on_line->push_back({vertex - layer.first, place_of(other)});
         }
         return;
       }
@@ -180,6 +181,7 @@ class Sweep {
     moved_.resize_for_overwrite(width_);
     links_.resize((steps_ + 1) * width_, Links(place_of_zero()));
     more_.resize(steps_ + 1);
+    on_line_.resize(steps_ + 1);
   }
 
   void run() {
@@ -220,7 +222,8 @@ class Sweep {
         .first = static_cast<std::uint32_t>(round_.first_vertex(layer)),
         .first_place = static_cast<Place>(turn(layer, kRingLayers) * width_ * kPlacesPerPosition),
         .first_index = static_cast<std::size_t>(links(layer) - links_.data()),
-        .more = &more_neighbors(layer)};
+        .more = &more_neighbors(layer),
+        .on_line = &on_line_[turn(layer, steps_ + 1)]};
   }
   Place place_of_zero() const {
     return static_cast<Place>(kRingLayers * width_ * kPlacesPerPosition);
@@ -261,6 +264,7 @@ class Sweep {
   void begin_links(std::ptrdiff_t layer) {
     std::fill_n(links(layer), vertices(layer), Links(place_of_zero()));
     more_neighbors(layer).clear();
+    on_line_[turn(layer, steps_ + 1)].clear();
   }
 
   // Adds the layer's triangles to the lists of neighbours; those of its vertices are complete then.
@@ -285,14 +289,37 @@ class Sweep {
     more.push_back({kNoVertex, 0});
   }
 
+  // Three walls meet along a line, so three triangles name each neighbour along it. Two name one
+  // across a wall. Sets the neighbours of vertices that have two along lines; where a line ends or
+  // lines meet there are not two.
+  void find_lines(std::ptrdiff_t layer) {
+    auto& found = on_line_[turn(layer, steps_ + 1)];
+    const auto key = [](const MoreNeighbor& n) { return std::pair(n.vertex, n.place); };
+    std::ranges::sort(found, {}, key);
+    for (std::size_t i = 0; i < found.size();) {
+      const std::uint32_t vertex = found[i].vertex;
+      std::array<Place, 2> along = {};
+      std::size_t count = 0;
+      while (i < found.size() && found[i].vertex == vertex) {
+        const std::size_t begin = i;
+        while (i < found.size() && key(found[i]) == key(found[begin])) ++i;
+        if (i - begin < 3) continue;
+        if (count < along.size()) along[count] = found[begin].place;
+        ++count;
+      }
+      if (count == along.size()) links(layer)[vertex].set_line(along[0], along[1]);
+    }
+  }
+
   // Decides which of the layer's vertices stay where they are.
   void weigh(std::ptrdiff_t layer) {
+    find_lines(layer);
     Links* link = links(layer);
     const std::uint64_t first = round_.first_vertex(layer);
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
       const bool is_held =
-          round_.mesh.is_on_line(first + v) ? !link[v].is_within_line() : link[v].is_on_boundary();
+          round_.mesh.is_on_line(first + v) ? !link[v].has_line() : link[v].is_on_boundary();
       const bool is_fixed = is_held || round_.mesh.is_on_border(first + v);
       link[v].set_weight(is_fixed ? 0 : link[v].one_over_count());
     }
@@ -388,6 +415,7 @@ class Sweep {
   Buffer<Float4> moved_;               // the positions of one layer after the last step
   std::vector<Links> links_;
   std::vector<std::vector<MoreNeighbor>> more_;  // in the order of the vertices
+  std::vector<std::vector<MoreNeighbor>> on_line_;
 };
 
 }  // namespace

@@ -260,7 +260,7 @@ TEST_F(OptionsTest, RefusesWhatIsForLabelsWithoutThem) {
   EXPECT_EQ(status_with({"--labels", "one"}), 2);
   EXPECT_EQ(status_with({"--labels", "1", "--label-name", "Liver"}), 2);
   EXPECT_EQ(status_with({"--labels", "1", "--interpolation", "linear"}), 2);
-  EXPECT_EQ(status_with({"--labels", "1", "--regularize"}), 2);
+  EXPECT_EQ(status_with({"--labels", "1", "--regularize"}), -1);
 }
 
 }  // namespace

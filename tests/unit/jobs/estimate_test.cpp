@@ -58,6 +58,29 @@ TEST_F(EstimateTest, CountsWhatIsJoined) {
   EXPECT_EQ(seen.size(), 3U);  // none is taken for another's count
 }
 
+TEST_F(EstimateTest, CountsWhatIsJoinedOfLabels) {
+  const Volume volume =
+      add(test::noise<std::uint8_t>({0, 0, 0, 1, 2, 2, 3}, {14, 13, 12}, 9), SampleType::kUint8);
+  JobParameters parameters = label_parameters({});
+  parameters.volume = volume.id;
+  parameters.formats = {MeshFormat::kGlb};
+  std::set<std::uint64_t> seen;
+  for (const bool regularize : {false, true}) {
+    parameters.regularize = regularize;
+    const Estimate estimate = estimator_.estimate("", parameters);
+    const Job job = run(parameters);
+    ASSERT_TRUE(job.mesh);
+    EXPECT_EQ(estimate.triangles, job.mesh->triangles);
+    EXPECT_EQ(estimate.vertices, job.mesh->vertices);
+    ASSERT_EQ(estimate.labels.size(), 3U);
+    for (std::size_t n = 0; n < 3; ++n) {
+      EXPECT_EQ(estimate.labels[n].triangles, job.mesh->labels[n].triangles);
+    }
+    seen.insert(estimate.triangles);
+  }
+  EXPECT_EQ(seen.size(), 2U);
+}
+
 TEST_F(EstimateTest, IsOfTheBoxThatAJobIsCroppedTo) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);

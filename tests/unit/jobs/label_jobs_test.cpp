@@ -119,6 +119,25 @@ TEST_F(LabelJobsTest, OfOneLabelAreThoseOfItsIsoValueAtMidpoints) {
   EXPECT_EQ(by_label.mesh.volume_mm3.extracted, by_iso.mesh.volume_mm3.extracted);
 }
 
+TEST_F(LabelJobsTest, JoinVerticesAndKeepEveryLabelsTopology) {
+  const Volume volume =
+      add(test::noise<std::uint8_t>({0, 0, 0, 1, 2, 2, 3}, {14, 13, 12}, 9), SampleType::kUint8);
+  for (const bool close : {false, true}) {
+    JobParameters parameters = settled(volume, label_parameters({}));
+    parameters.formats = {MeshFormat::kGlb};
+    parameters.close = close;
+    const MeshSummary plain = run(volume, parameters).mesh;
+    parameters.regularize = true;
+    const MeshSummary joined = run(volume, parameters).mesh;
+    EXPECT_LT(joined.triangles, plain.triangles);
+    EXPECT_TRUE(joined.quality.manifold && joined.quality.oriented);
+    EXPECT_EQ(joined.quality.closed, close);
+    EXPECT_EQ(joined.components, plain.components);
+    EXPECT_EQ(joined.euler, plain.euler);
+    EXPECT_EQ(joined.boundary_edges, plain.boundary_edges);
+  }
+}
+
 TEST_F(LabelJobsTest, LabelsThatAreNotChosenAreBackground) {
   const Volume volume = add_labels();
   JobParameters parameters = label_parameters({{3}});

@@ -26,8 +26,10 @@ struct NamedWalls {
 std::vector<NamedWalls> walls() {
   std::vector<NamedWalls> all;
   const auto add = [&](const std::string& name, const auto& volume, std::size_t labels) {
-    for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, labels))) {
+    for (SeparateOptions options : all_separations(consecutive<std::int64_t>(1, labels))) {
       all.push_back({name + ", " + describe(volume.dims, options), separated(volume, options)});
+      options.regularize = true;
+      all.push_back({"joined " + all.back().name, separated(volume, options)});
     }
   };
   add("noise", label_noise(6, {9, 7, 40}, 101), 5);

@@ -69,7 +69,6 @@ TEST(JobBody, RefusesWhatLabelsCannotHave) {
   EXPECT_THAT(faults_of(R"("labels": [5], "background": 5)"), ElementsAre("labels"));
   EXPECT_THAT(faults_of(R"("labels": "all", "interpolation": "linear")"),
               ElementsAre("interpolation"));
-  EXPECT_THAT(faults_of(R"("labels": "all", "regularize": true)"), ElementsAre("regularize"));
   EXPECT_THAT(faults_of(R"("labels": "all", "components": {"keep": 1})"),
               ElementsAre("components"));
   EXPECT_THAT(faults_of(R"("labels": "all", "label_names": {"3": ""})"),

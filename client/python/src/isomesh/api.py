@@ -999,7 +999,8 @@ class JobOptions(TypedDict, total=False):
     regularize
         Join the vertices around a sample where that keeps the topology. The surface has about a
         third as many triangles, with larger angles. It keeps its connected components, its
-        boundary and its genus. Vertices at the volume's border stay where they are.
+        boundary and its genus. Vertices at the volume's border stay where they are. The same
+        holds for the own surface of each label.
 
     passes
         Number of smoothing passes. Vertices on the surface's boundary stay where they are. For

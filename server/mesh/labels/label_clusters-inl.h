@@ -1,0 +1,300 @@
+// What the walk over clusters is told of labels. Compiled once for each instruction set, see
+// slabs.cpp.
+//
+// Labels have no values, so of two the larger owns the crossing between them. Around a sample with
+// one other label beside its own this is the rule of links.h. Where there are more, points of faces
+// and centres (wall_cases.h) belong to their largest label as crossings do, and the sample joins
+// all that it owns in one vertex, or nothing. It joins them if the first two conditions of links.h
+// hold, and
+//  * the first one also holds for the directions of each label alone;
+//  * there are no more than three labels in those directions, and with three of them one point
+//    where these and the sample's own meet, and the first condition holds for each two of them;
+//  * on the ring of an earlier neighbour, what both join is nothing, or one run that leaves two
+//    places free, in which the label changes once at most; and so is what has each label alone.
+// So the vertex is a disk in each wall, an arc of each curve and a point where curves meet, and
+// each label's own surface stays a manifold of the same topology. That of several labels together
+// need not: an edge may lie between the same two vertices of a curve in two walls. So where a label
+// has several parts (label_parts.h), nothing is joined at junctions.
+#if defined(ISOMESH_LABEL_CLUSTERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ISOMESH_LABEL_CLUSTERS_INL_H_
+#undef ISOMESH_LABEL_CLUSTERS_INL_H_
+#else
+#define ISOMESH_LABEL_CLUSTERS_INL_H_
+#endif
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include <hwy/highway.h>
+
+#include "server/mesh/extract/clusters-inl.h"
+#include "server/mesh/extract/links.h"
+#include "server/mesh/labels/labels-inl.h"
+#include "server/mesh/labels/star_points.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isomesh::mesh::HWY_NAMESPACE {
+
+class LabelClusters {
+ public:
+  using Marched = Separation;
+
+  LabelClusters(const Separation& separation, std::uint32_t first)
+      : separation_(separation),
+        links_(links_of(separation.scheme)),
+        points_(star_points(separation.scheme)),
+        field_(separation, first) {}
+
+  // Takes the triangles that vanish from the places of the labels' numbers.
+  void tally_into(std::span<std::uint64_t> triangles) { tally_ = triangles; }
+
+  void reach(std::uint32_t z) { field_.reach(z); }
+  void open(std::uint32_t /*z*/) {}
+
+  WordCount split_edges(std::size_t w, std::uint32_t y, std::uint32_t z, EdgeWords& out) const {
+    out.any = 0;
+    const LabelRow row = field_.row(y, z);
+    if (!row.may_cross(w)) return {};
+    const std::array<Word, 8> crossed = row.crossed_edges(w);
+    for (const Word all : crossed) out.any |= all;
+    for (unsigned direction = 1; direction < 8; ++direction) {
+      const Word all = crossed[direction];
+      const Word first = all == 0 ? 0 : all & row.first_is_larger(w, direction);
+      out.first[direction] = first;
+      out.second[direction] = all & ~first;
+    }
+    return row.count(w);
+  }
+
+  Directions candidates(const GridSample& at, const Star& star) {
+    look_around(at);
+    if (!is_junction(star.crossed)) return components_to_join(links_, parity(at), star);
+    return !separation_.parts.overlap() && joins_all(at, star) ? star.own | JoiningSample::kJunction
+                                                               : 0;
+  }
+
+  Directions clashing(const GridSample& at, std::size_t direction, const GridSample& to,
+                      Directions mine, Directions theirs) {
+    const bool has_junction = ((mine | theirs) & JoiningSample::kJunction) != 0;
+    const Directions own = mine & ~JoiningSample::kFlags;
+    const Directions others = theirs & ~JoiningSample::kFlags;
+    if (!has_junction) {
+      if (label(at) != label(to)) return 0;
+      return links_.clashing(parity(at), direction, own, others);
+    }
+    look_around(at);
+    return meet_well(at, direction, own, others) ? 0 : mine;
+  }
+
+  ClusterLoss loss(const GridSample& at, Directions kept, const ClusterFacts& facts,
+                   ClusterLayer& layer) {
+    const Directions joined = kept & ~JoiningSample::kFlags;
+    const bool is_junction = (kept & JoiningSample::kJunction) != 0;
+    if (!is_junction && tally_.empty()) return loss_of_components(links_, joined, facts);
+    look_around(at);
+    if (!is_junction) {
+      const ClusterLoss loss = loss_of_components(links_, joined, facts);
+      take(label(at), around_[first_of(joined)], loss.triangles + loss.triangles_below);
+      return loss;
+    }
+    JoinedPoints points;
+    ClusterLoss loss = {.vertices = ~std::uint64_t{0}};  // one vertex remains
+    const StarPoints& all = points_[parity(at)];
+    const auto lose = [&](const StarPoint& point) {
+      ++(point.is_below ? loss.vertices_below : loss.vertices);
+    };
+    for (Directions rest = joined; rest != 0; rest &= rest - 1) lose(all.edges[first_of(rest)]);
+    visit_joined(all.faces, joined, [&](std::size_t n, const StarPoint& point) {
+      points.faces |= std::uint64_t{1} << n;
+      lose(point);
+    });
+    visit_joined(all.centres, joined, [&](std::size_t n, const StarPoint& point) {
+      points.centres |= std::uint64_t{1} << n;
+      lose(point);
+    });
+    layer.points.push_back(points);
+    for (const Directions corners : links_.above(parity(at))) {
+      loss.triangles += lose_triangles(label(at), corners & joined);
+    }
+    for (const Directions corners : links_.below(parity(at))) {
+      loss.triangles_below += lose_triangles(label(at), corners & joined);
+    }
+    return loss;
+  }
+
+ private:
+  static std::size_t first_of(Directions set) {
+    return static_cast<std::size_t>(std::countr_zero(set));
+  }
+
+  unsigned parity(const GridSample& at) const { return separation_.parity(at.x, at.y, at.z); }
+  PartNumber label(const GridSample& at) const { return field_.labels(at.y, at.z)[at.x]; }
+
+  // Looks up the labels of the sample's neighbours, those that the volume has.
+  void look_around(const GridSample& at) {
+    const auto directions = links_.directions();
+    if (at.y != row_y_ || at.z != row_z_ || !has_row_) {
+      for (std::size_t d = 0; d < directions.size(); ++d) {
+        const auto& step = directions[d].step;
+        rows_[d] = field_.labels(at.y + static_cast<std::uint32_t>(step[1]),
+                                 at.z + static_cast<std::uint32_t>(step[2])) +
+                   step[0];
+      }
+      row_y_ = at.y;
+      row_z_ = at.z;
+      has_row_ = true;
+    }
+    for (std::size_t d = 0; d < directions.size(); ++d) around_[d] = rows_[d][at.x];
+  }
+
+  // Whether the neighbours with another label have several.
+  bool is_junction(Directions crossed) const {
+    const PartNumber first = around_[first_of(crossed)];
+    for (Directions rest = crossed & (crossed - 1); rest != 0; rest &= rest - 1) {
+      if (around_[first_of(rest)] != first) return true;
+    }
+    return false;
+  }
+
+  // Those of `set` in which the neighbour has that label.
+  Directions with_label(Directions set, PartNumber wanted) const {
+    Directions found = 0;
+    for (Directions rest = set; rest != 0; rest &= rest - 1) {
+      const std::size_t d = first_of(rest);
+      if (around_[d] == wanted) found |= Directions{1} << d;
+    }
+    return found;
+  }
+
+  bool is_disk(unsigned parity, Directions set) const {
+    const ClusterFacts facts = links_.facts(parity, set);
+    return facts.components() == 1 && facts.may_join();
+  }
+
+  bool joins_all(const GridSample& at, const Star& star) const {
+    const unsigned here = parity(at);
+    if (!is_disk(here, star.own)) return false;
+    if ((links_.facts(here, star.own).forbidden() & star.crossed) != 0) return false;
+    std::size_t labels = 0;
+    std::array<Directions, 3> groups = {};
+    for (Directions rest = star.own; rest != 0; ++labels) {
+      if (labels == groups.size()) return false;
+      groups[labels] = with_label(rest, around_[first_of(rest)]);
+      rest &= ~groups[labels];
+    }
+    if (labels == 1) return true;
+    for (std::size_t n = 0; n < labels; ++n) {
+      if (!is_disk(here, groups[n])) return false;
+      if (labels == 3 && !is_disk(here, star.own & ~groups[n])) return false;
+    }
+    return labels < 3 || corners(here, star.own) == 1;
+  }
+
+  // The tetrahedra in whose other corners, all in the set, three labels are.
+  std::size_t corners(unsigned parity, Directions set) const {
+    std::size_t count = 0;
+    visit_joined(points_[parity].centres, set, [&](std::size_t, const StarPoint&) { ++count; });
+    return count;
+  }
+
+  bool meet_well(const GridSample& at, std::size_t direction, Directions mine,
+                 Directions theirs) const {
+    const unsigned here = parity(at);
+    if (links_.clash(here, direction, mine, theirs)) return false;
+    const Links::Ring& ring = links_.ring(here, direction);
+    Directions both = 0;
+    unsigned changes = 0;
+    const auto is_in_both = [&](std::size_t i) {
+      return (mine >> ring.mine[i] & theirs >> ring.theirs[i] & 1) != 0;
+    };
+    for (std::size_t i = 0; i < ring.size; ++i) {
+      const std::size_t next = i + 1 == ring.size ? 0 : i + 1;
+      if (!is_in_both(i)) continue;
+      both |= Directions{1} << ring.mine[i];
+      if (is_in_both(next) && around_[ring.mine[i]] != around_[ring.mine[next]]) ++changes;
+    }
+    if (changes > 1) return false;
+    while (both != 0) {
+      const Directions group = with_label(both, around_[first_of(both)]);
+      if (links_.clash(here, direction, group, theirs)) return false;
+      both &= ~group;
+    }
+    return true;
+  }
+
+  // Calls visit(place, point) for the points all of whose neighbours are in the set and have
+  // different labels.
+  template <class Visit>
+  void visit_joined(std::span<const StarPoint> points, Directions set, Visit visit) const {
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const StarPoint& point = points[n];
+      if ((point.neighbours & ~set) != 0) continue;
+      const PartNumber a = around_[point.members[0]];
+      const PartNumber b = around_[point.members[1]];
+      if (a == b) continue;
+      if (std::popcount(point.neighbours) == 3) {
+        const PartNumber c = around_[point.members[2]];
+        if (a == c || b == c) continue;
+      }
+      visit(n, point);
+    }
+  }
+
+  // How many triangles vanish in a tetrahedron some of whose corners the sample joins, those in
+  // `joined`: all with two vertices that are joined. Takes them from the tally.
+  std::uint64_t lose_triangles(PartNumber own, Directions joined) {
+    const int size = std::popcount(joined);
+    if (size < 2) return 0;
+    std::array<PartNumber, 3> labels = {};
+    std::array<std::uint64_t, 3> corners = {};
+    std::size_t count = 0;
+    for (Directions rest = joined; rest != 0; rest &= rest - 1) {
+      const PartNumber next = around_[first_of(rest)];
+      const std::size_t n = static_cast<std::size_t>(
+          std::find(labels.data(), labels.data() + count, next) - labels.data());
+      labels[n] = next;
+      ++corners[n];
+      count = std::max(count, n + 1);
+    }
+    // Of wall_cases.h: of two joined corners, one triangle beside each label. Of three, where all
+    // vertices are joined but those between other labels: all but one or two.
+    std::uint64_t lost = 0;
+    for (std::size_t n = 0; n < count; ++n) {
+      const bool has_two = size == 3 && (count == 3 || (count == 2 && corners[n] == 2));
+      const std::uint64_t of_own = has_two ? 2 : 1;
+      take(own, labels[n], of_own);
+      lost += of_own;
+      for (std::size_t m = n + 1; size == 3 && m < count; ++m) {
+        take(labels[n], labels[m], 1);
+        ++lost;
+      }
+    }
+    return lost;
+  }
+
+  void take(PartNumber a, PartNumber b, std::uint64_t triangles) {
+    if (tally_.empty()) return;
+    separation_.parts.visit_labels(a, b,
+                                   [&](std::size_t label, bool) { tally_[label] -= triangles; });
+  }
+
+  const Separation& separation_;
+  const Links& links_;
+  const std::array<StarPoints, 2>& points_;
+  LabelField field_;
+  std::span<std::uint64_t> tally_;
+  bool has_row_ = false;
+  std::uint32_t row_y_ = 0;
+  std::uint32_t row_z_ = 0;
+  std::array<const PartNumber*, kMostDirections> rows_ = {};  // of the neighbours, by direction
+  std::array<PartNumber, kMostDirections> around_ = {};
+};
+
+}  // namespace isomesh::mesh::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

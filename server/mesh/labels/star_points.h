@@ -1,0 +1,35 @@
+// The points around a sample of the walls between labels: half-way on an edge to a neighbour, in a
+// face with two neighbours, and in a tetrahedron with three; private to this folder.
+//
+// Of each point one of its samples is the owner of its name (wall_cases.h), and one the sample that
+// it may be joined at: that of the largest number, see label_clusters-inl.h.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/mesh/extract/links.h"
+
+namespace isomesh::mesh {
+
+struct StarPoint {
+  Directions neighbours = 0;                 // of the point beside the sample: one, two or three
+  std::array<std::uint8_t, 3> members = {};  // those, ascending
+  // Which corner the sample is of the cell of the name's owner, and the slot there.
+  std::uint8_t corner = 0;
+  std::uint8_t slot = 0;
+  bool is_below = false;  // a sample of the plane below owns the name
+};
+
+struct StarPoints {
+  std::vector<StarPoint> edges;    // by direction; with zeros where there is none
+  std::vector<StarPoint> faces;    // at most 48
+  std::vector<StarPoint> centres;  // at most 32
+};
+
+// Those around samples of even and of odd parity.
+const std::array<StarPoints, 2>& star_points(Scheme scheme);
+
+}  // namespace isomesh::mesh
