@@ -8,7 +8,6 @@
 #include "tests/fuzz/targets.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
-#include "tests/unit/import/hdf5_writer.h"
 #include "tests/unit/import/other_writers.h"
 #include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
@@ -121,11 +120,6 @@ std::vector<std::string> numpy_files() {
           npy(npy_header(">f2", true, "(2, 1, 3, 2)"), kSamples)};
 }
 
-std::vector<std::string> hdf5_files() {
-  const import::test::Hdf5Image image = {some_samples<std::int16_t>(24)};
-  return {itk_hdf5(image), itk_hdf5({image.samples, false}), minc({}, image)};
-}
-
 std::vector<std::string> tiff_files() {
   return {tiff({kSamples.substr(0, 12), kSamples.substr(12)}),
           tiff({kSamples.substr(0, 12), kSamples.substr(12)},
@@ -149,7 +143,6 @@ std::vector<std::string> other_files(std::string_view name) {
   if (name == "mrc") return mrc_files();
   if (name == "cube") return cube_files();
   if (name == "numpy") return numpy_files();
-  if (name == "hdf5") return hdf5_files();
   if (name == "tiff") return tiff_files();
   if (name == "png") return {grey_png(4, kSamples)};
   if (name == "bmp") return {grey_bmp(4, kSamples)};

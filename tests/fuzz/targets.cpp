@@ -212,7 +212,6 @@ constexpr Target kTargets[] = {
     {"isq", [](Bytes bytes) { import_only("isq", bytes); }},
     {"mrc", [](Bytes bytes) { import_only("mrc", bytes); }},
     {"cube", [](Bytes bytes) { import_only("cube", bytes); }},
-    {"hdf5", [](Bytes bytes) { import_only("hdf5", bytes); }},
     {"numpy", [](Bytes bytes) { import_spaced("numpy", bytes); }},
     {"tiff", [](Bytes bytes) { import_spaced("tiff", bytes); }},
     {"png", [](Bytes bytes) { import_pages("png", bytes); }},

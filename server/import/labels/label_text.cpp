@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <optional>
 #include <set>
 #include <span>
@@ -133,14 +134,60 @@ std::vector<LabelEntry> named(std::span<const TextEntry> entries, bool is_of_sli
   return labels;
 }
 
+// "#rrggbb" as three numbers up to 255.
+std::optional<Color> hex_color(std::string_view text) {
+  if (text.size() != 7 || text.front() != '#') return std::nullopt;
+  Color color = {};
+  for (std::size_t part = 0; part < color.size(); ++part) {
+    const std::string_view digits = text.substr(1 + part * 2, 2);
+    unsigned value = 0;
+    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
+    if (end.ptr != digits.data() + digits.size()) return std::nullopt;
+    color[part] = value;
+  }
+  return color;
+}
+
+// BIDS's table of a segmentation: a line of names of columns, then one line for each label. Empty
+// if the lines are none.
+std::vector<LabelEntry> labels_of_bids(std::span<const std::string_view> lines) {
+  const auto columns = split(lines.front(), '\t');
+  const auto column = [&](std::string_view name) {
+    return static_cast<std::size_t>(std::ranges::find(columns, name) - columns.begin());
+  };
+  const std::size_t index = column("index");
+  const std::size_t name = column("name");
+  const std::size_t color = column("color");
+  if (index == columns.size() || name == columns.size()) return {};
+  std::vector<LabelEntry> labels;
+  for (const std::string_view line : lines.subspan(1)) {
+    const auto cells = split(line, '\t');
+    if (cells.size() <= std::max(index, name) || labels.size() == Volume::kMostLabels) return {};
+    const auto label = parse_int64(cells[index]);
+    if (!label || cells[name].empty() || has_control_characters(cells[name])) return {};
+    LabelEntry entry = {.label = *label, .name = label_name(cells[name])};
+    if (const auto parts = color < cells.size() ? hex_color(cells[color]) : std::nullopt) {
+      const auto& [red, green, blue] = *parts;
+      entry.color = label_color({red / kMostColor, green / kMostColor, blue / kMostColor});
+    }
+    labels.push_back(std::move(entry));
+  }
+  return labels;
+}
+
 }  // namespace
 
 std::vector<LabelEntry> labels_of_text(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  const std::vector<std::string_view> all = lines(text);
+  if (!all.empty() && all.front().find('\t') != std::string_view::npos) {
+    auto labels = labels_of_bids(all);
+    if (!labels.empty()) return labels;
+  }
   std::vector<TextEntry> entries;
   bool is_of_slicer = false;
-  for (const std::string_view line : lines(text)) {
+  for (const std::string_view line : all) {
     if (is_comment(line)) {
       is_of_slicer = is_of_slicer || line.starts_with("# Color table file");
       continue;

@@ -181,5 +181,15 @@ TEST(LabelsBeside, OfMricronsAtlases) {
   EXPECT_EQ(labels.front(), entry(1, "Precentral_L"));
 }
 
+TEST(LabelText, ReadsTheNamedColumnsOfBids) {
+  EXPECT_THAT(labels_of_text("name\tindex\tabbreviation\tcolor\nGrey Matter\t1\tGM\t#ff8000\n"
+                             "White Matter\t2\tWM\tn/a\n"),
+              ElementsAre(LabelEntry{.label = 1, .name = "Grey Matter", .color = "#ff8000"},
+                          LabelEntry{.label = 2, .name = "White Matter"}));
+  EXPECT_THAT(labels_of_text("index\tname\nx\ta\n"), testing::IsEmpty());
+  EXPECT_THAT(labels_of_text("index\tname\n1\n"), testing::IsEmpty());
+  EXPECT_THAT(labels_of_text("index\tname\n"), testing::IsEmpty());
+}
+
 }  // namespace
 }  // namespace isomesh::import::test
