@@ -154,13 +154,17 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                   .option = "label-values"},
         self.label_values);
   }
-  parameter(Parameter{.name = "scheme",
-                      .title = "Tetrahedra per cell",
-                      .help = "Number of tetrahedra per cell.",
-                      .more = "With 5, every second cell is mirrored; the cell (0,0,0) is not.",
-                      .values = {"Fewer triangles; every second cell is mirrored",
-                                 "The same split in every cell"}},
-            self.scheme);
+  parameter(
+      Parameter{.name = "scheme",
+                .title = "Tetrahedra per cell",
+                .help = "Number of tetrahedra per cell.",
+                .more = "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision "
+                        "of the face-centred cubic lattice: every second cell is mirrored; "
+                        "the cell (0,0,0) is not.",
+                .values = {"The face-centred lattice, with fewer triangles; every second cell is "
+                           "mirrored",
+                           "The primitive lattice, with the same split in every cell"}},
+      self.scheme);
   if (by_iso) {
     parameter(
         Parameter{
@@ -202,8 +206,17 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
               "`laplacian`: each pass moves every vertex towards the mean of its neighbours by the "
               "factor `lambda`; the enclosed volume shrinks. `taubin`: each pass does the same and "
               "then moves all vertices back by the factor `mu`, where 1/lambda + 1/mu = "
-              "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume.",
-          .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume"}},
+              "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume. "
+              "`angle` and `optimize` keep shape and volume and make the angles of triangles "
+              "larger: "
+              "each pass moves every vertex along the extracted surface. `angle` moves it towards "
+              "the bisectors of its neighbours' angles. `optimize` moves it towards the mean of "
+              "its "
+              "neighbours in the first half of the passes, and then to wherever the smallest angle "
+              "becomes larger. Neither uses `lambda`, and neither removes noise.",
+          .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
+                     "Evens out the angles of triangles, and keeps shape and volume",
+                     "Enlarges the smallest angles of triangles, and keeps shape and volume"}},
       self.smoothing);
   // Above 0.66, Taubin smoothing amplifies the highest frequencies in every pass, whatever the
   // pass-band.

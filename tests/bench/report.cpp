@@ -23,15 +23,27 @@ constexpr double kBrainIso = 60;
 constexpr int kPasses = 5;
 constexpr int kRuns = 5;
 
+// The share that the first bins have.
+double share_below(const Distribution& values, std::size_t bins) {
+  const auto sum = [](auto begin, auto end) {
+    return static_cast<double>(std::accumulate(begin, end, std::uint64_t{0}));
+  };
+  const auto& all = values.histogram;
+  return sum(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(bins)) /
+         sum(all.begin(), all.end());
+}
+
 // Triangles whose aspect ratio is below 0.3 count as poor.
 double poor_share(const Distribution& ratios) {
   constexpr std::size_t kPoorBins = 6;
   static_assert(10 * kPoorBins == 3 * Distribution::kBins);
-  const auto& bins = ratios.histogram;
-  const auto sum = [](auto begin, auto end) {
-    return static_cast<double>(std::accumulate(begin, end, std::uint64_t{0}));
-  };
-  return sum(bins.begin(), bins.begin() + kPoorBins) / sum(bins.begin(), bins.end());
+  return share_below(ratios, kPoorBins);
+}
+
+// Triangles with an angle below 21 degrees.
+double small_share(const Distribution& angles) {
+  constexpr std::size_t kSmallBins = 7;  // of 3 degrees
+  return share_below(angles, kSmallBins);
 }
 
 std::vector<Surface> ways_to_extract(double iso, bool close) {
@@ -75,15 +87,17 @@ Json measure_choices(const Subject& subject) {
   return rows;
 }
 
-// Aspect ratios, angles and enclosed volume against passes, Laplacian beside Taubin.
+// Aspect ratios, angles and enclosed volume against passes, for each kind of smoothing.
 Json measure_quality(const Subject& subject) {
   Json rows = Json::array();
-  for (const Smoothing smoothing : {Smoothing::kLaplacian, Smoothing::kTaubin}) {
+  for (const Smoothing smoothing : values_of<Smoothing>()) {
     for (const Surface& surface : ways_to_extract(subject.levels.front().iso, true)) {
       Stages stages(subject.samples, surface);
       for (const int passes : {0, 1, 2, 5, 10, 20}) {
         stages.extract();
         const double extracted_mm3 = stages.volume_mm3();
+        const double smooth_ms =
+            median_ms({[&] { stages.smooth(passes, smoothing); }, [&] { stages.extract(); }}, 1);
         stages.smooth(passes, smoothing);
         const mesh::Shapes shapes = stages.shapes();
         Json row = row_of(subject, surface);
@@ -92,6 +106,8 @@ Json measure_quality(const Subject& subject) {
         row["aspect_ratio"] = shapes.aspect_ratio.mean;
         row["poor"] = poor_share(shapes.aspect_ratio);
         row["smallest_angle_deg"] = shapes.smallest_angle_deg.mean;
+        row["small_angles"] = small_share(shapes.smallest_angle_deg);
+        row["smooth_ms"] = smooth_ms;
         row["least_angle_deg"] = shapes.smallest_angle_deg.min;
         row["volume_kept"] = stages.volume_mm3() / extracted_mm3;
         rows.push_back(row);

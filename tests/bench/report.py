@@ -315,6 +315,8 @@ QUANTITIES = [
     ('poor triangles, %', lambda row: 100 * row['poor'], 2),
     ("mean of the triangles' smallest angles, degrees", lambda row: row['smallest_angle_deg'], 1),
     ('smallest angle of all, degrees', lambda row: row['least_angle_deg'], 3),
+    ('triangles with an angle below 21 degrees, %', lambda row: 100 * row['small_angles'], 2),
+    ('time of smoothing, ms', lambda row: row['smooth_ms'], 1),
     ('change of the enclosed volume, %', lambda row: 100 * (row['volume_kept'] - 1), 3),
 ]
 
@@ -325,7 +327,7 @@ def write_quality(rows, report):
         'The paper says that smoothing makes triangles well shaped, and shows pictures. Here are the numbers, against'
         ' passes of 0, 1, 2, 5, 10 and 20, with aspect ratio and poor triangles as above. Surfaces are closed where they'
         " meet the volume's border, so that what they enclose is exact. Laplacian has lambda 1; Taubin's passes are two"
-        " steps each, with the daemon's defaults.")
+        " steps each, with the daemon's defaults. `angle` and `optimize` move vertices along the extracted surface.")
     for (volume,), of_volume in by(rows, 'volume'):
         report.paragraph(f'**{volume}**')
         ways = [(f'{way_of(group[0])}, {group[0]["smoothing"]}', group)

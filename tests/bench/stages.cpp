@@ -88,6 +88,8 @@ void Stages::smooth(int passes, Smoothing smoothing) {
   if (smoothing == Smoothing::kTaubin) {
     options.mu = mesh::taubin_mu(options.lambda, JobParameters{}.pass_band);
   }
+  if (smoothing == Smoothing::kAngle) options.way = mesh::SmoothingWay::kAngle;
+  if (smoothing == Smoothing::kOptimize) options.way = mesh::SmoothingWay::kOptimize;
   mesh::smooth(options, {}, mesh_);
 }
 

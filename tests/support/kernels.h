@@ -40,6 +40,20 @@ inline mesh::Mesh mesh_of(const std::vector<mesh::Vec3>& positions,
   return mesh;
 }
 
+inline mesh::Mesh copy_of(const mesh::Mesh& other) {
+  mesh::Mesh copy;
+  copy.origin = other.origin;
+  copy.positions.resize_for_overwrite(other.positions.size());
+  std::ranges::copy(other.positions, copy.positions.begin());
+  copy.triangles.resize_for_overwrite(other.triangles.size());
+  std::ranges::copy(other.triangles, copy.triangles.begin());
+  copy.layer_vertices = other.layer_vertices;
+  copy.layer_triangles = other.layer_triangles;
+  copy.on_border = other.on_border;
+  copy.on_line = other.on_line;
+  return copy;
+}
+
 // Changes the kernels' number of threads during its lifetime. Not for tests that run kernels
 // concurrently.
 class ThreadCount {

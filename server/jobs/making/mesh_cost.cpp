@@ -62,13 +62,27 @@ std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParam
 
 }  // namespace
 
+mesh::SmoothingWay way_of(Smoothing smoothing) {
+  switch (smoothing) {
+    case Smoothing::kAngle:
+      return mesh::SmoothingWay::kAngle;
+    case Smoothing::kOptimize:
+      return mesh::SmoothingWay::kOptimize;
+    case Smoothing::kLaplacian:
+    case Smoothing::kTaubin:
+      break;
+  }
+  return mesh::SmoothingWay::kMean;
+}
+
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
   const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
   const double lambda = parameters.lambda.value_or(default_lambda(parameters));
   return {.passes = parameters.passes,
           .lambda = lambda,
           .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
-          .max_displacement_mm = most_displacement(parameters)};
+          .max_displacement_mm = most_displacement(parameters),
+          .way = way_of(parameters.smoothing)};
 }
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,

@@ -19,6 +19,7 @@ constexpr double kExtractPerSample = 1.0e-6;
 constexpr double kExtractPerTriangle = 1.6e-5;
 constexpr double kConnectivityPerTriangle = 1.0e-5;
 constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
+constexpr double kEnlargePerTriangleAndPass = 6.0e-5;  // of angles
 constexpr double kMeasurePerTriangle = 3.0e-5;
 constexpr double kSimplifyPerTriangle = 5.0e-4;
 constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
@@ -34,8 +35,10 @@ double extract_ms(const SurfaceSize& surface, std::uint64_t samples) {
 
 double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   if (parameters.passes == 0) return 0;
-  return as_double(surface.triangles) *
-         (kConnectivityPerTriangle + kSmoothPerTriangleAndPass * parameters.passes);
+  const bool enlarges =
+      parameters.smoothing == Smoothing::kAngle || parameters.smoothing == Smoothing::kOptimize;
+  const double pass = enlarges ? kEnlargePerTriangleAndPass : kSmoothPerTriangleAndPass;
+  return as_double(surface.triangles) * (kConnectivityPerTriangle + pass * parameters.passes);
 }
 
 double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters) {

@@ -7,6 +7,7 @@
 
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
+#include "server/mesh/smooth/quality.h"
 #include "server/mesh/smooth/sweep.h"
 
 namespace isomesh::mesh {
@@ -219,11 +220,13 @@ SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mes
     const Extent extent = measure_extent(mesh, context);
     return {.before = extent, .after = extent};
   }
+  if (options.way != SmoothingWay::kMean) return smooth_by_quality(options, context, mesh);
   return Smoother(options, context, mesh).run();
 }
 
 std::uint64_t smoothing_memory(const SmoothOptions& options, const SurfaceSize& size) {
-  return steps_of(options) == 0 || size.vertices == 0 ? 0 : plan_for(options, size).bytes;
+  if (steps_of(options) == 0 || size.vertices == 0) return 0;
+  return options.way == SmoothingWay::kMean ? plan_for(options, size).bytes : quality_memory(size);
 }
 
 }  // namespace isomesh::mesh

@@ -28,6 +28,10 @@ struct HalfSpace {
   double offset = 0;
 };
 
+// How a vertex is moved: towards the mean of its neighbours, or in the surface so that angles grow
+// (quality.h). Only the first looks at lambda, mu and within.
+enum class SmoothingWay { kMean, kAngle, kOptimize };
+
 struct SmoothOptions {
   int passes = 5;
   double lambda = 1;  // (0, 1]: the share of the way to the mean of the neighbours
@@ -37,6 +41,7 @@ struct SmoothOptions {
   double max_displacement_mm = std::numeric_limits<double>::infinity();
   // No free vertex leaves them. Steps away from the mean would, next to caps: their side of them.
   std::vector<HalfSpace> within = {};
+  SmoothingWay way = SmoothingWay::kMean;
 };
 
 // The second step's share for a first step of `lambda` and a pass-band frequency: what varies more
@@ -66,7 +71,8 @@ SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mes
 
 // An upper bound of what `smooth` takes beside the mesh, in bytes, on the present number of
 // threads: some layers' positions for each thread, or, where there are too many steps for that,
-// those and one copy of all positions.
+// those and one copy of all positions. To raise angles: that copy, and the neighbours of all
+// vertices.
 std::uint64_t smoothing_memory(const SmoothOptions& options, const SurfaceSize& size);
 
 }  // namespace isomesh::mesh

@@ -219,7 +219,7 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   std::istringstream stream(help);
   for (std::string word; stream >> word;) words += (words.empty() ? "" : " ") + word;
   for (const std::string text : {"Number of tetrahedra per cell (5 or 6; default: 6)",
-                                 "(laplacian or taubin; default: laplacian)",
+                                 "(laplacian, taubin, angle or optimize; default: laplacian)",
                                  "(from 0 to 1000; default: 5, 10 with --labels)",
                                  "default: 1 for laplacian, 0.33 for taubin, ", "default: 0.1)",
                                  "position, in mm", "(default: drc)"}) {

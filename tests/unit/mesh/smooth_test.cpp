@@ -15,6 +15,7 @@
 namespace isomesh::mesh {
 namespace {
 
+using test::copy_of;
 using test::Surface;
 
 struct NamedMesh {
@@ -52,18 +53,6 @@ std::vector<NamedMesh> meshes() {
   result.push_back({"open noise", open_noise()});
   result.push_back({"oblique noise", oblique_noise()});
   return result;
-}
-
-Mesh copy_of(const Mesh& mesh) {
-  Mesh copy;
-  copy.origin = mesh.origin;
-  copy.positions.resize_for_overwrite(mesh.positions.size());
-  std::copy(mesh.positions.begin(), mesh.positions.end(), copy.positions.begin());
-  copy.triangles.resize_for_overwrite(mesh.triangles.size());
-  std::copy(mesh.triangles.begin(), mesh.triangles.end(), copy.triangles.begin());
-  copy.layer_vertices = mesh.layer_vertices;
-  copy.layer_triangles = mesh.layer_triangles;
-  return copy;
 }
 
 Mesh smoothed(const Mesh& mesh, const SmoothOptions& options) {

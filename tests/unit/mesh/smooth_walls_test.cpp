@@ -254,5 +254,26 @@ TEST(SmoothWallsShape, TwoLabelsAreSmoothedAsAnIsosurfaceIs) {
   }
 }
 
+TEST(SmoothWalls, LargerAnglesLeaveJunctionCurvesWhereTheyAre) {
+  for (const SmoothingWay way : {SmoothingWay::kAngle, SmoothingWay::kOptimize}) {
+    for (auto& [name, surface] : walls()) {
+      SCOPED_TRACE(name);
+      Mesh& mesh = surface.mesh;
+      const std::vector<Vec3> before(mesh.positions.begin(), mesh.positions.end());
+      const SmoothingEffect effect = smooth({.max_displacement_mm = 0.5, .way = way}, {}, mesh);
+      std::size_t moved = 0;
+      for (std::size_t v = 0; v < before.size(); ++v) {
+        if (mesh.is_on_line(v) || mesh.is_on_border(v)) {
+          ASSERT_EQ(mesh.positions[v], before[v]);
+        }
+        moved += mesh.positions[v] != before[v] ? 1 : 0;
+      }
+      EXPECT_GT(moved, 0);
+      EXPECT_GT(effect.max_displacement_mm, 0);
+      EXPECT_LE(effect.max_displacement_mm, 0.5);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace isomesh::mesh

@@ -255,8 +255,9 @@ class Estimate(TypedDict):
     volume: str
     #: Otsu's threshold if it was requested. Left out for a job by labels.
     iso: NotRequired[float]
-    #: Number of tetrahedra per cell. With 5, every second cell is mirrored; the cell (0,0,0) is
-    #: not.
+    #: Number of tetrahedra per cell. 6 is Kuhn's split of the primitive cubic lattice. 5 is the
+    #: subdivision of the face-centred cubic lattice: every second cell is mirrored; the cell
+    #: (0,0,0) is not.
     scheme: Scheme
     #: The exact number for the extracted surface, before components and fill_cavities remove
     #: anything and before simplification.
@@ -322,7 +323,7 @@ Regularize = bool
 Passes = int
 
 
-Smoothing = Literal['laplacian', 'taubin']
+Smoothing = Literal['laplacian', 'taubin', 'angle', 'optimize']
 
 
 Lambda = Union['Optional[float]']
@@ -989,8 +990,9 @@ class JobOptions(TypedDict, total=False):
         from the volume's file.
 
     scheme
-        Number of tetrahedra per cell. With 5, every second cell is mirrored; the cell (0,0,0)
-        is not.
+        Number of tetrahedra per cell. 6 is Kuhn's split of the primitive cubic lattice. 5 is
+        the subdivision of the face-centred cubic lattice: every second cell is mirrored; the
+        cell (0,0,0) is not.
 
     interpolation
         Position of a vertex on the edge between two samples. linear interpolates the two
@@ -1010,7 +1012,12 @@ class JobOptions(TypedDict, total=False):
         The smoothing method. laplacian: each pass moves every vertex towards the mean of its
         neighbours by the factor lambda; the enclosed volume shrinks. taubin: each pass does the
         same and then moves all vertices back by the factor mu, where 1/lambda + 1/mu =
-        pass_band. A pass is thus two steps: they remove noise and keep shape and volume.
+        pass_band. A pass is thus two steps: they remove noise and keep shape and volume. angle
+        and optimize keep shape and volume and make the angles of triangles larger: each pass
+        moves every vertex along the extracted surface. angle moves it towards the bisectors of
+        its neighbours' angles. optimize moves it towards the mean of its neighbours in the
+        first half of the passes, and then to wherever the smallest angle becomes larger.
+        Neither uses lambda, and neither removes noise.
 
     lambda_
         Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours. Null: 1

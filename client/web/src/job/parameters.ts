@@ -173,10 +173,12 @@ export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string 
   return labels.length === 1 ? `label ${only}` : `${labels.length} labels`;
 }
 
+const smoothingInWords = { laplacian: 'Laplacian', taubin: 'Taubin', angle: 'by angles', optimize: 'optimised' };
+
 // In a few words, for titles: 6 tetrahedra, linear, 5 passes.
 export function inWords(job: JobParameters): string {
   const passes = job.passes === 1 ? '1 pass' : `${job.passes} passes`;
-  const smoothing = job.smoothing === 'taubin' && job.passes > 0 ? ' (Taubin)' : '';
+  const smoothing = job.smoothing !== 'laplacian' && job.passes > 0 ? ` (${smoothingInWords[job.smoothing]})` : '';
   const closed = job.close ? ', closed' : '';
   const placed = isByLabels(job) ? '' : `, ${job.interpolation}`;
   return `${job.scheme} tetrahedra${placed}, ${passes}${smoothing}${closed}`;

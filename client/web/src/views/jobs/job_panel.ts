@@ -199,10 +199,12 @@ export const comparisons: readonly Comparison[] = [
   },
   { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
   {
-    title: 'Laplacian and Taubin',
+    title: 'all kinds of smoothing',
     variants: [
       { smoothing: 'laplacian' },
       { smoothing: 'taubin' },
+      { smoothing: 'angle' },
+      { smoothing: 'optimize' },
     ],
   },
 ];
