@@ -204,9 +204,6 @@ std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
 
 void check_options(const Reader& reader, const ImportOptions& options) {
   const bool is_volume = reader.content == Content::kVolume;
-  if (options.spacing && reader.content == Content::kSlices) {
-    throw invalid_parameter("spacing", "applies to files without a spacing, and DICOM has one");
-  }
   if (is_volume && !options.series.empty()) {
     throw invalid_parameter("series", "selects a DICOM series, but this file is not DICOM");
   }
