@@ -65,7 +65,7 @@ export class SliceLayers {
     const over = field('Volume over it', this.choice);
     over.append(this.opacity);
     over.hidden = true;
-    this.element = h('div', { class: 'row' }, over, ...this.slabControls());
+    this.element = h('div', { class: 'row slice-layers' }, over, ...this.slabControls());
     // Without the list nothing can be laid over, and everything else works.
     void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
   }
