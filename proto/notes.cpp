@@ -26,10 +26,16 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "space-assumed",
      .meaning = "The file does not say how its axes lie in the patient. The detail says what was "
                 "assumed.",
+     .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kUnitUnknown,
      .name = "unit-unknown",
      .meaning = "The file's unit is not a length. One unit was read as one millimetre.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kUnitAngstrom,
+     .name = "unit-angstrom",
+     .meaning = "The coordinates are in angstrom, as in the file. Lengths, areas and volumes that "
+                "are given in millimetres are in angstrom, too.",
      .is_in_mesh = true},
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
@@ -75,6 +81,16 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning = "Segments overlap. Samples of several segments have values that stand for the "
                 "combination. "
                 "A label consists of all values of its segment.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kContoursSkipped,
+     .name = "contours-skipped",
+     .meaning = "A DICOM structure set has contours or structures that were not drawn. The detail "
+                "says how many and why.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kContoursInterpolated,
+     .name = "contours-interpolated",
+     .meaning = "A structure of a DICOM structure set has no contours in some slices between "
+                "others. Its shape was interpolated there.",
      .is_in_mesh = true},
     {.code = NoteCode::kFractionalSegments,
      .name = "fractional-segments",

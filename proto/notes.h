@@ -15,6 +15,7 @@ enum class NoteCode {
   kVolumeChosen,         // one of several volumes of the file
   kSpaceAssumed,         // the file does not define its axes in the patient
   kUnitUnknown,          // the file's unit is not a length; taken as millimetres
+  kUnitAngstrom,         // coordinates are in angstrom, wherever millimetres are told
   kNonFiniteSamples,     // some samples are NaN or infinite; they are outside of any surface
   kTrailingBytes,        // the data is longer than the header says
   kValuesRescaled,       // by a slope that other programs ignore
@@ -24,7 +25,9 @@ enum class NoteCode {
   kEmptyPlanes,          // DICOM: frames missing from a segmentation; filled with zeros
   kDistanceAssumed,      // DICOM: no distance between slices; taken from the thickness
   kOverlappingSegments,  // segments overlap; values number their combinations
-  kFractionalSegments,   // DICOM: segments are fractions or probabilities; thresholded at one half
+  kContoursSkipped,      // DICOM: contours or structures of a structure set that were not drawn
+  kContoursInterpolated,  // DICOM: shapes of structures in slices between their contours
+  kFractionalSegments,    // DICOM: segments are fractions or probabilities; thresholded at one half
 };
 
 struct NoteDescription {

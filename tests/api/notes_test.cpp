@@ -14,6 +14,7 @@
 namespace isomesh::test {
 namespace {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::Field;
@@ -164,7 +165,36 @@ std::string mosaic() {
                element(0x29, 0x1010, "OB", header) + element(0x7fe0, 0x10, "OW", halves(64)));
 }
 
+// A structure with a square in the slices 1 and 4 of a series, and a point.
+std::string structure_set() {
+  const auto contour = [](const std::string& type, const std::string& points) {
+    return element(0x3006, 0x42, "CS", type) + element(0x3006, 0x50, "DS", points);
+  };
+  const auto square = [&](const std::string& z) {
+    const std::string end = "\\" + z;
+    return contour("CLOSED_PLANAR",
+                   "0.5\\0.5" + end + "\\2.5\\0.5" + end + "\\2.5\\2.5" + end + "\\0.5\\2.5" + end);
+  };
+  return dicom(
+      element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.481.3") + element(8, 0x18, "UI", "1.2.9.1") +
+      element(8, 0x60, "CS", "RTSTRUCT") + element(0x20, 0xe, "UI", "1.2.9") +
+      sequence(0x3006, 0x10, {element(0x20, 0x52, "UI", "1.9")}) +
+      sequence(0x3006, 0x20,
+               {element(0x3006, 0x22, "IS", "5") + element(0x3006, 0x26, "LO", "heart")}) +
+      sequence(0x3006, 0x39,
+               {element(0x3006, 0x2a, "IS", "255\\0\\0") +
+                sequence(0x3006, 0x40, {square("1"), square("4"), contour("POINT", "1\\1\\1")}) +
+                element(0x3006, 0x84, "IS", "5")}));
+}
+
 using Files = std::map<std::string, std::string>;
+
+Files structures_and_images() {
+  Files files = {{"RS", structure_set()}};
+  for (int index = 1; index <= 4; ++index)
+    files["CT" + std::to_string(index)] = slice(index, "1.9");
+  return files;
+}
 
 struct Shown {
   Files files;
@@ -186,6 +216,8 @@ const std::map<std::string, Shown>& shown() {
        {{{"a.nrrd",
           nrrd("space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace units: \"pixel\" "
                "\"pixel\" \"pixel\"\n")}}}},
+      {"unit-angstrom",
+       {{{"a.cube", "title\n\n1 0 0 0\n2 1 0 0\n2 0 1 0\n2 0 0 1\n6 6 0 0 0\n1 2 3 4 5 6 7 8\n"}}}},
       {"non-finite-samples",
        {{{"a.nii", nifti({.datatype = 16, .bits = 32, .samples = not_finite()})}}}},
       {"trailing-bytes", {{{"a.nrrd", nrrd("", kSamples + "more")}}}},
@@ -202,6 +234,8 @@ const std::map<std::string, Shown>& shown() {
           "(0,0,1)\nSegment0_Layer:=0\nSegment1_Layer:=1\n\n" +
               std::string(16, '\1')}}}},
       {"fractional-segments", {{{"a.dcm", fractional_segmentation()}}}},
+      {"contours-skipped", {structures_and_images(), {"--series", "1.2.9"}}},
+      {"contours-interpolated", {structures_and_images(), {"--series", "1.2.9"}}},
       {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
       {"distance-assumed", {{{"a.dcm", mosaic()}}}},
       {"frame-of-reference",
@@ -271,6 +305,19 @@ TEST_F(NotesTest, ARefusalOffersTheVolumesOfAFile) {
   const Finished said = daemon_.command({"upload", folder_ / "a.nii"});
   EXPECT_EQ(said.status, 1);
   EXPECT_THAT(said.errors, HasSubstr("--volume 1"));
+}
+
+TEST_F(NotesTest, AStructureSetAloneNeedsASpacing) {
+  const Answer open = daemon_.send("POST", "/v1/volumes", structure_set());
+  EXPECT_EQ(open.status, 422);
+  EXPECT_THAT(open.body, HasSubstr("spacing=X,Y,Z"));
+  const Answer drawn = daemon_.send("POST", "/v1/volumes?spacing=1,1,1", structure_set());
+  ASSERT_EQ(drawn.status, 201) << drawn.body;
+  const Volume volume = volume_from_json(drawn.body);
+  EXPECT_EQ(volume.geometry.spacing, (std::array<double, 3>{1, 1, 1}));
+  const Answer labels = daemon_.send("GET", "/v1/volumes/" + volume.id + "/labels");
+  EXPECT_THAT(labels.body, AllOf(HasSubstr("heart"), HasSubstr("#ff0000")));
+  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?spacing=0,1,1", structure_set()).status, 400);
 }
 
 TEST_F(NotesTest, ARefusedUploadIsKeptForWhoWantsToChoose) {

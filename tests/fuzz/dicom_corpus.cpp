@@ -3,6 +3,7 @@
 #include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/mosaics.h"
 #include "tests/unit/import/dicom/segments.h"
+#include "tests/unit/import/dicom/structures.h"
 
 namespace isomesh::fuzz {
 
@@ -21,9 +22,9 @@ std::vector<std::string> dicom_objects() {
   fractional.maximum = 10;
   for (const DicomObject& object :
        {siemens_mosaic(), siemens_mosaic(csa_fields({"0", "0", "-1"}), false),
-        united_imaging_grid(), segmentation(two_segments()), segmentation(labels),
-        segmentation(overlapping), segmentation(fractional), DicomSeries{}.enhanced({0, 1, 2}),
-        DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
+        protocol_mosaic(true), united_imaging_grid(), segmentation(two_segments()),
+        segmentation(labels), segmentation(overlapping), segmentation(fractional),
+        DicomSeries{}.enhanced({0, 1, 2}), DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
     for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
       files.push_back(object.file(syntax));
     }
@@ -33,6 +34,23 @@ std::vector<std::string> dicom_objects() {
 
 std::vector<std::string> csa_headers() {
   return {csa_header(csa_fields({"0", "0", "1"})), csa_header(csa_fields({"0", "0", "1"}), false)};
+}
+
+std::vector<std::string> structure_sets() {
+  const TestContour large = {box(0, 0, 20, 20, 0)};
+  const TestContour hole = {box(5, 5, 12, 12, 0), "CLOSEDPLANAR_XOR"};
+  const TestContour above = {box(2, 2, 12, 18, 8)};
+  const DicomObject object =
+      structure_set({{.number = 1, .name = "ring", .contours = {large, hole, above}},
+                     {.number = 7, .name = "box", .contours = {above, {{{1, 1, 1}}, "POINT"}}}});
+  return {object.file(kImplicit), object.file(kExplicit)};
+}
+
+std::vector<std::string> siemens_protocols() {
+  return {
+      "SV10### ASCCONV BEGIN ###\nsSliceArray.lSize = 5\n"
+      "sSliceArray.asSlice[0].sNormal.dTra = 1\nsSliceArray.asSlice[4].sPosition.dTra = 16\n"
+      "### ASCCONV END ###\n"};
 }
 
 }  // namespace isomesh::fuzz

@@ -8,5 +8,7 @@ namespace isomesh::fuzz {
 
 std::vector<std::string> dicom_objects();
 std::vector<std::string> csa_headers();
+std::vector<std::string> structure_sets();
+std::vector<std::string> siemens_protocols();
 
 }  // namespace isomesh::fuzz

@@ -15,6 +15,7 @@
 #include "server/import/dicom/kinds/segmentation.h"
 #include "server/import/dicom/pixels/pixels.h"
 #include "server/import/dicom/pixels/values.h"
+#include "server/import/dicom/structures.h"
 #include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
 #include "server/volume/presets.h"
@@ -154,6 +155,28 @@ DicomIdentity identify(const Stack& stack, std::span<const Source> sources, cons
   return identity;
 }
 
+// The grid of the images that a structure set belongs to; empty if there are none.
+std::optional<ContourGrid> grid_beside(const StructureFile& structures,
+                                       const std::vector<Source>& all, ImportOptions options) {
+  const std::vector<Source> sources = images_of(structures, all);
+  if (sources.empty() || options.spacing) return std::nullopt;
+  // Several volumes of one series have the same grid, and `volume` selects a structure here.
+  options.volume.reset();
+  std::vector<Note> notes;
+  const auto stack_of = [&] { return choose_stack(slices_of(sources), options, notes); };
+  const auto grid_of = [](const Stack& stack) {
+    const PixelLayout& layout = stack.slices.front().image->layout;
+    return ContourGrid{{layout.columns, layout.rows, stack.depth()}, stack.geometry};
+  };
+  try {
+    return grid_of(stack_of());
+  } catch (const Error& error) {
+    if (error.remedy().choices.empty()) throw;
+    options.volume = 0;
+    return grid_of(stack_of());
+  }
+}
+
 }  // namespace
 }  // namespace dicom
 
@@ -164,6 +187,12 @@ bool is_dicom(std::string_view head) {
 Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task) {
   const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;
   dicom::Upload upload = dicom::read_headers(files, task.scratch, most_sample_bytes);
+  if (const auto* structures = chosen_structures(upload, task.options.series)) {
+    Volume volume = import_structures(
+        structures->path, dicom::grid_beside(*structures, upload.sources, task.options), task);
+    volume.ignored = std::move(upload.ignored);
+    return volume;
+  }
   const std::vector<dicom::Source> sources =
       choose_series(std::move(upload.sources), task.options.series);
   std::vector<Note> notes = std::move(upload.notes);

@@ -183,4 +183,16 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
   return produced;
 }
 
+std::size_t inflate_bytes(std::span<const std::byte> stream, std::span<std::byte> target) {
+  Inflater inflater(Wrapping::kNone);
+  set_input(inflater.stream(), stream);
+  set_output(inflater.stream(), target);
+  const int result = inflate(&inflater.stream(), Z_FINISH);
+  const std::size_t left = inflater.stream().avail_out;
+  if (result != Z_STREAM_END && left > 0) {
+    throw Error(ErrorCode::kUnusableVolume, "its deflated samples are corrupt or truncated");
+  }
+  return target.size() - left;
+}
+
 }  // namespace isomesh::import

@@ -39,4 +39,9 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
                             std::uint64_t limit, const ByteSink& sink,
                             Wrapping wrapping = Wrapping::kZlibOrGzip);
 
+// Inflates a raw deflate stream in memory into `target`, up to its size. Returns the number of
+// bytes. Throws Error kUnusableVolume, with a clause without a subject, if the stream is corrupt or
+// truncated; bytes after the target's size are not read.
+std::size_t inflate_bytes(std::span<const std::byte> stream, std::span<std::byte> target);
+
 }  // namespace isomesh::import

@@ -60,4 +60,23 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
       expect(await excess(page), name).toEqual({ down: 0, right: 0, header: 0 });
     }
   });
+
+  it('the list of jobs leaves nothing out, and has no column of single words', async () => {
+    const { page } = at;
+    await page.setViewportSize(size);
+    await open(page, 'jobs');
+    const cells = await page.locator('.jobs tbody td').evaluateAll((all) =>
+      all
+        .filter(({ textContent }) => textContent !== '')
+        .map((cell) => {
+          const { left, right, height } = cell.getBoundingClientRect();
+          const isSeen = cell.checkVisibility() && left >= 0 && right <= window.innerWidth;
+          const padding = parseFloat(getComputedStyle(cell).paddingBlock) || 0;
+          return { text: cell.textContent, isSeen, lines: (height - 2 * padding) / parseFloat(getComputedStyle(cell).lineHeight) };
+        }),
+    );
+    // Of each of three jobs its state, priority, surface, result, time and age.
+    expect(cells).toHaveLength(18);
+    expect(cells.filter(({ isSeen, lines }) => !isSeen || lines > 3.5)).toEqual([]);
+  });
 });

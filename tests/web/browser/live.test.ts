@@ -68,6 +68,41 @@ describe('the surface beside the slices', () => {
     expect(asked.filter((path) => path.startsWith('/v1/') && path !== '/v1/estimate')).toEqual([]);
   });
 
+  it('is drawn once for all moves that come while a picture is drawn, at the last of them', async () => {
+    const { page } = at;
+    await open(page, 'iso=60');
+    // What draws takes as long as the test lets it.
+    await page.evaluate(() => {
+      const made = WebGL2RenderingContext.prototype;
+      // eslint-disable-next-line @typescript-eslint/unbound-method -- called on their contexts below
+      const { clientWaitSync } = made;
+      const test = { isHeld: true, drawn: [] as string[] };
+      Object.assign(window, { test });
+      made.clientWaitSync = function (...given) {
+        return test.isHeld ? this.TIMEOUT_EXPIRED : clientWaitSync.apply(this, given);
+      };
+      const cell = document.querySelector<HTMLElement>('.live');
+      if (!cell) throw new Error('there is no surface');
+      const note = (): number => test.drawn.push(cell.dataset.iso ?? '');
+      new MutationObserver(note).observe(cell, { attributes: true, attributeFilter: ['data-moving', 'data-resting'] });
+    });
+    const input = page.getByLabel('Iso-value', { exact: true }).nth(0);
+    for (let iso = 61; iso <= 90; iso += 1) await input.fill(String(iso));
+    const drawn = await page.evaluate(() => {
+      const { test } = window as unknown as { test: { isHeld: boolean; drawn: string[] } };
+      const before = [...test.drawn];
+      test.isHeld = false;
+      return before;
+    });
+    expect(drawn).toEqual([]);
+    await rested(page);
+    await expect.poll(() => page.locator('.live').getAttribute('data-iso')).toBe('90');
+    // The one that was being drawn when the others came, and the last.
+    const values = await page.evaluate(() => (window as unknown as { test: { drawn: string[] } }).test.drawn);
+    expect(new Set(values).size).toBeLessThanOrEqual(2);
+    expect(values.at(-1)).toBe('90');
+  });
+
   it('is turned by keys and by the pointer, and sends the slices to where it is clicked', async () => {
     const { page } = at;
     await open(page, 'iso=100&at=2,3,4');

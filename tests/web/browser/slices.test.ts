@@ -1,7 +1,7 @@
 // Slices and parameters never show or use something else than what is asked for.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, contourPixels, noted, openedJob, setup, tiltedNrrd } from './support';
+import { ballNrrd, contourPixels, noted, openedJob, settled, setup, tiltedNrrd } from './support';
 
 const at = setup();
 let ball: string;
@@ -143,6 +143,43 @@ describe('slices before there is a mesh', () => {
     await expect.poll(() => text.innerText()).toMatch(/\d+ \u00b7 LPS 24, 24, 24 mm$/);
     await page.getByLabel('Coordinates').selectOption('RAS');
     await expect.poll(() => text.innerText()).toContain('RAS \u221224, \u221224, 24 mm');
+  });
+
+  it('show another volume over them where it lies in the patient, and the maximum of a slab', async () => {
+    const { page, daemon } = at;
+    // A block of 11 mm on the left and at the back of the ball, whose axes run in another order and the other way.
+    
+    const block = Buffer.alloc(12 ** 3, 200);
+    const header = 'NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 12 12 12\nspace directions: (0,1,0) (1,0,0) (0,0,-1)\nspace origin: (30,30,35)\nencoding: raw\n\n';
+    block[0] = 0;
+    await daemon.upload(Buffer.concat([Buffer.from(header), block]));
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/volumes/${ball}?iso=100&at=24,24,30`);
+    await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
+    const coloured = (): Promise<{ count: number; isRight: boolean; isBelow: boolean }> =>
+      page.evaluate(() => {
+        const canvas = document.querySelector<HTMLCanvasElement>('[data-plane=axial] canvas');
+        const { width = 0, height = 0 } = canvas ?? {};
+        const data = canvas?.getContext('2d')?.getImageData(0, 0, width, height).data ?? [];
+        const found: [number, number][] = [];
+        for (let i = 0; i < data.length; i += 4) {
+          if ((data[i] ?? 0) > (data[i + 2] ?? 0) + 60 && (data[i] ?? 0) > 120) found.push([(i / 4) % width, Math.floor(i / 4 / width)]);
+        }
+        return { count: found.length, isRight: found.every(([x]) => x > width / 2), isBelow: found.every(([, y]) => y > height / 2) };
+      });
+    expect((await coloured()).count).toBe(0);
+    const other = page.getByLabel('Volume over it', { exact: true });
+    await other.selectOption({ index: 1 });
+    await expect.poll(async () => (await coloured()).count).toBeGreaterThan(100);
+    expect(await coloured()).toMatchObject({ isRight: true, isBelow: true });
+    await page.getByLabel('Opacity of the volume over it').fill('0');
+    await expect.poll(async () => (await coloured()).count).toBe(0);
+    // At the ball's pole there is little; a slab of 40 mm reaches its middle.
+    await page.locator('[data-plane=axial] input[type=range]').fill('8');
+    const few = await settled(() => greyPixels(page, 'axial'));
+    await page.getByLabel('Show', { exact: true }).selectOption('maximum');
+    await page.getByLabel('Thickness', { exact: true }).selectOption('40');
+    await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(1.25 * few);
   });
 
   it('are measured, and show it to those who hear them', async () => {

@@ -28,8 +28,10 @@ export interface Block {
 
 const mostVertices = 65_535;
 export const mostTriangles = 65_000;
-// Edge lengths that one cell of the coarse copy spans.
+// Edge lengths that one cell of the coarse copy spans at least.
 const coarseness = 3.5;
+// Of a whole surface while it turns. Software needs about 5 µs of a core for each.
+const movingTriangles = 30_000;
 
 // Sums of the triangles' normals times twice their area, three a vertex.
 export function areaNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
@@ -135,9 +137,33 @@ function meanEdge({ positions, index }: Triangles): number {
   return count > 0 ? sum / count : 0;
 }
 
+// The size of cells that leave about `movingTriangles` of a surface of that area: about six for each square of a cell's side, as
+// bone and cortex are folded.
+export function movingCell(area: number): number {
+  return Math.sqrt((6 * area) / movingTriangles);
+}
+
+// The vertex that stands for each on the border: the least one of its cell, which is the same in the neighbouring block, so that
+// no gap opens between the two.
+function joinBorder(positions: Float32Array, border: Uint16Array, keyOf: (at: number) => number, heads: Uint16Array): void {
+  const isBefore = (a: number, b: number): boolean => {
+    for (let axis = 0; axis < 3; axis += 1) {
+      const difference = (positions[3 * a + axis] as number) - (positions[3 * b + axis] as number);
+      if (difference !== 0) return difference < 0;
+    }
+    return false;
+  };
+  const least = new Map<number, number>();
+  for (const vertex of border) {
+    const key = keyOf(3 * vertex);
+    const head = least.get(key);
+    if (head === undefined || isBefore(vertex, head)) least.set(key, vertex);
+  }
+  for (const vertex of border) heads[vertex] = least.get(keyOf(3 * vertex)) ?? vertex;
+}
+
 // The triangles that are left when the vertices of a cell of that size become one, apart for each
-// octant that their normals point into, so that both sides of a thin wall stay. Vertices on the border
-// stay as well: the neighbouring block goes on there.
+// octant that their normals point into, so that both sides of a thin wall stay. Vertices on the border become one of these.
 //
 // meshoptimizer's simplifySloppy takes 1.4 to 1.8 times as long for as many triangles (5.1 million made
 // coarse: 272 against 154 ms) and joins vertices of both sides of a thin wall.
@@ -152,22 +178,25 @@ export function clustered(
   const heads = new Uint16Array(positions.length / 3);
   // 15 bits an axis: cells whose numbers are the same by overflow are farther apart than a block is wide.
   const place = (at: number): number => Math.floor((positions[at] as number) / cell) & 0x7fff;
+  const cellOf = (at: number): number => (place(at) * 0x8000 + place(at + 1)) * 0x8000 + place(at + 2);
   const side = (at: number): number => ((normals[at] as number) < 0 ? 1 : 0);
   for (let vertex = 0; vertex < heads.length; vertex += 1) {
     const at = 3 * vertex;
     const octant = 4 * side(at) + 2 * side(at + 1) + side(at + 2);
-    const key = ((place(at) * 0x8000 + place(at + 1)) * 0x8000 + place(at + 2)) * 8 + octant;
+    const key = cellOf(at) * 8 + octant;
     const head = first.get(key);
     if (head === undefined) first.set(key, vertex);
     heads[vertex] = head ?? vertex;
   }
-  for (const vertex of border) heads[vertex] = vertex;
+  joinBorder(positions, border, cellOf, heads);
   const kept = new Uint16Array(index.length);
   let used = 0;
+  // The head of one inside may be on the border, and that one's head another.
+  const headAt = (corner: number): number => heads[heads[index[corner] as number] as number] as number;
   for (let i = 0; i + 2 < index.length; i += 3) {
-    const a = heads[index[i] as number] as number;
-    const b = heads[index[i + 1] as number] as number;
-    const c = heads[index[i + 2] as number] as number;
+    const a = headAt(i);
+    const b = headAt(i + 1);
+    const c = headAt(i + 2);
     if (a === b || b === c || a === c) continue;
     // What was turned over by that would be dark or, of a label, not be drawn at all.
     const isOver = isTurned(positions, normals, 3 * a, 3 * b, 3 * c);
@@ -252,7 +281,8 @@ export function boundsOf(positions: ArrayLike<number>): [Vec3, Vec3] {
   return [low, high];
 }
 
-export function prepare(triangles: Triangles): Block {
+// `cell` is the least size of the coarse copy's cells.
+export function prepare(triangles: Triangles, cell = 0): Block {
   const { positions, index } = triangles;
   const sums = areaNormals(triangles);
   const border = borderVertices(index, positions.length / 3);
@@ -263,7 +293,7 @@ export function prepare(triangles: Triangles): Block {
   return {
     positions,
     index: Uint16Array.from(index),
-    coarse: clustered(triangles, sums, border, coarseness * meanEdge(triangles)),
+    coarse: clustered(triangles, sums, border, Math.max(cell, coarseness * meanEdge(triangles))),
     normals: packedNormals(sums),
     border,
     borderNormals,

@@ -10,6 +10,8 @@ export interface DecodeRequest {
   positionId: number | null;
   // The number of the attribute of distances; null: it has none.
   distanceId: number | null;
+  // The least size of the coarse copy's cells, in millimetres.
+  cell: number;
 }
 
 export interface DecodeAnswer {
@@ -79,7 +81,7 @@ scope.onmessage = (event) => {
   const request = event.data;
   ready
     .then((draco) => {
-      const blocks = split(decode(draco, request)).map(prepare);
+      const blocks = split(decode(draco, request)).map((part) => prepare(part, request.cell));
       const buffers = blocks.flatMap((block) =>
         Object.values(block).flatMap((value: unknown) => (ArrayBuffer.isView(value) ? [value.buffer as ArrayBuffer] : [])),
       );

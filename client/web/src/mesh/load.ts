@@ -2,7 +2,7 @@
 import { client, connected } from '../client';
 import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
 import type { Job, MeshFile } from '../api/types';
-import type { Block } from './blocks';
+import { movingCell, type Block } from './blocks';
 import { GlbReader, type DracoPrimitive, type Part } from './glb';
 import { decoders } from './pool';
 
@@ -113,11 +113,12 @@ export async function loadMesh(
     totalBytes: file.bytes,
     totalTriangles: job.mesh?.triangles ?? 0,
   };
+  const cell = movingCell(job.mesh?.area_mm2 ?? 0);
   const began = performance.now();
   const decoding: Promise<void>[] = [];
   const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: DracoPrimitive | undefined): void => {
     const { positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
-    const done = decoders.decode(bytes, { positionId, distanceId }, signal).then((blocks) => {
+    const done = decoders.decode(bytes, { positionId, distanceId, cell }, signal).then((blocks) => {
       if (signal.aborted) return;
       listener.onBlocks(blocks, part, isCoarse);
     });

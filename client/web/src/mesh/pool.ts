@@ -18,11 +18,11 @@ class DecodePool {
 
   decode(
     bytes: Uint8Array<ArrayBuffer>,
-    ids: Pick<DecodeRequest, 'positionId' | 'distanceId'>,
+    options: Omit<DecodeRequest, 'id' | 'bytes'>,
     signal: AbortSignal,
   ): Promise<Block[]> {
     return new Promise((resolve, reject) => {
-      const task: Task = { request: { id: this.nextId++, bytes, ...ids }, resolve, reject };
+      const task: Task = { request: { id: this.nextId++, bytes, ...options }, resolve, reject };
       signal.addEventListener('abort', () => {
         const place = this.waiting.indexOf(task);
         if (place >= 0) this.waiting.splice(place, 1);

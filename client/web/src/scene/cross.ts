@@ -3,6 +3,9 @@ import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, type 
 import type { Vec3, Volume } from '../api/types';
 import { toPatient } from '../volume/geometry';
 
+// Of what lies over the surface, so that it is drawn once.
+export const overLayer = 1;
+
 export class Cross {
   private readonly geometry = new BufferGeometry();
   private readonly material = new LineBasicMaterial({ color: '#17a398', transparent: true, opacity: 0.55, depthTest: false });
@@ -13,6 +16,7 @@ export class Cross {
     this.lines.visible = false;
     this.lines.frustumCulled = false;
     this.lines.renderOrder = 9;
+    this.lines.layers.set(overLayer);
     parent.add(this.lines);
   }
 

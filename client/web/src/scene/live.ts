@@ -14,30 +14,33 @@ import {
   Matrix4,
   Mesh,
   PerspectiveCamera,
-  PlaneGeometry,
   RawShaderMaterial,
   Scene,
   Vector2,
   Vector3,
   WebGLRenderer,
-  WebGLRenderTarget,
+  type WebGLRenderTarget,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
-import { blockSize, firstCrossing, firstLabel, type Preview } from '../volume/preview';
-import { compile, whenDrawn } from './compile';
+import { blockSize, firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
+import { compile } from './compile';
 import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import type { Look } from '../volume/looks';
-import { enlargingFragmentShader, enlargingVertexShader, fragmentShader, vertexShader } from './live_shader';
+import { fragmentShader, vertexShader } from './live_shader';
+import { Painting, type Picture } from './painting';
 import { onTap } from './tap';
-import { firstOffset, fitDistance } from './views';
+import { firstOffset, fitted } from './views';
 
 const verticalAngle = 30;
-const fill = 1.02;
-// How long a frame may take while something moves, and at rest, in milliseconds.
-const movingTime = 40;
-const movingTimeOfSoftware = 110;
+// How long a frame may take while something moves, and at rest, in milliseconds. A change in the middle of a frame is
+// drawn after it, so that half a frame's time comes on top.
+const movingTime = 33;
+const movingTimeOfSoftware = 50;
 const restingTime = 1500;
+// A picture at rest is drawn in bands that take so long; a change ends it after the band that is being drawn.
+const bandTime = 50;
+const mostBands = 64;
 const settleDelay = 220;
 // How much longer a look through the volume takes than its surface, guessed for the first frame.
 const costOfLook = 3;
@@ -49,6 +52,8 @@ export interface Frame {
   took: number;
   scale: number;
   isResting: boolean;
+  // Of the surface that it shows.
+  iso: number;
 }
 
 export class LiveSurface {
@@ -93,13 +98,10 @@ export class LiveSurface {
     new LineBasicMaterial({ color: '#2ce0cb', transparent: true, opacity: 0.45, depthTest: false }),
   );
   private cursor: Vec3 | null = null;
+  private iso = NaN;
   private labelTable = new Uint8Array(0);
   private crop: readonly [Vec3, Vec3] | null = null;
-  // What is drawn with fewer pixels than the canvas has. A canvas that changes its size holds the page up until
-  // all that was drawn before is done.
-  private readonly target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
-  private readonly enlarging: Mesh<PlaneGeometry, RawShaderMaterial>;
-  private readonly part = { picture: { value: this.target.texture }, part: { value: new Vector2() }, last: { value: new Vector2() } };
+  private readonly painting: Painting;
   // Software draws the first, coarser one while something moves.
   private first: Drawable | null = null;
   private best: Drawable | null = null;
@@ -115,8 +117,9 @@ export class LiveSurface {
 
   // Throws where WebGL 2 is missing.
   constructor(private readonly host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: false, alpha: true, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({ antialias: false, depth: false, alpha: true, powerPreference: 'high-performance' });
     this.gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.painting = new Painting(this.renderer, this.scene, this.camera);
     this.isSoftware = isSoftware(this.gl);
     const guess = this.isSoftware ? 4e-3 : 1e-5;
     this.costs = { moving: guess, resting: 2 * guess };
@@ -139,16 +142,6 @@ export class LiveSurface {
     this.cross.geometry.setAttribute('position', new BufferAttribute(new Float32Array(18), 3));
     this.box.add(this.cross);
     this.scene.add(this.box);
-    const enlarged = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: enlargingVertexShader,
-      fragmentShader: enlargingFragmentShader,
-      uniforms: this.part,
-      depthTest: false,
-      depthWrite: false,
-    });
-    this.enlarging = new Mesh(new PlaneGeometry(2, 2), enlarged);
-    this.enlarging.frustumCulled = false;
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener('change', () => this.moved());
@@ -158,7 +151,7 @@ export class LiveSurface {
     this.resizing.observe(host);
     const shaders: [Scene | Mesh, PerspectiveCamera][] = [
       [this.scene, this.camera],
-      [this.enlarging, this.camera],
+      [this.painting.enlarging, this.camera],
     ];
     compile(this.renderer, shaders, this.over.signal, () => {
       this.isCompiled = true;
@@ -189,6 +182,7 @@ export class LiveSurface {
     this.uniforms.samples.value = samples;
     this.uniforms.blocks.value = blocks;
     this.uniforms.dims.value.set(...preview.dims);
+    this.uniforms.iso.value = inPreview(preview, this.iso);
     const [x, y, z] = preview.steps;
     const [ox, oy, oz] = preview.origin;
     this.box.matrix.set(x[0], y[0], z[0], ox, x[1], y[1], z[1], oy, x[2], y[2], z[2], oz, 0, 0, 0, 1);
@@ -220,10 +214,10 @@ export class LiveSurface {
     positions.needsUpdate = true;
   }
 
-  // In parts of the preview's window.
+  // In the volume's units, of a preview of values.
   setIso(iso: number): void {
-    if (this.uniforms.iso.value === iso) return;
-    this.uniforms.iso.value = iso;
+    if (this.iso === iso) return;
+    this.iso = iso;
     this.moved();
   }
 
@@ -275,13 +269,11 @@ export class LiveSurface {
     const corners = this.corners();
     const low = corners[0].clone().min(corners[1]);
     const high = corners[0].clone().max(corners[1]);
-    const size = high.clone().sub(low).toArray();
     const { clientWidth: width, clientHeight: height } = this.host;
     const angle = (verticalAngle * Math.PI) / 180;
-    const distance = fill * fitDistance(size, offset, angle, width / Math.max(1, height));
-    const scale = distance / Math.hypot(...offset);
-    this.controls.target.copy(low).add(high).multiplyScalar(0.5);
-    this.camera.position.copy(this.controls.target).addScaledVector(new Vector3(...offset), scale);
+    const place = fitted([low.toArray(), high.toArray()], offset, angle, width / Math.max(1, height));
+    this.controls.target.set(...place.target);
+    this.camera.position.copy(this.controls.target).add(new Vector3(...place.offset));
     this.controls.update();
     this.moved();
   }
@@ -312,9 +304,7 @@ export class LiveSurface {
     this.box.material.dispose();
     this.cross.geometry.dispose();
     this.cross.material.dispose();
-    this.enlarging.geometry.dispose();
-    this.enlarging.material.dispose();
-    this.target.dispose();
+    this.painting.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.canvas.remove();
@@ -367,10 +357,7 @@ export class LiveSurface {
     this.uniforms.reach.value = this.isSoftware && !isResting ? 1 : 0.5;
     const ratio = Math.min(2, window.devicePixelRatio || 1);
     const [wide, high] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
-    if (this.canvas.width !== wide || this.canvas.height !== high) {
-      this.renderer.setSize(wide, high, false);
-      this.target.setSize(wide, high);
-    }
+    if (this.canvas.width !== wide || this.canvas.height !== high) this.renderer.setSize(wide, high, false);
     const scale = this.scaleFor(wide * high, kind);
     const [width, height] = [Math.max(1, Math.round(wide * scale)), Math.max(1, Math.round(high * scale))];
     this.camera.aspect = clientWidth / clientHeight;
@@ -383,13 +370,16 @@ export class LiveSurface {
     this.uniforms.towardsEye.value.copy(this.camera.position).sub(this.controls.target).normalize();
     this.uniforms.towardsLight.value.set(-0.35, 0.5, 1).transformDirection(this.camera.matrixWorld);
     const began = performance.now();
-    this.paint(width, height);
-    whenDrawn(this.gl, () => {
+    const { iso } = this;
+    const isOver = (): boolean => this.isDisposed || this.changedAt !== 0;
+    this.painting.paint(this.inBands(width, height, kind), isOver, (isWhole) => {
       const now = performance.now();
-      this.costs[kind] = 0.5 * this.costs[kind] + (0.5 * (now - began)) / (width * height);
       this.isBusy = false;
       if (this.isDisposed) return;
-      this.onFrame?.({ took: now - changedAt, scale, isResting });
+      if (isWhole) {
+        this.costs[kind] = 0.5 * this.costs[kind] + (0.5 * (now - began)) / (width * height);
+        this.onFrame?.({ took: now - changedAt, scale, isResting, iso });
+      }
       if (this.changedAt !== 0) this.changed();
       // There was time for more.
       else if (isResting && this.scaleFor(wide * high, kind) > scale) this.changed();
@@ -397,22 +387,14 @@ export class LiveSurface {
     });
   }
 
-  // With so many pixels.
-  private paint(width: number, height: number): void {
-    const { renderer, target } = this;
-    if (width === target.width) {
-      renderer.setRenderTarget(null);
-      renderer.render(this.scene, this.camera);
-      return;
-    }
-    target.viewport.set(0, 0, width, height);
-    renderer.setRenderTarget(target);
-    renderer.clear();
-    renderer.render(this.scene, this.camera);
-    renderer.setRenderTarget(null);
-    this.part.part.value.set(width / target.width, height / target.height);
-    this.part.last.value.set((width - 0.5) / target.width, (height - 0.5) / target.height);
-    renderer.render(this.enlarging, this.camera);
+  private inBands(width: number, height: number, kind: 'moving' | 'resting'): Picture {
+    const steps = kind === 'resting' ? Math.max(1, Math.min(mostBands, Math.ceil((this.costs.resting * width * height) / bandTime))) : 1;
+    const edge = (step: number): number => Math.floor((height * step) / steps);
+    const begin = (step: number, target: WebGLRenderTarget): void => {
+      target.scissorTest = true;
+      target.scissor.set(0, edge(step), width, edge(step + 1) - edge(step));
+    };
+    return { width, height, steps, begin };
   }
 
   private scaleFor(pixels: number, kind: 'moving' | 'resting'): number {

@@ -238,6 +238,19 @@ export class Parts {
     if ([...this.looks.values()].some(({ level }) => level.blocks > 0)) this.showAll();
   }
 
+  // Which of so many steps is drawn; null: all at once. What is looked through has to be drawn in order, from the back.
+  setStep(step: number | null, steps: number): void {
+    const share = this.blocks.length / steps;
+    this.blocks.forEach((block, at) => {
+      if (step === null || Math.floor(at / share) === step) this.show(block);
+      else for (const mesh of block.meshes) mesh.visible = false;
+    });
+  }
+
+  get isSeenThrough(): boolean {
+    return [...this.looks.values()].some(({ opacity }) => opacity * this.style.opacity < 1);
+  }
+
   // The first triangle of what is shown that the ray meets within the interval.
   hit(ray: Ray, { from, to }: Interval): Hit | null {
     let end = to;

@@ -10,6 +10,7 @@ import {
   type Camera,
   type Object3D,
 } from 'three';
+import { overLayer } from './cross';
 import { h } from '../ui/dom';
 import type { Vec3 } from '../api/types';
 
@@ -50,6 +51,7 @@ export class Rulers {
     const points = new Points(this.geometry, this.pointMaterial);
     lines.frustumCulled = false;
     points.frustumCulled = false;
+    for (const over of [lines, points]) over.layers.set(overLayer);
     lines.renderOrder = 10;
     points.renderOrder = 11;
     parent.add(lines, points);

@@ -1,11 +1,6 @@
 // A surface in a canvas: blocks of triangles that come one by one, a camera around them, and what is
 // drawn over them. Draws when something changed, never for nothing.
-import {
-  PerspectiveCamera,
-  Scene,
-  Vector3,
-  WebGLRenderer,
-} from 'three';
+import { type Object3D, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3, Volume } from '../api/types';
 import type { Block } from '../mesh/blocks';
@@ -18,6 +13,7 @@ import { Cut } from './cut';
 import { FrameBudget } from './budget';
 import type { Reach } from './distances';
 import { facing } from './facing';
+import { Frame } from './frame';
 import { addLights } from './lights';
 import { joinSeams } from './joining';
 import { Parts, type SurfaceStyle } from './parts';
@@ -26,10 +22,9 @@ import { pictureOf } from './picture';
 import { Rulers } from './rulers';
 import { Uploading } from './uploading';
 import { onTap } from './tap';
-import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
+import { firstOffset, fitted, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
 const verticalAngle = 30;
-const fill = 1.02;
 const settleDelay = 180;
 
 export class Surface {
@@ -51,6 +46,7 @@ export class Surface {
   // Its letters take the browser a while.
   private cube: OrientationCube | null = null;
   private readonly uploading: Uploading;
+  private readonly frame: Frame;
   private readonly parts: Parts;
   private readonly resizing: ResizeObserver;
   private bounds: [Vec3, Vec3] = [
@@ -77,6 +73,7 @@ export class Surface {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
     this.uploading = new Uploading(this.renderer);
     this.parts = new Parts(this.scene, this.uploading, () => this.draw());
+    this.frame = new Frame(this.renderer, this.scene, this.camera, this.parts);
     this.renderer.localClippingEnabled = true;
     this.renderer.autoClear = false;
     this.canvas = this.renderer.domElement;
@@ -120,9 +117,10 @@ export class Surface {
     const compiling = new AbortController();
     this.compiling = compiling;
     this.isCompiled = false;
-    const scenes: [Scene, PerspectiveCamera][] = [
+    const scenes: [Object3D, PerspectiveCamera][] = [
       [this.scene, this.camera],
       [this.cube.scene, this.cube.camera],
+      [this.frame.painting.enlarging, this.camera],
     ];
     compile(this.renderer, scenes, compiling.signal, () => {
       this.uploading.compile(this.camera, compiling.signal, () => {
@@ -152,18 +150,16 @@ export class Surface {
     this.isStale = true;
     this.uploading.step(this.camera);
     this.onShown?.();
-    this.whenDone(() => this.budget.soon(() => this.draw()));
+    whenDrawn(this.renderer.getContext() as WebGL2RenderingContext, () => this.release(() => this.budget.soon(() => this.draw())));
   }
 
-  // What is drawn next waits until this is done.
-  private whenDone(then: () => void): void {
-    whenDrawn(this.renderer.getContext() as WebGL2RenderingContext, () => {
-      this.isBusy = false;
-      if (this.isDisposed) return;
-      then();
-      if (this.isWaiting) this.draw();
-      else this.bring();
-    });
+  // What was to be done is done; what is to be drawn next has waited for it.
+  private release(then: () => void): void {
+    this.isBusy = false;
+    if (this.isDisposed) return;
+    then();
+    if (this.isWaiting) this.draw();
+    else this.bring();
   }
 
   // To be called once the last block is drawn: from then on the shading has no edges at the seams.
@@ -192,8 +188,7 @@ export class Surface {
   }
 
   setStyle(style: SurfaceStyle): void {
-    if (this.parts.setStyle(style)) this.compile();
-    this.draw();
+    this.changed(this.parts.setStyle(style));
   }
 
   // How far its vertices are from the surface as it was extracted; null where the file does not say.
@@ -209,14 +204,12 @@ export class Surface {
 
   // What is seen below a pointer; null where nothing is, and while it moves.
   below({ clientX, clientY }: { clientX: number; clientY: number }): Picked | null {
-    const box = this.canvas.getBoundingClientRect();
-    const x = (2 * (clientX - box.left)) / box.width - 1;
-    return this.isMoving ? null : this.pickedAt(x, 1 - (2 * (clientY - box.top)) / box.height);
+    const { left, top } = this.canvas.getBoundingClientRect();
+    return this.isMoving ? null : this.pickedAt(clientX - left, clientY - top);
   }
 
   setCut(isCut: boolean): void {
-    if (this.parts.setCut(isCut ? [this.cut.plane] : null)) this.compile();
-    this.draw();
+    this.changed(this.parts.setCut(isCut ? [this.cut.plane] : null));
   }
 
   // Turns the camera so that the cut is seen, where it is seen edge-on or from the side that stays.
@@ -243,18 +236,16 @@ export class Surface {
 
   // Of one label beside others; times the opacity of all.
   setOpacity(label: number, opacity: number): void {
-    if (this.parts.setOpacity(label, opacity)) this.compile();
+    this.changed(this.parts.setOpacity(label, opacity));
+  }
+
+  private changed(hasOtherShader: boolean): void {
+    if (hasOtherShader) this.compile();
     this.draw();
   }
 
   fit(offset: Vec3 = this.place.offset): void {
-    const [low, high] = this.bounds;
-    const target: Vec3 = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
-    const size: Vec3 = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
-    const angle = (verticalAngle * Math.PI) / 180;
-    const distance = fill * fitDistance(size, offset, angle, this.camera.aspect);
-    const scale = distance / Math.hypot(...offset);
-    this.moveTo({ offset: [offset[0] * scale, offset[1] * scale, offset[2] * scale], target });
+    this.moveTo(fitted(this.bounds, offset, (verticalAngle * Math.PI) / 180, this.camera.aspect));
   }
 
   look(view: ViewName): void {
@@ -320,7 +311,7 @@ export class Surface {
   // The picture as it is, over that colour.
   picture(background: string): Promise<Blob> {
     this.setCoarse(false);
-    this.render();
+    this.render(1);
     const scale = this.canvas.width / Math.max(1, this.host.clientWidth);
     return pictureOf(this.canvas, background, (context) => this.rulers.paintLabels(context, this.camera, scale));
   }
@@ -334,6 +325,7 @@ export class Surface {
     this.controls.dispose();
     this.parts.dispose();
     this.uploading.dispose();
+    this.frame.painting.dispose();
     this.rulers.dispose();
     this.cut.dispose();
     this.cross.dispose();
@@ -344,28 +336,27 @@ export class Surface {
     this.canvas.remove();
   }
 
-  private get radius(): number {
-    const [low, high] = this.bounds;
-    return Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2);
-  }
-
-  private render(): void {
+  // In one step it is drawn at once.
+  private render(steps = this.isMoving || this.parts.isSeenThrough ? 1 : this.budget.steps): void {
     if (this.isDisposed) return;
     this.isStale = false;
     const began = performance.now();
+    const { isCoarse } = this;
     const { clientWidth: width, clientHeight: height } = this.host;
-    this.renderer.setViewport(0, 0, width, height);
-    this.renderer.clear();
-    this.renderer.render(this.scene, this.camera);
-    this.cube?.render(this.renderer, this.camera, height);
-    this.rulers.placeLabels(this.camera, width, height);
+    const after = (): void => {
+      this.cube?.render(this.renderer, this.camera, height);
+      this.rulers.placeLabels(this.camera, width, height);
+    };
     this.isBusy = true;
-    this.whenDone(() => {
-      this.budget.drawn(began, this.isMoving);
-      if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
-      if (this.uploading.isEmpty && !this.isStale) for (const resolve of this.onAllShown.splice(0)) resolve();
-      this.noteStill();
-    });
+    const isOver = (): boolean => this.isDisposed || this.isWaiting;
+    this.frame.paint(steps, isOver, after, (isWhole) => this.release(() => isWhole && this.drawn(began, isCoarse)));
+  }
+
+  private drawn(began: number, isCoarse: boolean): void {
+    this.budget.drawn(began, { isMoving: this.isMoving, isCoarse });
+    if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
+    if (this.uploading.isEmpty && !this.isStale) for (const resolve of this.onAllShown.splice(0)) resolve();
+    this.noteStill();
   }
 
   // What is seen is all of it, and nothing is to be drawn any more.
@@ -384,14 +375,19 @@ export class Surface {
     if (this.scheduled !== 0) cancelAnimationFrame(this.scheduled);
     this.scheduled = 0;
     // At once: a canvas of another size is blank.
-    if (this.isCompiled) this.render();
+    if (!this.isCompiled) return;
+    // A surface that takes long stays coarse until the size is the last one.
+    this.beginMove();
+    this.render(1);
+    this.endMove();
   }
 
   private cameraChanged(): void {
     const distance = this.camera.position.distanceTo(this.controls.target);
-    const reach = 4 * this.radius + distance;
-    this.camera.near = Math.max(reach / 5000, distance - 4 * this.radius);
-    this.camera.far = reach;
+    const [low, high] = this.bounds;
+    const wide = 2 * Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
+    this.camera.far = wide + distance;
+    this.camera.near = Math.max(this.camera.far / 5000, distance - wide);
     this.camera.updateProjectionMatrix();
     this.draw();
     this.onCamera?.();
@@ -427,20 +423,17 @@ export class Surface {
   }
 
   private tapped(event: PointerEvent): void {
-    const box = this.canvas.getBoundingClientRect();
-    const x = event.clientX - box.left;
-    const y = event.clientY - box.top;
-    const face = this.cube?.faceAt(x, y, box.height);
-    if (face) {
-      this.look(face);
-      return;
-    }
-    if (this.onPick) this.onPick(this.pickedAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height));
+    const { left, top, height } = this.canvas.getBoundingClientRect();
+    const [x, y] = [event.clientX - left, event.clientY - top];
+    const face = this.cube?.faceAt(x, y, height);
+    if (face) this.look(face);
+    else this.onPick?.(this.pickedAt(x, y));
   }
 
-  // The nearest point of the surface, or of the slice on its cut, that is seen there.
+  // The nearest point of the surface, or of the slice on its cut, that is seen there, in pixels from the upper left corner.
   private pickedAt(x: number, y: number): Picked | null {
     this.setCoarse(false);
-    return pickedAt(x, y, this.camera, this.parts, this.cut);
+    const { clientWidth, clientHeight } = this.canvas;
+    return pickedAt((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight, this.camera, this.parts, this.cut);
   }
 }

@@ -70,6 +70,16 @@ export function fitDistance(size: Vec3, offset: Vec3, verticalAngle: number, asp
   return Math.max(distance, 1e-3);
 }
 
+const fill = 1.02;
+
+// From where a camera looks from that side at all of a box; the angle is the vertical one, in radians.
+export function fitted([low, high]: readonly [Vec3, Vec3], offset: Vec3, verticalAngle: number, aspect: number): CameraPlace {
+  const size = high.map((value, axis) => value - low[axis as 0]) as Vec3;
+  const target = high.map((value, axis) => (value + low[axis as 0]) / 2) as Vec3;
+  const scale = (fill * fitDistance(size, offset, verticalAngle, aspect)) / Math.hypot(...offset);
+  return { offset: offset.map((value) => value * scale) as Vec3, target };
+}
+
 export function placeToText({ offset, target }: CameraPlace): string {
   return [...offset, ...target].map((value) => Number(value.toPrecision(5))).join(',');
 }

@@ -126,6 +126,27 @@ Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
   return stack;
 }
 
+// Throws unless the options accept that a volume's place in the patient is unknown.
+void note_place(const Stack& stack, const ImportOptions& options, std::vector<Note>& notes) {
+  const PlaceKind place = stack.slices.front().image->place;
+  if (place == PlaceKind::kVolume) {
+    notes.push_back(note_of(NoteCode::kSpaceAssumed,
+                            "The positions of the DICOM frames are relative to the transducer, not "
+                            "to the patient. They were read as if they were in the patient."));
+  }
+  if (place != PlaceKind::kAssumed) return;
+  if (!options.accepts(NoteCode::kSpaceAssumed)) {
+    throw_overridable(NoteCode::kSpaceAssumed,
+                      "The DICOM tomogram does not define its position and orientation, so its "
+                      "place in the patient is unknown. Add accept=space-assumed to place its "
+                      "first slice at the origin.");
+  }
+  notes.push_back(note_of(NoteCode::kSpaceAssumed,
+                          "The DICOM tomogram does not define its position and orientation. Its "
+                          "first slice was placed at the origin, and rows and columns without an "
+                          "orientation along the patient's x and y."));
+}
+
 }  // namespace
 
 Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
@@ -138,11 +159,11 @@ Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
   }
   Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
   if (stack.slices.front().image->is_distance_assumed) {
-    notes.push_back(
-        note_of(NoteCode::kDistanceAssumed,
-                "The distance between the slices of the mosaic is unknown. The slice thickness, " +
-                    in_mm(stack.geometry.spacing[2]) + ", was used."));
+    notes.push_back(note_of(NoteCode::kDistanceAssumed,
+                            "The distance between the slices is unknown. The slice thickness, " +
+                                in_mm(stack.geometry.spacing[2]) + ", was used."));
   }
+  note_place(stack, options, notes);
   if (auto note = note_on_frames_of_reference(stack.slices, options)) {
     notes.push_back(std::move(*note));
   }

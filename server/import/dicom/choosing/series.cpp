@@ -5,6 +5,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "server/import/dicom/contours/structure_set.h"
 #include "server/import/dicom/elements/beginning.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
@@ -54,6 +55,7 @@ Source describe_source(const std::filesystem::path& path, const DicomFile& file)
   source.path = path;
   source.series_uid = series_name(data);
   source.series_description = utf8(data, kSeriesDescription);
+  source.series_number = data.integer(kSeriesNumber);
   source.frame_count = std::max<std::int64_t>(data.integer(kNumberOfFrames).value_or(1), 1);
   source.instance = instance_of(file);
   try {
@@ -77,6 +79,7 @@ class HeaderReader {
   void read(const std::filesystem::path& path) {
     if (!begins_as_dicom(path)) return ignore(upload_, path, "it is not a DICOM file");
     const DicomFile file(path, scratch_, most_sample_bytes_);
+    if (is_structure_set(file.data())) return read_structure_set(path, file);
     if (const auto reason = reason_to_ignore(file)) return ignore(upload_, path, *reason);
     Source source = describe_source(path, file);
     const std::string& uid = source.instance.sop_instance_uid;
@@ -94,6 +97,17 @@ class HeaderReader {
   }
 
  private:
+  void read_structure_set(const std::filesystem::path& path, const DicomFile& file) {
+    const DataSet& data = file.data();
+    for (const StructureFile& known : upload_.structure_sets) {
+      if (!same_bytes(known.path, path)) continue;
+      ++doubles_;
+      return ignore(upload_, path, reason_of_double(name_of(known.path)));
+    }
+    upload_.structure_sets.push_back(
+        {path, series_name(data), utf8(data, kSeriesDescription), frame_of_structures(data)});
+  }
+
   std::filesystem::path scratch_;
   std::uint64_t most_sample_bytes_;
   Upload upload_;
@@ -110,6 +124,7 @@ std::vector<Choice> list_series(std::span<const Source> sources) {
   struct Series {
     std::string description;
     std::string modality;
+    std::optional<std::int64_t> number;
     std::int64_t slices = 0;
   };
   std::map<std::string, Series> all;
@@ -117,15 +132,24 @@ std::vector<Choice> list_series(std::span<const Source> sources) {
     Series& series = all[source.series_uid];
     series.description = source.series_description;
     series.modality = source.image.modality;
+    series.number = source.series_number;
     series.slices += source.frame_count;
   }
-  std::vector<Choice> choices;
-  for (const auto& [uid, series] : all) {
+  const auto title_of = [](const Series& series) {
     std::string title;
     for (const std::string& part : {series.description, series.modality}) {
       if (!part.empty()) title += part + ", ";
     }
-    choices.push_back({"series", uid, title + count_of(series.slices)});
+    return title + count_of(series.slices);
+  };
+  std::map<std::string, std::size_t> uses;
+  for (const auto& entry : all) ++uses[title_of(entry.second)];
+  std::vector<Choice> choices;
+  for (const auto& [uid, series] : all) {
+    std::string title = title_of(series);
+    // The number is the scanner's, and tells equal series apart.
+    if (uses[title] > 1 && series.number) title += ", series " + std::to_string(*series.number);
+    choices.push_back({"series", uid, title});
   }
   return choices;
 }
@@ -137,6 +161,16 @@ std::string joined_titles(const std::vector<Choice>& choices) {
     text += (i == 0 ? "" : "; ") + choices[i].title + " (" + choices[i].value + ')';
   }
   return text + (choices.size() > kMostNamed ? "; ..." : "");
+}
+
+std::vector<Choice> list_all(const Upload& upload) {
+  std::vector<Choice> choices = list_series(upload.sources);
+  for (const StructureFile& each : upload.structure_sets) {
+    choices.push_back({"series", each.series_uid,
+                       (each.description.empty() ? "" : each.description + ", ") +
+                           "RTSTRUCT, contours of structures"});
+  }
+  return choices;
 }
 
 DicomCode code_of(const DataSet& data, Tag sequence) {
@@ -180,12 +214,47 @@ Upload read_headers(std::span<const std::filesystem::path> files,
   if (files.size() > 1) {
     for (Source& source : upload.sources) source.image.file_name = name_of(source.path);
   }
-  if (!upload.sources.empty()) return upload;
+  if (!upload.sources.empty() || !upload.structure_sets.empty()) return upload;
   if (upload.ignored.size() == 1) {
     throw_unusable("The upload has no DICOM image: " + upload.ignored.front().reason + ".");
   }
   throw_unusable("None of the upload's " + std::to_string(files.size()) +
                  " files is a DICOM image that can be part of a volume.");
+}
+
+const StructureFile* chosen_structures(const Upload& upload, const std::string& uid) {
+  const auto& all = upload.structure_sets;
+  if (all.empty()) return nullptr;
+  const bool has_images = !upload.sources.empty();
+  const auto is_chosen = [&](const StructureFile& each) { return each.series_uid == uid; };
+  const auto count = uid.empty() ? std::ssize(all) : std::ranges::count_if(all, is_chosen);
+  if (uid.empty() ? count == 1 && !has_images : count == 1) {
+    return uid.empty() ? &all.front() : &*std::ranges::find_if(all, is_chosen);
+  }
+  if (!uid.empty() && count == 0 && has_images) return nullptr;
+  if (count > 1 && !uid.empty()) {
+    throw_unusable("The upload has " + std::to_string(count) +
+                   " structure sets of the series. Send each one by itself with its images.");
+  }
+  const std::vector<Choice> choices = list_all(upload);
+  throw_choice("The upload holds " + std::to_string(choices.size()) +
+                   " series. Choose one with series=UID: " + joined_titles(choices) + '.',
+               choices);
+}
+
+std::vector<Source> images_of(const StructureFile& structures, std::vector<Source> sources) {
+  const std::string& frame = structures.frame_of_reference_uid;
+  std::erase_if(sources, [&](const Source& source) {
+    return frame.empty() || source.fault || source.image.segmentation ||
+           source.image.frame_of_reference_uid != frame || source.image.modality == "RTDOSE";
+  });
+  std::map<std::string, std::int64_t> slices;
+  for (const Source& source : sources) slices[source.series_uid] += source.frame_count;
+  if (slices.empty()) return {};
+  const std::string uid =
+      std::ranges::max_element(slices, {}, [](const auto& entry) { return entry.second; })->first;
+  std::erase_if(sources, [&](const Source& source) { return source.series_uid != uid; });
+  return sources;
 }
 
 std::vector<Source> choose_series(std::vector<Source> sources, const std::string& uid) {

@@ -18,14 +18,24 @@ struct Source {
   std::filesystem::path path;
   std::string series_uid;          // "3.0" for series 3 without a UID
   std::string series_description;  // UTF-8
-  std::int64_t frame_count = 1;    // as declared, unchecked
+  std::optional<std::int64_t> series_number;
+  std::int64_t frame_count = 1;  // as declared, unchecked
   DicomInstance instance;
   Image image;
   std::optional<Error> fault;  // the reason if `image` is not filled in
 };
 
+// An uploaded structure set (contours/structure_set.h).
+struct StructureFile {
+  std::filesystem::path path;
+  std::string series_uid;
+  std::string description;
+  std::string frame_of_reference_uid;
+};
+
 struct Upload {
   std::vector<Source> sources;
+  std::vector<StructureFile> structure_sets;
   std::vector<IgnoredObject> ignored;
   std::vector<Note> notes;
 };
@@ -34,6 +44,15 @@ struct Upload {
 // kUnusableVolume if a DICOM file is truncated or corrupt, or if none holds images.
 Upload read_headers(std::span<const std::filesystem::path> files,
                     const std::filesystem::path& scratch, std::uint64_t most_sample_bytes);
+
+// Returns the structure set of the series, or the only one if `uid` is empty and there are no
+// images; null for images. Throws Error kUnusableVolume with all series as choices if the upload
+// has both and `uid` is empty, or several structure sets.
+const StructureFile* chosen_structures(const Upload& upload, const std::string& uid);
+
+// The images of the frame of reference of a structure set: of one series, the one with the most
+// slices. Empty if there are none.
+std::vector<Source> images_of(const StructureFile& structures, std::vector<Source> sources);
 
 // Returns the sources of the series, or of the only one if `uid` is empty. Throws Error
 // kUnusableVolume if that is ambiguous, with all series as choices, or if a source has a fault.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -83,8 +84,20 @@ Positions positions_of(const std::vector<Placed>& placed) {
   return positions;
 }
 
+// Two whole volumes show that a series has several. One suffices if the other one was interrupted:
+// the attribute is a step of the protocol, and the last step has fewer slices, but more than one. A
+// slice that was taken twice is no step.
+bool are_plausible(const std::vector<std::uint32_t>& counts,
+                   std::span<const Criterion* const> criteria, std::uint32_t positions) {
+  const auto whole = std::ranges::count(counts, positions);
+  if (whole >= 2) return true;
+  return counts.size() == 2 && counts.front() == positions && counts.back() > 1 &&
+         criteria.size() == 1 && is_planned(criteria.front()->name);
+}
+
 // Assigns a volume to each slice by its values of the criteria. Empty unless the number of volumes
-// equals the slices at one position, and no volume has two slices at one position.
+// equals the slices at one position, no volume has two slices at one position, and the volumes are
+// plausible.
 std::optional<std::vector<std::uint32_t>> volumes_by(std::span<const Criterion* const> criteria,
                                                      const Positions& positions) {
   // Too few values for that many volumes, or more combinations than any real series has.
@@ -114,7 +127,7 @@ std::optional<std::vector<std::uint32_t>> volumes_by(std::span<const Criterion* 
     ++counts[static_cast<std::size_t>(volume)];
     volumes.push_back(static_cast<std::uint32_t>(volume));
   }
-  if (std::ranges::count(counts, positions.count) < 2) return std::nullopt;
+  if (!are_plausible(counts, criteria, positions.count)) return std::nullopt;
   return volumes;
 }
 
@@ -200,6 +213,22 @@ std::string title_of(std::span<const Criterion* const> criteria, std::size_t sli
   return title + count_of(slices, "slice");
 }
 
+// "instances 21 to 40, ", for volumes that differ in nothing else.
+std::string range_of(const std::vector<Placed>& placed, const std::vector<std::int64_t>& order,
+                     const std::vector<std::uint32_t>& volumes, std::size_t volume) {
+  std::int64_t first = std::numeric_limits<std::int64_t>::max();
+  std::int64_t last = std::numeric_limits<std::int64_t>::min();
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    if (volumes[i] != volume) continue;
+    first = std::min(first, order[i]);
+    last = std::max(last, order[i]);
+  }
+  const bool one_object = placed.front().slice.file == placed.back().slice.file;
+  const std::int64_t base = one_object ? 1 : 0;  // frames are numbered from 1 for people
+  return (one_object ? "frames " : "instances ") + std::to_string(first + base) + " to " +
+         std::to_string(last + base) + ", ";
+}
+
 std::vector<SeriesVolume> gathered(const std::vector<Placed>& placed,
                                    const std::vector<std::uint32_t>& volumes,
                                    std::span<const Criterion* const> criteria) {
@@ -267,7 +296,13 @@ SeriesVolumes split_by_phase(Slices slices) {
                                  });
   if (was_split) return result;
   if (const auto volumes = volumes_by_order(placed, positions)) {
-    return {"the order of acquisition", gathered(placed, *volumes, {})};
+    SeriesVolumes ordered = {"the order of acquisition", gathered(placed, *volumes, {})};
+    const std::vector<std::int64_t> order = acquisition_order(placed);
+    for (std::size_t at = 0; at < ordered.volumes.size(); ++at) {
+      std::string& title = ordered.volumes[at].title;
+      title = range_of(placed, order, *volumes, at) + title;
+    }
+    return ordered;
   }
   return whole();
 }
@@ -332,7 +367,7 @@ bool same_lattice(const Slice& a, const Slice& b) {
   return same_size(a, b) && same_orientation(a, b) && same_spacing(a, b);
 }
 
-// " of 256 x 256 samples with normal (0, 0, 1)"
+// " of 256 x 256 samples with normal (0, 0, 1), 0.5 x 0.5 mm"
 std::string described(const Slice& slice) {
   const Plane& plane = slice.frame->plane;
   std::string text = " of " + std::to_string(slice.image->layout.columns) + " x " +
@@ -343,7 +378,7 @@ std::string described(const Slice& slice) {
             to_text(std::round(part * 1000) / 1000 + 0.0);
     before = ',';
   }
-  return text + ')';
+  return text + "), " + to_text(plane.spacing[0]) + " x " + to_text(plane.spacing[1]) + " mm";
 }
 
 }  // namespace

@@ -37,7 +37,16 @@ struct Head {
 // The sequences that a volume needs; implicit elements do not declare that they are sequences.
 bool is_needed_sequence(Tag tag) {
   switch (tag) {
+    case kContourSequence:
+    case kDetectorInformationSequence:
     case kFrameContentSequence:
+    case kPlaneOrientationVolumeSequence:
+    case kPlanePositionVolumeSequence:
+    case kReferencedFrameOfReferenceSequence:
+    case kRoiContourSequence:
+    case kStructureSetRoiSequence:
+    case kTemporalPositionSequence:
+    case kUsImageDescriptionSequence:
     case kSegmentSequence:
     case kSegmentIdentificationSequence:
     case kMrEchoSequence:
@@ -58,9 +67,41 @@ bool is_needed_sequence(Tag tag) {
   }
 }
 
-// Some programs write blanks for unknown representations, followed by a 16-bit length.
+// The representations with 32-bit lengths (PS3.5, 7.1.2).
+bool has_long_length(std::string_view vr) {
+  static constexpr std::array<std::string_view, 13> kLong = {
+      "OB", "OD", "OF", "OL", "OV", "OW", "SQ", "SV", "UC", "UN", "UR", "UT", "UV"};
+  return std::ranges::find(kLong, vr) != kLong.end();
+}
+
+// Written by some programs for unknown representations.
 bool is_blank(std::string_view vr) {
   return vr == "  " || vr == "??" || vr == std::string_view("\0\0", 2);
+}
+
+// How a length may be stored after a tag.
+struct LengthPlace {
+  unsigned skipped = 0;  // bytes before the length
+  unsigned bytes = 0;
+};
+
+constexpr LengthPlace kImplicitPlace = {0, 4};
+constexpr LengthPlace kShortPlace = {2, 2};
+constexpr LengthPlace kLongPlace = {4, 4};
+
+// The places to try for an element whose representation is not in the standard. Most programs write
+// a 16-bit length then; others omit the representation, and future ones will have 32-bit lengths.
+std::array<LengthPlace, 3> possible_places(std::string_view vr) {
+  if (is_representation(vr)) return {kLongPlace, kShortPlace, kImplicitPlace};
+  return {kShortPlace, kImplicitPlace, kLongPlace};
+}
+
+// Few values are longer than kLongestValue but needed: tables of values and contours.
+std::uint64_t longest_value(Tag tag) {
+  constexpr std::uint64_t kLongestTable = std::uint64_t{2} << 16;
+  constexpr std::uint64_t kLongestContour = std::uint64_t{1} << 26;
+  if (tag == kLutData) return kLongestTable;
+  return tag == kContourData ? kLongestContour : kLongestValue;
 }
 
 bool is_pixel_data(Tag tag) {
@@ -155,19 +196,47 @@ class Parser {
       return head;
     }
     head.vr = window(at_, 2);
-    if (!is_representation(head.vr) && !is_blank(head.vr)) {
-      throw_unusable("The DICOM file is corrupt: its element " + tag_name(head.tag) +
-                     " has no value representation.");
+    if (has_short_length(head.vr)) {
+      take_length(kShortPlace, encoding, limit, head);
+    } else {
+      const bool is_long = has_long_length(head.vr);
+      take_length(is_long ? kLongPlace : place_of_length(encoding, limit, head), encoding, limit,
+                  head);
     }
-    if (has_short_length(head.vr) || is_blank(head.vr)) {
-      head.length = number(at_ + 2, 2, encoding.big_endian);
-      at_ += 4;
-      return head;
-    }
-    require(8, limit, head.tag);
-    head.length = number(at_ + 4, 4, encoding.big_endian);
-    at_ += 8;
     return head;
+  }
+
+  void take_length(const LengthPlace& place, const Encoding& encoding, std::uint64_t limit,
+                   Head& head) {
+    require(place.skipped + place.bytes, limit, head.tag);
+    head.length = number(at_ + place.skipped, place.bytes, encoding.big_endian);
+    at_ += place.skipped + place.bytes;
+  }
+
+  // The first possible place whose length leads to an end, or to an element that may follow.
+  LengthPlace place_of_length(const Encoding& encoding, std::uint64_t limit, const Head& head) {
+    for (const LengthPlace& place : possible_places(head.vr)) {
+      const std::uint64_t value = at_ + place.skipped + place.bytes;
+      if (value > limit) continue;
+      const std::uint64_t length = number(at_ + place.skipped, place.bytes, encoding.big_endian);
+      const bool is_open = length == kUndefinedLength;
+      if (!is_open && length > limit - value) continue;
+      if (may_follow(is_open ? value : value + length, encoding, limit, head.tag)) return place;
+    }
+    // The file may be truncated within the value.
+    if (is_representation(head.vr) || is_blank(head.vr)) return possible_places(head.vr).front();
+    throw_unusable("The DICOM file is corrupt: its element " + tag_name(head.tag) +
+                   " has no value representation.");
+  }
+
+  bool may_follow(std::uint64_t offset, const Encoding& encoding, std::uint64_t limit, Tag tag) {
+    if (offset == limit) return true;
+    if (limit - offset < 8) return false;
+    const Tag next =
+        number(offset, 2, encoding.big_endian) << 16 | number(offset + 2, 2, encoding.big_endian);
+    if (next >> 16 == kItem >> 16) return next == kItem || next == kItemEnd || next == kSequenceEnd;
+    const std::string_view vr = window(offset + 4, 2);
+    return next > tag && (is_pixel_data(next) || next >> 16 <= tag >> 16 || is_representation(vr));
   }
 
   std::string read_value(const Head& head, std::uint64_t limit,
@@ -199,7 +268,8 @@ class Parser {
   // Reads an element of the file's data set, including required private ones.
   void read_outer_element(const Head& head, const Encoding& encoding, DataSet& set) {
     if (!is_private(head.tag)) return read_element(head, encoding, end(), 0, set);
-    const auto needed = blocks_.needed(head.tag);
+    auto needed = blocks_.needed(head.tag);
+    if (!needed && end() - at_ >= 4) needed = blocks_.needed_by_value(head.tag, window(at_, 4));
     Head known = head;
     if (needed) known.tag = *needed;
     Element element =
@@ -228,7 +298,8 @@ class Parser {
     const bool is_sequence = head.vr == "SQ" || head.has_undefined_length() ||
                              (is_known ? head.tag == kGridFrames : is_needed_sequence(head.tag));
     if (!is_sequence) {
-      element.value = read_value(head, limit, is_known ? kLongestPrivateValue : kLongestValue);
+      element.value =
+          read_value(head, limit, is_known ? kLongestPrivateValue : longest_value(head.tag));
       return element;
     }
     // Systems that do not know an element store it as UN, with its items in implicit encoding.

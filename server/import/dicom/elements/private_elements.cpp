@@ -15,6 +15,7 @@ constexpr std::string_view kSiemens = "SIEMENS MR HEADER";
 constexpr std::string_view kUnitedImaging = "Image Private Header";
 
 constexpr std::array kNeeded = {NeededElement{"SIEMENS CSA HEADER", kCsaImageHeader},
+                                NeededElement{"SIEMENS CSA HEADER", kCsaSeriesHeader},
                                 NeededElement{kSiemens, kMosaicImages},
                                 NeededElement{kSiemens, kSiemensBValue},
                                 NeededElement{kUnitedImaging, kGridImages},
@@ -42,6 +43,13 @@ std::optional<Tag> PrivateBlocks::needed(Tag tag) const {
     if (each.creator == block->creator && each.tag == as_block_10) return each.tag;
   }
   return std::nullopt;
+}
+
+std::optional<Tag> PrivateBlocks::needed_by_value(Tag tag, std::string_view beginning) const {
+  if (tag != kCsaImageHeader && tag != kCsaSeriesHeader) return std::nullopt;
+  const auto block = std::ranges::find(blocks_, tag & 0xFFFFFF00U, &Block::first);
+  if (block != blocks_.end() || !beginning.starts_with("SV10")) return std::nullopt;
+  return tag;
 }
 
 }  // namespace isomesh::import::dicom

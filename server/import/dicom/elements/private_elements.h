@@ -9,10 +9,12 @@
 
 namespace isomesh::import::dicom {
 
-// Siemens: the number of slices of a mosaic, and the CSA header (csa_header.h). United Imaging: the
-// number of slices of a grid, and an item for each. Tags are those in block 10.
+// Siemens: the number of slices of a mosaic, and the CSA headers of the image (csa_header.h) and of
+// the series (ascconv.h). United Imaging: the number of slices of a grid, and an item for each.
+// Tags are those in block 10.
 inline constexpr Tag kMosaicImages = 0x0019100A;
 inline constexpr Tag kCsaImageHeader = 0x00291010;
+inline constexpr Tag kCsaSeriesHeader = 0x00291020;
 inline constexpr Tag kGridImages = 0x00651050;
 inline constexpr Tag kGridFrames = 0x00651051;
 inline constexpr Tag kSiemensBValue = 0x0019100C;
@@ -31,6 +33,10 @@ class PrivateBlocks {
 
   // The element's tag in block 10; empty if volumes do not need it.
   std::optional<Tag> needed(Tag tag) const;
+
+  // The same for an element whose block has no creator, because some anonymisers remove it. Only
+  // CSA headers are known, by the first bytes of their value.
+  std::optional<Tag> needed_by_value(Tag tag, std::string_view beginning) const;
 
  private:
   struct Block {

@@ -22,6 +22,9 @@ constexpr double kCosineTolerance = 1e-3;
 
 enum class Kind { kText, kReal, kWord };
 
+// The group of rows that are set from elsewhere: no tag of a sequence.
+constexpr Tag kNoGroup = 0xFFFFFFFF;
+
 struct PhaseRow {
   std::string_view name;
   Tag group;  // 0: the object itself
@@ -32,6 +35,13 @@ struct PhaseRow {
 constexpr std::array kPhaseRows = {
     PhaseRow{"TemporalPositionIdentifier", 0, kTemporalPositionIdentifier, Kind::kText},
     PhaseRow{"TemporalPositionIndex", kFrameContentSequence, kTemporalPositionIndex, Kind::kWord},
+    PhaseRow{"TemporalPositionTimeOffset", kTemporalPositionSequence, kTemporalPositionTimeOffset,
+             Kind::kReal},
+    PhaseRow{"DataType", kUsImageDescriptionSequence, kDataType, Kind::kText},
+    // Of nuclear medicine, whose frames have no groups (tomogram.h).
+    PhaseRow{"EnergyWindowVector", kNoGroup, kEnergyWindowVector, Kind::kWord},
+    PhaseRow{"RRIntervalVector", kNoGroup, kRrIntervalVector, Kind::kWord},
+    PhaseRow{"TimeSlotVector", kNoGroup, kTimeSlotVector, Kind::kWord},
     PhaseRow{"EchoTime", 0, kEchoTime, Kind::kText},
     PhaseRow{"EffectiveEchoTime", kMrEchoSequence, kEffectiveEchoTime, Kind::kReal},
     PhaseRow{"EchoNumbers", 0, kEchoNumbers, Kind::kText},
@@ -55,6 +65,14 @@ constexpr std::array kPhaseRows = {
     PhaseRow{"AcquisitionTime", 0, kAcquisitionTime, Kind::kText},
     PhaseRow{"ContentTime", 0, kContentTime, Kind::kText},
 };
+
+constexpr std::array<std::string_view, 6> kUnplannedNames = {
+    "AcquisitionNumber", "AcquisitionDateTime", "AcquisitionTime",
+    "ContentTime",       "FrameType",           "ImageType"};
+
+bool all_finite(const std::vector<double>& numbers) {
+  return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
+}
 
 // File texts that appear in messages.
 constexpr std::size_t kLongestPhase = 64;
@@ -125,6 +143,30 @@ std::optional<double> factor(const DataSet& data, Tag tag) {
                  " do not define the values of its samples.");
 }
 
+// Ultrasound volumes are placed in their own space (PS3.3, C.7.6.16.2.21), with binary numbers.
+std::vector<double> volume_numbers(const Attributes& attributes, Tag group, Tag tag) {
+  const DataSet* place = attributes.group(group);
+  return place == nullptr ? std::vector<double>() : place->binary_reals(tag);
+}
+
+std::vector<double> position_of(const Attributes& attributes) {
+  if (attributes.group(kPlanePositionSequence) == nullptr) {
+    auto told = volume_numbers(attributes, kPlanePositionVolumeSequence, kImagePositionVolume);
+    if (told.size() == 3 && all_finite(told)) return told;
+  }
+  return required_numbers(attributes.place(kPlanePositionSequence), kImagePosition, 3, "position");
+}
+
+std::vector<double> cosines_of(const Attributes& attributes) {
+  if (attributes.group(kPlaneOrientationSequence) == nullptr) {
+    auto told =
+        volume_numbers(attributes, kPlaneOrientationVolumeSequence, kImageOrientationVolume);
+    if (told.size() == 6 && all_finite(told)) return told;
+  }
+  return required_numbers(attributes.place(kPlaneOrientationSequence), kImageOrientation, 6,
+                          "orientation");
+}
+
 }  // namespace
 
 Attributes::Attributes(const DataSet& data, std::uint32_t frame)
@@ -143,6 +185,11 @@ const DataSet* Attributes::group(Tag sequence) const {
 const DataSet& Attributes::place(Tag sequence) const {
   const DataSet* found = group(sequence);
   return found == nullptr ? data_ : *found;
+}
+
+bool is_in_volume_space(const Attributes& attributes) {
+  return attributes.group(kPlanePositionSequence) == nullptr &&
+         attributes.group(kPlanePositionVolumeSequence) != nullptr;
 }
 
 bool has_functional_groups(const DataSet& data) {
@@ -174,14 +221,19 @@ Vector3 unit_vector(const double* parts) {
 }
 
 Plane plane_of(const Attributes& attributes) {
-  const auto position =
-      required_numbers(attributes.place(kPlanePositionSequence), kImagePosition, 3, "position");
-  const auto cosines = required_numbers(attributes.place(kPlaneOrientationSequence),
-                                        kImageOrientation, 6, "orientation");
-  const auto spacing =
-      required_numbers(attributes.place(kPixelMeasuresSequence), kPixelSpacing, 2, "pixel spacing");
-  Plane plane;
+  const auto position = position_of(attributes);
+  Plane plane = placeless_plane_of(attributes);
   std::copy(position.begin(), position.end(), plane.position.begin());
+  return plane;
+}
+
+Plane placeless_plane_of(const Attributes& attributes) {
+  return plane_of(cosines_of(attributes), required_numbers(attributes.place(kPixelMeasuresSequence),
+                                                           kPixelSpacing, 2, "pixel spacing"));
+}
+
+Plane plane_of(const std::vector<double>& cosines, const std::vector<double>& spacing) {
+  Plane plane;
   plane.along_row = unit_vector(cosines.data());
   plane.along_column = unit_vector(cosines.data() + 3);
   if (std::abs(dot(plane.along_row, plane.along_column)) > kCosineTolerance) {
@@ -200,6 +252,15 @@ Rescale rescale_of(const DataSet& data) {
 }
 
 std::span<const std::string_view> phase_names() { return kPhaseNames; }
+
+std::size_t phase_attribute(std::string_view name) {
+  return static_cast<std::size_t>(std::ranges::find(kPhaseNames, name) - kPhaseNames.begin());
+}
+
+bool is_planned(std::string_view phase_name) {
+  return std::ranges::find(kPhaseNames, phase_name) != kPhaseNames.end() &&
+         std::ranges::find(kUnplannedNames, phase_name) == kUnplannedNames.end();
+}
 
 std::vector<Phase> phases_of_object(const DataSet& data) {
   return phases_in(data.item(kSharedFunctionalGroups), &data);

@@ -35,6 +35,16 @@ bool has_functional_groups(const DataSet& data);
 // Throws Error kUnusableVolume if the object does not define the frame's position.
 Plane plane_of(const Attributes& attributes);
 
+// The same without a position, for objects that define it elsewhere: the position is 0.
+Plane placeless_plane_of(const Attributes& attributes);
+
+// The plane of these cosines (of a row, then of a column) and distances (between rows, then between
+// columns), at the position 0. Throws Error kUnusableVolume.
+Plane plane_of(const std::vector<double>& cosines, const std::vector<double>& spacing);
+
+// True if the frame's position is in the space of an ultrasound volume (PS3.3, A.59).
+bool is_in_volume_space(const Attributes& attributes);
+
 // Returns a unit vector. Throws Error kUnusableVolume if its length is not 1.
 Vector3 unit_vector(const double* parts);
 
@@ -47,6 +57,13 @@ Rescale rescale_of(const DataSet& data);
 
 // The names (PS3.6) of the attributes in which frames at one position may differ.
 std::span<const std::string_view> phase_names();
+
+// The index of a name in phase_names(), which must be there.
+std::size_t phase_attribute(std::string_view name);
+
+// True if the attribute is a step of a protocol, such as an echo, and not only a time or number by
+// which a slice that was taken twice differs from its copy.
+bool is_planned(std::string_view phase_name);
 
 // The values of those attributes for the whole object, and for one frame alone. Missing ones are
 // omitted; the order is that of phase_names().

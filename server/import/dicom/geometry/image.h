@@ -80,6 +80,20 @@ struct Segmentation {
   std::optional<double> slice_distance;  // mm
 };
 
+// Origin of the frames' positions.
+enum class PlaceKind {
+  kPatient,  // the patient's space
+  kVolume,   // the space of an ultrasound volume, relative to the transducer
+  kAssumed,  // the object has none
+};
+
+// A table that maps stored values to modality values (PS3.3, C.11.1). Stored values before the
+// first have its value, and those behind the last have the last's.
+struct ValueTable {
+  std::int64_t first = 0;  // the stored value of values[0]
+  std::vector<std::uint16_t> values;
+};
+
 struct Image {
   std::string file_name;  // without folders; empty for a single uploaded file
   std::string frame_of_reference_uid;
@@ -91,7 +105,9 @@ struct Image {
   PixelLayout layout;  // of each of `frames`, decoded
   // If nonzero, the file has one frame, with `frames` as tiles in rows of this length.
   std::uint32_t tiles_per_row = 0;
-  bool is_distance_assumed = false;  // the tiles' spacing is their slice thickness
+  bool is_distance_assumed = false;  // the frames' distance is their slice thickness
+  PlaceKind place = PlaceKind::kPatient;
+  std::optional<ValueTable> table;  // then `layout` has 16 unsigned bits
   std::vector<Frame> frames;
   std::vector<Phase> phases;  // of the whole object
   std::optional<Segmentation> segmentation;

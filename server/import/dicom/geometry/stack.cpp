@@ -127,9 +127,15 @@ std::string Stack::name(std::size_t place) const {
          std::to_string(slices.size());
 }
 
+void throw_flat(const std::string& what, std::size_t slices, const PixelLayout& layout) {
+  throw_unusable(what + " is a flat image: it has " + count_of(slices, "slice") + " of " +
+                 std::to_string(layout.columns) + " x " + std::to_string(layout.rows) +
+                 " samples. A volume needs slices at two positions or more.");
+}
+
 Stack make_stack(std::vector<Slice> slices) {
   if (slices.size() < 2) {
-    throw_unusable("The upload is a single slice. A volume needs at least two.");
+    throw_flat("The series", slices.size(), slices.front().image->layout);
   }
   refuse_mixtures(slices);
   const std::vector<Placed> placed = placed_along_normal(slices);

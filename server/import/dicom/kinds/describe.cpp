@@ -11,7 +11,9 @@
 #include "server/import/dicom/kinds/dose.h"
 #include "server/import/dicom/kinds/mosaic.h"
 #include "server/import/dicom/kinds/segmentation.h"
+#include "server/import/dicom/kinds/tomogram.h"
 #include "server/import/dicom/pixels/pixel_layout.h"
+#include "server/import/dicom/pixels/value_table.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
@@ -54,22 +56,23 @@ void check_label_layout(const Segmentation& segmentation, const PixelLayout& lay
 
 // The most common reason for an unusable file: a picture made by some program.
 void refuse_placeless(const DataSet& data, std::uint32_t frames) {
-  if (frames > 1 || has_functional_groups(data)) return;
+  if (frames > 1 || has_functional_groups(data) || is_placed_grid(data)) return;
   for (const auto& [tag, name] :
        {std::pair{kImagePosition, "position"}, std::pair{kImageOrientation, "orientation"},
         std::pair{kPixelSpacing, "pixel spacing"}}) {
     if (!data.text(tag).empty()) continue;
-    throw_unusable("The DICOM image is a single slice and has no " + std::string(name) + ' ' +
-                   tag_name(tag) + ", so it cannot be part of a volume.");
+    throw_unusable("The DICOM image has 1 slice and no " + std::string(name) + ' ' + tag_name(tag) +
+                   ", so it is a flat image and cannot be part of a volume.");
   }
 }
 
-// Single bits become 8-bit samples.
-PixelLayout unpacked(PixelLayout layout) {
-  if (layout.bits_allocated != 1) return layout;
-  layout.bits_allocated = 8;
-  layout.bits_stored = 8;
-  layout.high_bit = 7;
+// Single bits become 8-bit samples, and values of a table 16-bit ones.
+PixelLayout decoded_layout(const Image& image) {
+  PixelLayout layout = image.stored;
+  if (layout.bits_allocated != 1 && !image.table) return layout;
+  layout.bits_allocated = image.table ? 16 : 8;
+  layout.bits_stored = layout.bits_allocated;
+  layout.high_bit = layout.bits_stored - 1;
   layout.is_signed = false;
   return layout;
 }
@@ -78,8 +81,10 @@ Frame describe_frame(const DataSet& data, std::uint32_t number, const Image& ima
   const Attributes attributes(data, number);
   Frame frame;
   frame.number = number;
-  frame.plane = plane_of(attributes);
-  frame.rescale = rescale_of(attributes.place(kPixelValueTransformationSequence));
+  frame.plane = is_placed_grid(data) ? placeless_plane_of(attributes) : plane_of(attributes);
+  if (!image.table) {
+    frame.rescale = rescale_of(attributes.place(kPixelValueTransformationSequence));
+  }
   if (image.segmentation && image.segmentation->kind != SegmentKind::kLabelMap) {
     frame.segment = segment_of(data, number);
   }
@@ -93,8 +98,11 @@ Image describe_object(const DataSet& data) {
   image.modality = utf8(data, kModality);
   image.photometric = data.text(kPhotometricInterpretation);
   image.instance_number = data.integer(kInstanceNumber);
+  const DataSet* table = data.item(kModalityLutSequence);
   image.rescale_type =
-      Attributes(data, 0).place(kPixelValueTransformationSequence).text(kRescaleType);
+      table != nullptr
+          ? table->text(kModalityLutType)
+          : Attributes(data, 0).place(kPixelValueTransformationSequence).text(kRescaleType);
   image.phases = phases_of_object(data);
   if (is_segmentation(data)) image.segmentation = describe_segmentation(data);
   return image;
@@ -107,13 +115,13 @@ Image describe_image(const DicomFile& file) {
   Image image = describe_object(data);
   const std::uint32_t frames = frame_count(data);
   image.stored = pixel_layout(file);
-  image.layout = unpacked(image.stored);
+  image.table = value_table(data, image.stored);
+  image.layout = decoded_layout(image);
   if (image.segmentation) check_label_layout(*image.segmentation, image.stored);
   require_pixels(file, image.stored, frames);
-  if (data.item(kModalityLutSequence) != nullptr) {
-    throw_unusable(
-        "The DICOM image defines the values of its samples by a lookup table, which is not "
-        "supported.");
+  if (is_tomogram(data)) {
+    place_tomogram(data, frames, image);
+    return image;
   }
   if (!is_dose(data)) refuse_unplaced_frames(data, frames);
   refuse_placeless(data, frames);
@@ -122,6 +130,7 @@ Image describe_image(const DicomFile& file) {
   }
   if (is_dose(data)) place_dose(data, image.frames);
   if (frames == 1 && is_mosaic(data)) unfold_mosaic(data, image);
+  if (is_in_volume_space(Attributes(data, 0))) image.place = PlaceKind::kVolume;
   return image;
 }
 

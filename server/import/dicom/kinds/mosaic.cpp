@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/text.h"
+#include "server/import/dicom/elements/ascconv.h"
 #include "server/import/dicom/elements/csa_header.h"
 #include "server/import/dicom/elements/private_elements.h"
 #include "server/import/dicom/elements/tags.h"
@@ -66,36 +67,77 @@ void cut(const Tiling& tiling, Image& image) {
   for (std::uint32_t tile = 0; tile < tiling.slices; ++tile) image.frames[tile].number = tile;
 }
 
-double slice_count(const DataSet& data, const CsaHeader& header) {
-  if (const auto told = csa_numbers(header, "NumberOfImagesInMosaic"); !told.empty()) {
+// The Siemens headers: of the image, and the protocol in that of the series.
+struct SiemensHeaders {
+  CsaHeader image;
+  std::optional<ProtocolSlices> protocol;
+};
+
+SiemensHeaders siemens_headers(const DataSet& data) {
+  SiemensHeaders headers;
+  if (const Element* image = data.find(kCsaImageHeader)) {
+    headers.image = parse_csa_header(image->value);
+  }
+  if (const Element* series = data.find(kCsaSeriesHeader)) {
+    headers.protocol = protocol_slices(series->value);
+  }
+  return headers;
+}
+
+double slice_count(const DataSet& data, const SiemensHeaders& headers) {
+  if (const auto told = csa_numbers(headers.image, "NumberOfImagesInMosaic"); !told.empty()) {
     return told.front();
   }
   if (const auto told = data.unsigned_number(kMosaicImages)) return *told;
+  if (headers.protocol) return headers.protocol->count;
   throw_unusable(
       "The DICOM image is a mosaic, but its number of slices is unknown: it has no Siemens header "
-      "(0029,1010).");
+      "(0029,1010) or (0029,1020).");
 }
 
-Vector3 slice_normal(const Plane& plane, const CsaHeader& header) {
-  const auto told = csa_numbers(header, "SliceNormalVector");
+void refuse_other_normal(double along) {
+  if (std::abs(std::abs(along) - 1) <= kParallel) return;
+  throw_unusable("The DICOM image is a mosaic, but its slices are not stacked along their normal.");
+}
+
+// The direction from the first tile to the last, which lies at an end of the protocol's slices. The
+// protocol's order may be the reverse of the tiles', so the position of the first tile decides.
+Vector3 protocol_normal(const ProtocolSlices& slices, const Vector3& corner, const Vector3& own) {
+  refuse_other_normal(dot(own, unit_vector(slices.normal.data())));
+  const double to_first = std::abs(dot(difference(slices.first, corner), own));
+  const double to_last = std::abs(dot(difference(slices.last, corner), own));
+  const double extent = dot(difference(slices.last, slices.first), own);
+  // Scanners move slices with the patient, so the position may be that of no slice.
+  if (slices.count > 1 && !(std::min(to_first, to_last) < std::abs(extent) / 4)) {
+    throw_unusable(
+        "The DICOM image is a mosaic, but the order of its slices is unknown: its position is at "
+        "neither end of the slices in its Siemens header (0029,1020).");
+  }
+  return moved({}, own, std::copysign(1, to_first <= to_last ? extent : -extent));
+}
+
+Vector3 slice_normal(const Plane& plane, const Vector3& corner, const SiemensHeaders& headers) {
+  const auto told = csa_numbers(headers.image, "SliceNormalVector");
+  const Vector3 own = cross(plane.along_row, plane.along_column);
   if (told.size() != 3) {
+    if (headers.protocol) return protocol_normal(*headers.protocol, corner, own);
     throw_unusable(
         "The DICOM image is a mosaic, but the order of its slices is unknown: its Siemens header "
         "(0029,1010) has no SliceNormalVector.");
   }
-  const Vector3 own = cross(plane.along_row, plane.along_column);
   const double along = dot(own, unit_vector(told.data()));
-  if (std::abs(std::abs(along) - 1) > kParallel) {
-    throw_unusable(
-        "The DICOM image is a mosaic, but its slices are not stacked along their normal.");
-  }
+  refuse_other_normal(along);
   return moved({}, own, std::copysign(1, along));
 }
 
-double slice_distance(const DataSet& data, const CsaHeader& header, Image& image) {
+double slice_distance(const DataSet& data, const SiemensHeaders& headers, Image& image) {
   for (const auto& told :
-       {data.numbers(kSpacingBetweenSlices), csa_numbers(header, "SpacingBetweenSlices")}) {
+       {data.numbers(kSpacingBetweenSlices), csa_numbers(headers.image, "SpacingBetweenSlices")}) {
     if (!told.empty() && told.front() > 0) return told.front();
+  }
+  if (headers.protocol && headers.protocol->count > 1) {
+    const double extent = length(difference(headers.protocol->last, headers.protocol->first));
+    if (extent > 0) return extent / (headers.protocol->count - 1);
   }
   image.is_distance_assumed = true;
   const auto thickness = data.numbers(kSliceThickness);
@@ -105,13 +147,9 @@ double slice_distance(const DataSet& data, const CsaHeader& header, Image& image
 }
 
 void unfold_siemens(const DataSet& data, Image& image) {
-  const Element* element = data.find(kCsaImageHeader);
-  const CsaHeader header =
-      parse_csa_header(element == nullptr ? std::string_view() : std::string_view(element->value));
-  const Tiling tiling = tiling_of(slice_count(data, header), true);
+  const SiemensHeaders headers = siemens_headers(data);
+  const Tiling tiling = tiling_of(slice_count(data, headers), true);
   const Plane plane = image.frames.front().plane;
-  const Vector3 normal = slice_normal(plane, header);
-  const double distance = slice_distance(data, header, image);
   cut(tiling, image);
   const auto half_less = [](std::uint32_t whole, std::uint32_t tile) {
     return (static_cast<double>(whole) - static_cast<double>(tile)) / 2;
@@ -120,6 +158,8 @@ void unfold_siemens(const DataSet& data, Image& image) {
   const double down = half_less(image.stored.rows, image.layout.rows) * plane.spacing[1];
   const Vector3 corner =
       moved(moved(plane.position, plane.along_row, across), plane.along_column, down);
+  const Vector3 normal = slice_normal(plane, corner, headers);
+  const double distance = slice_distance(data, headers, image);
   for (Frame& frame : image.frames) {
     frame.plane.position = moved(corner, normal, distance * frame.number);
   }
@@ -145,10 +185,14 @@ void unfold_united_imaging(const DataSet& data, Image& image) {
 
 }  // namespace
 
+bool is_placed_grid(const DataSet& data) {
+  if (has_functional_groups(data) || !is_grid(data)) return false;
+  return has_image_type(data, "VFRAME") || data.find(kGridFrames) != nullptr;
+}
+
 bool is_mosaic(const DataSet& data) {
   if (has_functional_groups(data)) return false;
-  if (is_grid(data)) return has_image_type(data, "VFRAME") || data.find(kGridFrames) != nullptr;
-  return has_image_type(data, "MOSAIC");
+  return is_grid(data) ? is_placed_grid(data) : has_image_type(data, "MOSAIC");
 }
 
 void unfold_mosaic(const DataSet& data, Image& image) {

@@ -74,7 +74,7 @@ std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
                                      const std::optional<double>& told) {
   const std::vector<std::size_t> starts = position_starts(placed);
   if (starts.size() < 2) {
-    throw_unusable("The segmentation is a single slice. A volume needs at least two.");
+    throw_flat("The segmentation", 1, placed.front().slice.image->layout);
   }
   const std::vector<double> gaps = gaps_of(placed, starts);
   const double distance = plane_distance(gaps, told);

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <gdcmDataElement.h>
 #include <gdcmFragment.h>
@@ -17,12 +18,13 @@
 
 #include "base/text.h"
 #include "server/import/dicom/elements/tags.h"
+#include "server/import/source/gzip.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
 namespace {
 
-enum class Family { kRle, kJpeg, kJpegLs, kJpeg2000 };
+enum class Family { kRle, kDeflate, kJpeg, kJpegLs, kJpeg2000 };
 
 struct Syntax {
   std::string_view uid;
@@ -32,6 +34,7 @@ struct Syntax {
 
 constexpr std::array kSyntaxes = {
     Syntax{kRle, Family::kRle, "RLE"},
+    Syntax{kDeflatedFrames, Family::kDeflate, "deflate"},
     Syntax{"1.2.840.10008.1.2.4.50", Family::kJpeg, "JPEG baseline"},
     Syntax{"1.2.840.10008.1.2.4.51", Family::kJpeg, "JPEG extended"},
     Syntax{"1.2.840.10008.1.2.4.57", Family::kJpeg, "JPEG lossless"},
@@ -131,29 +134,35 @@ void check_stream(std::span<const std::byte> stream, const Syntax& syntax,
   }
 }
 
-void decode_rle_segment(std::span<const std::byte> segment, std::size_t first, std::size_t stride,
-                        std::span<std::byte> target) {
+// Returns the number of bytes that the segment has for the target, up to its size.
+std::size_t decode_rle_bytes(std::span<const std::byte> segment, std::size_t first,
+                             std::size_t stride, std::span<std::byte> target) {
   std::size_t at = first;
+  std::size_t decoded = 0;
   for (std::size_t next = 0; at < target.size();) {
-    if (next + 1 >= segment.size()) throw_unusable("its RLE segment ends before its samples do");
+    if (next + 1 >= segment.size()) return decoded;
     const int control = static_cast<signed char>(segment[next++]);
     if (control == -128) continue;
     const bool is_run = control < 0;
     const auto count = static_cast<std::size_t>(is_run ? 1 - control : control + 1);
-    if (!is_run && count > segment.size() - next) {
-      throw_unusable("its RLE segment ends before its samples do");
-    }
-    for (std::size_t i = 0; i < count && at < target.size(); ++i, at += stride) {
+    if (!is_run && count > segment.size() - next) return decoded;
+    for (std::size_t i = 0; i < count && at < target.size(); ++i, at += stride, ++decoded) {
       target[at] = segment[is_run ? next : next + i];
     }
     next += is_run ? 1 : count;
   }
+  return decoded;
 }
 
-// PS3.5, annex G: one segment of packed bytes per byte of a sample, highest first. Decoded here,
-// because GDCM reports success for streams that end early.
-void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
-                std::span<std::byte> target) {
+void decode_rle_segment(std::span<const std::byte> segment, std::size_t first, std::size_t stride,
+                        std::span<std::byte> target) {
+  if (decode_rle_bytes(segment, first, stride, target) < target.size() / stride) {
+    throw_unusable("its RLE segment ends before its samples do");
+  }
+}
+
+std::vector<std::span<const std::byte>> rle_segments(std::span<const std::byte> stream,
+                                                     std::size_t segments) {
   constexpr std::size_t kHeaderBytes = 64;
   if (stream.size() < kHeaderBytes) throw_unusable("its RLE header is truncated");
   const auto header = [&](std::size_t index) {
@@ -162,18 +171,37 @@ void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
     std::reverse(word.begin(), word.end());
     return std::size_t{big_endian(word, 0, 4)};
   };
-  const std::size_t segments = layout.bits_allocated / 8;
   if (header(0) != segments) {
     throw_unusable("its RLE header declares " + std::to_string(header(0)) + " segments, but " +
-                   std::to_string(segments) + " are needed");
+                   std::to_string(segments) + (segments == 1 ? " is needed" : " are needed"));
   }
+  std::vector<std::span<const std::byte>> all;
   for (std::size_t i = 0; i < segments; ++i) {
     const std::size_t begin = header(i + 1);
     const std::size_t end = i + 1 < segments ? header(i + 2) : stream.size();
     if (begin < kHeaderBytes || begin > end || end > stream.size()) {
       throw_unusable("its RLE segments lie outside its compressed data");
     }
-    decode_rle_segment(stream.subspan(begin, end - begin), segments - 1 - i, segments, target);
+    all.push_back(stream.subspan(begin, end - begin));
+  }
+  return all;
+}
+
+// PS3.5, annex G: one segment of packed bytes per byte of a sample, highest first. Decoded here,
+// because GDCM reports success for streams that end early.
+void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
+                std::span<std::byte> target) {
+  const std::size_t segments = layout.bits_allocated / 8;
+  const std::vector<std::span<const std::byte>> all = rle_segments(stream, segments);
+  for (std::size_t i = 0; i < segments; ++i) {
+    decode_rle_segment(all[i], segments - 1 - i, segments, target);
+  }
+}
+
+// A frame of an odd number of bytes is padded, so the stream may be longer.
+void decode_deflate(std::span<const std::byte> stream, std::span<std::byte> target) {
+  if (inflate_bytes(stream, target) < target.size()) {
+    throw_unusable("its deflated samples end before its size does");
   }
 }
 
@@ -195,8 +223,11 @@ bool decode_by(const gdcm::DataElement& input, const PixelLayout& layout,
   const auto bits = [](unsigned count) { return static_cast<unsigned short>(count); };
   codec.SetNumberOfDimensions(2);
   codec.SetDimensions(dimensions.data());
-  codec.SetPixelFormat(gdcm::PixelFormat(1, bits(layout.bits_allocated), bits(layout.bits_stored),
-                                         bits(layout.bits_stored - 1), layout.is_signed ? 1 : 0));
+  // GDCM ends the process if fewer bits are stored than allocated, except of 16. Unused bits are
+  // removed later (values.cpp).
+  const unsigned stored = layout.bits_allocated == 16 ? layout.bits_stored : layout.bits_allocated;
+  codec.SetPixelFormat(gdcm::PixelFormat(1, bits(layout.bits_allocated), bits(stored),
+                                         bits(stored - 1), layout.is_signed ? 1 : 0));
   codec.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
   if constexpr (requires { codec.SetBufferLength(0); }) {
     codec.SetBufferLength(layout.frame_bytes());
@@ -208,6 +239,7 @@ bool decode_by_gdcm(Family family, const gdcm::DataElement& input, const PixelLa
                     gdcm::DataElement& output) {
   switch (family) {
     case Family::kRle:
+    case Family::kDeflate:
       return false;
     case Family::kJpeg:
       return decode_by<gdcm::JPEGCodec>(input, layout, output);
@@ -244,6 +276,14 @@ void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const 
   std::memcpy(target.data(), bytes->GetPointer(), target.size());
 }
 
+// Spreads the bits at the beginning over all bytes, from the last, so that none is overwritten
+// before it is read.
+void unpack_bits(std::span<std::byte> bytes) {
+  for (std::size_t at = bytes.size(); at-- > 0;) {
+    bytes[at] = bytes[at / 8] >> (at % 8) & std::byte{1};
+  }
+}
+
 }  // namespace
 
 bool can_decode(std::string_view transfer_syntax) {
@@ -257,7 +297,29 @@ void decode_frame(std::string_view transfer_syntax, std::span<const std::byte> c
     throw_unusable("its transfer syntax " + in_quotes(transfer_syntax) + " is not supported");
   }
   if (syntax->family == Family::kRle) return decode_rle(compressed, layout, target);
+  if (syntax->family == Family::kDeflate) return decode_deflate(compressed, target);
   decode_jpeg(compressed, *syntax, layout, target);
+}
+
+void decode_bits(std::string_view transfer_syntax, std::span<const std::byte> compressed,
+                 const PixelLayout& layout, std::span<std::byte> target) {
+  const Syntax* syntax = find_syntax(transfer_syntax);
+  const bool is_deflated = syntax != nullptr && syntax->family == Family::kDeflate;
+  std::size_t decoded = target.size();
+  if (is_deflated) {
+    decoded = inflate_bytes(compressed, target);
+  } else if (syntax != nullptr && syntax->family == Family::kRle) {
+    decoded = decode_rle_bytes(rle_segments(compressed, 1).front(), 0, 1, target);
+  } else {
+    PixelLayout bytes = layout;
+    bytes.bits_allocated = 8;
+    decode_frame(transfer_syntax, compressed, bytes, target);
+  }
+  if (decoded < layout.frame_bytes()) {
+    throw_unusable("its compressed samples end before its size does");
+  }
+  if (decoded < target.size()) unpack_bits(target);
+  for (std::byte& sample : target) sample = std::byte{sample != std::byte{0}};
 }
 
 }  // namespace isomesh::import::dicom

@@ -81,10 +81,10 @@ void check_syntax(const DicomFile& file, const PixelLayout& layout) {
         "The DICOM image's transfer syntax " + in_quotes(syntax) +
         (is_encapsulated ? " is not supported." : " is not one for uncompressed samples."));
   }
-  if (is_encapsulated && (layout.is_float || layout.bits_allocated == 1)) {
-    throw_unusable("The DICOM image's samples are compressed. " +
-                   std::string(layout.is_float ? "Floating-point numbers" : "Single bits") +
-                   " are read only uncompressed.");
+  if (is_encapsulated && layout.is_float) {
+    throw_unusable(
+        "The DICOM image's samples are compressed. Floating-point numbers are read only "
+        "uncompressed.");
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/pixels/decode.h"
+#include "server/import/dicom/pixels/value_table.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
@@ -61,7 +62,14 @@ FrameReader::FrameReader(const DicomFile& file, const Image& image)
 void FrameReader::read(std::uint32_t frame, std::span<std::byte> target) {
   if (image_.tiles_per_row > 0) return read_tile(frame, target);
   if (stored_.bits_allocated == 1) return read_bits(frame, target);
+  if (image_.table) return read_by_table(frame, target);
   read_stored(frame, target);
+}
+
+void FrameReader::read_by_table(std::uint32_t frame, std::span<std::byte> target) const {
+  std::vector<std::byte> stored(stored_.frame_bytes());
+  read_stored(frame, stored);
+  apply_table(*image_.table, stored_, stored, target);
 }
 
 void FrameReader::read_stored(std::uint32_t frame, std::span<std::byte> target) const {
@@ -86,9 +94,12 @@ void FrameReader::read_tile(std::uint32_t tile, std::span<std::byte> target) {
   }
 }
 
-// Bits fill bytes from the lowest, and frames may start within a byte.
+// Bits fill bytes from the lowest. Frames may start within a byte, but compressed ones never do.
 void FrameReader::read_bits(std::uint32_t frame, std::span<std::byte> target) const {
   const PixelElement& pixels = *file_.pixels();
+  if (pixels.is_encapsulated) {
+    return decode_bits(file_.transfer_syntax(), compressed(frame), stored_, target);
+  }
   const std::uint64_t first = std::uint64_t{frame} * target.size();
   const bool is_swapped = file_.transfer_syntax() == kExplicitBigEndian && pixels.is_words;
   // Whole words, because big-endian words have swapped bytes.

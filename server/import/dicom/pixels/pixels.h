@@ -17,11 +17,12 @@ class FrameReader {
   FrameReader(const DicomFile& file, const Image& image);
 
   // Reads one frame of the image into `target`, which has layout.frame_bytes() bytes: little-endian
-  // stored values, single bits as bytes. Throws Error kUnusableVolume if the frame cannot be
-  // decoded or its size differs from the declared one.
+  // stored values, or those of the image's table; single bits as bytes. Throws Error
+  // kUnusableVolume if the frame cannot be decoded or its size differs from the declared one.
   void read(std::uint32_t frame, std::span<std::byte> target);
 
  private:
+  void read_by_table(std::uint32_t frame, std::span<std::byte> target) const;
   void read_stored(std::uint32_t frame, std::span<std::byte> target) const;
   void read_bits(std::uint32_t frame, std::span<std::byte> target) const;
   void read_tile(std::uint32_t tile, std::span<std::byte> target);

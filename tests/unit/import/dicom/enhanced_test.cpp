@@ -74,7 +74,7 @@ TEST(DicomFrames, ThatAreMissingOrDoubledAreNamed) {
   EXPECT_THAT(error_of({5, 4, 2, 1, 0}), HasSubstr("slice 3 of 6 is missing"));
   EXPECT_THAT(error_of({0, 1, 2, 3, 3, 4, 5}), HasSubstr("Slice 4 of 6 occurs more than once"));
   EXPECT_THAT(error_of({0, 1, 0, 2, 1, 2}), HasSubstr("2 slices at each of its 3 positions"));
-  EXPECT_THAT(error_of({3}), HasSubstr("single slice"));
+  EXPECT_THAT(error_of({3}), HasSubstr("1 slice of"));
 }
 
 TEST(DicomFrames, MustAllBeDescribed) {

@@ -100,6 +100,33 @@ TEST(DicomMosaic, TakesTheThicknessWhereNoDistanceIsTold) {
   EXPECT_THAT(note_detail(outcome, NoteCode::kDistanceAssumed), HasSubstr("4 mm"));
 }
 
+TEST(DicomMosaic, IsUnfoldedByItsProtocol) {
+  for (const bool is_reversed : {false, true}) {
+    DicomObject object = protocol_mosaic(is_reversed);
+    // The creator is what anonymisers remove first.
+    for (const bool has_creator : {true, false}) {
+      if (!has_creator) object.erase(0x00290010);
+      const Outcome outcome = import_one(object);
+      ASSERT_EQ(outcome.error, "");
+      EXPECT_EQ(outcome.volume.dims[2], kTiles);
+      EXPECT_EQ(outcome.volume.geometry.spacing[2], 4);
+      EXPECT_EQ(outcome.volume.geometry.origin[2], is_reversed ? 30 - 16 : 30);
+      const auto samples = samples_of<std::int16_t>(outcome);
+      EXPECT_EQ(samples[0], tile_sample(0, 0, is_reversed ? kTiles - 1 : 0));
+    }
+  }
+}
+
+TEST(DicomMosaic, IsRefusedIfItsProtocolIsOfOtherSlices) {
+  EXPECT_THAT(import_one(protocol_mosaic(false).text(kImagePosition, "DS", "10\\20\\300")).error,
+              HasSubstr("neither end"));
+  EXPECT_THAT(import_one(protocol_mosaic(false).bytes(
+                             kCsaSeriesHeader, "OB",
+                             "SV10### ASCCONV BEGIN ###\nsSliceArray.lSize = 1e9\n"))
+                  .error,
+              HasSubstr("number of slices is unknown"));
+}
+
 // Scanners that have unfolded it leave the word.
 TEST(DicomMosaic, IsNoneWithFunctionalGroups) {
   const DicomSeries series;
@@ -139,6 +166,13 @@ TEST(DicomGrid, HasAPlaceForEachSlice) {
     EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{1, 2, 30 - 16}));
     EXPECT_EQ(outcome.volume.geometry.spacing, (Numbers{3, 2, 4}));
   }
+}
+
+// Its slices have positions; the object itself often has none.
+TEST(DicomGrid, NeedsNoPositionOfItsOwn) {
+  const Outcome outcome = import_one(united_imaging_grid().erase(kImagePosition));
+  EXPECT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, import_one(united_imaging_grid()).canonical);
 }
 
 TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {

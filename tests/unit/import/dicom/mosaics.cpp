@@ -59,6 +59,25 @@ DicomObject siemens_mosaic(const CsaFields& fields, bool is_newer) {
 
 DicomObject siemens_mosaic() { return siemens_mosaic(csa_fields({"0", "0", "1"})); }
 
+DicomObject protocol_mosaic(bool is_reversed) {
+  // The centre of the first tile is at (19, 24) plus half of the tile's extent.
+  const int low = is_reversed ? 30 - 4 * 4 : 30;
+  const std::string protocol =
+      "SV10 some binary fields\n### ASCCONV BEGIN object=MrProtDataImpl ###\n"
+      "sSliceArray.asSlice[0].sPosition.dSag = 22\n"
+      "sSliceArray.asSlice[0].sPosition.dTra\t=\t" +
+      std::to_string(low) + "\n" +
+      "sSliceArray.asSlice[0].sNormal.dTra   = 1\n"
+      "sSliceArray.asSlice[4].sPosition.dSag = 22\n"
+      "sSliceArray.asSlice[4].sPosition.dTra = " +
+      std::to_string(low + 4 * 4) + "\n" +
+      "sSliceArray.lSize                     = 5\n### ASCCONV END ###\n";
+  return siemens_mosaic()
+      .erase(kCsaImageHeader)
+      .erase(kSpacingBetweenSlices)
+      .bytes(kCsaSeriesHeader, "OB", protocol + std::string(protocol.size() % 2, ' '));
+}
+
 DicomObject united_imaging_grid() {
   std::vector<DicomObject> frames;
   for (std::uint32_t k = 0; k < kTiles; ++k) {

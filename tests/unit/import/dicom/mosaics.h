@@ -25,6 +25,10 @@ CsaFields csa_fields(const std::vector<std::string>& normal);
 DicomObject siemens_mosaic(const CsaFields& fields, bool is_newer = true);
 DicomObject siemens_mosaic();
 
+// The same without the header of the image: the protocol names the slices. With `is_reversed` its
+// first slice is the last tile.
+DicomObject protocol_mosaic(bool is_reversed);
+
 // Three by two tiles, 4 mm apart, from the highest to the lowest.
 DicomObject united_imaging_grid();
 

@@ -1,4 +1,6 @@
 // Compressed samples, and what is wrong with them.
+#include <algorithm>
+#include <span>
 #include <sstream>
 
 #include <gdcmImageReader.h>
@@ -6,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/pixels/decode.h"
 #include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::import::test {
@@ -18,6 +21,23 @@ using testing::HasSubstr;
 constexpr std::string_view kJpegLossless = "1.2.840.10008.1.2.4.70";
 constexpr std::string_view kJpegLs = "1.2.840.10008.1.2.4.80";
 constexpr std::string_view kJpeg2000 = "1.2.840.10008.1.2.4.90";
+
+// Programs store bits as images of 0 and 1, or of 0 and 255.
+TEST(DicomPixels, OfSingleBitsMayBeCompressedAsImages) {
+  const PixelLayout bytes = {64, 48, 8, 8, 7, false};
+  for (const char set : {'\1', '\xFF'}) {
+    std::string native(64 * 48, '\0');
+    for (std::size_t at = 1000; at < 1500; ++at) native[at] = set;
+    for (const std::string_view syntax : {kJpeg2000, kJpegLs, kJpegLossless}) {
+      const std::string stream = compressed(syntax, bytes, native);
+      std::vector<std::byte> decoded(native.size());
+      decode_bits(syntax, std::as_bytes(std::span(stream)), {64, 48, 1, 1, 0, false}, decoded);
+      EXPECT_EQ(std::ranges::count(decoded, std::byte{1}), 500) << syntax;
+      EXPECT_EQ(decoded[1000], std::byte{1});
+      EXPECT_EQ(decoded[999], std::byte{0});
+    }
+  }
+}
 
 struct Depth {
   unsigned allocated;

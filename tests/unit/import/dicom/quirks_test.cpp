@@ -28,6 +28,28 @@ TEST(DicomFiles, MayHaveBlankRepresentations) {
   }
 }
 
+// Representations that the standard does not have, before a length in any place.
+TEST(DicomFiles, MayHaveUnknownRepresentations) {
+  const DicomSeries series;
+  const std::string expected = import_objects(series.files()).canonical;
+  const std::string padding("\x28\0\x20\x01", 4);  // (0028,0120)
+  const std::string plain = padding + std::string("US\x02\0ab", 6);
+  for (const std::string_view odd :
+       {std::string_view("??\2\0ab", 6), std::string_view("ox\2\0ab", 6),
+        std::string_view("XY\2\0ab", 6), std::string_view("\2\0\0\0ab", 6),
+        std::string_view("xs\0\0\2\0\0\0ab", 10), std::string_view("ZZ\0\0\2\0\0\0ab", 10)}) {
+    NamedFiles files;
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      std::string file = series.slice(k).bytes(kPixelPaddingValue, "US", "ab").file();
+      file.replace(file.find(plain), plain.size(), padding + std::string(odd));
+      files.emplace_back("F" + std::to_string(k), file);
+    }
+    const Outcome outcome = import_objects(files);
+    EXPECT_EQ(outcome.error, "") << odd;
+    EXPECT_EQ(outcome.canonical, expected) << odd;
+  }
+}
+
 // Deflated files, each changed, as an import of them.
 Outcome import_deflated(const std::function<void(std::string&, const std::string&)>& change) {
   const DicomSeries series;

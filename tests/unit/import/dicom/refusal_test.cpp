@@ -204,7 +204,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(DicomRefusal, OfASingleSlice) {
   const Outcome outcome = import_objects({{"one", DicomSeries{}.slice(0).file()}});
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("single slice"));
+  EXPECT_THAT(outcome.error, HasSubstr("1 slice of 5 x 4 samples"));
 }
 
 TEST(DicomRefusal, OfWhatExceedsTheLimits) {

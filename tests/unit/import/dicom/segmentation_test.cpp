@@ -1,8 +1,11 @@
 // Segmentations of single bits, and label maps.
+#include <functional>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/import/dicom/elements/tags.h"
+#include "tests/support/deflate.h"
 #include "tests/unit/import/dicom/segments.h"
 
 namespace isomesh::import::test {
@@ -133,12 +136,75 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   EXPECT_EQ(label_at(sparse, 1, 6), 2);
 }
 
+std::string packed_bits(const SegmentFrame& frame) {
+  std::string bytes((kSegmentSamples + 7) / 8, '\0');
+  for (const unsigned place : frame.labels) {
+    bytes[place / 8] = static_cast<char>(bytes[place / 8] | 1 << place % 8);
+  }
+  return bytes;
+}
+
+// One literal run in one segment, as in PS3.5, annex G.
+std::string rle_of(const std::string& bytes) {
+  std::string stream(64, '\0');
+  stream[0] = 1;
+  stream[4] = 64;
+  stream += static_cast<char>(bytes.size() - 1) + bytes;
+  return stream + std::string(stream.size() % 2, '\0');
+}
+
+// The segmentation of two_segments() with compressed frames.
+Outcome import_frames(std::string_view syntax,
+                      const std::function<std::string(const SegmentFrame&)>& compress) {
+  const SegmentObject what = two_segments();
+  std::vector<std::string> fragments;
+  for (const SegmentFrame& frame : what.frames) fragments.push_back(compress(frame));
+  DicomObject object = segmentation(what);
+  object.fragments(fragments, {});
+  return import_objects({{"seg", object.file(syntax)}});
+}
+
+// Each frame begins at a byte when it is compressed, though it has 15 bits.
+TEST(DicomSegmentation, MayHaveCompressedFrames) {
+  const std::string expected = import_labels(two_segments()).canonical;
+  const auto as_bytes = [](const SegmentFrame& frame) {
+    std::string bytes(kSegmentSamples, '\0');
+    for (const unsigned place : frame.labels) bytes[place] = 1;
+    return bytes;
+  };
+  const Outcome deflated = import_frames(kDeflatedFrames, [](const SegmentFrame& frame) {
+    return isomesh::test::raw_deflate(packed_bits(frame));
+  });
+  EXPECT_EQ(deflated.error, "");
+  EXPECT_EQ(deflated.canonical, expected);
+  const Outcome runs =
+      import_frames(kRle, [](const SegmentFrame& frame) { return rle_of(packed_bits(frame)); });
+  EXPECT_EQ(runs.error, "");
+  EXPECT_EQ(runs.canonical, expected);
+  // Some programs write a byte for each bit.
+  const Outcome bytes =
+      import_frames(kRle, [&](const SegmentFrame& frame) { return rle_of(as_bytes(frame)); });
+  EXPECT_EQ(bytes.canonical, expected);
+}
+
+TEST(DicomSegmentation, WithFramesThatEndEarlyIsRefused) {
+  EXPECT_THAT(import_frames(kRle, [](const SegmentFrame&) { return rle_of("x"); }).error,
+              HasSubstr("end before its size does"));
+  EXPECT_THAT(import_frames(kDeflatedFrames,
+                            [](const SegmentFrame&) { return isomesh::test::raw_deflate("x"); })
+                  .error,
+              HasSubstr("end before its size does"));
+  EXPECT_THAT(
+      import_frames(kDeflatedFrames, [](const SegmentFrame&) { return std::string("abcd"); }).error,
+      HasSubstr("corrupt or truncated"));
+}
+
 TEST(DicomSegmentation, OfUnevenFramesIsRefused) {
   SegmentObject object = two_segments();
   object.frames[3].z = 5;
   EXPECT_THAT(import_labels(object).error, HasSubstr("unevenly spaced"));
   object.frames = {{.z = 3, .segment = 1, .labels = {1}}, {.z = 3, .segment = 2, .labels = {2}}};
-  EXPECT_THAT(import_labels(object).error, HasSubstr("single slice"));
+  EXPECT_THAT(import_labels(object).error, HasSubstr("1 slice of 5 x 3 samples"));
   object.frames = {{.z = 3, .segment = 1, .labels = {1}},
                    {.z = 3, .segment = 1, .labels = {2}},
                    {.z = 4, .segment = 1, .labels = {2}}};

@@ -185,8 +185,9 @@ TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
   const Outcome outcome = import_objects(files);
   EXPECT_THAT(
       outcome.remedy.choices,
-      ElementsAre(Choice{"volume", "0", "6 slices of 5 x 4 samples with normal (0, 0, 1)"},
-                  Choice{"volume", "1", "4 slices of 5 x 4 samples with normal (0, 1, 0)"}));
+      ElementsAre(
+          Choice{"volume", "0", "6 slices of 5 x 4 samples with normal (0, 0, 1), 0.75 x 0.5 mm"},
+          Choice{"volume", "1", "4 slices of 5 x 4 samples with normal (0, 1, 0), 0.75 x 0.5 mm"}));
   EXPECT_EQ(import_objects(files, {.volume = 1}).volume.dims[2], 4);
 }
 
@@ -316,12 +317,70 @@ TEST(DicomUpload, NamesTheOneThatDiffersWhereverItComes) {
   }
 }
 
+// The last instant of a series has only every other slice.
+NamedFiles interrupted(Tag attribute, std::string_view vr) {
+  NamedFiles files;
+  const DicomSeries series;
+  for (std::uint32_t instant = 1; instant <= 2; ++instant) {
+    for (std::uint32_t k = 0; k < series.slices; k += instant) {
+      const std::string name = std::to_string(instant * 100 + k);
+      files.emplace_back("F" + name, series.slice(k)
+                                         .text(attribute, vr, std::to_string(instant))
+                                         .text(kSopInstanceUid, "UI", "1.2." + name)
+                                         .erase(kInstanceNumber)
+                                         .file());
+    }
+  }
+  return files;
+}
+
+TEST(DicomVolumes, OffersWhatIsWholeOfAnInterruptedSeries) {
+  const NamedFiles files = interrupted(kTemporalPositionIdentifier, "IS");
+  const Outcome all = import_objects(files);
+  EXPECT_THAT(all.remedy.choices,
+              ElementsAre(Choice{"volume", "0", "TemporalPositionIdentifier 1, 6 slices"},
+                          Choice{"volume", "1", "TemporalPositionIdentifier 2, 3 slices of 6"}));
+  EXPECT_EQ(import_objects(files, {.volume = 0}).volume.dims[2], 6);
+  EXPECT_THAT(import_objects(files, {.volume = 1}).error, HasSubstr("incomplete"));
+  // Slices that were taken twice are not an instant.
+  EXPECT_THAT(import_objects(interrupted(kContentTime, "TM")).error,
+              HasSubstr("occurs more than once"));
+}
+
+TEST(DicomVolumes, AreNamedByTheirInstancesIfNothingElseDiffers) {
+  int number = 0;
+  const Outcome all =
+      import_objects(several([&](DicomObject& object, std::uint32_t, std::uint32_t) {
+        object.text(kInstanceNumber, "IS", std::to_string(++number));
+      }));
+  ASSERT_EQ(all.remedy.choices.size(), kVolumes) << all.error;
+  EXPECT_EQ(all.remedy.choices[1].title, "instances 2 to 17, 6 slices");
+}
+
+TEST(DicomUpload, TellsEqualSeriesApartByTheirNumbers) {
+  NamedFiles files;
+  for (int copy = 1; copy <= 2; ++copy) {
+    DicomSeries series;
+    series.uid = "1.2." + std::to_string(copy);
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      const std::string name = std::to_string(copy * 10 + int(k));
+      files.emplace_back("F" + name, series.slice(k)
+                                         .text(kSeriesNumber, "IS", std::to_string(copy))
+                                         .text(kSopInstanceUid, "UI", "1.2." + name)
+                                         .file());
+    }
+  }
+  EXPECT_THAT(import_objects(files).remedy.choices,
+              ElementsAre(Choice{"series", "1.2.1", "CT, 6 slices, series 1"},
+                          Choice{"series", "1.2.2", "CT, 6 slices, series 2"}));
+}
+
 TEST(DicomUpload, OfOneSliceSaysThatItIsOne) {
   DicomObject object = DicomSeries{}.slice(0);
   object.erase(kImagePosition).erase(kImageOrientation);
-  EXPECT_THAT(import_objects({{"one", object.file()}}).error,
-              AllOf(HasSubstr("a single slice"), HasSubstr("position (0020,0032)"),
-                    Not(HasSubstr("frames"))));
+  EXPECT_THAT(
+      import_objects({{"one", object.file()}}).error,
+      AllOf(HasSubstr("1 slice"), HasSubstr("position (0020,0032)"), Not(HasSubstr("frames"))));
 }
 
 }  // namespace

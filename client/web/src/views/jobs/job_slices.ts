@@ -55,6 +55,7 @@ class JobSlices {
       contourColour: () => cssColour('--contour'),
       crop: null,
       measures: null,
+      layers: null,
       onError: tellError,
     };
     this.views = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));

@@ -11,8 +11,8 @@ import { toPatient } from '../../volume/geometry';
 import type { Box } from '../../volume/crop';
 import { coloursOf, LabelMap, type LabelLook } from '../../volume/label_map';
 import { lookOf, looksFor, type LookName } from '../../volume/looks';
-import { inPreview, type Preview } from '../../volume/preview';
-import type { PreviewAnswer, PreviewRequest } from '../../volume/preview.worker';
+import type { Preview } from '../../volume/preview';
+import { readPreview } from '../../volume/preview_file';
 import type { Window } from '../../volume/slices';
 
 // Samples along an axis: what is there soon, and what is drawn then.
@@ -52,7 +52,6 @@ export class LiveView {
   private window: Window | null = null;
   private labels: LabelLook | null = null;
   private loading: AbortController | null = null;
-  private worker: Worker | null = null;
   private retry = 0;
   private hasFailed = false;
   private look: LookName | '' = '';
@@ -73,7 +72,6 @@ export class LiveView {
     scope.onEnd(() => {
       clearTimeout(this.retry);
       this.loading?.abort();
-      this.worker?.terminate();
       this.surface?.dispose();
     });
     scope.onEnd(
@@ -175,8 +173,7 @@ export class LiveView {
   private showIso(): void {
     if (!this.surface || !this.preview || this.iso === null || Number.isNaN(this.preview.window[0])) return;
     this.showPlace(`Preview of the surface at iso-value ${formatValue(this.iso)}`);
-    this.surface.setIso(inPreview(this.preview, this.iso));
-    this.element.dataset.iso = String(this.iso);
+    this.surface.setIso(this.iso);
   }
 
   private showPlace(name: string): void {
@@ -229,34 +226,19 @@ export class LiveView {
     const { window } = this;
     if (!window) throw new Error('There is no window.');
     const file = await client.previewFile(this.host.volume.id, size, window, signal);
-    return this.read({ file, window }, [file], signal);
+    return readPreview({ file, window }, [file], signal);
   }
 
   // All samples: a mean of labels is none of them.
   private async fetchLabels({ windows, labels }: LabelMap, signal: AbortSignal): Promise<Preview> {
     const { id } = this.host.volume;
     const files = await Promise.all(windows.map((window) => client.previewFile(id, hardwareSize, [...window], signal)));
-    return this.read({ files, labels }, files, signal);
-  }
-
-  private read(request: PreviewRequest, buffers: ArrayBuffer[], signal: AbortSignal): Promise<Preview> {
-    return new Promise((resolve, reject) => {
-      const worker = new Worker(new URL('../../volume/preview.worker.ts', import.meta.url), { type: 'module' });
-      this.worker?.terminate();
-      this.worker = worker;
-      worker.onmessage = ({ data: { preview, error } }: MessageEvent<PreviewAnswer>) => {
-        worker.terminate();
-        if (signal.aborted) reject(new DOMException('Not wanted any more', 'AbortError'));
-        else if (preview) resolve(preview);
-        else reject(new Error(error));
-      };
-      worker.onerror = (event) => reject(new Error(event.message));
-      worker.postMessage(request, buffers);
-    });
+    return readPreview({ files, labels }, files, signal);
   }
 
   private begin(surface: LiveSurface): LiveSurface {
-    surface.onFrame = ({ took, scale, isResting }) => {
+    surface.onFrame = ({ took, scale, isResting, iso }) => {
+      this.element.dataset.iso = String(iso);
       this.element.dataset.took = took.toFixed(1);
       this.element.dataset.scale = String(scale);
       // Pictures while something moves, and when it rests.

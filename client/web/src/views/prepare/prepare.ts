@@ -2,14 +2,7 @@
 import { client } from '../../client';
 import { asApiError, type ApiError } from '../../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../../api/types';
-import {
-  changed,
-  defaultParameters,
-  estimateQuery,
-  jobRequest,
-  parametersOfQuery,
-  queryOfParameters,
-} from '../../job/parameters';
+import { changed, defaultParameters, estimateQuery, jobRequest, parametersOfQuery, queryOfParameters } from '../../job/parameters';
 import { kindOf, kinds, withKind, type Kind } from '../../job/kinds';
 import { trianglesOf } from '../../job/labels';
 import { isByLabels, withLabels } from '../../job/table';
@@ -36,6 +29,7 @@ import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
 import { makeEnlargeable } from '../slices/enlarge';
 import { sliceControls } from '../slices/slice_looks';
+import { SliceLayers } from '../slices/slice_layers';
 import { SliceMeasures } from '../slices/slice_measure';
 import { SliceView, type SliceHost } from '../slices/slice_view';
 
@@ -70,6 +64,7 @@ class Prepare {
   private cursor: Vec3;
   private readonly slices: SliceView[];
   private readonly measures = new SliceMeasures();
+  private readonly layers: SliceLayers;
   private readonly histogram: HistogramView;
   private readonly live: LiveView;
   // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
@@ -109,6 +104,7 @@ class Prepare {
     this.window = windowOfText(route.query.get('window') ?? '') ?? common;
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
+    this.layers = new SliceLayers(volume, common, scope);
     const host: SliceHost = {
       volume,
       source: new SliceSource(volume, scope.signal),
@@ -132,6 +128,7 @@ class Prepare {
       crop: isUpright(volume) ? { box: () => this.box, setBox: (box) => this.setBox(within(volume, box)) } : null,
       onError: (error) => this.sliceFailed(error),
       measures: this.measures,
+      layers: this.layers,
     };
     this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
@@ -303,6 +300,7 @@ class Prepare {
         this.labelPart,
         this.windowRow(common),
         sliceControls(volume, this.measures, (window) => this.setWindow(window ?? common)),
+        this.layers.element,
         this.crop?.element ?? '',
         ...notedOf(volume),
         this.surfaceKind,

@@ -7,6 +7,7 @@ import { coloursOf, paintLabels, type LabelLook } from '../../volume/label_map';
 import { labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
 import { pixelsOf, sliceColours, sliceSpace } from './slice_looks';
+import type { SliceLayers } from './slice_layers';
 import type { SliceMeasures } from './slice_measure';
 import { SliceReadout } from './slice_readout';
 import { SliceZoom } from './slice_zoom';
@@ -47,6 +48,8 @@ export interface SliceHost {
   onError: (error: unknown) => void;
   // Null where nothing is measured.
   measures: SliceMeasures | null;
+  // Null where nothing is shown beside the samples.
+  layers: SliceLayers | null;
 }
 
 interface Press {
@@ -119,7 +122,7 @@ export class SliceView {
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
-    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes]) {
+    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes]) {
       if (look) scope.onEnd(look.subscribe(() => this.draw()));
     }
   }
@@ -206,14 +209,18 @@ export class SliceView {
 
   private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
     const { iso, labels, cursor } = this.host.state();
-    if (slice.labels && labels) this.fillLabels(slice, slice.labels, labels);
-    else this.fillBuffer(slice);
+    const { layers } = this.host;
+    const projected = layers?.projected(slice.axis, slice.index) ?? null;
+    if (slice.labels && labels && !projected) this.fillLabels(slice, slice.labels, labels);
+    else this.fillBuffer(projected ?? slice);
     context.save();
     context.setTransform(...this.placement());
     context.imageSmoothingEnabled = labels === null;
     context.drawImage(this.buffer, 0, 0);
+    layers?.paint(context, slice.axis, slice.index);
 
-    const segments = iso === null ? [] : contour(slice, inSlice(slice, iso));
+    // The contour is one slice's.
+    const segments = iso === null || projected ? [] : contour(slice, inSlice(slice, iso));
     const [column, row] = pictureAxes(this.layout.normal);
     context.translate(0.5, 0.5);
     context.beginPath();

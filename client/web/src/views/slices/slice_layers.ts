@@ -1,0 +1,161 @@
+// What slices show beside their own samples: another volume over them, and a projection of the slab around them.
+import { client } from '../../client';
+import type { Axis, Volume } from '../../api/types';
+import { field, h } from '../../ui/dom';
+import { tellError } from '../../ui/notices';
+import { Signal, type Scope } from '../../ui/signal';
+import { axisIndex } from '../../volume/geometry';
+import { defaultWindow } from '../../volume/histogram';
+import { volumeName } from '../../volume/names';
+import type { Preview } from '../../volume/preview';
+import { readPreview } from '../../volume/preview_file';
+import { resliced, type Projection, type Slab } from '../../volume/reslice';
+import type { Slice, Window } from '../../volume/slices';
+import { pixelsOf } from './slice_looks';
+
+const previewSize = 256;
+const bins = 256;
+const thicknesses = [5, 10, 20, 40]; // mm
+// Of 255 values, those that fade out, so that what is around a body does not darken the other volume.
+const fading = 48;
+// Up to yellow: what is white could be either volume.
+const hottest = 2 / 3;
+
+interface Layer {
+  volume: Volume;
+  preview: Preview;
+}
+
+// Keeps what was made last for each axis.
+class Kept<T> {
+  private readonly made = new Map<Axis, { key: string; value: T }>();
+
+  get(axis: Axis, key: string, make: () => T): T {
+    const known = this.made.get(axis);
+    if (known?.key === key) return known.value;
+    const value = make();
+    this.made.set(axis, { key, value });
+    return value;
+  }
+}
+
+export class SliceLayers {
+  readonly element: HTMLElement;
+  // They are to be drawn anew.
+  readonly changes = new Signal(0);
+  private other: Layer | null = null;
+  private own: Preview | null = null;
+  private projection: Projection | null = null;
+  private thickness = 10;
+  private readonly choice = h('select', {}, h('option', { value: '' }, 'None'));
+  private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the volume over it' });
+  private readonly overlays = new Kept<HTMLCanvasElement>();
+  private readonly projections = new Kept<Slice>();
+  private wanted = new AbortController();
+
+  constructor(
+    private readonly volume: Volume,
+    private readonly window: Window,
+    private readonly scope: Scope,
+  ) {
+    scope.onEnd(() => this.wanted.abort());
+    this.opacity.hidden = true;
+    this.opacity.addEventListener('input', () => this.changed());
+    this.choice.addEventListener('change', () => void this.show(this.choice.value).catch(tellError));
+    const over = field('Volume over it', this.choice);
+    over.append(this.opacity);
+    over.hidden = true;
+    this.element = h('div', { class: 'row' }, over, ...this.slabControls());
+    // Without the list nothing can be laid over, and everything else works.
+    void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
+  }
+
+  // A projection instead of that slice; null where none is wanted or there.
+  projected(axis: Axis, index: number): Slice | null {
+    const { own, projection, volume } = this;
+    if (!own || !projection) return null;
+    const reach = Math.max(1, Math.round(this.thickness / volume.spacing[axisIndex(axis)] / 2));
+    const slab: Slab = { reach, projection };
+    return this.projections.get(axis, [index, reach, projection].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
+  }
+
+  // Draws the other volume over that slice, in whose samples the context counts.
+  paint(context: CanvasRenderingContext2D, axis: Axis, index: number): void {
+    const { other, volume } = this;
+    if (!other) return;
+    const before = context.globalAlpha;
+    context.globalAlpha *= this.opacity.valueAsNumber;
+    const picture = this.overlays.get(axis, [other.volume.id, index].join(), () => {
+      const { width, height, values } = resliced(other.preview, volume, axis, index);
+      const canvas = h('canvas', { width, height });
+      const picture = new ImageData(width, height);
+      const pixels = new Uint32Array(picture.data.buffer);
+      const colours = pixelsOf('hot');
+      values.forEach((value, at) => {
+        const alpha = Math.round(255 * Math.min(1, value / fading));
+        pixels[at] = (((colours[Math.round(hottest * value)] ?? 0) & 0xff_ffff) | (alpha << 24)) >>> 0;
+      });
+      canvas.getContext('2d', { willReadFrequently: true })?.putImageData(picture, 0, 0);
+      return canvas;
+    });
+    context.drawImage(picture, 0, 0);
+    context.globalAlpha = before;
+  }
+
+  private slabControls(): HTMLElement[] {
+    const kinds = [['', 'Slice'], ['maximum', 'Maximum of a slab'], ['mean', 'Mean of a slab']] as const;
+    const kind = h('select', {}, ...kinds.map(([value, text]) => h('option', { value }, text)));
+    const thick = h('select', {}, ...thicknesses.map((value) => h('option', { value, selected: value === this.thickness }, `${value} mm`)));
+    const thickness = field('Thickness', thick);
+    thickness.hidden = true;
+    kind.addEventListener('change', () => {
+      this.projection = kind.value === '' ? null : (kind.value as Projection);
+      thickness.hidden = this.projection === null;
+      void this.loadOwn().then(() => this.changed(), tellError);
+    });
+    thick.addEventListener('change', () => {
+      this.thickness = Number(thick.value);
+      this.changed();
+    });
+    return [field('Show', kind), thickness];
+  }
+
+  private async list(): Promise<boolean> {
+    const { volumes } = await client.listVolumes('', this.scope.signal);
+    const others = volumes.filter(({ id }) => id !== this.volume.id);
+    this.choice.append(...others.map((one) => h('option', { value: one.id }, volumeName(one))));
+    return others.length > 0;
+  }
+
+  private async loadOwn(): Promise<void> {
+    if (this.projection) this.own ??= await this.load(this.volume.id, this.window, this.scope.signal);
+  }
+
+  // That one over the slices; '' for none.
+  private async show(id: string): Promise<void> {
+    this.wanted.abort();
+    const wanted = new AbortController();
+    this.wanted = wanted;
+    this.other = null;
+    this.opacity.hidden = id === '';
+    this.changed();
+    if (id === '') return;
+    try {
+      const [volume, counts] = await Promise.all([client.getVolume(id), client.histogramOf(id, bins, wanted.signal)]);
+      const preview = await this.load(id, defaultWindow(counts, volume.suggested_iso), wanted.signal);
+      this.other = { volume, preview };
+      this.changed();
+    } catch (error) {
+      if (!wanted.signal.aborted) throw error;
+    }
+  }
+
+  private async load(id: string, window: Window, signal: AbortSignal): Promise<Preview> {
+    const file = await client.previewFile(id, previewSize, window, signal);
+    return readPreview({ file, window }, [file], signal);
+  }
+
+  private changed(): void {
+    this.changes.value += 1;
+  }
+}
