@@ -39,10 +39,9 @@ struct Names<Interpolation> {
 
 template <>
 struct Names<Smoothing> {
-  static constexpr std::array kTable = {std::pair{Smoothing::kLaplacian, "laplacian"},
-                                        std::pair{Smoothing::kTaubin, "taubin"},
-                                        std::pair{Smoothing::kAngle, "angle"},
-                                        std::pair{Smoothing::kOptimize, "optimize"}};
+  static constexpr std::array kTable = {
+      std::pair{Smoothing::kLaplacian, "laplacian"}, std::pair{Smoothing::kTaubin, "taubin"},
+      std::pair{Smoothing::kAngle, "angle"}, std::pair{Smoothing::kOptimize, "optimize"}};
 };
 
 // What client and server know of a format; the server's row is in server/codec/formats.cpp.
