@@ -19,6 +19,7 @@ void visit(Is<JobOrder> auto& self, auto&& field) {
   field("certify", self.certify);
   field("memory_bytes", self.memory_bytes);
   field("disk_bytes", self.disk_bytes);
+  field("expected", self.expected);
 }
 
 void visit(Is<JobProgress> auto& self, auto&& field) {

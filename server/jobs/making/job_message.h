@@ -40,6 +40,7 @@ struct JobOrder {
   bool certify = false;
   std::uint64_t memory_bytes = 0;
   std::uint64_t disk_bytes = 0;  // of all files together
+  Timing expected = {};          // of a mesh; progress follows it
 };
 
 struct JobProgress {

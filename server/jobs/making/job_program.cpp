@@ -27,7 +27,6 @@
 #include "server/jobs/making/make_labels.h"
 #include "server/jobs/making/make_mesh.h"
 #include "server/jobs/making/memory.h"
-#include "server/jobs/making/stage_times.h"
 #include "server/mesh/parallel.h"
 #include "server/process/child.h"
 #include "server/process/passing.h"
@@ -183,7 +182,7 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
     reporter.tell(stage, share, timing);
   };
-  Progress progress(stop, report, expected_times(order.volume, order.parameters, order.certify));
+  Progress progress(stop, report, order.expected);
   progress.enter(Stage::kLoad);
   const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
   canonical.preload();

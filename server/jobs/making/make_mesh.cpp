@@ -113,7 +113,7 @@ void Progress::enter(Stage stage) {
   end_stage();
   stage_ = stage;
   done_before_ += share_;
-  share_ = expected_.*row_of(stage).elapsed / expected_ms_;
+  share_ = expected_ms_ > 0 ? expected_.*row_of(stage).elapsed / expected_ms_ : 0;
   began_ = Clock::now();
   report_(stage_, done_before_, timing_);
 }

@@ -27,7 +27,7 @@ using Report = std::function<void(Stage stage, double progress, const Timing& ti
 // Follows a job through its stages: times each, reports its progress, passes cancellation on.
 class Progress {
  public:
-  // A stage's share of the job is its share of the expected times.
+  // A stage's share of the job is its share of the expected times; 0 if none is expected.
   Progress(std::stop_token stop, const Report& report, const Timing& expected);
 
   // Ends the stage before and starts this one.

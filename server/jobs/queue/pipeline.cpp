@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/jobs/library/stored_samples.h"
+#include "server/jobs/making/stage_times.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -55,7 +56,8 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                           .iso = parameters.iso.value_or(volume.suggested_iso),
                           .certify = parameters.certify,
                           .memory_bytes = limits.memory_bytes,
-                          .disk_bytes = disk_for_files(blobs, volume)};
+                          .disk_bytes = disk_for_files(blobs, volume),
+                          .expected = expected_times(volume, parameters, parameters.certify)};
   MadeMesh made = made_of_intact(blobs, volume.id, stop,
                                  [&] { return process.make(order, sinks, stop, pass_on); });
   const auto stored = Clock::now();

@@ -289,7 +289,7 @@ HWY_INLINE Lanes square_from_fan(const Fan& fan, const Lanes3& apex, const Lanes
     const Mask is_within = (area > 0) & (along_a >= 0) & (along_b >= 0);
     const Lanes3 off = way - (along_a / area) * a - (along_b / area) * b;
     const Lanes square = dot(off, off);
-    result = is_within & (square < result) ? square : result;
+    result = (is_within & (square < result)) ? square : result;
     a = b;
   }
   return result;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -93,6 +94,17 @@ TEST_F(JobProcessTest, MakesOneMeshAfterTheOtherInTheSameProcess) {
     EXPECT_EQ(processes.size(), 1U);
   }
   EXPECT_EQ(stages, (std::set{Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kEncode}));
+}
+
+TEST_F(JobProcessTest, ProgressFollowsTheTimesThatTheOrderExpects) {
+  JobOrder order = order_of(add_sphere(), 0.5);
+  order.expected = {.load = 1, .extract = 2, .smooth = 3, .encode = 4};
+  std::map<Stage, double> first;
+  make(process_, order,
+       [&](Stage stage, double share, const Timing&) { first.try_emplace(stage, share); });
+  EXPECT_NEAR(first.at(Stage::kExtract), 0.1, 1e-9);
+  EXPECT_NEAR(first.at(Stage::kSmooth), 0.3, 1e-9);
+  EXPECT_NEAR(first.at(Stage::kEncode), 0.6, 1e-9);
 }
 
 // It may have a few dozen descriptors open, and gets one with each order.
