@@ -208,12 +208,10 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
               "then moves all vertices back by the factor `mu`, where 1/lambda + 1/mu = "
               "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume. "
               "`angle` and `optimize` keep shape and volume and make the angles of triangles "
-              "larger: "
-              "each pass moves every vertex along the extracted surface. `angle` moves it towards "
-              "the bisectors of its neighbours' angles. `optimize` moves it towards the mean of "
-              "its "
-              "neighbours in the first half of the passes, and then to wherever the smallest angle "
-              "becomes larger. Neither uses `lambda`, and neither removes noise.",
+              "larger: each pass moves every vertex along the extracted surface. `angle` moves it "
+              "towards the bisectors of its neighbours' angles. `optimize` moves it towards the "
+              "mean of its neighbours in the first half of the passes, and then to wherever the "
+              "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise.",
           .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
                      "Evens out the angles of triangles, and keeps shape and volume",
                      "Enlarges the smallest angles of triangles, and keeps shape and volume"}},

@@ -44,7 +44,7 @@ struct Names<Smoothing> {
       std::pair{Smoothing::kAngle, "angle"}, std::pair{Smoothing::kOptimize, "optimize"}};
 };
 
-// What client and server know of a format; the server's row is in server/codec/formats.cpp.
+// Client and server both know this row; the server's own is in server/codec/formats.cpp.
 struct FormatRow {
   MeshFormat format;
   std::string_view name;

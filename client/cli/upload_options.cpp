@@ -32,8 +32,7 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
          },
          std::string("A volume: " + volume_format_titles() +
                      ", a folder or archive of it, or raw samples with --dims and --type. Several "
-                     "files may "
-                     "belong together, such as .hdr and .img. - reads standard input") +
+                     "files may belong together, such as .hdr and .img. - reads standard input") +
              (takes_ids ? ". The id of a stored volume also works; its beginning or end is enough "
                           "if unique"
                         : ""))

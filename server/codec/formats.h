@@ -44,8 +44,8 @@ struct Format {
   // Null for a format that does not hold all labels in one file.
   void (*encode_labels)(const LabelledSurface& surface, const Provenance& provenance, Space space,
                         const mesh::Context& context, const Sink& sink) = nullptr;
-  // Of a format that rounds coordinates; null for those that hold the mesh's triangles and floats
-  // exactly, in the file's space; by labels, the triangles of each label's own surface.
+  // Null for a format that holds the mesh's triangles and floats exactly, in the file's space; by
+  // labels, the triangles of each label's own surface. Other formats round coordinates.
   DecodedSurface (*decode)(std::span<const std::byte> file, const mesh::Context& context) = nullptr;
 };
 

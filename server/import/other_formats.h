@@ -6,7 +6,7 @@
 
 namespace isomesh::import {
 
-// What the file is, with an article: "an Imaris file". Empty for an unknown beginning.
+// Names the file's format, with an article: "an Imaris file". Empty for an unknown beginning.
 std::optional<std::string_view> name_of_other_format(std::string_view head);
 
 }  // namespace isomesh::import

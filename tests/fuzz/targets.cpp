@@ -119,7 +119,7 @@ void import_archive(const std::vector<import::test::Member>& members) {
   import_bytes(std::as_bytes(std::span(archive)), {});
 }
 
-// Of two equal pages.
+// Imports a stack of two equal pages.
 void import_pages(std::string_view format, Bytes bytes) {
   const std::string page(text_of(bytes));
   if (is_of(format, bytes)) import_archive({{"1", page}, {"2", page}});

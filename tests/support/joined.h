@@ -13,9 +13,9 @@ namespace isomesh::test {
 
 inline constexpr std::uint32_t kNotJoined = ~std::uint32_t{0};
 
-// What each vertex of the plain mesh becomes in the regular one, or kNotJoined if it is in no
-// triangle there. `clusters`: for each vertex of the plain mesh its cluster, or kNotJoined. It is
-// read off the triangles, which are in the same order; empty if those are not the plain ones
+// The vertex of the regular mesh that each vertex of the plain one becomes, or kNotJoined if it is
+// in no triangle there. `clusters`: for each vertex of the plain mesh its cluster, or kNotJoined.
+// It is read off the triangles, which are in the same order; empty if those are not the plain ones
 // without those that vanish.
 std::vector<std::uint32_t> joined_to(const mesh::Mesh& regular, const mesh::Mesh& plain,
                                      std::span<const std::uint32_t> clusters);

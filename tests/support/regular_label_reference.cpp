@@ -202,7 +202,7 @@ class RegularLabelBuilder {
   RegularLabelReference reference_;
 };
 
-// What the vertices of the plain surface are in the reference, and become.
+// The plain surface's vertices: their names in the reference, and the clusters that they become.
 struct Joining {
   std::vector<std::uint32_t> names;
   std::vector<std::uint32_t> clusters;

@@ -29,10 +29,10 @@ std::vector<Samples> components_of(const Star& star, Samples all);
 
 Samples common(const Samples& a, const Samples& b);
 
-// Whether `some`, which are not all neighbours, leave neighbours that are connected.
+// True if `some`, which are not all neighbours, leave neighbours that are connected.
 bool leaves_connected(const Star& star, const Samples& some);
 
-// Whether `some` of the ring around a neighbour are none, or one run with two others left.
+// True if `some` of the ring around a neighbour are none, or one run with two others left.
 bool is_run(const Star& star, const Samples& ring, const Samples& some);
 
 }  // namespace isomesh::test

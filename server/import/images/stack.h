@@ -26,7 +26,7 @@ Volume import_images(std::vector<ImageFile> files, const ImportTask& task);
 // A file that was uploaded alone.
 Volume parse_image(const Input& input);
 
-// Of any picture; its header does not bound its size.
+// The limit for all pictures: their headers do not bound their size.
 MostBytes most_image_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -14,7 +14,7 @@ namespace {
 using std::string_view_literals::operator""sv;
 
 constexpr std::uint64_t kMostPages = 1'000'000;
-// Of one strip or one row of tiles.
+// The limit for one strip or one row of tiles.
 constexpr std::uint64_t kMostBlockBytes = std::uint64_t{256} << 20;
 
 [[noreturn]] void throw_damaged_tiff() {

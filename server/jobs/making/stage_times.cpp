@@ -66,6 +66,15 @@ double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   return as_double(surface.triangles) * (slowest + (sum - slowest) / 2 + levels);
 }
 
+// The size of a surface that is not extracted yet. A guess.
+SurfaceSize typical_surface(double samples) {
+  // Surfaces grow with the square of a volume's length, its samples with the cube. A noisy head and
+  // a smooth body of CT have 135 and 20 times that many triangles.
+  constexpr double kTypical = 50;
+  const double triangles = kTypical * std::pow(samples, 2.0 / 3);
+  return {static_cast<std::uint64_t>(triangles), static_cast<std::uint64_t>(triangles / 2)};
+}
+
 }  // namespace
 
 Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written, std::uint64_t samples,
@@ -87,12 +96,17 @@ double share_within(double error_mm, double spacing_mm) {
   return 1 / (1 + std::pow(error_mm / spacing_mm / kHalf, kSteepness));
 }
 
-SurfaceSize typical_surface(double samples) {
-  // Surfaces grow with the square of a volume's length, its samples with the cube. A noisy head and
-  // a smooth body of CT have 135 and 20 times that many triangles.
-  constexpr double kTypical = 50;
-  const double triangles = kTypical * std::pow(samples, 2.0 / 3);
-  return {static_cast<std::uint64_t>(triangles), static_cast<std::uint64_t>(triangles / 2)};
+SurfaceSize simplified_surface(const SurfaceSize& extracted, const MeshParameters& parameters,
+                               double spacing_mm, double correction) {
+  double triangles = as_double(extracted.triangles);
+  if (parameters.max_error_mm) {
+    triangles *= std::min(1.0, correction * share_within(*parameters.max_error_mm, spacing_mm));
+  }
+  if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
+  SurfaceSize result = extracted;
+  result.triangles = static_cast<std::uint64_t>(std::llround(triangles));
+  result.vertices = std::min(extracted.vertices, result.triangles / 2);
+  return result;
 }
 
 Timing expected_times(const Volume& volume, const MeshParameters& parameters, bool certify) {
@@ -106,14 +120,8 @@ Timing expected_times(const Volume& volume, const MeshParameters& parameters, bo
     samples = std::min(samples, part);
   }
   const SurfaceSize extracted = typical_surface(samples);
-  SurfaceSize written = extracted;
-  double triangles = as_double(extracted.triangles);
-  if (parameters.max_error_mm) {
-    triangles *= share_within(*parameters.max_error_mm, std::ranges::min(volume.geometry.spacing));
-  }
-  if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
-  written.triangles = static_cast<std::uint64_t>(triangles);
-  written.vertices = std::min(extracted.vertices, written.triangles / 2);
+  const SurfaceSize written =
+      simplified_surface(extracted, parameters, std::ranges::min(volume.geometry.spacing));
   return stage_times(extracted, written, static_cast<std::uint64_t>(samples), parameters, certify);
 }
 

@@ -18,8 +18,10 @@ Timing stage_times(const mesh::SurfaceSize& extracted, const mesh::SurfaceSize& 
 // The share of the triangles that simplification leaves within an error. A guess.
 double share_within(double error_mm, double spacing_mm);
 
-// The size of a surface that is not extracted yet, in a volume of that many samples. A guess.
-mesh::SurfaceSize typical_surface(double samples);
+// The size that simplification leaves. A guess; `correction` multiplies the share within an error.
+mesh::SurfaceSize simplified_surface(const mesh::SurfaceSize& extracted,
+                                     const MeshParameters& parameters, double spacing_mm,
+                                     double correction = 1);
 
 // The times of a job before any sample of its volume is read, for a surface of typical size.
 Timing expected_times(const Volume& volume, const MeshParameters& parameters, bool certify);

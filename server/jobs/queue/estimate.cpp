@@ -94,16 +94,7 @@ double CostModel::milliseconds(const SurfaceSize& surface, const SurfaceSize& wr
 
 SurfaceSize CostModel::simplified(const SurfaceSize& surface, const MeshParameters& parameters,
                                   double spacing_mm) const {
-  double share = 1;
-  if (parameters.max_error_mm) {
-    share = std::min(1.0, share_.factor() * share_within(*parameters.max_error_mm, spacing_mm));
-  }
-  double triangles = share * static_cast<double>(surface.triangles);
-  if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
-  SurfaceSize result = surface;
-  result.triangles = static_cast<std::uint64_t>(std::llround(triangles));
-  result.vertices = std::min(surface.vertices, result.triangles / 2);
-  return result;
+  return simplified_surface(surface, parameters, spacing_mm, share_.factor());
 }
 
 std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surface,

@@ -70,8 +70,8 @@ struct Star {
   Directions crossed = 0;
 };
 
-// What vanishes where a sample's clusters are vertices: in its own layer, modulo 2^64, and in the
-// one below.
+// The vertices and triangles that vanish because a sample's clusters are vertices: in its own
+// layer, modulo 2^64, and in the one below.
 struct ClusterLoss {
   std::uint64_t vertices = 0;
   std::uint64_t vertices_below = 0;
@@ -79,7 +79,8 @@ struct ClusterLoss {
   std::uint64_t triangles_below = 0;
 };
 
-// Of the sample's own crossings the components that keep the first two conditions of links.h.
+// Returns the components of the sample's own crossings that keep the first two conditions of
+// links.h.
 HWY_INLINE Directions components_to_join(const Links& links, unsigned parity, const Star& star) {
   Directions kept = 0;
   for (Directions own = star.own; own != 0;) {
@@ -94,7 +95,7 @@ HWY_INLINE Directions components_to_join(const Links& links, unsigned parity, co
   return kept;
 }
 
-// Where each of the components in `joined` is a vertex.
+// The loss if each of the components in `joined` becomes a vertex.
 HWY_INLINE ClusterLoss loss_of_components(const Links& links, Directions joined,
                                           const ClusterFacts& facts) {
   const auto below = static_cast<std::uint64_t>(std::popcount(joined & links.below()));

@@ -30,7 +30,7 @@ struct ClusterLayer {
   std::vector<JoiningSample> samples;    // row by row
   std::vector<std::uint32_t> row_begin;  // how many those are before each row, and all
 
-  // Of the samples at junctions among those, in their order.
+  // The points of those samples that are at junctions, in their order.
   std::vector<JoinedPoints> points;
   std::vector<std::uint32_t> points_begin;  // how many those are before each row
 

@@ -1,5 +1,5 @@
-// Which of the vertices that a row's samples own are some cluster's. Compiled once for each
-// instruction set, see slabs.cpp.
+// Rows of bits that tell which vertices of a row's samples belong to a cluster. Compiled once for
+// each instruction set, see slabs.cpp.
 #if defined(ISOMESH_JOINED_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_JOINED_ROWS_INL_H_
 #undef ISOMESH_JOINED_ROWS_INL_H_
@@ -36,8 +36,8 @@ void visit_joining(std::span<const ClusterLayer> clusters, std::uint32_t y, std:
   }
 }
 
-// Where a vertex beside a sample has its name: in which of the rows (y, z), (y - 1, z), (y, z - 1)
-// and (y - 1, z - 1), how many samples before, and its place there.
+// The place of the name of a vertex beside a sample: one of the rows (y, z), (y - 1, z), (y, z - 1)
+// and (y - 1, z - 1), the number of samples before, and the slot there.
 struct JoinedName {
   std::uint8_t row = 0;
   std::uint8_t before = 0;

@@ -1,5 +1,5 @@
-// What the walk over clusters is told of an iso-value's signs: a crossing belongs to the end whose
-// value is nearer to the iso-value. Compiled once for each instruction set, see slabs.cpp.
+// The rule of the walk over clusters for an iso-value: a crossing belongs to the end whose value is
+// nearer to the iso-value. Compiled once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_SIGN_CLUSTERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_SIGN_CLUSTERS_INL_H_
 #undef ISOMESH_SIGN_CLUSTERS_INL_H_

@@ -1,4 +1,4 @@
-// What the walk over clusters is told of labels. Compiled once for each instruction set, see
+// The rule of the walk over clusters for labels. Compiled once for each instruction set, see
 // slabs.cpp.
 //
 // Labels have no values, so of two the larger owns the crossing between them. Around a sample with
@@ -151,7 +151,7 @@ class LabelClusters {
     for (std::size_t d = 0; d < directions.size(); ++d) around_[d] = rows_[d][at.x];
   }
 
-  // Whether the neighbours with another label have several.
+  // True if the neighbours with other labels have more than one label.
   bool is_junction(Directions crossed) const {
     const PartNumber first = around_[first_of(crossed)];
     for (Directions rest = crossed & (crossed - 1); rest != 0; rest &= rest - 1) {
@@ -260,8 +260,8 @@ class LabelClusters {
       ++corners[n];
       count = std::max(count, n + 1);
     }
-    // Of wall_cases.h: of two joined corners, one triangle beside each label. Of three, where all
-    // vertices are joined but those between other labels: all but one or two.
+    // The cases of wall_cases.h: two joined corners lose one triangle beside each label. Three lose
+    // all but one or two, if all vertices are joined but those between other labels.
     std::uint64_t lost = 0;
     for (std::size_t n = 0; n < count; ++n) {
       const bool has_two = size == 3 && (count == 3 || (count == 2 && corners[n] == 2));

@@ -31,7 +31,7 @@ class LabelParts {
 
   std::size_t labels() const { return labels_; }
 
-  // Whether some part belongs to several labels, or some label has several parts.
+  // True if a part belongs to several labels, or a label has several parts.
   bool overlap() const { return !members_.empty(); }
 
   // Calls visit(number of the label, whether `front` belongs to it) for each label that one of the

@@ -1,4 +1,4 @@
-// What the walk is told of labels where their surface is regularised: as regular-inl.h for an
+// The walk's parts for labels whose surface is regularised, as regular-inl.h has them for an
 // iso-value. Compiled once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_REGULAR_LABELS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_REGULAR_LABELS_INL_H_

@@ -1,8 +1,8 @@
 // The points around a sample of the walls between labels: half-way on an edge to a neighbour, in a
 // face with two neighbours, and in a tetrahedron with three; private to this folder.
 //
-// Of each point one of its samples is the owner of its name (wall_cases.h), and one the sample that
-// it may be joined at: that of the largest number, see label_clusters-inl.h.
+// One of a point's samples owns its name (wall_cases.h). The point may be joined at the sample with
+// the largest number, see label_clusters-inl.h.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ namespace isomesh::mesh {
 struct StarPoint {
   Directions neighbours = 0;                 // of the point beside the sample: one, two or three
   std::array<std::uint8_t, 3> members = {};  // those, ascending
-  // Which corner the sample is of the cell of the name's owner, and the slot there.
+  // The sample's corner in the cell of the name's owner, and the slot there.
   std::uint8_t corner = 0;
   std::uint8_t slot = 0;
   bool is_below = false;  // a sample of the plane below owns the name

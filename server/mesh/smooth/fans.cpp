@@ -101,7 +101,7 @@ HWY_INLINE void gather_fan(const FanMoves& moves, std::span<const std::uint32_t>
   fan.mean_length = lengths / fan.count;
 }
 
-// Where points come down on the extracted surface.
+// The places where points come down on the extracted surface.
 struct Landing {
   Lanes3 at;  // as the fan's spokes
   Mask is_there;
@@ -295,8 +295,8 @@ HWY_INLINE Lanes square_from_fan(const Fan& fan, const Lanes3& apex, const Lanes
   return result;
 }
 
-// Whether a move turns over no triangle that had not been, leaves each an area, and keeps the old
-// place near the new triangles and the new place near the old ones.
+// True for a move that turns over no more triangles, leaves each an area, and keeps the old place
+// near the new triangles and the new place near the old ones.
 HWY_INLINE Mask keeps_shape(const Fan& fan, const Lanes3& at) {
   Mask bad = {};
   for (std::size_t i = 0; i < fan.size; ++i) {

@@ -54,7 +54,7 @@ class Links {
     fan_ = 2;
   }
 
-  // Of a vertex on a line.
+  // True for a vertex on a line.
   bool has_line() const { return fan_ == 2; }
 
   // In an oriented manifold the triangles name each neighbour once as the next corner and once as

@@ -86,9 +86,9 @@ std::int64_t Database::us_of(std::chrono::steady_clock::time_point time) const {
   return to_steady_us(time) + beyond_steady_us_;
 }
 
-// Of several measurements, the one with the shortest round trip is the most accurate. The
-// database's time is taken as that at the start of the request, so that times it has written are
-// never in the future.
+// The measurement with the shortest round trip is the most accurate of several. The database's time
+// is taken as that at the start of the request, so that times it has written are never in the
+// future.
 void Database::look_at_clock(Connection& connection) {
   constexpr std::int64_t kQuickUs = 5000;
   std::int64_t quickest = std::numeric_limits<std::int64_t>::max();

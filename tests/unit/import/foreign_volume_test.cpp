@@ -150,7 +150,7 @@ TEST_F(ForeignVolumes, PagesOfTiffAreThoseOfPillow) {
                    {.spacing = std::array<double, 3>{1, 1, 1}});
 }
 
-// Of a phantom, with oblique slices of a real scanner; it comes with nibabel.
+// The file is a phantom's, with oblique slices of a real scanner; it comes with nibabel.
 TEST_F(ForeignVolumes, ParRecIsThatOfNibabel) {
   const std::filesystem::path data = "/usr/lib/python3/dist-packages/nibabel/tests/data";
   const std::string name = "phantom_EPI_asc_CLEAR_2_1";

@@ -279,7 +279,7 @@ class NaivePass {
     return minus(way, times(dot(way, normal), normal));
   }
 
-  // Where the line through `from` meets a triangle.
+  // The point where the line through `from` meets a triangle.
   static std::optional<Point> meeting(const Point& from, const Point& along, const Point& a,
                                       const Point& b, const Point& c) {
     const double area = dot(along, cross(minus(b, a), minus(c, a)));

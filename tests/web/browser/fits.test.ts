@@ -75,7 +75,7 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
           return { text: cell.textContent, isSeen, lines: (height - 2 * padding) / parseFloat(getComputedStyle(cell).lineHeight) };
         }),
     );
-    // Of each of three jobs its state, priority, surface, result, time and age.
+    // State, priority, surface, result, time and age of each of three jobs.
     expect(cells).toHaveLength(18);
     expect(cells.filter(({ isSeen, lines }) => !isSeen || lines > 3.5)).toEqual([]);
   });

@@ -71,7 +71,7 @@ describe('the surface beside the slices', () => {
   it('is drawn once for all moves that come while a picture is drawn, at the last of them', async () => {
     const { page } = at;
     await open(page, 'iso=60');
-    // What draws takes as long as the test lets it.
+    // Drawing takes as long as the test lets it.
     await page.evaluate(() => {
       const made = WebGL2RenderingContext.prototype;
       // eslint-disable-next-line @typescript-eslint/unbound-method -- called on their contexts below

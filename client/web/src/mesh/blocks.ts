@@ -30,7 +30,7 @@ const mostVertices = 65_535;
 export const mostTriangles = 65_000;
 // Edge lengths that one cell of the coarse copy spans at least.
 const coarseness = 3.5;
-// Of a whole surface while it turns. Software needs about 5 µs of a core for each.
+// The most of a whole surface while it turns: an estimate that software draws each in about 5 µs of a core.
 const movingTriangles = 30_000;
 
 // Sums of the triangles' normals times twice their area, three a vertex.

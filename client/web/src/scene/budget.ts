@@ -10,7 +10,7 @@ export class FrameBudget {
   // Durations of the last frames while the surface was moving, for measurements.
   readonly moving: number[] = [];
   private cost = 0;
-  // Of frames that show all triangles.
+  // The cost of frames that show all triangles.
   private wholeCost = 0;
   private later = 0;
   private lastEnd = 0;

@@ -3,7 +3,7 @@ import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, type 
 import type { Vec3, Volume } from '../api/types';
 import { toPatient } from '../volume/geometry';
 
-// Of what lies over the surface, so that it is drawn once.
+// The layer of things over the surface, so that they are drawn once.
 export const overLayer = 1;
 
 export class Cross {

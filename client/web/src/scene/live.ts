@@ -52,7 +52,7 @@ export interface Frame {
   took: number;
   scale: number;
   isResting: boolean;
-  // Of the surface that it shows.
+  // The iso-value of the surface that it shows.
   iso: number;
 }
 

@@ -21,11 +21,11 @@ export interface Picture {
   // In pixels of the canvas.
   width: number;
   height: number;
-  // Of one step and all pixels is drawn on the canvas itself.
+  // A picture of one step and all pixels is drawn on the canvas itself.
   steps: number;
   // Says what a step paints.
   begin?: (step: number, target: WebGLRenderTarget) => void;
-  // What is to be done to the canvas before it gets the picture, and what is drawn over it.
+  // Called before the canvas gets the picture, and after it, to draw over it.
   before?: () => void;
   after?: () => void;
 }

@@ -238,7 +238,7 @@ export class Parts {
     if ([...this.looks.values()].some(({ level }) => level.blocks > 0)) this.showAll();
   }
 
-  // Which of so many steps is drawn; null: all at once. What is looked through has to be drawn in order, from the back.
+  // Draws one of so many steps; null: all at once. Transparent blocks must be drawn in order, from the back.
   setStep(step: number | null, steps: number): void {
     const share = this.blocks.length / steps;
     this.blocks.forEach((block, at) => {

@@ -153,7 +153,7 @@ export class Surface {
     whenDrawn(this.renderer.getContext() as WebGL2RenderingContext, () => this.release(() => this.budget.soon(() => this.draw())));
   }
 
-  // What was to be done is done; what is to be drawn next has waited for it.
+  // Ends a task; the next drawing has waited for it.
   private release(then: () => void): void {
     this.isBusy = false;
     if (this.isDisposed) return;

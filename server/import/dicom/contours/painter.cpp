@@ -15,7 +15,8 @@ namespace {
 
 // Contours within this distance of a slice are in it. Positions are written with a few decimals.
 constexpr double kSameSlice = 0.1;
-// Of rows, by all edges of a structure: minutes of work, and far more than a person draws.
+// Limits the rows that all edges of a structure cross: minutes of work, far more than a person
+// draws.
 constexpr std::uint64_t kMostCrossings = std::uint64_t{1} << 34;
 
 // Positions in the patient's space -> indices of samples, as real numbers.

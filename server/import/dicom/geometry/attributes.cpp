@@ -38,7 +38,7 @@ constexpr std::array kPhaseRows = {
     PhaseRow{"TemporalPositionTimeOffset", kTemporalPositionSequence, kTemporalPositionTimeOffset,
              Kind::kReal},
     PhaseRow{"DataType", kUsImageDescriptionSequence, kDataType, Kind::kText},
-    // Of nuclear medicine, whose frames have no groups (tomogram.h).
+    // Frames of nuclear medicine have no groups (tomogram.h).
     PhaseRow{"EnergyWindowVector", kNoGroup, kEnergyWindowVector, Kind::kWord},
     PhaseRow{"RRIntervalVector", kNoGroup, kRrIntervalVector, Kind::kWord},
     PhaseRow{"TimeSlotVector", kNoGroup, kTimeSlotVector, Kind::kWord},

@@ -22,7 +22,8 @@ struct TestStructure {
   std::string color = "255\\0\\0";
 };
 
-// Of the series 1.2.9, in the frame of reference 1.2.3.frame. Coordinates have six decimals.
+// A structure set of the series 1.2.9, in the frame of reference 1.2.3.frame. Coordinates have six
+// decimals.
 DicomObject structure_set(const std::vector<TestStructure>& structures);
 
 // A rectangle in the plane at z.

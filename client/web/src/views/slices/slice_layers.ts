@@ -1,4 +1,4 @@
-// What slices show beside their own samples: another volume over them, and a projection of the slab around them.
+// Layers of slices beside their own samples: another volume over them, and a projection of the slab around them.
 import { client } from '../../client';
 import type { Axis, Volume } from '../../api/types';
 import { field, h } from '../../ui/dom';
@@ -16,7 +16,7 @@ import { pixelsOf } from './slice_looks';
 const previewSize = 256;
 const bins = 256;
 const thicknesses = [5, 10, 20, 40]; // mm
-// Of 255 values, those that fade out, so that what is around a body does not darken the other volume.
+// The lowest of 255 values fade out, so that air around a body does not darken the other volume.
 const fading = 48;
 // Up to yellow: what is white could be either volume.
 const hottest = 2 / 3;
