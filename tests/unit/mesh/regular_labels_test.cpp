@@ -6,6 +6,7 @@
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/labels/separate.h"
 #include "tests/support/regular_label_reference.h"
+#include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh {
@@ -46,7 +47,7 @@ void expect_regular_walls(const SampleVolume<std::uint8_t>& volume, std::size_t 
 // Two labels around every pattern of a block, then blocks of a few labels at random.
 TEST(RegularLabels, OfBlocksAreTheReferences) {
   constexpr Dims kDims = {5, 4, 4};
-  for (std::uint32_t seed = 0; seed < 2000 && !testing::Test::HasFailure(); ++seed) {
+  for (std::uint32_t seed = 0; seed < 2000 && !testing::Test::HasFailure(); seed += test::kStep) {
     SCOPED_TRACE(seed);
     auto volume = test::constant<std::uint8_t>(static_cast<std::uint8_t>(seed % 4), kDims);
     const std::size_t labels = 1 + seed % 4;
@@ -60,7 +61,7 @@ TEST(RegularLabels, OfBlocksAreTheReferences) {
 }
 
 TEST(RegularLabels, OfNoiseAreTheReferences) {
-  for (std::uint32_t seed = 0; seed < 24 && !testing::Test::HasFailure(); ++seed) {
+  for (std::uint32_t seed = 0; seed < 24 && !testing::Test::HasFailure(); seed += test::kStep) {
     SCOPED_TRACE(seed);
     const std::size_t labels = 1 + seed % 6;
     expect_regular_walls(label_noise(labels + 1, {4 + seed % 5, 4 + seed % 4, 4 + seed % 3}, seed),
@@ -69,7 +70,7 @@ TEST(RegularLabels, OfNoiseAreTheReferences) {
 }
 
 TEST(RegularLabels, OfCompactLabelsAreTheReferences) {
-  for (std::uint32_t seed = 0; seed < 6 && !testing::Test::HasFailure(); ++seed) {
+  for (std::uint32_t seed = 0; seed < 6 && !testing::Test::HasFailure(); seed += test::kStep) {
     SCOPED_TRACE(seed);
     expect_regular_walls(label_cells(3 + seed % 4, {14, 13, 12}, 7, seed), 3 + seed % 4);
     auto noisy = label_cells(4, {9, 8, 9}, 7, seed);

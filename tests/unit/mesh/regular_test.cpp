@@ -10,6 +10,7 @@
 
 #include "server/mesh/extract/extract.h"
 #include "tests/support/regular_reference.h"
+#include "tests/support/step.h"
 #include "tests/unit/mesh/reference_surface.h"
 
 namespace isomesh::mesh {
@@ -70,7 +71,7 @@ SampleVolume<std::int8_t> block(unsigned pattern, unsigned distances, std::mt199
 
 TEST(RegularSurface, OfEveryPatternOfABlockIsTheReferences) {
   std::mt19937 random(1);
-  for (unsigned pattern = 0; pattern < 1U << 12 && !testing::Test::HasFailure(); ++pattern) {
+  for (unsigned pattern = 0; pattern < 1U << 12 && !testing::Test::HasFailure(); pattern += test::kStep) {
     SCOPED_TRACE(pattern);
     auto volume = block(pattern, pattern % 3 == 0 ? 1 : pattern % 3 == 1 ? 3 : 100, random);
     // The other side is inside, for half of them.
@@ -101,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(Cells, RegularCells,
                                                           test::Surround::kInside)));
 
 TEST(RegularSurface, OfNoiseAndPlateausIsTheReferences) {
-  for (std::uint32_t seed = 0; seed < 12 && !testing::Test::HasFailure(); ++seed) {
+  for (std::uint32_t seed = 0; seed < 12 && !testing::Test::HasFailure(); seed += test::kStep) {
     SCOPED_TRACE(seed);
     const Dims dims = {4 + seed % 5, 4 + seed % 4, 4 + seed % 3};
     expect_regular_surfaces(test::noise_between<float>(-1, 1, dims, seed), 0);
@@ -113,7 +114,7 @@ TEST(RegularSurface, OfNoiseAndPlateausIsTheReferences) {
 
 // Sheets of about the thickness of a voxel, with noise: both sides want the same samples.
 TEST(RegularSurface, OfThinShellsIsTheReferences) {
-  for (std::uint32_t seed = 0; seed < 12 && !testing::Test::HasFailure(); ++seed) {
+  for (std::uint32_t seed = 0; seed < 12 && !testing::Test::HasFailure(); seed += test::kStep) {
     SCOPED_TRACE(seed);
     const Dims dims = {9, 8, 9};
     auto volume = test::noise_between<float>(-0.3, 0.3, dims, seed);

@@ -11,6 +11,7 @@
 
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/points.h"
+#include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh {
@@ -112,7 +113,9 @@ constexpr double kFree = std::numeric_limits<double>::infinity();
 class SmoothWalls : public testing::TestWithParam<SmoothOptions> {};
 
 TEST_P(SmoothWalls, MovesVerticesAsTheNaiveWayDoes) {
-  for (auto& [name, surface] : walls()) {
+  std::vector<NamedWalls> all = walls();
+  for (std::size_t n = 0; n < all.size(); n += test::kStep) {
+    auto& [name, surface] = all[n];
     SCOPED_TRACE(name);
     const std::vector<Point> before = points_of(surface.mesh);
     const std::vector<Point> expected = naively_smoothed(surface, GetParam());
