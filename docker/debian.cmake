@@ -38,12 +38,12 @@ set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "adduser")
 set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
   ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm ${scripts}/conffiles)
 set(CPACK_COMPONENT_DAEMON_DESCRIPTION
-  "daemon that turns medical volumes into surface meshes\nisomeshd has an HTTP API and a web page. It reads NIfTI, NRRD, MetaImage, VTI\nand DICOM files, ZIP and TAR archives of them, and raw samples. It extracts and\nsmooths the surfaces of iso-values and labels, and writes Draco, GLB, STL, PLY,\nOBJ, 3MF, OFF, VTK, VTP and GIFTI files.\nThe package contains isomeshd and the programs that it runs: isomesh-import\nreads uploads, isomesh-job makes meshes, and isomesh-dimse sends and receives\nDICOM objects.")
+  "daemon that turns medical volumes into surface meshes\nisomeshd has an HTTP API and a web page. It reads DICOM, NIfTI, NRRD,\nMetaImage, VTK, TIFF and other files, ZIP and TAR archives of them, and raw\nsamples. It extracts and\nsmooths the surfaces of iso-values and labels, and writes Draco, GLB, STL, PLY,\nOBJ, 3MF, OFF, VTK, VTP and GIFTI files.\nThe package contains isomeshd and the programs that it runs: isomesh-import\nreads uploads, isomesh-job makes meshes, and isomesh-dimse sends and receives\nDICOM objects.")
 
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS isomeshd)
 set(CPACK_COMPONENT_CLIENT_DESCRIPTION
-  "command that turns medical volumes into surface meshes\nisomesh uploads a volume to an isomesh daemon, starts a job and downloads the\nmesh, in one step or in several. It takes NIfTI, NRRD, MetaImage, VTI and DICOM\nfiles and folders, and saves Draco, GLB, STL, PLY, OBJ, 3MF, OFF, VTK, VTP and\nGIFTI files. With the package isomeshd it also works without a server.")
+  "command that turns medical volumes into surface meshes\nisomesh uploads a volume to an isomesh daemon, starts a job and downloads the\nmesh, in one step or in several. It takes DICOM, NIfTI, NRRD, MetaImage, VTK, TIFF\nand other files and folders, and saves Draco, GLB, STL, PLY, OBJ, 3MF, OFF, VTK, VTP and\nGIFTI files. With the package isomeshd it also works without a server.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libcurl4-openssl-dev | libcurl4-gnutls-dev, libssl-dev")

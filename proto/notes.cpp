@@ -26,10 +26,16 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "space-assumed",
      .meaning = "The file does not say how its axes lie in the patient. The detail says what was "
                 "assumed.",
+     .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kUnitUnknown,
      .name = "unit-unknown",
      .meaning = "The file's unit is not a length. One unit was read as one millimetre.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kUnitAngstrom,
+     .name = "unit-angstrom",
+     .meaning = "The coordinates are in angstrom, as in the file. Lengths, areas and volumes that "
+                "are given in millimetres are in angstrom, too.",
      .is_in_mesh = true},
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",

@@ -143,7 +143,7 @@ struct Volume {
   // Initially the name of the uploaded series or file; the owner may rename it. May name a patient,
   // so it is in no log. UTF-8; empty if unknown.
   std::optional<std::string> name = {};
-  std::string format;  // of the upload: "raw", "nifti", "nrrd", "metaimage", "dicom"
+  std::string format;                             // of the upload; see proto/volume_formats.h
   std::array<std::uint32_t, 3> dims = {0, 0, 0};  // samples along x, y, z; x runs fastest
   SampleType type = SampleType::kUint8;
   Geometry geometry;

@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "client/cli/ids.h"
 #include "client/cli/option_values.h"
+#include "proto/volume_formats.h"
 
 namespace isomesh::cli {
 
@@ -29,10 +30,10 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
              options.files.emplace_back(path);
            }
          },
-         std::string(
-             "A volume: NIfTI, NRRD, MetaImage, VTI or DICOM, a folder or archive of it, or "
-             "raw samples with --dims and --type. Several files may belong together, such "
-             "as .hdr and .img. - reads standard input") +
+         std::string("A volume: " + volume_format_titles() +
+                     ", a folder or archive of it, or raw samples with --dims and --type. Several "
+                     "files may "
+                     "belong together, such as .hdr and .img. - reads standard input") +
              (takes_ids ? ". The id of a stored volume also works; its beginning or end is enough "
                           "if unique"
                         : ""))
@@ -85,17 +86,19 @@ void add_raw(CLI::App& app, Options& options) {
                                     [raw](SampleType value) { raw().type = value; });
   dims->needs(type);
   type->needs(dims);
+  auto* spacing = add(
+      app, "--spacing", "X,Y,Z",
+      "Distance between samples along each axis, in millimetres: of raw samples, or of a file that "
+      "gives none",
+      [&options](const std::string& text) {
+        options.upload.spacing = numbers_from<double, 3>("--spacing", text);
+        const auto is_length = [](double length) { return length > 0 && std::isfinite(length); };
+        if (!std::ranges::all_of(*options.upload.spacing, is_length)) {
+          refuse("--spacing", "must be three numbers above 0, separated by commas");
+        }
+      });
+  spacing->group(kRawGroup);
   std::vector<CLI::Option*> others = {
-      add(app, "--spacing", "X,Y,Z", "Distance between samples along each axis, in millimetres",
-          [raw](const std::string& text) {
-            raw().geometry.spacing = numbers_from<double, 3>("--spacing", text);
-            const auto is_length = [](double length) {
-              return length > 0 && std::isfinite(length);
-            };
-            if (!std::ranges::all_of(raw().geometry.spacing, is_length)) {
-              refuse("--spacing", "must be three numbers above 0, separated by commas");
-            }
-          }),
       add(app, "--origin", "X,Y,Z", "Position of the first sample, in millimetres (LPS)",
           [raw](const std::string& text) {
             raw().geometry.origin = numbers_from<double, 3>("--origin", text);

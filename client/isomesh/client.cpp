@@ -49,7 +49,11 @@ void add_raw(const RawDescription& raw, Query& pairs) {
 
 std::string upload_query(const UploadOptions& options) {
   Query pairs;
-  if (options.raw) add_raw(*options.raw, pairs);
+  if (options.raw) {
+    RawDescription raw = *options.raw;
+    if (options.spacing) raw.geometry.spacing = *options.spacing;
+    add_raw(raw, pairs);
+  }
   if (!options.series.empty()) pairs.emplace_back("series", options.series);
   if (!options.member.empty()) pairs.emplace_back("member", options.member);
   if (options.volume) pairs.emplace_back("volume", std::to_string(*options.volume));
@@ -57,6 +61,7 @@ std::string upload_query(const UploadOptions& options) {
   for (const std::string& code : options.accept) accepted += (accepted.empty() ? "" : ",") + code;
   if (!accepted.empty()) pairs.emplace_back("accept", accepted);
   if (options.nifti_form) pairs.emplace_back("nifti_form", to_string(*options.nifti_form));
+  if (options.spacing && !options.raw) pairs.emplace_back("spacing", joined(*options.spacing));
   return pairs.empty() ? std::string() : query_string(pairs);
 }
 

@@ -58,7 +58,9 @@ struct UploadOptions {
   // Codes of notes whose errors to override, as listed in the server's error.
   std::vector<std::string> accept = {};
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
-  std::string name = {};                     // of the volume; empty: that of the file or folder
+  // Millimetres along x, y and z, for a file that gives none, or instead of those in `raw`.
+  std::optional<std::array<double, 3>> spacing = {};
+  std::string name = {};  // of the volume; empty: that of the file or folder
   // Sends the file's SHA-256 first, so that the server rejects a body that was corrupted in
   // transit. Reads the file twice.
   bool digest = false;

@@ -115,11 +115,25 @@ std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::st
   return files;
 }
 
-// The header and the image of a pair, from either of them.
-std::vector<PackedFile> pair_of(const fs::path& path) {
+// The suffixes of a header and of its samples, of which a program writes either the one or the
+// other.
+const std::vector<std::string>* pair_suffixes(const std::string& suffix) {
+  static const std::vector<std::vector<std::string>> pairs = {
+      {".hdr", ".img", ".img.gz"},
+      {".HEAD", ".BRIK", ".BRIK.gz", ".BRIK.bz2"},
+      {".PAR", ".REC"},
+      {".par", ".rec"}};
+  const auto found = std::ranges::find_if(pairs, [&](const std::vector<std::string>& each) {
+    return suffix == each[0] || suffix == each[1];
+  });
+  return found == pairs.end() ? nullptr : &*found;
+}
+
+// The header and the samples of a pair, from either of them.
+std::vector<PackedFile> pair_of(const fs::path& path, const std::vector<std::string>& suffixes) {
   std::vector<PackedFile> files;
   std::error_code error;
-  for (const char* suffix : {".hdr", ".img", ".img.gz"}) {
+  for (const std::string& suffix : suffixes) {
     fs::path one = path;
     one.replace_extension(suffix);
     if (one == path || fs::is_regular_file(one, error)) {
@@ -190,10 +204,11 @@ std::string lead_of(const Member& member) {
 
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
   if (fs::is_directory(path)) return files_below(path);
-  const std::string suffix = lower(path.extension().string());
+  const std::string own_suffix = path.extension().string();
+  const std::string suffix = lower(own_suffix);
   if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
   if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");
-  if (suffix == ".hdr" || suffix == ".img") return pair_of(path);
+  if (const auto* suffixes = pair_suffixes(own_suffix)) return pair_of(path, *suffixes);
   return {{path.filename().string(), path}};
 }
 

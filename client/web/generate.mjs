@@ -83,6 +83,12 @@ function write(name, text) {
 const made = '// Made by generate.mjs of proto/openapi.yaml.\n';
 const types = await openapiTS(source, { arrayLength: true, defaultNonNullable: false });
 const table = JSON.stringify(parametersOf(components.schemas.JobParameters), null, 2);
+const { enum: formatNames, 'x-titles': titles, 'x-suffixes': suffixes } = components.schemas.VolumeFormat;
+const volumes = JSON.stringify(
+  formatNames.map((name) => ({ name, title: titles[name], suffixes: suffixes[name].split(' ') })),
+  null,
+  2,
+);
 const whole = JSON.stringify(components.schemas.MeshFormat['x-hold-all-labels']);
 mkdirSync(folder, { recursive: true });
 write('api.d.ts', made + astToString(types));
@@ -91,5 +97,8 @@ write(
   `${made}import type { Parameter } from '../src/job/table';\n\nexport const parameters: readonly Parameter[] = ${table};
 
 // One file of these holds all labels.
-export const wholeFormats: readonly string[] = ${whole};\n`,
+export const wholeFormats: readonly string[] = ${whole};
+
+// The formats in which volumes are uploaded.
+export const volumeFormats: readonly { name: string; title: string; suffixes: readonly string[] }[] = ${volumes};\n`,
 );

@@ -8,6 +8,7 @@
 
 #include "proto/openapi/yaml.h"
 #include "proto/parameters.h"
+#include "proto/volume_formats.h"
 
 namespace isomesh {
 namespace {
@@ -407,6 +408,36 @@ std::string notes() {
   return yaml.str();
 }
 
+// The formats of volumes, with what a client shows and looks for.
+std::string volumes() {
+  std::vector<std::string> names;
+  for (const VolumeFormat& format : volume_formats()) names.emplace_back(format.name);
+  Yaml yaml(2);
+  yaml.under("VolumeFormat", [&] {
+    yaml.line("description: |");
+    yaml.line("  The format of an upload.");
+    for (const VolumeFormat& format : volume_formats()) {
+      yaml.line("  * `" + std::string(format.name) + "`: " + std::string(format.title) + " (`" +
+                std::string(format.suffixes) + "`)");
+    }
+    yaml.line("type: string");
+    yaml.under("enum", [&] {
+      for (const std::string& name : names) yaml.line("- " + name);
+    });
+    yaml.under("x-titles", [&] {
+      for (const VolumeFormat& format : volume_formats()) {
+        yaml.line(std::string(format.name) + ": " + std::string(format.title));
+      }
+    });
+    yaml.under("x-suffixes", [&] {
+      for (const VolumeFormat& format : volume_formats()) {
+        yaml.line(std::string(format.name) + ": '" + std::string(format.suffixes) + "'");
+      }
+    });
+  });
+  return yaml.str();
+}
+
 // The start of the line that holds `text`, and of the next line.
 std::pair<std::size_t, std::size_t> line_with(const std::string& description,
                                               const std::string& text, std::size_t from) {
@@ -428,6 +459,7 @@ std::string with_parameters(const std::string& description) {
                                    {"parameters.h", "parameters of a query", query()},
                                    {"parameters.h", "query of an estimate", query_references()},
                                    {"parameters.h", "query of a mesh", query_references()},
+                                   {"volume_formats.h", "formats of volumes", volumes()},
                                    {"notes.h", "codes of notes", notes()}};
   std::string result = description;
   for (const auto& [source, name, text] : parts) {

@@ -35,10 +35,10 @@ bool needs_dimse(const orders::Hospital& hospital) {
          });
 }
 
-// Null where nobody speaks DIMSE.
+// Null if DIMSE is not configured.
 std::unique_ptr<process::PreparedProcesses> prepare_dimse(const orders::Hospital& hospital,
                                                           const http::WingSettings& settings) {
-  // As many as may soon be asked for at once; further ones take a moment.
+  // Expected number of simultaneous starts; further processes start with a short delay.
   constexpr std::size_t kPrepared = 2;
   if (!needs_dimse(hospital)) return nullptr;
   return std::make_unique<process::PreparedProcesses>(settings.program("isomesh-dimse"), kPrepared);
@@ -49,7 +49,7 @@ std::string host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
 }
 
-// Null where nobody collects it.
+// Null if no collector is configured.
 std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital,
                                                 store::AuditTrail& trail) {
   if (!hospital.syslog) return nullptr;
@@ -65,7 +65,6 @@ std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital
           .station = hospital.station_name, .host = host_name(), .process = ::getpid()});
 }
 
-// A hospital that is configured.
 class OpenHospital {
  public:
   OpenHospital(const http::WingSettings& settings, const http::WingServices& services)
@@ -136,7 +135,7 @@ class OpenHospital {
   const orders::PacsByName peers_;
   std::unique_ptr<audit::SyslogSender> audit_;
   orders::Orders orders_;
-  std::unique_ptr<dimse::DimseListener> listener_;  // null where no series are received
+  std::unique_ptr<dimse::DimseListener> listener_;  // null if no series are received
 };
 
 http::MeasuredFamily orders_of(const store::OrderCounts& counts) {
@@ -186,7 +185,7 @@ class HospitalWing final : public http::Wing {
     try {
       return is_final(hospital_->orders().get(std::nullopt, id).state);
     } catch (const Error&) {
-      return std::nullopt;  // it is no order
+      return std::nullopt;  // not an order
     }
   }
 
@@ -214,7 +213,7 @@ class HospitalWing final : public http::Wing {
 
  private:
   const http::WingServices services_;
-  std::unique_ptr<OpenHospital> hospital_;  // null where none is configured
+  std::unique_ptr<OpenHospital> hospital_;  // null if not configured
 };
 
 }  // namespace

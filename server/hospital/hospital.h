@@ -1,5 +1,5 @@
-// What speaks to a hospital, as one wing of the service: orders, PACS, series that are received,
-// the audit trail for a collector. The daemon is built without it when ISOMESH_HOSPITAL is off.
+// The hospital wing of the service: orders, PACS, received series, and sending the audit trail to a
+// collector. The daemon is built without it if ISOMESH_HOSPITAL is off.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +9,12 @@
 
 namespace isomesh::hospital {
 
-// The files that the file of --hospital names. Throws Error kInvalidParameter when it has a
-// mistake. Touches nothing else.
+// Returns the files named by the file of --hospital. Throws Error kInvalidParameter if that is
+// invalid. Has no side effects.
 http::ConfiguredFiles check(const std::filesystem::path& file);
 
-// A wing that is not open when no file is given. Throws as check() does, and Error kUnavailable
-// when it cannot listen for series.
+// Without a file, the wing is not open. Throws as check() does, and Error kUnavailable if it cannot
+// listen for series.
 std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
                                  const http::WingServices& services);
 

@@ -19,7 +19,7 @@ using orders::Orders;
 const std::string kOrders = "/v1/orders";
 constexpr const char* kOrderCursor = "orders";
 
-// Throws Error kNotFound where no PACS is configured.
+// Throws Error kNotFound if no PACS is configured.
 Orders& configured(Orders* orders) {
   if (orders != nullptr) return *orders;
   throw Error(ErrorCode::kNotFound, "this service has no PACS: it was started without --hospital");

@@ -1,4 +1,3 @@
-// The routes of orders and PACS.
 #pragma once
 
 #include "server/hospital/orders/orders.h"
@@ -6,8 +5,8 @@
 
 namespace isomesh::hospital {
 
-// `orders` is null where no hospital is configured: then the routes answer that. Both must outlive
-// the routes.
+// `orders` is null if no hospital is configured; the routes then respond with that error. Both must
+// outlive the routes.
 void add_order_routes(http::App& app, orders::Orders* orders);
 
 }  // namespace isomesh::hospital

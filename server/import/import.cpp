@@ -2,23 +2,27 @@
 
 #include <string>
 
+#include "base/files.h"
 #include "proto/error.h"
+#include "proto/volume_formats.h"
+#include "server/import/other_formats.h"
 #include "server/import/peers/series.h"
 #include "server/import/readers.h"
 
 namespace isomesh::import {
 namespace {
 
-[[noreturn]] void throw_unknown_format() {
-  std::string titles;
-  for (const Reader& reader : readers()) {
-    if (reader.sniff == nullptr) continue;
-    if (!titles.empty()) titles += reader.content == Content::kFiles ? ", or " : ", ";
-    titles += reader.title;
+[[noreturn]] void throw_unknown_format(const InputFile& file) {
+  if (const auto name = name_of_other_format(file.text(0, kSniffBytes))) {
+    throw Error(ErrorCode::kUnsupportedMedia,
+                "This is " + std::string(*name) +
+                    ", which cannot be read. Formats that can be read: " + volume_format_titles() +
+                    ", or a ZIP or TAR of one.");
   }
-  throw Error(
-      ErrorCode::kUnsupportedMedia,
-      "The file is not " + titles + ". If it holds raw samples, give their dims (X,Y,Z) and type.");
+  throw Error(ErrorCode::kUnsupportedMedia,
+              "The file is not " + volume_format_titles() +
+                  ", or a ZIP or TAR of one. If it holds raw samples, give their dims (X,Y,Z) and "
+                  "type.");
 }
 
 }  // namespace
@@ -27,8 +31,9 @@ Volume import_volume(const ImportTask& task, const FormatListener& listener) {
   const Input input = {.path = task.source, .companions = {}, .task = task, .listener = listener};
   if (task.options.raw) return read_raw_input(input);
   if (task.options.peers) return read_peers_series(task, listener);
-  const Reader* reader = sniff(InputFile(task.source));
-  if (reader == nullptr) throw_unknown_format();
+  const InputFile file(task.source);
+  const Reader* reader = sniff(file);
+  if (reader == nullptr) throw_unknown_format(file);
   if (!task.options.member.empty() && reader->content != Content::kFiles) {
     throw invalid_parameter("member",
                             "selects a member of an archive, but this file is not an archive");

@@ -12,9 +12,10 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "proto/volume_formats.h"
 #include "server/import/archives/archive.h"
 #include "server/import/dicom/import.h"
-#include "server/import/formats/vti.h"
+#include "server/import/images/stack.h"
 #include "server/import/labels_beside.h"
 #include "server/import/readers.h"
 #include "server/import/source/scratch_folder.h"
@@ -34,12 +35,15 @@ ArchiveLimits limits_of(const SizeLimits& limits) {
   return {.max_bytes = limits.max_sample_bytes + kHeadroomBytes};
 }
 
-// Slices are always needed. For others this is not known yet; nor is the size of data files.
+// Slices and pages are always needed. For others this is not known yet; nor is the size of data
+// files.
 std::optional<std::uint64_t> most_of_slice(const std::filesystem::path& beginning,
                                            const ImportTask& task) {
   const InputFile file(beginning);
   const Reader* reader = sniff(file);
-  if (reader == nullptr || reader->content != Content::kSlices) return std::nullopt;
+  const bool is_part = reader != nullptr &&
+                       (reader->content == Content::kSlices || reader->content == Content::kPages);
+  if (!is_part) return std::nullopt;
   return most_bytes_of(*reader, file, task).file;
 }
 
@@ -107,11 +111,11 @@ void Members::complete(const FoundVolume& found) {
   }
 }
 
-// True for files that only look like volumes: office documents are ZIPs, and VTK's XML may hold
+// True for files that only look like volumes: office documents are ZIPs, and VTK's files may hold
 // surfaces.
 bool is_beside(const Reader& reader, const InputFile& file) {
   return reader.content == Content::kFiles ||
-         (reader.sniff == is_vti && !may_hold_image(file.text(0, kSniffBytes)));
+         (reader.may_hold_volume != nullptr && !reader.may_hold_volume(file.text(0, kSniffBytes)));
 }
 
 std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& members) {
@@ -185,27 +189,64 @@ std::vector<FoundVolume> without_doubles(std::vector<FoundVolume> volumes, Membe
   return kept;
 }
 
-// An archive's content: volumes in one file each, with their data files, and one volume of all
-// slices.
+// Images of one folder and format that are a volume together, or a file of several pages.
+struct Stack {
+  std::string name;  // of the file, or a pattern: "folder/*.png"
+  const Reader* reader = nullptr;
+  std::vector<ImageFile> files = {};
+};
+
+// An archive's content: volumes in one file each, with their data files, one volume of all slices,
+// and, if there is nothing else, stacks of images.
 struct Contents {
   std::vector<FoundVolume> volumes;
+  std::vector<Stack> stacks;
   std::vector<ArchiveMember> slices;
   const Reader* slice_reader = nullptr;
   // Other files, listed as ignored.
   std::vector<ArchiveMember> others;
 };
 
+std::vector<Stack> stacks_of(const std::vector<FoundVolume>& pages) {
+  std::vector<Stack> stacks;
+  std::map<std::string, Stack> by_pattern;
+  for (const auto& [member, reader, doubles] : pages) {
+    if (has_pages(member.path)) {
+      stacks.push_back({member.name, reader, {{member.name, member.path}}});
+      continue;
+    }
+    const std::string pattern =
+        std::string(folder_of(member.name)) + "*." + std::string(reader->name);
+    Stack& stack = by_pattern.try_emplace(pattern, Stack{pattern, reader}).first->second;
+    stack.files.push_back({member.name, member.path});
+  }
+  for (auto& [pattern, stack] : by_pattern) stacks.push_back(std::move(stack));
+  return stacks;
+}
+
+// Pictures beside a volume are not volumes themselves.
+void add_pages(const std::vector<FoundVolume>& pages, Contents& contents) {
+  if (contents.volumes.empty() && contents.slices.empty()) {
+    contents.stacks = stacks_of(pages);
+    return;
+  }
+  for (const FoundVolume& page : pages) contents.others.push_back(page.member);
+}
+
 Contents contents_of(Members& members) {
   const std::vector<FoundVolume> found = files_of_formats(members.all());
   const std::set<std::filesystem::path> data = data_of(found, members);
   Contents contents;
   std::set<std::filesystem::path> taken = data;
+  std::vector<FoundVolume> pages;
   for (const FoundVolume& volume : found) {
     if (data.contains(volume.member.path)) continue;
     taken.insert(volume.member.path);
     if (volume.reader->content == Content::kSlices) {
       contents.slice_reader = volume.reader;
       contents.slices.push_back(volume.member);
+    } else if (volume.reader->content == Content::kPages) {
+      pages.push_back(volume);
     } else {
       contents.volumes.push_back(volume);
     }
@@ -214,6 +255,7 @@ Contents contents_of(Members& members) {
     if (!taken.contains(member.path)) contents.others.push_back(member);
   }
   contents.volumes = without_doubles(std::move(contents.volumes), members);
+  add_pages(pages, contents);
   return contents;
 }
 
@@ -255,6 +297,15 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   return volume;
 }
 
+Volume read_stack(const Stack& stack, const Contents& contents, const Input& input) {
+  if (input.listener) input.listener(stack.reader->name);
+  Volume volume = import_images(stack.files, input.task);
+  volume.format = stack.reader->name;
+  if (stack.files.size() == 1) volume.name = std::string(base_of(stack.name));
+  ignore(contents.others, volume);
+  return volume;
+}
+
 [[noreturn]] void offer_members(const Contents& contents, const std::string& asked) {
   std::vector<Choice> choices;
   if (!contents.slices.empty()) {
@@ -262,7 +313,13 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
                        std::to_string(contents.slices.size()) + " DICOM files"});
   }
   for (const auto& [member, reader, doubles] : contents.volumes) {
-    choices.push_back({"member", member.name, std::string(reader->title)});
+    choices.push_back({"member", member.name, std::string(volume_format(reader->name).title)});
+  }
+  for (const Stack& stack : contents.stacks) {
+    choices.push_back({"member", stack.name,
+                       std::to_string(stack.files.size()) + ' ' +
+                           std::string(volume_format(stack.reader->name).title) +
+                           (stack.files.size() == 1 ? " file" : " files")});
   }
   std::string names;
   constexpr std::size_t kMost = 10;
@@ -281,12 +338,17 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
 Volume read_members(Members& members, const Input& input) {
   const Contents contents = contents_of(members);
   const std::string& asked = input.task.options.member;
-  const std::size_t count = contents.volumes.size() + (contents.slices.empty() ? 0 : 1);
+  const std::size_t count =
+      contents.volumes.size() + contents.stacks.size() + (contents.slices.empty() ? 0 : 1);
   if (count == 0) throw_no_volume(members.all());
   if (!contents.slices.empty() &&
       (asked == process::kDicomMember || (asked.empty() && count == 1))) {
     return read_slices(contents, input);
   }
+  const auto stack = std::ranges::find_if(contents.stacks, [&](const Stack& each) {
+    return asked.empty() ? count == 1 : each.name == asked;
+  });
+  if (stack != contents.stacks.end()) return read_stack(*stack, contents, input);
   if (asked.empty() && count == 1) {
     return read_file(contents.volumes.front(), contents, members, input);
   }

@@ -4,11 +4,24 @@
 
 #include "proto/error.h"
 #include "server/import/dicom/import.h"
+#include "server/import/formats/afni.h"
+#include "server/import/formats/cube.h"
+#include "server/import/formats/hdf5.h"
+#include "server/import/formats/isq.h"
 #include "server/import/formats/metaimage.h"
+#include "server/import/formats/mgh.h"
+#include "server/import/formats/mrc.h"
 #include "server/import/formats/nifti.h"
 #include "server/import/formats/nrrd.h"
+#include "server/import/formats/numpy.h"
+#include "server/import/formats/par.h"
 #include "server/import/formats/raw.h"
 #include "server/import/formats/vti.h"
+#include "server/import/formats/vtk_legacy.h"
+#include "server/import/images/bmp.h"
+#include "server/import/images/png.h"
+#include "server/import/images/stack.h"
+#include "server/import/images/tiff.h"
 #include "server/import/labels_beside.h"
 #include "server/import/members.h"
 #include "server/import/samples/transfer.h"
@@ -27,44 +40,110 @@ Volume parse_with(const Input& input) {
   return volume;
 }
 
-constexpr Reader kRaw = {.name = "raw", .title = "raw samples", .parse = parse_raw};
+// For formats that are read as a whole.
+template <Volume (*kParse)(const Input&)>
+Volume parse_whole(const Input& input) {
+  Volume volume = kParse(input);
+  take_labels_beside(input.companions, volume);
+  return volume;
+}
+
+// For a header in front of its samples: the size of both. Formats with more data behind the samples
+// get more room.
+template <SourceVolume (*kParse)(const InputFile&, const Companions&, const ImportOptions&)>
+MostBytes most_plain_bytes(const InputFile& beginning, const ImportTask& task) {
+  constexpr std::uint64_t kFooterBytes = std::uint64_t{16} << 20;
+  const SourceVolume volume = kParse(beginning, {}, task.options);
+  check_limits(volume, task.limits);
+  return {.file = volume.payload.offset + volume.most_encoded_bytes() + kHeadroomBytes +
+                  (volume.has_footer ? kFooterBytes : 0)};
+}
+
+constexpr Reader kRaw = {.name = "raw", .parse = parse_raw};
 
 constexpr Reader kReaders[] = {
     kRaw,
     {.name = "nifti",
-     .title = "NIfTI",
      .sniff = is_nifti,
      .parse = parse_with<parse_nifti>,
      .most_bytes = most_nifti_bytes,
      .data_names = nifti_data_names},
     {.name = "nrrd",
-     .title = "NRRD",
      .sniff = is_nrrd,
      .parse = parse_with<parse_nrrd>,
      .most_bytes = most_nrrd_bytes,
      .data_names = nrrd_data_names},
     {.name = "metaimage",
-     .title = "MetaImage",
      .sniff = is_metaimage,
      .parse = parse_with<parse_metaimage>,
      .most_bytes = most_metaimage_bytes,
      .data_names = metaimage_data_names},
     {.name = "vti",
-     .title = "VTI",
      .sniff = is_vti,
+     .may_hold_volume = may_hold_image,
      .parse = parse_with<parse_vti>,
      .most_bytes = most_vti_bytes},
+    {.name = "vtk",
+     .sniff = is_vtk_legacy,
+     .may_hold_volume = may_hold_structured_points,
+     .parse = parse_with<parse_vtk_legacy>,
+     .most_bytes = most_vtk_legacy_bytes},
+    {.name = "mgh",
+     .sniff = is_mgh,
+     .parse = parse_with<parse_mgh>,
+     .most_bytes = most_plain_bytes<parse_mgh>},
+    {.name = "afni",
+     .sniff = is_afni,
+     .parse = parse_with<parse_afni>,
+     .most_bytes = most_afni_bytes,
+     .data_names = afni_data_names},
+    {.name = "par",
+     .sniff = is_par,
+     .parse = parse_with<parse_par>,
+     .most_bytes = most_par_bytes,
+     .data_names = par_data_names},
+    {.name = "isq",
+     .sniff = is_isq,
+     .parse = parse_with<parse_isq>,
+     .most_bytes = most_plain_bytes<parse_isq>},
+    {.name = "mrc",
+     .sniff = is_mrc,
+     .parse = parse_with<parse_mrc>,
+     .most_bytes = most_plain_bytes<parse_mrc>},
+    {.name = "cube",
+     .sniff = is_cube,
+     .parse = parse_with<parse_cube>,
+     .most_bytes = most_plain_bytes<parse_cube>},
+    {.name = "numpy",
+     .sniff = is_numpy,
+     .may_hold_volume = may_hold_numpy_volume,
+     .parse = parse_with<parse_numpy>,
+     .most_bytes = most_plain_bytes<parse_numpy>},
+    {.name = "hdf5",
+     .sniff = is_hdf5,
+     .parse = parse_whole<parse_hdf5>,
+     .most_bytes = most_hdf5_bytes},
+    {.name = "tiff",
+     .content = Content::kPages,
+     .sniff = is_tiff,
+     .parse = parse_image,
+     .most_bytes = most_image_bytes},
+    {.name = "png",
+     .content = Content::kPages,
+     .sniff = is_png,
+     .parse = parse_image,
+     .most_bytes = most_image_bytes},
+    {.name = "bmp",
+     .content = Content::kPages,
+     .sniff = is_bmp,
+     .parse = parse_image,
+     .most_bytes = most_image_bytes},
     {.name = "dicom",
-     .title = "DICOM",
      .content = Content::kSlices,
      .sniff = is_dicom,
      .parse = parse_dicom,
      .most_bytes = most_dicom_bytes},
-    {.name = "archive",
-     .title = "a ZIP or TAR of one",
-     .content = Content::kFiles,
-     .sniff = is_archive,
-     .parse = parse_archive},
+    {.name = "archive", .content = Content::kFiles, .sniff = is_archive, .parse = parse_archive},
 };
 
 const Reader* sniff_plain(std::string_view head) {
@@ -125,6 +204,9 @@ std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
 
 void check_options(const Reader& reader, const ImportOptions& options) {
   const bool is_volume = reader.content == Content::kVolume;
+  if (options.spacing && reader.content == Content::kSlices) {
+    throw invalid_parameter("spacing", "applies to files without a spacing, and DICOM has one");
+  }
   if (is_volume && !options.series.empty()) {
     throw invalid_parameter("series", "selects a DICOM series, but this file is not DICOM");
   }

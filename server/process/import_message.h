@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -36,6 +37,8 @@ struct ImportOptions {
   std::string member = {};
   std::vector<std::string> accept = {};      // names of notes whose errors are overridden
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, if present
+  // Millimetres along x, y and z, for a file that gives none.
+  std::optional<std::array<double, 3>> spacing = {};
   std::optional<PeersSeries> peers = {};     // empty: a client's upload
 
   bool accepts(NoteCode code) const {

@@ -55,7 +55,7 @@ std::string audit_record(const AuditEntry& entry) {
 }
 
 std::string audit_line(std::uint64_t number, const std::string& at, const std::string& record) {
-  // Both stand before what the record has.
+  // The record is appended after these two.
   const Json head = {{"id", number}, {"at", at}};
   std::string text = head.dump();
   text.back() = ',';

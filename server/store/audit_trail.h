@@ -1,5 +1,5 @@
-// Who has had which patient's images, when, and from where to where: the interface behind which
-// engines stand. Nothing that is in it is ever changed.
+// Interface of the audit trail: who accessed which patient's images, when, from where and to where.
+// Append-only.
 #pragma once
 
 #include <cstdint>
@@ -11,56 +11,56 @@
 
 namespace isomesh::store {
 
-// The events of PS3.15, A.5, that concern orders, by their codes in DICOM's coding scheme.
+// The events of DICOM PS3.15, A.5, that concern orders, with their codes of the coding scheme DCM.
 enum class AuditEvent {
   kStart,                  // 110120 Application Start
   kStop,                   // 110121 Application Stop
   kQuery,                  // 110112 Query
   kTransferred,            // 110104 DICOM Instances Transferred
-  kAuthenticationFailure,  // 110114 User Authentication, which failed
+  kAuthenticationFailure,  // 110114 User Authentication, failed
 };
 
 struct AuditEntry {
   AuditEvent event = AuditEvent::kStart;
   bool success = true;
-  std::string order = {};      // empty: of none
-  std::string owner = {};      // for whom
+  std::string order = {};      // empty: no order
+  std::string owner = {};      // the order's owner
   std::string pacs = {};       // the peer's name
-  std::string direction = {};  // "in" or "out" of transfers
+  std::string direction = {};  // of a transfer: "in" or "out"
   std::string study = {};
   std::uint64_t instances = 0;
   std::string patient_id = {};
 };
 
-// Thread safe. All may throw Error kOutOfSpace or kInternal.
+// Thread safe. All methods may throw Error kOutOfSpace or kInternal.
 class AuditTrail {
  public:
   virtual ~AuditTrail() = default;
 
   virtual void add(const AuditEntry& entry) = 0;
 
-  // Calls `line` with each entry after the one with the number `after`, oldest first, as one object
-  // of JSON without a line break.
+  // Calls `line` with each entry after number `after`, oldest first, as one JSON object without
+  // line breaks.
   virtual void read(std::uint64_t after,
                     const std::function<void(std::string_view line)>& line) const = 0;
 
-  // The number of the last entry that a collector has had; 0 for none.
+  // The number of the last entry that a collector has received; 0 for none.
   virtual std::uint64_t sent() const = 0;
   virtual void note_sent(std::uint64_t number) = 0;
 };
 
-// What --verify finds.
+// The result of --verify.
 struct AuditCheck {
-  std::uint64_t entries = 0;                 // that fit, up to the first that does not
-  std::uint64_t last = 0;                    // the number of the last of those
-  std::string digest = {};                   // its own
-  std::optional<std::uint64_t> misfit = {};  // the first that does not
+  std::uint64_t entries = 0;                 // valid ones, up to the first invalid one
+  std::uint64_t last = 0;                    // the number of the last valid one
+  std::string digest = {};                   // the digest of that one
+  std::optional<std::uint64_t> misfit = {};  // the number of the first invalid one
 };
 
-// Each entry has the digest of what it says and of the digest before it: SHA-256, in hex, of that
-// digest (of the first entry: nothing), a line break and the entry's line. So who changes, removes
-// or adds one in between has to change all digests after it, too. Those that an earlier version has
-// written have none of their own; the first that has one vouches for them.
+// A hash chain. The digest of an entry is the hex SHA-256 of the previous entry's digest (empty for
+// the first), a line break and the entry's line. So changing, removing or inserting an entry
+// requires changing all later digests. Entries written by earlier versions have no digest; the
+// first entry with one covers them.
 class AuditChain {
  public:
   AuditChain() = default;
@@ -73,7 +73,7 @@ class AuditChain {
   std::string digest_;
 };
 
-// For engines: what is kept of an entry, and how that is told.
+// For engines: the stored form of an entry, and its form as a line.
 std::string audit_record(const AuditEntry& entry);
 std::string audit_line(std::uint64_t number, const std::string& at, const std::string& record);
 

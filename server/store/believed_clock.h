@@ -1,4 +1,4 @@
-// The time, as far as it can be believed: what is kept must not expire because a clock was set.
+// A clock that does not let data expire because the system's clock was set wrongly.
 #pragma once
 
 #include <chrono>
@@ -9,34 +9,35 @@
 
 namespace isomesh::store {
 
-// Follows the system's clock for as long as that agrees with the time that has passed. Where it
-// does not, time goes on from where it was, at its own pace, until the clock is right again. It
-// never goes back: what is used while a clock is behind would be the oldest of all once it is
-// right. Thread safe.
+// Follows the system's clock while that agrees with the time elapsed on the steady clock. Otherwise
+// it advances at the steady clock's pace until the system's clock is right again. It never goes
+// back: records used while a clock is behind would be the oldest ones once it is right. Thread
+// safe.
 class BelievedClock {
  public:
   using Steady = std::chrono::steady_clock::time_point;
 
   struct Options {
-    std::chrono::milliseconds tolerance = std::chrono::days(7);  // how far ahead is still believed
+    // Largest deviation that is not doubted.
+    std::chrono::milliseconds tolerance = std::chrono::days(7);
     std::function<Time()> wall = [] { return std::chrono::system_clock::now(); };
     std::function<Steady()> steady = [] { return std::chrono::steady_clock::now(); };
     const char* name = "the clock";  // in the log
   };
 
-  // `last_seen` is a time that has passed for certain.
+  // `last_seen` is a time known to be in the past.
   BelievedClock(Time last_seen, Options options);
 
-  // Logs when the clock begins to be doubted.
+  // Logs when doubts about the clock begin.
   Time now();
 
   enum class Doubt {
     kNone,
-    kAhead,   // further than is believed: it is not followed
-    kBehind,  // by more than that
+    kAhead,   // beyond the tolerance; not followed
+    kBehind,  // behind by more than the tolerance
   };
 
-  // How the system's clock was when now() was called last.
+  // The state of the system's clock at the last call of now().
   Doubt doubt() const;
 
  private:

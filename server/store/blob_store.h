@@ -1,10 +1,8 @@
-// Finished files, named by the SHA-256 of their bytes: the interface behind which engines stand.
+// Interface of the store of finished files (blobs), which are named by the SHA-256 of their bytes.
 //
-// What an engine must have besides is a disk of this machine. Bytes are written there before they
-// are a blob, since only then it is known what the blob is called; and what maps or opens a blob,
-// which the processes `isomesh-job` and `isomesh-import` do in their sandboxes with a file or a
-// descriptor that they are given, does so with a file of this machine (LocalBlob), whose bytes were
-// checked.
+// Every engine also needs a local disk. A blob is first written there, because its name is known
+// only at its end. And the sandboxed processes `isomesh-job` and `isomesh-import` map or open blobs
+// only as local files (LocalBlob), whose bytes were verified.
 #pragma once
 
 #include <chrono>
@@ -23,30 +21,29 @@
 
 namespace isomesh::store {
 
-// What a blob is called and how long it is.
 struct Blob {
-  std::string key;  // hex SHA-256
+  std::string key;  // SHA-256 in hex
   std::uint64_t bytes = 0;
 };
 
-// Reads a file, and lets the disk begin to write it meanwhile. Throws Error kOutOfSpace or
-// kInternal.
+// Reads a file, and starts writing it to the disk meanwhile. Throws Error kOutOfSpace or kInternal.
 Blob digest_of(const std::filesystem::path& file);
 
-// Takes a blob's bytes in order. Not thread safe. What is not committed is removed.
+// Receives the bytes of a blob in order. Uncommitted bytes are removed on destruction. Not thread
+// safe.
 class BlobWriter {
  public:
   virtual ~BlobWriter() = default;
 
-  // Throws Error kOutOfSpace, and kTooLarge when there could never be enough room.
+  // Throws Error kOutOfSpace; kTooLarge if the blob exceeds all available space.
   virtual void write(std::span<const std::byte> bytes) = 0;
 
-  // Afterwards the blob is there and outlives a crash. To be called once. Throws Error kOutOfSpace,
-  // and kUnavailable where the store is elsewhere and does not answer.
+  // Makes the bytes a blob that survives a crash. Call once. Throws Error kOutOfSpace; kUnavailable
+  // if a remote store does not respond.
   virtual Blob commit() = 0;
 };
 
-// An open blob; outlives its erasing. Thread safe.
+// An open blob. Stays readable after the blob is erased. Thread safe.
 class BlobReader {
  public:
   virtual ~BlobReader() = default;
@@ -57,125 +54,123 @@ class BlobReader {
   virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const = 0;
 };
 
-// A blob as a file of this machine, to be mapped. The file is there for as long as this is: a store
-// that has to fetch its blobs keeps the copy until `held` is released.
+// A blob as a local file, to be mapped. The file exists while this object does: a remote store
+// keeps its local copy until `held` is released.
 struct LocalBlob {
   std::filesystem::path path;
   std::shared_ptr<const void> held = {};
 };
 
-// What somebody who is given a link to a blob sees of it.
+// Headers of the response to whoever follows a link to a blob.
 struct LinkedAs {
-  std::string name;  // for those who save it; without control characters, quotes and backslashes
+  std::string name;  // for saving; no control characters, quotes or backslashes
   std::string media_type;
   std::chrono::seconds lasts{60};
 };
 
-// What a sweep has done.
 struct Swept {
   std::size_t quarantined = 0;
-  std::size_t left = 0;  // blobs that nothing names either, but that would have been too many
+  std::size_t left = 0;  // further unnamed blobs, beyond the limit of one sweep
 };
 
-// Whether a record names the blob of that key.
+// Returns true if a record names the blob with that key.
 using Names = std::function<bool(const std::string& key)>;
-// Makes room for so many bytes, or throws Error kOutOfSpace.
+// Frees that many bytes, or throws Error kOutOfSpace.
 using MakeRoom = std::function<void(std::uint64_t bytes)>;
 using Steady = std::chrono::steady_clock::time_point;
 
-// A blob is seen whole or not at all, and never changes. Several daemons may have one store: what
-// one of them stores, and is about to name, no other one erases or sweeps. Thread safe. Everything
-// throws Error kUnavailable where the store is elsewhere and does not answer for a while; what was
-// to be done then may have been done.
+// Blobs appear atomically and never change. Several daemons may share a store: no daemon erases or
+// sweeps what another one has stored and is about to name. Thread safe. All methods throw Error
+// kUnavailable if a remote store does not respond for a while; the operation may have taken place
+// nevertheless.
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
 
-  // How many bytes all blobs may take, 0 for as many as there is room for, and what makes room. To
-  // be called before anything is stored.
+  // Limits the total size of all blobs to `max_bytes` (0: no limit but the disk), and sets the
+  // function that frees space. Call before anything is stored.
   virtual void limit_room(std::uint64_t max_bytes, MakeRoom make) = 0;
 
-  // Whether the store does what it is asked for: quick, and asked again and again.
+  // True if the store responds. Fast, so it can be called often.
   virtual bool answers() const = 0;
 
-  // Whether others than this daemon may have the store too.
+  // True if other daemons may use the store too.
   virtual bool is_shared() const = 0;
 
-  // Whether it holds no blob at all.
   virtual bool is_empty() const = 0;
 
-  // A short text that lies with the blobs and says whose they are (see Identity); empty without
-  // one.
+  // A short text stored with the blobs that names the database they belong to (see Identity); empty
+  // if there is none.
   virtual std::string mark() const = 0;
   virtual void set_mark(const std::string& text) const = 0;
 
   virtual std::unique_ptr<BlobWriter> begin() const = 0;
 
-  // False while there is so little room that nothing new should be begun.
+  // False if space is so short that no new work should start.
   virtual bool has_room() const = 0;
 
-  // What all blobs take, those in quarantine and those that are being written included. Of what
-  // other daemons have stored meanwhile the last sweep() knows.
+  // Total size of all blobs, including those in quarantine and those being written. Blobs stored by
+  // other daemons are included as of the last sweep().
   virtual std::uint64_t bytes() const = 0;
 
-  // What they could take together if nothing else were stored, as far as this machine's disk, on
-  // which they are written, and the limit let them.
+  // The size that all blobs may reach if nothing else is stored, by the limit and the local disk on
+  // which they are written.
   virtual std::uint64_t capacity() const = 0;
 
-  // Makes a finished file of this machine a blob that outlives a crash, and removes it. `blob` is
-  // what digest_of has just said of the file, so that is_intact() need not read it again. Throws
-  // Error kOutOfSpace.
+  // Turns a finished local file into a blob that survives a crash, and removes the file. `blob` is
+  // the recent result of digest_of(file), so that is_intact() need not read it again. Throws Error
+  // kOutOfSpace.
   virtual void adopt(const std::filesystem::path& file, const Blob& blob) const = 0;
 
-  // What is read are bytes of this machine: one that is elsewhere is fetched first, and its bytes
-  // are checked then. Throws Error kNotFound, and kInternal when they are not those of the key.
+  // Opens a local copy: a remote blob is first fetched and verified. Throws Error kNotFound;
+  // kInternal if its bytes do not match the key.
   virtual std::unique_ptr<BlobReader> open(const std::string& key) const = 0;
 
-  // As open().
+  // Throws as open() does.
   virtual LocalBlob local(const std::string& key) const = 0;
 
-  // Whether the bytes are those that the key names. A blob that was read whole and found intact is
-  // not read again for a while, as long as nothing has touched it; one that several ask for is read
-  // once. Throws Error kNotFound, and
-  // kCancelled when `stop` is requested while it reads.
+  // True if the blob's bytes match its key. A blob that was recently read and found intact is not
+  // read again unless its file was touched; concurrent callers share one read. Throws Error
+  // kNotFound; kCancelled if `stop` is requested meanwhile.
   virtual bool is_intact(const std::string& key, const std::stop_token& stop) const = 0;
 
-  // In bytes; empty when it is not there.
+  // Size in bytes; empty if the blob is missing.
   virtual std::optional<std::uint64_t> size(const std::string& key) const = 0;
 
-  // An address under which anybody gets the bytes for a while, from where they are and not from
-  // this daemon; empty where there is no such thing. Nothing is asked for: it may be of what is not
-  // there.
+  // A URL at which anybody can fetch the bytes for a while, directly from the remote store; empty
+  // if the store has no such URLs. Does not check that the blob exists.
   virtual std::optional<std::string> link(const std::string& key, const LinkedAs& as) const = 0;
 
-  // Keeps what erasing a large blob takes long for (the disk frees its bytes) until this is let go;
-  // null where there is nothing like that.
+  // Postpones the slow part of erasing a large blob (the disk frees its bytes) until the result is
+  // released. Null if there is no such part.
   virtual std::shared_ptr<const void> hold_bytes(const std::string& key) const = 0;
 
-  // For who knows that nobody is about to name it. Nothing happens when it is not there. Those that
-  // have it open keep what they have.
+  // Erases a blob; the caller must know that nobody is about to name it. Does nothing if it is
+  // missing. Open readers stay valid.
   virtual void erase(const std::string& key) const = 0;
 
-  // A record names the blob from now on. Until then it is safe from erase_unnamed() and sweep(), by
-  // whomever, for as long as they are told. To be called once for each time that it was stored.
+  // Tells the store that a record now names the blob. Until then erase_unnamed() and sweep(), of
+  // any daemon, spare it as long as it counts as unsettled. Call once for each time the blob was
+  // stored.
   virtual void settle(const std::string& key) const = 0;
 
-  // Erases those of `keys` that `names` does not name, but for those that were stored since
-  // `unsettled` and are not settled. Returns those that are still there for that reason.
+  // Erases the given blobs, except those that `names` reports and those stored since `unsettled`
+  // and not settled. Returns the latter.
   virtual std::vector<std::string> erase_unnamed(std::span<const std::string> keys,
                                                  Steady unsettled, const Names& names) const = 0;
 
-  // Puts what nothing names, by the same rule, into quarantine: a share of all blobs at most, since
-  // what names nearly none of them is more likely wrong than they are. A blob in quarantine is
-  // there for whoever asks for it. An engine for which this is much work does it now and then only.
+  // Moves unnamed blobs into quarantine, with the same exceptions. One sweep moves only a fraction
+  // of all blobs: if the records name almost none, the records are more likely wrong. Reading a
+  // quarantined blob brings it back. Engines for which sweeping is expensive do it only now and
+  // then.
   virtual Swept sweep(Steady unsettled, const Names& names) const = 0;
 
-  // Removes what has been in quarantine since before that time and is not named by now. Returns how
-  // many.
+  // Removes blobs that have been in quarantine since before that time and are still unnamed.
+  // Returns their number.
   virtual std::size_t empty_quarantine(Time before, const Names& names) const = 0;
 };
 
-// The same as is_intact, and false when it is not there.
+// As is_intact, but returns false if the blob is missing.
 bool is_there_and_intact(const BlobStore& blobs, const std::string& key,
                          const std::stop_token& stop);
 

@@ -1,4 +1,4 @@
-// What retention removes from the stores of jobs and of volumes.
+// Types for the expiry of jobs and volumes.
 #pragma once
 
 #include <chrono>
@@ -16,32 +16,31 @@ using Time = std::chrono::system_clock::time_point;
 
 enum class RecordKind { kJob, kVolume };
 
-// A job that has ended, or a volume that no queued or running job needs.
+// A finished job, or a volume that no queued or running job needs.
 struct Expirable {
   RecordKind kind = RecordKind::kJob;
   std::string owner;
   std::string id;
-  // When the job ended; when the volume was added or the last job on it ended, whichever is later.
+  // For a job, the time of its end. For a volume, the time it was added or the end of the last job
+  // on it, whichever is later.
   Time last_used;
 };
 
-// Which of those to list.
 struct ExpiryFilter {
-  Time before;                            // last used earlier
-  std::optional<std::string> owner = {};  // of this one alone
+  Time before;                            // last used earlier than this
+  std::optional<std::string> owner = {};  // only this owner's
 };
 
-// Bytes of the blobs that each owner's records name, each counted once for an owner.
+// Bytes of the blobs named by each owner's records; a blob counts once per owner.
 using OwnedBytes = std::map<std::string, std::uint64_t>;
 
-// What a call of expire() removed.
 struct Expired {
   std::vector<Expirable> records = {};
   std::uint64_t bytes = 0;              // of the blobs that no record names any more
-  std::vector<std::string> blobs = {};  // those
+  std::vector<std::string> blobs = {};  // keys of those blobs
 };
 
-// As the bytes that are enough: all records that are given expire.
+// As `enough` of expire(): removes all given records.
 inline constexpr std::uint64_t kAllBytes = std::numeric_limits<std::uint64_t>::max();
 
 }  // namespace isomesh::store

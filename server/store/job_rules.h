@@ -1,4 +1,4 @@
-// What is the same of jobs whatever engine keeps them. For engines only.
+// Rules for jobs that are the same in all engines. For engines only.
 #pragma once
 
 #include <chrono>
@@ -12,61 +12,60 @@
 
 namespace isomesh::store {
 
-// What a refused submission is told to wait.
+// Retry-After of rejected submissions.
 inline constexpr std::chrono::seconds kRetryAfter{1};
-// Between two events of a run's progress.
+// Minimum interval between progress events of a run.
 inline constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
 
-// The same for all jobs that make the same bytes and say the same of them, whatever else they are.
-// `notes` are the volume's: a mesh carries some of them.
+// Equal for all jobs whose results have the same bytes and properties. `notes` are the volume's; a
+// mesh carries some of them.
 std::string result_key(const std::string& volume, const std::vector<Note>& notes,
                        const JobParameters& parameters, const std::string& mesher_version);
 
-// What a turn in the queue costs, in microseconds: how long the run is expected to take. Never
-// nothing, so that no owner's jobs are free, and at most a day.
+// Cost of a job's turn in the queue, in microseconds: its expected run time, between 1 ms and a
+// day, so that no job is free.
 std::int64_t turn_cost_us(double expected_ms);
 
-// The job's volume is not there, or not any more.
+// Throws Error kNotFound, or kGone if the job's volume has expired.
 [[noreturn]] void throw_no_volume(bool is_gone);
-// The job itself is not.
+// Throws Error kNotFound, or kGone if the job has expired.
 [[noreturn]] void throw_no_job(bool is_gone);
 
-// What waits in the queue, of all and of one owner.
+// Number of queued jobs, of all owners and of one.
 struct QueueShare {
   std::size_t queued = 0;
   std::size_t own = 0;
 };
 
-// Whether the queue has room for one more of that owner: a share of it (base/share.h), and for
-// urgent ones a share of an eighth of it, since everybody else's wait for those. `waiting` counts
-// urgent ones only where the job is one.
+// True if the queue has room for another job of the owner: the owner's share of it (base/share.h).
+// Urgent jobs share an eighth of the queue, because all others wait for them. For an urgent job
+// `waiting` counts urgent jobs only.
 bool has_share_of_queue(const JobSpec& spec, const QueueShare& waiting, std::size_t max_queued);
 
-// How long a job that has failed so often waits until it is run again.
+// Delay before the next attempt of a job that has failed that often.
 std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& options);
 
-// The job is so far.
+// Copies the progress into the job; keeps its time in the queue.
 void give_progress(Job& job, const Progress& progress);
 
-// The job has that mesh.
+// Sets the job's mesh and the addresses of its files.
 void give_mesh(Job& job, const MeshSummary& mesh);
 
-// The blobs that the mesh is in: its files, and the file of its labels.
+// The blobs of the mesh: its files and the file of its labels.
 std::vector<Blob> blobs_of(const MeshSummary& mesh);
 
-// Whether two meshes are in the same blobs.
 bool have_same_blobs(const MeshSummary& one, const MeshSummary& other);
 
-// Whether every blob of the mesh is there with all its bytes; and whether these are the right ones,
-// which reads them.
+// is_there: every blob of the mesh exists with its size. is_intact: their bytes are also correct,
+// which requires reading them.
 bool is_there(const MeshSummary& mesh, const BlobStore& blobs);
 bool is_intact(const MeshSummary& mesh, const BlobStore& blobs);
 
-// What remake() says when the mesh cannot be made again.
+// Thrown by remake() if this version would make a different mesh.
 [[noreturn]] void throw_other_version();
 [[noreturn]] void throw_volume_gone();
 
-// Whether that viewer, asking for that job (empty: any), sees the event.
+// True if the viewer may see the event and it is of that job (empty: any).
 bool concerns(const Event& event, const Viewer& viewer, const std::string& job);
 
 }  // namespace isomesh::store

@@ -1,7 +1,7 @@
-// The queue of jobs and what became of them: the interface behind which engines stand.
+// Interface of the queue of jobs and of their records.
 //
-// The order that loses nothing: a volume's blob, its record, then submit; a worker writes the
-// mesh's blobs, then finish. So a record never names a blob that is not there.
+// The order of operations prevents losses: first a volume's blob, then its record, then submit; a
+// worker first writes the mesh's blobs, then calls finish. So a record never names a missing blob.
 #pragma once
 
 #include <array>
@@ -20,86 +20,84 @@
 
 namespace isomesh::store {
 
-// Who asks: an owner sees its own only, and what is another's is "not found". Empty (nullopt) is
-// the service itself, which sees everything. The owner is "" where no tokens are configured.
+// The identity that requests data. An owner sees only its own records; those of others are "not
+// found". Empty (nullopt) is the service itself, which sees everything. Without configured tokens
+// the owner is "".
 using Viewer = std::optional<std::string>;
 
 struct JobSpec {
   std::string owner;
   JobParameters parameters;
-  std::string idempotency_key;  // within the owner's; empty: none
-  std::string request_digest;   // of the request with the key: tells a retry from another request
+  std::string idempotency_key;  // unique within the owner's; empty: none
+  std::string request_digest;   // distinguishes a retry with the same key from another request
 };
 
 struct Submission {
   enum class Kind {
     kNew,
-    kExisting,     // the job that the same key and request made before
-    kConflict,     // the key came with another request before
-    kBusy,         // nothing was stored: the queue is full, or accepts nothing any more
-    kOwnersShare,  // nothing was stored: the owner has its share of the queue
+    kExisting,     // the job submitted before with the same key and request
+    kConflict,     // the key was used for another request
+    kBusy,         // nothing was stored: the queue is full or closed
+    kOwnersShare,  // nothing was stored: the owner's share of the queue is full
   };
 
   Kind kind = Kind::kNew;
-  Job job;                              // of kNew and kExisting
-  std::chrono::seconds retry_after{0};  // of kBusy and kOwnersShare
+  Job job;                              // for kNew and kExisting
+  std::chrono::seconds retry_after{0};  // for kBusy and kOwnersShare
 };
 
-// The submission's job. Throws Error kKeyReused for kConflict, kUnavailable for kBusy and
+// Returns the submission's job. Throws Error kKeyReused for kConflict, kUnavailable for kBusy and
 // kTooManyRequests for kOwnersShare.
 const Job& job_of(const Submission& submission);
 
-// A worker's right to run a job until its time is over. The fence grows with every claim of a job:
-// whoever holds an older one can neither renew nor finish.
+// A worker's right to run a job for a limited time. Each claim of a job increments its fence. A
+// holder with an older fence can neither renew nor finish.
 struct Lease {
   std::string id;
   std::uint64_t fence = 0;
-  int attempt = 0;  // 1 for the first
+  int attempt = 0;  // starts at 1
   std::string owner;
   JobParameters parameters;
 };
 
 enum class Standing {
   kOk,
-  kCancel,  // the lease holds, but the job is to be stopped: finish it without mesh and error
-  kLost,    // the time is over or somebody else holds it: nothing of this run counts
+  kCancel,  // the lease holds, but the job is cancelled: finish without mesh and error
+  kLost,    // the lease expired or another worker has it: discard this run
 };
 
-// How far a running job is.
 struct Progress {
   Stage stage = Stage::kLoad;
-  double share = 0;  // 0..1 of the whole job
-  Timing timing;     // of the stages that have ended
+  double share = 0;  // of the whole job, 0..1
+  Timing timing;     // of completed stages
 };
 
-// How a run ended. A cancelled run has neither mesh nor error.
+// The result of a run. A cancelled run has neither mesh nor error.
 struct Outcome {
   std::optional<MeshSummary> mesh;
   std::optional<Problem> error;
-  // The error may not come again: the job waits a while and is run again, unless this was its last
-  // attempt.
+  // The error may be temporary: the job is retried after a delay, unless this was its last attempt.
   bool may_retry = false;
   Timing timing;
 };
 
-// What the service itself wants to know about a job.
+// Data about a job for the service itself.
 struct JobAccount {
   Job job;
-  int attempts = 0;  // that count; none for a job that took the mesh of another
+  int attempts = 0;  // that count; 0 for a job that reused a mesh
 };
 
 enum class EventKind {
-  kStage,     // queued, or at a stage of its run
-  kProgress,  // further in the same stage
-  kDone,      // in a final state
+  kStage,     // queued, or entered a stage of its run
+  kProgress,  // advanced in the same stage
+  kDone,      // reached a final state
 };
 
-// What happened to a job. Queued, claimed and done are kept; what a run tells on its way is not,
-// and a reader that comes late, or asks another process than the one that runs it, may miss some of
-// it.
+// A change of a job. The events queued, claimed and done are stored. Progress is not: readers that
+// are late, or that ask another process than the one running the job, may miss some of it.
 struct Event {
-  // Grows, also over restarts, and is the same for all processes that share the records; whoever
-  // goes on after one that it has seen misses none that is kept. It is no time.
+  // Increases, also over restarts, and is common to all processes that share the records. A reader
+  // that continues after an id it has seen misses no stored event. Not a time.
   std::uint64_t id = 0;
   std::string owner;
   std::string job;
@@ -107,158 +105,158 @@ struct Event {
   JobState state = JobState::kQueued;
   Stage stage = Stage::kQueue;
   double progress = 0;
-  bool is_elsewhere = false;  // another process did it, and tells its log and metrics
+  bool is_elsewhere = false;  // done by another process, which logs and counts it
 
   bool operator==(const Event&) const = default;
 };
 
-// Which ended jobs are asked for.
 enum class Ended {
   kAll,
-  kWithMesh,  // those whose end frees room
+  kWithMesh,  // those whose expiry frees space
 };
 
 struct QueueDepth {
   std::array<std::size_t, 3> queued = {};  // by Priority
   std::size_t running = 0;
-  std::size_t waiting_for_disk = 0;  // of the queued
+  std::size_t waiting_for_disk = 0;  // of the queued jobs
 
   std::size_t all_queued() const { return queued[0] + queued[1] + queued[2]; }
 };
 
 struct JobStoreOptions {
-  std::size_t max_queued = 1000;                // a longer queue accepts nothing
-  int attempts = 3;                             // how often a job is begun that fails
-  std::chrono::milliseconds retry_delay{1000};  // after the first attempt; four times it after each
-  std::string mesher_version = {};              // results of another one are not reused
-  // Of engines that several processes share: for how long after an outage leases of others that ran
-  // out meanwhile are left to whoever holds them. All see the outage, and a holder tries all the
-  // time, so each has renewed by then if it is still there.
+  std::size_t max_queued = 1000;  // a longer queue rejects submissions
+  int attempts = 3;               // of a failing job
+  // After the first attempt; four times longer after each further one.
+  std::chrono::milliseconds retry_delay{1000};
+  std::string mesher_version = {};  // meshes of other versions are not reused
+  // For engines shared by several processes: the time after an outage during which expired leases
+  // of other processes are not reaped. All processes see the outage and holders keep trying to
+  // renew, so a holder that is alive has renewed by then.
   std::chrono::milliseconds grace{10'000};
-  // By which leases are renewed and outages are measured.
+  // The clock for renewals and outages.
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
-  // How long a run is expected to take. Owners take turns by it; it is asked once for each job,
-  // when that is submitted.
+  // The expected run time of a job. Owners take turns by it. Called once per job, at its
+  // submission.
   std::function<double(const Volume&, const JobParameters&)> expected_ms =
       [](const Volume&, const JobParameters&) { return 1000.0; };
 };
 
-// Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
-// Error kOutOfSpace (then nothing has changed), kInternal, or kUnavailable where the records are
-// kept elsewhere and do not answer. What has expired is kGone for some time, and kNotFound later.
+// Thread safe. Each method is one transaction; none stays open between calls. All may throw Error
+// kOutOfSpace (nothing has changed), kInternal, or kUnavailable if a remote database does not
+// respond. Expired records give kGone for some time, then kNotFound.
 //
-// Several processes may share the records, where the engine can that. What is said of one job is
-// then true over all of them: one of those alike runs, one key is one job, one end is told once. A
-// lease is held by one life of one process, and is over when the engine's clock says so, whatever
-// the process's own says. One that is over is anybody's to reap; its holder may still renew it, or
-// finish, if nobody has reaped it yet and the engine can tell. What a process remembers besides is
-// never what decides. Every verb may be interrupted between the engine and the process, and is then
-// asked again by the store itself: a second submit or finish of the same thing is the first one.
+// Some engines let several processes share the records. The guarantees for a job then hold across
+// all of them: of equal jobs only one runs, a key gives one job, an end is reported once. A lease
+// belongs to one run of one process, and expires by the engine's clock, not by the process's.
+// Anybody may reap an expired lease. Until then its holder may still renew it or finish, if the
+// engine can tell. Nothing is decided by the memory of a process. A connection may break during any
+// method; the store then repeats the call, and a second submit or finish of the same thing has no
+// further effect.
 class JobStore {
  public:
   virtual ~JobStore() = default;
 
-  // Stores a job. One whose mesh the owner has already, undamaged, is finished at once, with
-  // `reused` set.
-  // Throws Error kNotFound or kGone when the owner has no such volume.
+  // Stores a job. If the owner has an intact mesh of an equal job, the job is finished at once,
+  // with `reused` set. Throws Error kNotFound or kGone if the owner has no such volume.
   virtual Submission submit(const JobSpec& spec) = 0;
 
-  // Has the mesh of a job that succeeded made again, because its blobs are damaged: by a job like
-  // it, which makes the same bytes. Returns that job: one that is under way already, or has failed,
-  // or a new one. If the earlier one failed because the volume was damaged, and the volume is
-  // intact now, a new one is submitted. Throws Error kNotFound or kGone, kGone also when the mesh
-  // cannot be made again, and kUnavailable when the queue is full.
+  // Replaces a succeeded job's damaged mesh by submitting an equal job, which makes the same bytes.
+  // Returns that job: an existing one that is queued, running or failed, or a new one. If the
+  // existing one failed because the volume was damaged, and the volume is intact now, submits a new
+  // one. Throws Error kNotFound; kGone, also if the mesh cannot be made again; kUnavailable if the
+  // queue is full.
   virtual Job remake(const std::string& id) = 0;
 
-  // The next job for `lease` from now: by priority, then by turns of the owners (sql/turns.h), then
-  // by age. A job whose like is running for the same owner is left until that one has ended. Empty
-  // when there is none.
+  // Leases the next job for `lease` from now: by priority, then by turns of the owners
+  // (sql/turns.h), then by age. Skips a job while an equal one of the same owner runs. Empty if
+  // there is none.
   virtual std::optional<Lease> claim(const std::string& worker,
                                      std::chrono::milliseconds lease) = 0;
 
-  // Returns when a claim may succeed, `longest` is over or `stop` is requested. True: try.
+  // Returns when a claim may succeed, `longest` has passed or `stop` is requested. True: try to
+  // claim.
   virtual bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) = 0;
 
-  // Prolongs the lease to `length` from now and tells how far the job is. Meant to be called often:
-  // it does not reach the disk.
+  // Extends the lease to `length` from now and reports progress. Cheap, so call it often: it does
+  // not write to disk.
   virtual Standing renew(const Lease& lease, const Progress& progress,
                          std::chrono::milliseconds length) = 0;
 
-  // Ends a run. A job that was asked to cancel ends cancelled, whatever the outcome; jobs like one
-  // that succeeded end with it. False when the lease is lost: then nothing has changed.
+  // Ends a run. A cancelled job ends as cancelled, whatever the outcome. If it succeeded, equal
+  // jobs end with the same mesh. Returns false if the lease is lost; then nothing has changed.
   virtual bool finish(const Lease& lease, const Outcome& outcome) = 0;
 
-  // Gives a job back that could not be run now; it is claimed again after `delay`, and the attempt
-  // does not count. Until then it says what it waits for. One that was asked to cancel ends
-  // cancelled. False when the lease is lost.
+  // Returns a job that cannot run now to the queue, and reports what it waits for. It can be
+  // claimed again after `delay`; the attempt does not count. A cancelled job ends as cancelled.
+  // Returns false if the lease is lost.
   virtual bool put_back(const Lease& lease, std::chrono::milliseconds delay,
                         std::optional<WaitingFor> waiting_for = {}) = 0;
 
-  // Ends the runs whose leases have run out, and those whose process is known to be gone: their
-  // jobs are queued again, or are cancelled. No attempt is counted, however often that happens: it
-  // is the service that ended or stood still. Anyone may call. Returns how many there were.
+  // Ends runs with expired leases, and those of processes known to have died. Their jobs are queued
+  // again, or end as cancelled. These attempts do not count, because the service failed and not the
+  // job. Any process may call it. Returns the number of runs.
   virtual std::size_t reap() = 0;
 
-  // A queued job never runs, a running one is asked to stop, a finished one stays as it is. Throws
-  // Error kNotFound or kGone.
+  // Cancels a job: a queued one never runs, a running one is asked to stop, a finished one stays as
+  // it is. Throws Error kNotFound or kGone.
   virtual Job cancel(const Viewer& viewer, const std::string& id) = 0;
 
   // Throws Error kNotFound or kGone.
   virtual Job get(const Viewer& viewer, const std::string& id) const = 0;
 
-  // Whoever owns it. Throws Error kNotFound or kGone.
+  // For any owner. Throws Error kNotFound or kGone.
   virtual JobAccount account(const std::string& id) const = 0;
 
-  // Newest first; at most `limit` that are older than the job `after` (empty: from the newest).
+  // Newest first; at most `limit` jobs older than the job `after` (empty: from the newest).
   virtual std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
                                 const std::string& after, std::size_t limit) const = 0;
 
-  // What happened after the event `since` to one job, or to all with an empty id; oldest first, at
-  // most some hundred. Waits for at most `timeout` while there is nothing.
+  // Events after `since` of one job, or of all if `job` is empty; oldest first, at most a few
+  // hundred. Waits up to `timeout` if there are none.
   virtual std::vector<Event> events(const Viewer& viewer, const std::string& job,
                                     std::uint64_t since,
                                     std::chrono::milliseconds timeout) const = 0;
 
-  // The id of the latest event, for those who want what comes after it.
+  // The id of the latest event, to follow later ones.
   virtual std::uint64_t last_event() const = 0;
 
-  // Whether the records can be read now.
+  // True if the records can be read now.
   virtual bool answers() const = 0;
 
-  // Of the jobs that the viewer sees.
+  // Counts jobs visible to the viewer.
   virtual QueueDepth depth(const Viewer& viewer) const = 0;
 
-  // True when submit would answer kBusy.
+  // True if submit would return kBusy.
   virtual bool is_full() const = 0;
 
-  // No job is accepted any more.
+  // Rejects all further submissions.
   virtual void refuse_new() = 0;
 
-  // The same, and everybody who waits gets what there is.
+  // As refuse_new(), and wakes all waiting callers.
   virtual void close() = 0;
 
-  // Jobs that ended, as the filter says, the oldest first, at most `limit`.
+  // Ended jobs that match the filter, oldest first, at most `limit`.
   virtual std::vector<Expirable> ended(const ExpiryFilter& filter, Ended which,
                                        std::size_t limit) const = 0;
 
-  // Removes ended jobs with their events, in their order, until that frees `enough` bytes: until no
-  // record names blobs of so many bytes any more. One that is gone already is passed over. The
-  // blobs themselves stay for BlobStore::sweep.
+  // Removes ended jobs with their events, in the given order, until that frees `enough` bytes, that
+  // is, until no record names blobs of that total size. Skips jobs that are already gone.
+  // BlobStore::sweep removes the blobs themselves.
   virtual Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) = 0;
 
-  // The turn to remove what is not to be kept, which one of those that share the records has at a
-  // time: it is over when what is returned goes. Null while another has it.
+  // The lease for retention: of the processes that share the records, one has it at a time, until
+  // it releases the result. Null if another process has it.
   virtual std::shared_ptr<const void> turn_to_remove() = 0;
 
-  // Of the blobs that meshes name, each counted once.
+  // Total size of the blobs that meshes name; each counts once.
   virtual std::uint64_t named_bytes() const = 0;
   virtual OwnedBytes owned_bytes() const = 0;
 
-  // When the run began that lasts longest, whoever runs it; empty when nothing runs. Blobs that
-  // were stored since then may be about to be named.
+  // The start of the longest current run in any process; empty if none runs. Blobs stored since
+  // then may be about to be named.
   virtual std::optional<std::chrono::steady_clock::time_point> oldest_run() const = 0;
 
-  // Ids of jobs and volumes that expired before that time are not found from now on.
+  // Forgets the ids of jobs and volumes that expired before that time; they are then kNotFound.
   virtual void forget_expired(Time before) = 0;
 
   virtual void forget_events(Time before) = 0;

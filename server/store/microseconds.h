@@ -1,4 +1,4 @@
-// How engines keep time: microseconds since 1970.
+// Engines store times as microseconds since 1970.
 #pragma once
 
 #include <chrono>
@@ -16,7 +16,7 @@ inline std::int64_t to_us(Time time) {
 
 inline Time from_us(std::int64_t us) { return Time(std::chrono::microseconds(us)); }
 
-// The inverse of timestamp() of base/clock.h; 0 for what is none.
+// The inverse of timestamp() of base/clock.h; 0 for an invalid text.
 inline std::int64_t us_of_timestamp(std::string_view text) { return to_us(time_of(text)); }
 
 }  // namespace isomesh::store

@@ -2,10 +2,10 @@
 
 namespace isomesh::store {
 
-// Whether an operator takes responsibility for what looks wrong.
+// Overrides that an operator gives at the start, when the daemon finds something suspicious.
 struct OperatorsWord {
-  bool adopt = false;        // the database and the blobs belong together
-  bool trust_clock = false;  // the clock is right
+  bool adopt = false;        // accept that the database and the blobs belong together
+  bool trust_clock = false;  // accept that the clock is right
 };
 
 }  // namespace isomesh::store

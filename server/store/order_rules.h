@@ -1,4 +1,4 @@
-// What is the same of orders whatever engine keeps them. For engines only.
+// Rules for orders that are the same in all engines. For engines only.
 #pragma once
 
 #include <cstdint>
@@ -9,27 +9,26 @@
 
 namespace isomesh::store {
 
-// The first of the states that are final, which stand in the tables' conditions as a number.
+// The first final state. Conditions in SQL use the number.
 inline constexpr int kFirstFinalOrder = 4;
 static_assert(static_cast<int>(OrderState::kSucceeded) == kFirstFinalOrder);
 
-// The last order that was made of a watched series.
+// The last order made for a watched series.
 struct LastOrder {
-  std::uint32_t instances = 0;             // of the series for it
-  std::optional<OrderState> state = {};    // empty: it is forgotten
-  std::optional<std::string> record = {};  // of the order
+  std::uint32_t instances = 0;             // of the series at that time
+  std::optional<OrderState> state = {};    // empty: the order is forgotten
+  std::optional<std::string> record = {};  // the order's record
 };
 
-// Whether it is open, or was of that many.
+// True if no new order is needed: the last one is still open, or had that many instances.
 bool is_done(const LastOrder& last, const WatchedSeries& series);
 
-// What becomes of the series, of which the last instance came at that time.
+// Decides about a received series; `newest` is the time of its latest instance.
 ReceivedFate fate_of(const LastOrder& last, const WatchedSeries& series, Time newest);
 
-// Ends it as cancelled.
 void cancel_order(OrderRecord& record);
 
-// Has it tried from its beginning.
+// Resets a failed order to its beginning. Throws Error kNotReady unless it has failed.
 void begin_anew(OrderRecord& record);
 
 }  // namespace isomesh::store

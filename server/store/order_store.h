@@ -1,6 +1,5 @@
-// Orders and what became of them: the interface behind which engines stand. What an order does is
-// done step by step by one process; each step is saved before the next begins, so that a process
-// that comes after a crash goes on where the last one was.
+// Interface of the store of orders. One process carries out an order step by step, and saves each
+// step before the next, so that after a crash another process can continue.
 #pragma once
 
 #include <chrono>
@@ -19,7 +18,6 @@
 
 namespace isomesh::store {
 
-// An order as its engine sees it.
 struct OrderRecord {
   std::string owner;
   Order order;
@@ -27,24 +25,24 @@ struct OrderRecord {
 };
 
 struct OrderSpec {
-  OrderRecord record;           // with an id
-  std::string idempotency_key;  // within the owner's; empty: none
+  OrderRecord record;           // with its id
+  std::string idempotency_key;  // unique within the owner's; empty: none
   std::string request_digest;
 };
 
 struct OrderSubmission {
   enum class Kind {
     kNew,
-    kExisting,  // the order that the same key and request made before
-    kConflict,  // the key came with another request before
+    kExisting,  // the order submitted before with the same key and request
+    kConflict,  // the key was used for another request
     kBusy,      // nothing was stored: too many orders are open
   };
 
   Kind kind = Kind::kNew;
-  Order order;  // of kNew and kExisting
+  Order order;  // for kNew and kExisting
 };
 
-// A series as a rule's watch has seen it.
+// A series found by the watch of a rule.
 struct WatchedSeries {
   std::string rule;
   std::string study;
@@ -52,14 +50,12 @@ struct WatchedSeries {
   std::uint32_t instances = 0;
 };
 
-// What became of a series that was received.
 enum class ReceivedFate {
-  kNew,   // it has an order now
-  kOpen,  // it has one, which has not ended, or too many orders are open
-  kDone,  // it had one, of all that has come
+  kNew,   // an order was stored
+  kOpen,  // an order is still open, or too many orders are open
+  kDone,  // an order covered all instances
 };
 
-// Which orders to list.
 struct OrderFilter {
   std::optional<OrderState> state = {};
   std::optional<std::string> rule = {};
@@ -70,59 +66,59 @@ struct OrderCounts {
   std::optional<Time> oldest_open = {};
 };
 
-// Thread safe. Every verb is one transaction. All may throw Error kOutOfSpace (then nothing has
+// Thread safe. Each method is one transaction. All may throw Error kOutOfSpace (nothing has
 // changed) or kInternal.
 class OrderStore {
  public:
   virtual ~OrderStore() = default;
 
-  // Stores an order that is due at once. `most_open` orders may be open.
+  // Stores an order that is due at once. At most `most_open` orders may be open.
   virtual OrderSubmission submit(const OrderSpec& spec, std::size_t most_open) = 0;
 
-  // Stores an order for a series that a watch has found, unless one for it is open, or one has been
-  // made of that many instances. Returns whether it did.
+  // Stores an order for a series found by a watch, unless one is open or was made for the same
+  // number of instances. Returns true if it did.
   virtual bool submit_watched(const OrderSpec& spec, const WatchedSeries& series,
                               std::size_t most_open) = 0;
 
-  // Stores an order for a series that was received, the last of its instances at that time, unless
-  // one for it is open, or one that has succeeded was of that many instances. After one that ended
-  // otherwise there is another when something came later.
+  // Stores an order for a received series whose latest instance came at `last`, unless one is open
+  // or one for the same number of instances has succeeded. After an order that ended otherwise,
+  // instances that arrive later give a new one.
   virtual ReceivedFate submit_received(const OrderSpec& spec, const WatchedSeries& series,
                                        Time last, std::size_t most_open) = 0;
 
   // Throws Error kNotFound.
   virtual Order get(const Viewer& viewer, const std::string& id) const = 0;
 
-  // Newest first; at most `limit` that are older than the order `after` (empty: from the newest).
+  // Newest first; at most `limit` orders older than the order `after` (empty: from the newest).
   virtual std::vector<Order> list(const Viewer& viewer, const OrderFilter& filter,
                                   const std::string& after, std::size_t limit) const = 0;
 
-  // Open orders whose time has come, the longest due first.
+  // Open orders that are due, longest overdue first.
   virtual std::vector<OrderRecord> due(Time now, std::size_t limit) const = 0;
-  // The order, if it is one of those now.
+  // Returns the order if it is due.
   virtual std::optional<OrderRecord> if_due(const std::string& id, Time now) const = 0;
-  // The earliest time after `now` at which an open order is due.
+  // The earliest due time after `now` of an open order.
   virtual std::optional<Time> next_after(Time now) const = 0;
 
-  // Saves a step, and when the next is due. The blobs that its work names are named by it from now
-  // on, and no others; in a final state none are. A callback is told of a final state in the same
-  // transaction. False, and nothing has changed, when the order is in a final state already: it was
-  // cancelled meanwhile.
+  // Saves a step and the time of the next one. From now on the order names exactly the blobs of its
+  // work; in a final state it names none. Entering a final state also adds its callback, in the
+  // same transaction. Returns false, without changes, if the order is already in a final state
+  // because it was cancelled.
   virtual bool save(const OrderRecord& record, Time next) = 0;
 
-  // Has an open order looked at now.
+  // Makes an open order due now.
   virtual void hurry(const std::string& id) = 0;
 
-  // An open order ends; one that has ended stays as it is. Throws Error kNotFound.
+  // Cancels an open order; an ended one stays as it is. Throws Error kNotFound.
   virtual Order cancel(const Viewer& viewer, const std::string& id) = 0;
 
-  // A failed order is tried anew from its beginning. Throws Error kNotFound, and kNotReady for one
-  // that has not failed.
+  // Restarts a failed order from its beginning. Throws Error kNotFound; kNotReady unless it has
+  // failed.
   virtual Order retry(const Viewer& viewer, const std::string& id) = 0;
 
   virtual OrderCounts counts() const = 0;
 
-  // Removes orders that ended before that time. Returns how many.
+  // Removes orders that ended before that time. Returns their number.
   virtual std::size_t forget(Time before) = 0;
 };
 

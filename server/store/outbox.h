@@ -1,4 +1,4 @@
-// The callbacks that are not delivered yet: the interface behind which engines stand.
+// Interface of the store of undelivered callbacks.
 #pragma once
 
 #include <cstddef>
@@ -10,34 +10,33 @@
 
 namespace isomesh::store {
 
-// A callback that is to be delivered: the end of one job.
+// A callback to deliver: the end of one job or order.
 struct Delivery {
-  std::string job;  // one job calls back once, so this names the delivery too
+  std::string job;  // or order; it has one callback, so its id identifies the delivery
   std::string url;
-  std::string body;  // the job's JSON as it ended
-  int attempts = 0;  // that failed
+  std::string body;  // its JSON at its end
+  int attempts = 0;  // failed ones
   Time created;
 };
 
-// Kept over restarts. A job store adds the delivery of a job with a callback in the transaction
-// that ends the job, so that neither is there without the other. Thread safe; all may throw Error
-// kOutOfSpace or kInternal.
+// Survives restarts. The job store adds a delivery in the transaction that ends the job, so that
+// both happen or neither does. Thread safe; all methods may throw Error kOutOfSpace or kInternal.
 class Outbox {
  public:
   virtual ~Outbox() = default;
 
-  // Those that are due at that time, the oldest first, at most `per_receiver` of each scheme, host
-  // and port. Where several processes share the records, over all of them: what one has got here is
-  // its own for a minute from the last time, and nobody else gets it meanwhile.
+  // Deliveries due at `now`, oldest first, at most `per_receiver` for each scheme, host and port.
+  // If several processes share the records, the limit holds across them, and each returned delivery
+  // is reserved for this process for a minute.
   virtual std::vector<Delivery> due(Time now, std::size_t per_receiver) const = 0;
 
-  // When the first of those is due that are not due yet at that time; empty when there is none.
+  // The earliest due time after `now`; empty if there is none.
   virtual std::optional<Time> next_after(Time now) const = 0;
 
-  // It was delivered or given up.
+  // Removes a delivery that succeeded or was given up.
   virtual void remove(const std::string& job) = 0;
 
-  // It failed once more and is due again at that time.
+  // Counts a failed attempt; the delivery is due again at `next`.
   virtual void postpone(const std::string& job, Time next) = 0;
 
   virtual std::size_t count() const = 0;

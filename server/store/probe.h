@@ -7,12 +7,12 @@
 
 namespace isomesh::store {
 
-// Asks something that may hang, at most once at a time and now and then: many threads may want to
-// know. Thread safe.
+// Health check for something that may hang. Runs one check at a time, and caches its result,
+// because many threads may ask. Thread safe.
 class Probe {
  public:
-  // What `ask` says, or has said less than `for_how_long` ago. False while somebody waits for it
-  // for longer than `patience`.
+  // Returns the result of `ask`, or the last one if it is younger than `for_how_long` or a check is
+  // running. False if the running check takes longer than `patience`.
   bool answers(std::chrono::milliseconds for_how_long, std::chrono::milliseconds patience,
                const std::function<bool()>& ask) {
     using Clock = std::chrono::steady_clock;
@@ -35,8 +35,9 @@ class Probe {
  private:
   Mutex mutex_;
   bool is_asking_ ISOMESH_GUARDED_BY(mutex_) = false;
-  bool said_ ISOMESH_GUARDED_BY(mutex_) = true;  // before it was asked the first time
-  std::chrono::steady_clock::time_point last_ ISOMESH_GUARDED_BY(mutex_) = {};  // begun or ended
+  bool said_ ISOMESH_GUARDED_BY(mutex_) = true;  // before the first check
+  // Begin or end of the last check.
+  std::chrono::steady_clock::time_point last_ ISOMESH_GUARDED_BY(mutex_) = {};
 };
 
 }  // namespace isomesh::store

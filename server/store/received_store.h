@@ -1,5 +1,5 @@
-// Instances that peers have sent by themselves, until an order has had them: the interface behind
-// which engines stand. The instances' files are blobs, which are stored before they are named here.
+// Interface of the store of instances that peers sent by C-STORE, until an order has used
+// them. The files of instances are blobs, stored before they are named here.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@
 
 namespace isomesh::store {
 
-// A series as it was sent: the same one may be sent to several titles, for several rules.
+// A series as received. The same series may be sent to several AE titles, for several rules.
 struct ReceivedSeries {
-  std::string route;  // the title that it was sent to
+  std::string route;  // the AE title it was sent to
   std::string study;
   std::string series;
 
@@ -25,41 +25,41 @@ struct ReceivedSeries {
 
 struct ReceivedInstance {
   std::string instance;  // SOP Instance UID
-  std::string blob;      // empty: it is not held any more
+  std::string blob;      // empty: no longer held
   std::uint64_t bytes = 0;
 
   bool operator==(const ReceivedInstance&) const = default;
 };
 
-// What is held of a series.
+// The held instances of a series.
 struct HeldSeries {
   ReceivedSeries series;
-  std::uint32_t held = 0;   // instances
-  std::uint32_t known = 0;  // those, and those that were held before
-  Time last;                // when the last one came
+  std::uint32_t held = 0;   // number of held instances
+  std::uint32_t known = 0;  // including instances held earlier
+  Time last;                // arrival of the latest instance
 };
 
-// Thread safe. Every verb is one transaction. All may throw Error kOutOfSpace (then nothing has
+// Thread safe. Each method is one transaction. All may throw Error kOutOfSpace (nothing has
 // changed) or kInternal.
 class ReceivedStore {
  public:
   virtual ~ReceivedStore() = default;
 
-  // Once this has returned the instance is held, whatever ends. One of the same UID is replaced.
+  // The instance survives a crash once this returns. Replaces one with the same UID.
   virtual void add(const ReceivedSeries& series, const ReceivedInstance& instance) = 0;
 
-  // Every series of which something is held.
+  // All series with held instances.
   virtual std::vector<HeldSeries> held() const = 0;
   virtual std::uint64_t held_bytes() const = 0;
 
-  // All that are known, ascending by their UIDs.
+  // All known instances, ascending by UID.
   virtual std::vector<ReceivedInstance> instances(const ReceivedSeries& series) const = 0;
 
-  // Holds nothing of the series any more, and returns the blobs that were held; nothing happens
-  // when something has come since `series` was read. The instances stay known.
+  // Releases all instances of the series and returns their blobs. Does nothing if an instance has
+  // arrived since `series` was read. The instances stay known.
   virtual std::vector<std::string> release(const HeldSeries& series) = 0;
 
-  // Removes instances that are not held and came before that time. Returns how many.
+  // Removes known instances that are not held and arrived before that time. Returns their number.
   virtual std::size_t forget(Time before) = 0;
 };
 

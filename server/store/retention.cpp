@@ -15,17 +15,17 @@
 namespace isomesh::store {
 namespace {
 
-// Of one transaction, so that others are not held up for long.
+// Limit for one transaction, so that others do not wait for long.
 constexpr std::size_t kMostAtOnce = 100;
-// Longer than any upload or job leaves a file there.
+// Longer than any upload or job uses a file there.
 constexpr std::chrono::hours kLongestScratch{24};
-// More than a client that follows a job could have missed.
+// Longer than a client that follows a job may be absent.
 constexpr std::chrono::days kEventsKept{2};
 
 }  // namespace
 
-// What expires in one round, by one limit; logged when it goes, so that nothing that is gone stays
-// untold after an error.
+// Collects what expires in one round by one limit. Logs on destruction, so that removals are logged
+// even after an error.
 class Retention::Report {
  public:
   explicit Report(std::string_view limit) : limit_(limit) {}
@@ -45,7 +45,7 @@ class Retention::Report {
  private:
   struct Kind {
     std::size_t count = 0;
-    std::string named;  // the first of them
+    std::string named;  // the first ones
 
     void add(const Expirable& record) {
       constexpr std::size_t kMostNamed = 10;
@@ -71,7 +71,7 @@ class Retention::Report {
 
 Retention::Gone Retention::enforce() {
   const Time now = options_.now();
-  // Files have the times of the system's clock, whether that is right or not.
+  // Files are dated by the system's clock, whether it is right or not.
   const Time of_files = std::min(now, std::chrono::system_clock::now());
   Gone gone;
   sweep_scratch(of_files);
@@ -125,7 +125,8 @@ bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
       gone.blobs += erased;
       continue;
     }
-    // What has expired and cannot go yet will: no more is to expire for that.
+    // Space of expired blobs that cannot be erased yet will become free, so nothing more expires
+    // for it.
     const std::uint64_t going = garbage_bytes();
     if (used <= max_bytes + going) return false;
     const Superfluous superfluous = this->superfluous();
@@ -140,8 +141,8 @@ std::uint64_t Retention::garbage_bytes() const {
   return bytes;
 }
 
-// The oldest of whoever has most, so that the many uploads of one owner cost nobody else theirs
-// (longest queue drop: Suter, Lakshman, Stiliadis and Choudhury, 1998).
+// The oldest data of the owner with most data, so that one owner's many uploads do not displace
+// those of others (longest queue drop: Suter, Lakshman, Stiliadis and Choudhury, 1998).
 Retention::Superfluous Retention::superfluous() const {
   OwnedBytes owned = volumes_.owned_bytes();
   for (const auto& [owner, bytes] : jobs_.owned_bytes()) owned[owner] += bytes;
@@ -150,7 +151,7 @@ Retention::Superfluous Retention::superfluous() const {
   std::ranges::sort(most, std::greater());
   for (std::size_t n = 0; n < most.size(); ++n) {
     const std::uint64_t next = n + 1 < most.size() ? most[n + 1].first : 0;
-    // Jobs without a mesh take no room, and go by their age alone.
+    // Jobs without a mesh take no space; they expire by age only.
     std::vector<Expirable> items = oldest({Time::max(), most[n].second}, Ended::kWithMesh);
     if (!items.empty()) return {std::move(items), std::max<std::uint64_t>(1, most[n].first - next)};
   }
@@ -186,7 +187,7 @@ void Retention::expire(std::span<const Expirable> items, std::uint64_t enough, G
   }
 }
 
-// A worker may have stored, at any time since its run began, what it is about to name.
+// Blobs stored since this time may still be named: a worker names its blobs at the end of its run.
 Steady Retention::unsettled_since() const {
   const Steady now = Steady::clock::now();
   return std::min(now, jobs_.oldest_run().value_or(now)) - options_.grace;
@@ -198,7 +199,7 @@ std::size_t Retention::erase_garbage() {
   return before - garbage_.size();
 }
 
-// Without the lock: it looks at every file, and those who make room need not wait for that.
+// Without the lock: a sweep lists every file, and callers of make_room() need not wait for it.
 void Retention::sweep_blobs(Gone& gone) {
   const Steady now = Steady::clock::now();
   {
@@ -213,7 +214,7 @@ void Retention::sweep_blobs(Gone& gone) {
 }
 
 void Retention::sweep_scratch(Time now) const {
-  std::error_code gone;  // files come and go while we look
+  std::error_code gone;  // files come and go meanwhile
   const auto cutoff = std::chrono::file_clock::from_sys(now) - kLongestScratch;
   for (const auto& entry : std::filesystem::directory_iterator(scratch_, gone)) {
     const auto written = entry.last_write_time(gone);

@@ -17,34 +17,33 @@
 namespace isomesh::store {
 
 struct RetentionOptions {
-  // How long finished jobs are kept with their meshes, and volumes that no job has used since.
+  // Finished jobs, their meshes and unused volumes are kept this long.
   std::chrono::milliseconds keep = std::chrono::days(30);
-  // What all volumes and meshes may take; the oldest go first. 0: whatever the disk holds.
+  // Limit for all volumes and meshes; 0: no limit but the disk.
   std::uint64_t max_bytes = 0;
-  // How long an id is known as expired after it is gone.
+  // Ids of expired records are remembered this long.
   std::chrono::milliseconds remember = std::chrono::days(90);
-  // A blob is stored first and named by a record later. So one that no record names is removed only
-  // when it was stored this long ago, and this long before the oldest run that is under way began.
+  // A blob is stored before a record names it. So an unnamed blob is removed only if it was stored
+  // this long ago, and this long before the oldest current run began.
   std::chrono::milliseconds grace = std::chrono::minutes(2);
-  // How long blobs that no record names, and of which nobody knows why, lie in quarantine.
+  // Unnamed blobs of unknown origin stay in quarantine this long.
   std::chrono::milliseconds quarantine = std::chrono::days(7);
-  // How long no sweep follows one that found too many of those.
+  // Pause of sweeping after a sweep that found too many of them.
   std::chrono::milliseconds sweep_pause = std::chrono::hours(1);
-  // The time, as far as it can be believed.
+  // The believed time.
   std::function<Time()> now = [] { return std::chrono::system_clock::now(); };
 };
 
-// Keeps the stores from growing for ever, and a node's folder of unfinished files. Never touches
-// what a job that is queued or runs needs. Logs what expires, and why. Thread safe; what it is made
-// of must outlive it.
+// Limits the growth of the stores and of a node's scratch folder. Never removes what a queued or
+// running job needs. Logs what expires, and why. Thread safe; its dependencies must outlive it.
 class Retention {
  public:
   struct Gone {
     std::size_t jobs = 0;
     std::size_t volumes = 0;
-    std::size_t blobs = 0;        // of what expired, or out of quarantine
-    std::size_t quarantined = 0;  // blobs that no record names although none expired
-    std::size_t left = 0;         // those that were too many to be put into quarantine at once
+    std::size_t blobs = 0;        // of expired records, or out of quarantine
+    std::size_t quarantined = 0;  // unnamed blobs although nothing expired
+    std::size_t left = 0;         // further ones, too many to quarantine at once
   };
 
   Retention(JobStore& jobs, VolumeStore& volumes, const BlobStore& blobs,
@@ -55,26 +54,27 @@ class Retention {
         scratch_(std::move(scratch)),
         options_(options) {}
 
-  // Lets what is too old or too much expire, then removes the files that nothing names any more. To
-  // be called again and again. Throws Error kOutOfSpace or kInternal.
+  // Expires records that are too old or exceed the limit, then removes unnamed files. Call
+  // periodically. Throws Error kOutOfSpace or kInternal.
   Gone enforce();
 
-  // Lets the oldest expire until `bytes` more fit. Throws Error kOutOfSpace when they cannot.
+  // Expires the oldest data of the owner with most data until `bytes` more fit. Throws Error
+  // kOutOfSpace if that is impossible.
   void make_room(std::uint64_t bytes);
 
-  // What the blobs of all records take, each counted once.
+  // Total size of the blobs that records name; each counts once.
   std::uint64_t named_bytes() const;
 
  private:
   Names names() const;
   void expire_old(Time now, Gone& gone) ISOMESH_REQUIRES(mutex_);
-  // False when what queued and running jobs need is more than that.
+  // Returns false if queued and running jobs need more than that.
   bool shrink_to(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
   std::uint64_t garbage_bytes() const ISOMESH_REQUIRES(mutex_);
   std::vector<Expirable> oldest(const ExpiryFilter& filter, Ended which) const;
   struct Superfluous {
     std::vector<Expirable> items;
-    std::uint64_t enough = 0;  // bytes of them; after these it may be another owner's turn
+    std::uint64_t enough = 0;  // bytes to free before another owner may have more data
   };
   Superfluous superfluous() const;
   class Report;
@@ -91,9 +91,9 @@ class Retention {
   const BlobStore& blobs_;
   const std::filesystem::path scratch_;
   const RetentionOptions options_;
-  // Two threads that make room at the same time would make twice as much.
+  // Serialises callers of make_room(); otherwise two would free twice as much.
   Mutex mutex_;
-  // Blobs that expired records named, and that are still there.
+  // Blobs of expired records that are not erased yet.
   std::vector<std::string> garbage_ ISOMESH_GUARDED_BY(mutex_);
   Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
 };

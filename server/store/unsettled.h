@@ -9,8 +9,8 @@
 
 namespace isomesh::store {
 
-// The blobs that this process has stored and that no record names yet, each with the holds that
-// tell other daemons of it (empty names where there are none). Not thread safe.
+// The blobs that this process has stored and that no record names yet, each with its holds, which
+// mark it for other daemons (empty names if there are none). Not thread safe.
 class Unsettled {
  public:
   void note(const std::string& key, std::string hold) {
@@ -19,7 +19,8 @@ class Unsettled {
     stored.last = Steady::clock::now();
   }
 
-  // One that stored it is done with it; its hold is returned, to be let go.
+  // Removes one hold of the blob and returns its name, so that the caller removes it from the
+  // store.
   std::string settle(const std::string& key) {
     const auto found = blobs_.find(key);
     if (found == blobs_.end()) return {};
@@ -34,7 +35,7 @@ class Unsettled {
     return found != blobs_.end() && found->second.last >= since;
   }
 
-  // Those that were stored before that will not be named any more.
+  // Removes blobs stored before that; they will not be named any more.
   void forget(Steady before) {
     std::erase_if(blobs_, [&](const auto& blob) { return blob.second.last < before; });
   }
@@ -48,7 +49,7 @@ class Unsettled {
   std::map<std::string, Stored> blobs_;
 };
 
-// How long ago that was.
+// Time elapsed since then.
 inline std::chrono::nanoseconds age_of(Steady time) { return Steady::clock::now() - time; }
 
 }  // namespace isomesh::store

@@ -1,4 +1,4 @@
-// The records of the volumes that are there: the interface behind which engines stand.
+// Interface of the store of volume records.
 #pragma once
 
 #include <cstddef>
@@ -15,55 +15,53 @@
 
 namespace isomesh::store {
 
-// Of what is listed, by the time when it was stored.
+// Order of a list, by the time of storing.
 enum class ListOrder { kOldestFirst, kNewestFirst };
 
-// Records by owner and id: the same samples may belong to several owners, each with a record of its
-// own, while the blob that the id names is shared. A record is added after its blob and erased
-// before it, so it never names one that is missing. Thread safe; all may throw Error kOutOfSpace or
-// kInternal.
+// Records by owner and id. The same samples may belong to several owners, each with a record, and
+// share one blob. A record is added after its blob and erased before it, so it never names a
+// missing blob. Thread safe; all methods may throw Error kOutOfSpace or kInternal.
 class VolumeStore {
  public:
   virtual ~VolumeStore() = default;
 
-  // Adds a record, or returns the one that the owner has already. Second: whether it is new.
+  // Adds a record, or returns the owner's existing one. Second: true if it is new.
   virtual std::pair<Volume, bool> add(const std::string& owner, const Volume& volume) = 0;
 
-  // Throws Error kNotFound, or kGone when it has expired.
+  // Throws Error kNotFound, or kGone if the record has expired.
   virtual Volume get(const Viewer& viewer, const std::string& id) const = 0;
 
-  // Gives the owner's record another name, or none, and returns it. Throws as get does.
+  // Sets or removes the name of the owner's record, and returns the record. Throws as get does.
   virtual Volume rename(const std::string& owner, const std::string& id,
                         const std::optional<std::string>& name) = 0;
 
   virtual bool contains(const Viewer& viewer, const std::string& id) const = 0;
 
-  // In that order, without their labels; at most `limit` that come after the one that `after` is
-  // the cursor of.
+  // At most `limit` volumes, without their labels, after the one with the cursor `after`.
   virtual std::vector<Volume> list(const Viewer& viewer, const std::string& after = {},
                                    std::size_t limit = std::numeric_limits<std::size_t>::max(),
                                    ListOrder order = ListOrder::kOldestFirst) const = 0;
 
-  // Every record of that id that the viewer sees. Throws Error kNotFound, kGone, and kNotReady
+  // Erases every record of that id visible to the viewer. Throws Error kNotFound; kGone; kNotReady
   // while a queued or running job of one of their owners needs the volume.
   virtual void erase(const Viewer& viewer, const std::string& id) = 0;
 
-  // Whether any record, of a volume or of a mesh, names the blob.
+  // True if any record, of a volume, mesh, order or received instance, names the blob.
   virtual bool names(const std::string& blob) const = 0;
 
-  // Volumes, as the filter says, that no queued or running job of their owner needs, the oldest
+  // Volumes that match the filter and that no queued or running job of their owner needs, oldest
   // first, at most `limit`.
   virtual std::vector<Expirable> unused(const ExpiryFilter& filter, std::size_t limit) const = 0;
 
-  // As JobStore::expire. A volume that was used since unused() named it is passed over.
+  // As JobStore::expire. Skips volumes used since unused() listed them.
   virtual Expired expire(std::span<const Expirable> volumes, std::uint64_t enough) = 0;
 
-  // Of the blobs that volumes name, each counted once.
+  // Total size of the blobs that volumes name; each counts once.
   virtual std::uint64_t named_bytes() const = 0;
   virtual OwnedBytes owned_bytes() const = 0;
 };
 
-// What list() continues after.
+// The cursor with which list() continues after this volume.
 std::string cursor_of(const Volume& volume);
 
 }  // namespace isomesh::store

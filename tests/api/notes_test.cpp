@@ -186,6 +186,8 @@ const std::map<std::string, Shown>& shown() {
        {{{"a.nrrd",
           nrrd("space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace units: \"pixel\" "
                "\"pixel\" \"pixel\"\n")}}}},
+      {"unit-angstrom",
+       {{{"a.cube", "title\n\n1 0 0 0\n2 1 0 0\n2 0 1 0\n2 0 0 1\n6 6 0 0 0\n1 2 3 4 5 6 7 8\n"}}}},
       {"non-finite-samples",
        {{{"a.nii", nifti({.datatype = 16, .bits = 32, .samples = not_finite()})}}}},
       {"trailing-bytes", {{{"a.nrrd", nrrd("", kSamples + "more")}}}},

@@ -15,6 +15,7 @@
 
 #include "proto/notes.h"
 #include "proto/types.h"
+#include "proto/volume_formats.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
 
@@ -177,6 +178,22 @@ TEST(Docs, TheirTableOfNotesIsThatOfTheProgram) {
   }
   EXPECT_TRUE(read_file(kDocs / "uploads.md").ends_with(table))
       << "docs/uploads.md must end with:\n"
+      << table;
+}
+
+// So that a new format is told of there too.
+TEST(Docs, TheirTableOfFormatsIsThatOfTheProgram) {
+  std::string table = "| format | files | what is read |\n|---|---|---|\n";
+  for (const VolumeFormat& format : volume_formats()) {
+    std::string files = std::string(format.suffixes);
+    for (std::size_t at = files.find(' '); at != std::string::npos; at = files.find(' ', at + 3)) {
+      files.replace(at, 1, "` `");
+    }
+    table += "| " + std::string(format.title) + " | `" + files + "` | " +
+             std::string(format.content) + " |\n";
+  }
+  EXPECT_NE(read_file(kDocs / "uploads.md").find(table + '\n'), std::string::npos)
+      << "docs/uploads.md must hold these rows and no others:\n"
       << table;
 }
 

@@ -8,6 +8,8 @@
 #include "tests/fuzz/targets.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
+#include "tests/unit/import/hdf5_writer.h"
+#include "tests/unit/import/other_writers.h"
 #include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
 
@@ -91,6 +93,67 @@ std::vector<std::string> vti_files() {
   files.push_back(vti({.form = VtiForm::kAscii, .extent = "0 1 0 0 0 1"}, "1 2 3 4"));
   files.push_back(gzip(vti({}, kSamples)));
   return files;
+}
+
+std::vector<std::string> vtk_files() {
+  const std::string scalars = "SCALARS s unsigned_char 1\nLOOKUP_TABLE default\n";
+  return {vtk_legacy(false, "POINT_DATA 24\n" + scalars + kSamples),
+          vtk_legacy(true, "CELL_DATA 6\nFIELD f 1\nv 2 1 float\n1 2\nMETADATA\nx\n\n" + scalars +
+                               "1 2 3 4 5 6\n")};
+}
+
+std::vector<std::string> mrc_files() {
+  return {mrc({}, kSamples), mrc({.big_endian = true, .axes = {3, 1, 2}}, kSamples),
+          mrc({.sizes = {4, 3, 1}, .mode = 12, .angles = {90, 90, 120}}, kSamples),
+          mrc({.sampling = {4, 3, 1}, .space_group = 401, .extended = "more"}, kSamples)};
+}
+
+std::vector<std::string> cube_files() {
+  const std::string numbers = "0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23\n";
+  return {cube({}, numbers), cube({.atoms = "-1 0 0 0",
+                                   .axes = {"2 1 0 0", "-3 0 1 0", "2 0 0 1"},
+                                   .behind_atoms = "2 1\n2\n"},
+                                  numbers)};
+}
+
+std::vector<std::string> numpy_files() {
+  return {npy(npy_header("|u1", false, "(2, 3, 4)"), kSamples),
+          npy(npy_header(">f2", true, "(2, 1, 3, 2)"), kSamples)};
+}
+
+std::vector<std::string> hdf5_files() {
+  const import::test::Hdf5Image image = {some_samples<std::int16_t>(24)};
+  return {itk_hdf5(image), itk_hdf5({image.samples, false}), minc({}, image)};
+}
+
+std::vector<std::string> tiff_files() {
+  return {tiff({kSamples.substr(0, 12), kSamples.substr(12)}),
+          tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+               "ImageJ=1\nimages=2\nslices=2\nunit=mm\nspacing=2\n"),
+          tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+               "<OME><Pixels DimensionOrder='XYZCT' SizeZ='2' PhysicalSizeX='1'/></OME>")};
+}
+
+std::vector<std::string> afni_files() {
+  return {afni_head(), afni_head({{"IJK_TO_DICOM_REAL", "float", "2 0 0 7 0 2 0 8 0 0 2 9"},
+                                  {"BRICK_FLOAT_FACS", "float", "2"}})};
+}
+
+// Files of the formats whose writers need no more than one line.
+std::vector<std::string> other_files(std::string_view name) {
+  if (name == "vtk") return vtk_files();
+  if (name == "mgh") return {mgh({}, kSamples), mgh({.sizes = {4, 3, 1, 2}}, kSamples)};
+  if (name == "afni") return afni_files();
+  if (name == "par") return {par({{.slice = 1}, {.slice = 2, .place = 1, .slope = 2}})};
+  if (name == "isq") return {isq({}, kSamples + kSamples)};
+  if (name == "mrc") return mrc_files();
+  if (name == "cube") return cube_files();
+  if (name == "numpy") return numpy_files();
+  if (name == "hdf5") return hdf5_files();
+  if (name == "tiff") return tiff_files();
+  if (name == "png") return {grey_png(4, kSamples)};
+  if (name == "bmp") return {grey_bmp(4, kSamples)};
+  return {};
 }
 
 std::vector<std::string> archive_files() {
@@ -193,6 +256,7 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "nrrd") return nrrd_files();
   if (name == "metaimage") return metaimage_files();
   if (name == "vti") return vti_files();
+  if (auto files = other_files(name); !files.empty()) return files;
   if (name == "dicom") return dicom_files();
   if (name == "csa") return csa_headers();
   if (name == "archive") return archive_files();

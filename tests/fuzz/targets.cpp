@@ -1,6 +1,7 @@
 #include "tests/fuzz/targets.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -21,6 +22,7 @@
 #include "server/volume/canonical.h"
 #include "server/volume/labels.h"
 #include "tests/fuzz/draco_target.h"
+#include "tests/unit/import/archives.h"
 
 namespace isomesh::fuzz {
 namespace {
@@ -98,6 +100,35 @@ void import_only(std::string_view format, Bytes bytes) {
   import_bytes(bytes, {.volume = 1});
 }
 
+bool is_of(std::string_view format, Bytes bytes) {
+  const import::Reader* reader =
+      import::sniff(bytes.first(std::min(bytes.size(), import::kSniffBytes)));
+  return reader != nullptr && reader->name == format;
+}
+
+// For files without a spacing.
+void import_spaced(std::string_view format, Bytes bytes) {
+  if (!is_of(format, bytes)) return;
+  import_bytes(bytes, {.spacing = std::array<double, 3>{1, 1, 1}});
+}
+
+void import_archive(const std::vector<import::test::Member>& members) {
+  const std::string archive = import::test::tar(members);
+  import_bytes(std::as_bytes(std::span(archive)), {.spacing = std::array<double, 3>{1, 1, 1}});
+  import_bytes(std::as_bytes(std::span(archive)), {});
+}
+
+// Of two equal pages.
+void import_pages(std::string_view format, Bytes bytes) {
+  const std::string page(text_of(bytes));
+  if (is_of(format, bytes)) import_archive({{"1", page}, {"2", page}});
+}
+
+// A header of text, and samples enough for small sizes.
+void import_beside_samples(const std::string& header, const std::string& samples, Bytes bytes) {
+  import_archive({{header, std::string(text_of(bytes))}, {samples, std::string(24, 'x')}});
+}
+
 void import_anything(Bytes bytes) { import_bytes(bytes, {}); }
 
 // The description comes first, byte for byte, and then the samples.
@@ -169,6 +200,18 @@ constexpr Target kTargets[] = {
     {"nrrd", [](Bytes bytes) { import_only("nrrd", bytes); }},
     {"metaimage", [](Bytes bytes) { import_only("metaimage", bytes); }},
     {"vti", [](Bytes bytes) { import_only("vti", bytes); }},
+    {"vtk", [](Bytes bytes) { import_only("vtk", bytes); }},
+    {"mgh", [](Bytes bytes) { import_only("mgh", bytes); }},
+    {"isq", [](Bytes bytes) { import_only("isq", bytes); }},
+    {"mrc", [](Bytes bytes) { import_only("mrc", bytes); }},
+    {"cube", [](Bytes bytes) { import_only("cube", bytes); }},
+    {"hdf5", [](Bytes bytes) { import_only("hdf5", bytes); }},
+    {"numpy", [](Bytes bytes) { import_spaced("numpy", bytes); }},
+    {"tiff", [](Bytes bytes) { import_spaced("tiff", bytes); }},
+    {"png", [](Bytes bytes) { import_pages("png", bytes); }},
+    {"bmp", [](Bytes bytes) { import_pages("bmp", bytes); }},
+    {"afni", [](Bytes bytes) { import_beside_samples("a.HEAD", "a.BRIK", bytes); }},
+    {"par", [](Bytes bytes) { import_beside_samples("a.PAR", "a.REC", bytes); }},
     {"dicom", [](Bytes bytes) { import_only("dicom", bytes); }},
     {"csa",
      [](Bytes bytes) {

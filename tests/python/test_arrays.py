@@ -75,7 +75,7 @@ class Arrays(DaemonTest):
             (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
             (object(), {}, TypeError, "object"),
             ("/no/such/file.nii", {}, FileNotFoundError, "/no/such/file.nii"),
-            (b"", {"spacing": (1, 1, 1)}, ValueError, "for arrays"),
+            (b"", {"affine": numpy.eye(4)}, ValueError, "for arrays"),
         ]
         for source, more, kind, text in wrong:
             with self.subTest(text), self.assertRaisesRegex(kind, text):

@@ -1,6 +1,6 @@
-// isomesh-dimse: a program that speaks DIMSE with peers for the daemon, each association in a copy
-// of itself that is made ahead. A copy gives up what no association needs, reads its order, with
-// which the connection to the peer comes, gives up the rest, and tells what came of it.
+// isomesh-dimse: speaks DIMSE with peers for the daemon. Each association runs in a process forked
+// ahead of time. The process first drops the rights that no association needs, then receives its
+// order with the peer's connection, drops all other rights, and reports the outcome.
 #include <cstdint>
 #include <string>
 #include <variant>
@@ -20,9 +20,9 @@ namespace {
 using namespace isomesh;
 using namespace isomesh::process;
 
-// Objects go through in pieces; what stays in memory is an association and an object's head.
+// Objects are streamed, so memory holds only the association and the head of one object.
 constexpr std::uint64_t kMemoryBytes = std::uint64_t{512} << 20;
-// Of the processor: for some hundred gigabytes.
+// Limit of processor time; enough for some hundred gigabytes.
 constexpr std::chrono::hours kTime{1};
 
 Confinement confinement_of(const DimseSending& order) {
@@ -60,9 +60,9 @@ void serve_one() {
 }  // namespace
 
 int main() {
-  // What DCMTK tells of names patients.
+  // DCMTK's log messages name patients.
   OFLog::configure(OFLogger::OFF_LOG_LEVEL);
-  // Read now, because a confined copy could not.
+  // Loaded now, because a confined process could not open the file.
   dcmDataDict.rdlock();
   dcmDataDict.rdunlock();
   serve_copies(serve_one);

@@ -27,8 +27,8 @@ using process::DimseObject;
 using process::DimseReceiving;
 using process::DimseRefusal;
 
-// Forms that isomesh-import reads, in the order in which they are chosen from: objects come as they
-// are, and what is not compressed takes the sender no time.
+// Transfer syntaxes that isomesh-import reads, in order of preference: objects are accepted as
+// stored, and uncompressed ones cost the sender no time.
 constexpr std::array kSyntaxes = {UID_LittleEndianExplicitTransferSyntax,
                                   UID_LittleEndianImplicitTransferSyntax,
                                   UID_BigEndianExplicitTransferSyntax,
@@ -49,7 +49,7 @@ bool is_wanted(std::string_view abstract_syntax) {
   return abstract_syntax.starts_with(kStorage) && !volume::kind_without_images(abstract_syntax);
 }
 
-// Null when none of what the peer proposes is one of ours.
+// Null if the peer proposes none of our syntaxes.
 const char* chosen_syntax(const T_ASC_PresentationContext& context) {
   for (const char* syntax : kSyntaxes) {
     for (int n = 0; n < context.transferSyntaxCount; ++n) {
@@ -83,7 +83,6 @@ bool is_among(const std::vector<std::string>& titles, const std::string& title) 
   return std::ranges::find(titles, title) != titles.end();
 }
 
-// The association of this process.
 class Association {
  public:
   explicit Association(const DimseReceiving& order) : order_(order) {}
@@ -106,7 +105,7 @@ class Association {
   DimseRefusal reject(DimseRefusal why, T_ASC_RejectParametersReason reason);
   void answer_messages();
   OFCondition store(T_ASC_PresentationContextID context_id, const T_DIMSE_C_StoreRQ& request);
-  // The status of an object whose file is there.
+  // The status of an object that was written to its file.
   DIC_US status_of(const T_DIMSE_C_StoreRQ& request);
   std::filesystem::path file() const { return order_.folder / std::to_string(count_); }
   int idle() const { return static_cast<int>(order_.idle.count()); }
@@ -116,7 +115,7 @@ class Association {
   T_ASC_Association* association_ = nullptr;
   std::string called_;
   std::string calling_;
-  std::size_t count_ = 0;  // of objects that have begun to come
+  std::size_t count_ = 0;  // objects started so far
 };
 
 DimseRefusal Association::reject(DimseRefusal why, T_ASC_RejectParametersReason reason) {
@@ -209,7 +208,7 @@ OFCondition Association::store(T_ASC_PresentationContextID context_id,
   std::snprintf(response.AffectedSOPInstanceUID, sizeof(response.AffectedSOPInstanceUID), "%s",
                 request.AffectedSOPInstanceUID);
   response.opts = O_STORE_AFFECTEDSOPCLASSUID | O_STORE_AFFECTEDSOPINSTANCEUID;
-  std::error_code gone;  // the daemon has taken it where it is stored
+  std::error_code gone;  // the daemon has moved it into its store
   std::filesystem::remove(file(), gone);
   return DIMSE_sendStoreResponse(association_, context_id, &request, &response, nullptr);
 }

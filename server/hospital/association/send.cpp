@@ -15,7 +15,7 @@ namespace {
 using process::DimseEnd;
 using process::DimseSent;
 
-// Nobody resolves it: talk.cpp has the connection.
+// Never resolved: talk.cpp has the connection.
 constexpr const char* kPeersAddress = "127.0.0.1:104";
 constexpr const char* kOurAddress = "isomesh";
 
@@ -28,7 +28,8 @@ struct EndAssociation {
 using Network = std::unique_ptr<T_ASC_Network, EndNetwork>;
 using Association = std::unique_ptr<T_ASC_Association, EndAssociation>;
 
-// DCMTK 3.6.9 wants to be told how long connecting may take; talk.cpp has connected.
+// DCMTK 3.6.9 requires a connection timeout; it has no effect, because talk.cpp is already
+// connected.
 OFCondition make_parameters(T_ASC_Parameters** parameters) {
 #if PACKAGE_VERSION_NUMBER >= 369
   return ASC_createAssociationParameters(parameters, ASC_DEFAULTMAXPDU, dcmConnectionTimeout.get());
@@ -47,7 +48,7 @@ DimseEnd end_of(const OFCondition& condition) {
   return DimseEnd::kUnreadable;
 }
 
-// The object's own form, and the one that every peer has to know.
+// Proposes the object's own transfer syntax and the default one that every peer must support.
 OFCondition propose(const process::DimseSending& order, T_ASC_Parameters* parameters) {
   std::array<const char*, 1> own = {UID_LittleEndianExplicitTransferSyntax};
   std::array<const char*, 1> plain = {UID_LittleEndianImplicitTransferSyntax};

@@ -1,4 +1,4 @@
-// C-STORE as a user of the service (PS3.4, B): one object, over an association of its own.
+// Service class user of C-STORE (PS3.4, B): sends one object over its own association.
 #pragma once
 
 #include "server/process/dimse_message.h"

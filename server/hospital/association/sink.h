@@ -1,4 +1,3 @@
-// A file that an object is written to as it comes.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +11,13 @@
 
 namespace isomesh::association {
 
-// What cannot be written is passed over, so that the rest of the object is read from the connection
-// and its sender can be told why it is not stored; DCMTK's own file would end the association.
+// Continues after write errors, so that the rest of the object is read from the connection and the
+// sender gets a status. DCMTK's own file output would end the association.
 class FileSink : public DcmConsumer {
  public:
-  // At most that many bytes are written.
+  // Writes at most that many bytes.
   FileSink(const std::filesystem::path& path, std::uint64_t most_bytes);
 
-  // Whether something could not be written.
   bool has_failed() const { return has_failed_; }
 
   OFBool good() const override { return OFTrue; }
@@ -37,7 +35,7 @@ class FileSink : public DcmConsumer {
   bool has_failed_ = false;
 };
 
-// The same as DCMTK writes to it.
+// A stream of DCMTK that writes to a FileSink.
 class FileStream : public DcmOutputStream {
  public:
   explicit FileStream(FileSink& sink) : DcmOutputStream(&sink) {}

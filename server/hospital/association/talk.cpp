@@ -57,8 +57,8 @@ process::DimseVerdict hear_verdict() {
 
 }  // namespace isomesh::association
 
-// DCMTK makes the connections of its associations itself. This process may make none: it has the
-// one that the daemon has made, and DCMTK is given that wherever it asks for a socket to connect.
+// DCMTK opens its own connections, but this process may not open any. These functions replace those
+// of the C library, and give DCMTK the daemon's connection whenever it connects a socket.
 extern "C" {
 
 int socket(int, int, int) noexcept { return ::dup(isomesh::association::peer_socket()); }

@@ -1,4 +1,4 @@
-// What the program and the daemon say to each other, and the one connection that it has to a peer.
+// Messages between the program and the daemon, and the connection to the peer.
 #pragma once
 
 #include <string>
@@ -8,17 +8,16 @@
 
 namespace isomesh::association {
 
-// Its first line from the daemon, with which the connection to the peer has come. Empty when the
-// daemon has no use for this process any more.
+// The first line from the daemon, which also passes the peer's connection. Empty if the daemon no
+// longer needs this process.
 std::string read_order();
 
-// The descriptor of that connection.
 int peer_socket();
 
-// Ends the process when the daemon has closed its end.
+// Ends the process if the daemon has closed its socket.
 void say(std::string_view line);
 
-// What the daemon says of the object that it was told of last. Ends the process as say() does.
+// The daemon's verdict on the object reported last. Ends the process as say() does.
 process::DimseVerdict hear_verdict();
 
 }  // namespace isomesh::association

@@ -24,7 +24,7 @@ constexpr Code kStudyUid = {"110180", "DCM", "Study Instance UID"};
 constexpr Code kSopClassUid = {"110181", "DCM", "SOP Class UID"};
 constexpr Code kPatientNumber = {"2", "RFC-3881", "Patient Number"};
 
-// What a query for instances of a series is called in the older service (PS3.4, C.6.2).
+// SOP class of a query for the instances of a series (PS3.4, C.6.2).
 constexpr std::string_view kStudyRootFind = "1.2.840.10008.5.1.4.1.2.2.1";
 
 std::string text_of(const Entry& entry, const char* name) {
@@ -48,7 +48,7 @@ std::string participant(std::string_view user, bool is_requestor, const Code* ro
   return head + '>' + coded("RoleIDCode", *role) + "</ActiveParticipant>";
 }
 
-// Types and roles: PS3.15, table A.5-1.
+// Types and roles of objects: PS3.15, table A.5-1.
 std::string object(std::string_view id, std::string_view type, std::string_view role,
                    const Code& kind, const std::string& content) {
   return "<ParticipantObjectIdentification" + attribute("ParticipantObjectID", id) +
@@ -91,7 +91,6 @@ Event event_of(const std::string& code) {
   throw Error(ErrorCode::kInternal, "an entry of the audit trail has an unknown event");
 }
 
-// Who took part in it, and what it was about.
 struct Content {
   std::string participants;
   std::string objects = {};
@@ -129,7 +128,7 @@ std::string audit_message(std::string_view text, const AuditSource& source) {
     const std::string code = entry.at("event").get<std::string>();
     const Event event = event_of(code);
     const bool is_success = entry.at("outcome") == "success";
-    // A serious failure is one that what was begun cannot go on after; these are tried again.
+    // A failure is serious only if the operation cannot continue; these operations are retried.
     const Content content = content_of(entry, code, source);
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?><AuditMessage><EventIdentification" +
            attribute("EventActionCode", event.action) +
@@ -147,7 +146,7 @@ std::string audit_message(std::string_view text, const AuditSource& source) {
 }
 
 std::string syslog_frame(std::string_view entry, const AuditSource& source) {
-  // Facility 10, security; severity 5, notice. The message is UTF-8, which the mark before it says.
+  // Facility 10 (security), severity 5 (notice). The byte order mark announces UTF-8.
   const std::string time = Entry::parse(entry).at("at").get<std::string>();
   const std::string message = "<85>1 " + time + ' ' + source.host + " isomeshd " +
                               std::to_string(source.process) + " DICOM+RFC3881 - \xEF\xBB\xBF" +

@@ -1,5 +1,5 @@
-// Entries of the audit trail as others take them: an AuditMessage (DICOM PS3.15, A.5) in a message
-// of syslog (RFC 5424), as IHE ITI-20 asks for. Pure functions.
+// Formats entries of the audit trail for collectors: an AuditMessage (DICOM PS3.15, A.5) in a
+// syslog message (RFC 5424), as IHE ITI-20 requires. Pure functions.
 #pragma once
 
 #include <string>
@@ -7,17 +7,17 @@
 
 namespace isomesh::audit {
 
-// Whose trail it is.
 struct AuditSource {
   std::string station;  // AuditSourceID
   std::string host;     // HOSTNAME of syslog
   long process = 0;     // PROCID
 };
 
-// The XML of an entry, as AuditTrail::read gives it. Throws Error kInternal when it is none.
+// The XML of an entry as AuditTrail::read returns it. Throws Error kInternal if the entry is
+// invalid.
 std::string audit_message(std::string_view entry, const AuditSource& source);
 
-// The same as a message of syslog behind its length, as it goes over TLS (RFC 5425, 4.3).
+// As a syslog message preceded by its length, the framing for TLS (RFC 5425, 4.3).
 std::string syslog_frame(std::string_view entry, const AuditSource& source);
 
 }  // namespace isomesh::audit

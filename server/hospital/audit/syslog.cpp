@@ -17,10 +17,10 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kTimeout{10};
-constexpr milliseconds kLook{500};  // for new entries
+constexpr milliseconds kLook{500};  // interval between checks for new entries
 constexpr milliseconds kLongestPause{60'000};
-constexpr milliseconds kLastWord{2'000};  // to send the end of the service
-// After so many the mark is set, or all would be sent again after a break.
+constexpr milliseconds kLastWord{2'000};  // time to send the entry about the end of the service
+// The mark is set after this many entries, to limit repetition after a lost connection.
 constexpr std::size_t kMostUnmarked = 100;
 
 std::uint64_t number_of(std::string_view entry) {

@@ -10,33 +10,33 @@
 
 namespace isomesh::audit {
 
-// The trail itself is what waits while the collector cannot be reached: it is on the disk, and in
-// it is marked how far the collector has had it. Syslog acknowledges nothing, so the mark is set
-// when the collector's machine has confirmed all bytes of an entry; after a crash or a connection
-// that broke, some entries may come twice, with the same numbers.
+// While the collector is unreachable, entries wait in the trail itself, which is on disk and
+// records how far the collector has received it. Syslog has no acknowledgements, so that mark is
+// set when the collector's TCP has confirmed all bytes of an entry. After a crash or a lost
+// connection some entries may be sent twice, with the same numbers.
 class SyslogSender {
  public:
-  // Begins to send. What it is made of must outlive it.
+  // Starts sending. The trail must outlive this object.
   SyslogSender(store::AuditTrail& trail, TlsServer server, AuditSource source);
   // As stop().
   ~SyslogSender() { stop(); }
   SyslogSender(const SyslogSender&) = delete;
   SyslogSender& operator=(const SyslogSender&) = delete;
 
-  // Sends what there is, unless that takes long, and ends.
+  // Sends the remaining entries, for a short time at most, and ends.
   void stop();
 
  private:
   void run(const std::stop_token& stop);
-  // All entries after the mark. Throws Error when the collector does not take them.
+  // Sends all entries after the mark. Throws Error if the collector does not accept them.
   void send_new(const std::stop_token& stop);
 
   store::AuditTrail& trail_;
   const TlsServer server_;
   const AuditSource source_;
-  std::unique_ptr<TlsClient> connection_;  // used by the thread alone; null: none
-  std::stop_source cut_;                   // ends what waits for the collector
-  std::jthread thread_;                    // last: runs on all of the above
+  std::unique_ptr<TlsClient> connection_;  // used by the thread only; null: not connected
+  std::stop_source cut_;                   // aborts waiting for the collector
+  std::jthread thread_;                    // last: uses all other members
 };
 
 }  // namespace isomesh::audit

@@ -50,7 +50,7 @@ struct TlsClient::Session {
     if (is_address(server.host)) {
       X509_VERIFY_PARAM_set1_ip_asc(parameters, server.host.c_str());
     } else {
-      // As the macro SSL_set_tlsext_host_name does, which casts in C's way.
+      // As the macro SSL_set_tlsext_host_name, which has a C cast.
       std::string name = server.host;
       SSL_ctrl(ssl.get(), SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name, name.data());
       X509_VERIFY_PARAM_set1_host(parameters, server.host.c_str(), server.host.size());
@@ -100,7 +100,7 @@ TlsClient::~TlsClient() {
 }
 
 bool TlsClient::is_open() {
-  // What a server sends is of TLS itself, such as tickets; it is taken without waiting for more.
+  // The server sends only TLS records such as tickets. They are read without waiting for more.
   ::fcntl(socket_.number(), F_SETFL, O_NONBLOCK);
   char byte = 0;
   const int count = SSL_read(session_->ssl.get(), &byte, 1);
@@ -128,7 +128,7 @@ void TlsClient::await_receipt() {
     if (std::chrono::steady_clock::now() >= deadline || stop_.stop_requested()) throw_lost();
     std::this_thread::sleep_for(kLookForReceipt);
   }
-  // A connection that was reset has nothing unsent either.
+  // A reset connection has no unsent bytes either.
   if (unsent != 0 || !is_open()) throw_lost();
 }
 

@@ -1,4 +1,4 @@
-// A connection to a server over TLS, for what is only sent.
+// A TLS connection to a server, for sending only.
 #pragma once
 
 #include <chrono>
@@ -17,29 +17,29 @@ struct TlsServer {
   std::string host;
   std::uint16_t port = 0;
   std::filesystem::path authorities;  // PEM; empty: the system's
-  std::filesystem::path certificate;  // ours; empty: none
+  std::filesystem::path certificate;  // client certificate; empty: none
   std::filesystem::path key;
 };
 
 // Not thread safe.
 class TlsClient {
  public:
-  // Connects, by TLS 1.2 or newer, to a server whose certificate is for its name. Everything may
-  // take `timeout`. Throws Error kUnreachable, kRequestTimeout, kInvalidParameter for files that
-  // cannot be read, and kCancelled when `stop` is requested.
+  // Connects by TLS 1.2 or newer, and verifies that the certificate is for the server's name.
+  // `timeout` limits each operation. Throws Error kUnreachable; kRequestTimeout; kInvalidParameter
+  // if a file cannot be read; kCancelled if `stop` is requested.
   TlsClient(const TlsServer& server, std::chrono::seconds timeout, const std::stop_token& stop);
   ~TlsClient();
   TlsClient(const TlsClient&) = delete;
   TlsClient& operator=(const TlsClient&) = delete;
 
-  // False when the server has ended the connection.
+  // False once the server has closed the connection.
   bool is_open();
 
   // Throws Error kUnreachable.
   void send(std::string_view bytes);
 
-  // Returns when the server's machine has all that was sent. Throws Error kUnreachable when it has
-  // not within the timeout.
+  // Returns when the server's TCP has confirmed all sent bytes. Throws Error kUnreachable if that
+  // takes longer than the timeout.
   void await_receipt();
 
  private:

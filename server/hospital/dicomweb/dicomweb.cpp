@@ -17,12 +17,12 @@ using process::PeersObject;
 
 constexpr std::uint64_t kMostAnswerBytes = std::uint64_t{64} << 20;
 constexpr const char* kDicomJson = "application/dicom+json";
-// Optional attributes of a series and of a study that are asked for.
+// Optional attributes to include in results about series and studies.
 constexpr const char* kSeriesFields =
     "includefield=00201209&includefield=00080060&includefield=0008103E";
 constexpr const char* kPatientField = "includefield=00100020";
 
-// Throws where the status says that there is no answer of the kind that was asked for.
+// Throws unless the status promises a response of the requested kind.
 void check_status(const PeerAnswerHead& head) {
   const int status = head.status;
   if (status >= 200 && status < 300) return;
@@ -42,7 +42,7 @@ FoundSeries series_of(const PeersObject& object) {
           .instances = object.instances};
 }
 
-// What is asked for as a value stays one value.
+// Escapes a value for a query.
 std::string in_query(std::string_view text) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string encoded;
@@ -59,7 +59,7 @@ std::string in_query(std::string_view text) {
   return encoded;
 }
 
-// The texts around an object, and the object, as one stream.
+// The multipart body of an object as one stream.
 class MultipartBody {
  public:
   MultipartBody(std::string before, const orders::OutgoingObject& object, std::string after)
@@ -103,7 +103,7 @@ bool names(const std::vector<PeersObject>& objects, const std::string& instance)
   return std::ranges::find(objects, instance, &PeersObject::instance) != objects.end();
 }
 
-// What the PACS says of why it did not store the object (PS3.18, table I.2-2).
+// Throws the reason given by the PACS for not storing the object (PS3.18, table I.2-2).
 [[noreturn]] void throw_not_stored(std::optional<std::uint16_t> reason) {
   constexpr std::uint16_t kOutOfResources = 0xA700;
   const std::string said =
@@ -131,7 +131,7 @@ std::vector<PeersObject> DicomWeb::search(const std::string& target, const std::
                                           .answer = answer.path(),
                                           .most_bytes = kMostAnswerBytes},
                                          stop);
-  if (head.status == kNotFound) return {};  // some say so of what is not there
+  if (head.status == kNotFound) return {};  // some PACS respond so if nothing is found
   check_status(head);
   return read_answer_(answer.path()).objects;
 }
@@ -153,8 +153,8 @@ std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
       }
       if (known.insert(object.*name).second) all.push_back(object);
     }
-    // A PACS that knows no pages sends everything each time, and some send at most fewer than was
-    // asked for: only a page without anything new is the end.
+    // A PACS without paging returns everything each time, and some return smaller pages than
+    // requested. So only a page without new objects is the end.
     if (known.size() == before) return all;
   }
   throw Error(ErrorCode::kTooLarge, "the PACS found more than " + std::to_string(kMost) +
@@ -233,7 +233,7 @@ std::optional<bool> DicomWeb::has_instance(const orders::InstancePlace& place,
 }
 
 void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
-  // Random, so that no mesh holds it: a PACS would take what is before it for the whole object.
+  // Random, so that no mesh contains it: a PACS would truncate the object there.
   constexpr std::size_t kBoundaryBytes = 24;
   const std::string boundary = random_hex(kBoundaryBytes);
   MultipartBody multipart("--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n", object,
@@ -249,7 +249,7 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
                                           .answer = answer.path(),
                                           .most_bytes = kMostAnswerBytes},
                                          stop);
-  constexpr int kConflict = 409;  // with the reason in the body
+  constexpr int kConflict = 409;  // the body has the reason
   if (head.status != kConflict) check_status(head);
   const process::PeersAnswer said = read_answer_(answer.path());
   const std::string& instance = object.place.instance;

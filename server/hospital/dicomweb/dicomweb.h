@@ -1,4 +1,4 @@
-// A PACS by DICOMweb (PS3.18): QIDO-RS, WADO-RS and STOW-RS.
+// A PACS accessed by DICOMweb (PS3.18): QIDO-RS, WADO-RS and STOW-RS.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +10,12 @@
 
 namespace isomesh::dicomweb {
 
-// Reads what a PACS has answered, somewhere where that does no harm: see
-// jobs::ImportRunner::read_answer.
+// Parses a PACS response in a confined process: see jobs::ImportRunner::read_answer.
 using AnswerReader = std::function<process::PeersAnswer(const std::filesystem::path& file)>;
 
 class DicomWeb : public orders::Pacs {
  public:
-  // `scratch` is a folder for answers; a series may have so many bytes.
+  // `scratch` is a folder for responses; the limit of bytes applies to one series.
   DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
            std::uint64_t most_series_bytes, AnswerReader read_answer);
 
@@ -38,9 +37,9 @@ class DicomWeb : public orders::Pacs {
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:
-  // One page of what a search finds.
+  // Returns one page of results.
   std::vector<process::PeersObject> search(const std::string& target, const std::stop_token& stop);
-  // All pages; `name` is what is to be there once.
+  // Returns the objects of all pages, each once; `name` is the member that identifies an object.
   std::vector<process::PeersObject> search_all(const std::string& target,
                                                std::string process::PeersObject::*name,
                                                const std::stop_token& stop);

@@ -16,7 +16,7 @@ namespace {
 using orders::PacsFailure;
 using orders::PacsFault;
 
-// A secret of one line.
+// Reads a secret of one line.
 std::string secret_in(const std::filesystem::path& file) {
   std::string secret;
   try {
@@ -31,7 +31,6 @@ std::string secret_in(const std::filesystem::path& file) {
   return secret;
 }
 
-// A request under way.
 class Exchange {
  public:
   Exchange(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)
@@ -69,8 +68,8 @@ class Exchange {
     curl::connect_directly(easy, settings.ca_file);
     const auto timeout = static_cast<long>(settings.timeout.count());
     curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT, timeout);
-    // Slow is not bad: only what stands still is given up. A PACS is silent while it stores what it
-    // was sent, the longer the more that was.
+    // A slow PACS is not an error; only one without progress is given up. A PACS sends nothing
+    // while it stores an object, so larger objects get more time.
     constexpr std::uint64_t kStoredPerSecond = std::uint64_t{4} << 20;
     const std::uint64_t sent = request_.body == nullptr ? 0 : request_.body->bytes;
     curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
@@ -141,7 +140,7 @@ class Exchange {
   const Descriptor target_;
   std::uint64_t received_ = 0;
   curl::Headers headers_;
-  const curl::Easy easy_;  // last: knows all of the above
+  const curl::Easy easy_;  // last: has pointers to the members above
 };
 
 }  // namespace

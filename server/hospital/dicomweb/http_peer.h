@@ -1,4 +1,4 @@
-// One request to a PACS over HTTP. Nothing of the answer's body is looked at here.
+// One HTTP request to a PACS. Does not parse the response's body.
 #pragma once
 
 #include <cstdint>
@@ -13,25 +13,24 @@
 
 namespace isomesh::dicomweb {
 
-// A body that is sent.
 struct RequestBody {
   std::string content_type;
   std::uint64_t bytes = 0;
-  // Fills the buffer as far as there is something left; returns how much.
+  // Fills the buffer with the next bytes; returns their number, 0 at the end.
   std::function<std::size_t(std::span<std::byte> buffer)> read;
 };
 
 struct PeerRequest {
-  std::string target;  // path and query below the PACS' address
+  std::string target;  // path and query, relative to the PACS' address
   std::string accept;
   const RequestBody* body = nullptr;  // null: a GET
-  std::filesystem::path answer;       // the file that the answer's body is written to
-  std::uint64_t most_bytes = 0;       // of it
+  std::filesystem::path answer;       // the file for the response's body
+  std::uint64_t most_bytes = 0;       // limit of the response's body
 };
 
 struct PeerAnswerHead {
   int status = 0;
-  std::string content_type;  // printable; as the PACS wrote it
+  std::string content_type;  // as sent by the PACS; printable characters only
   std::chrono::seconds retry_after{0};
 };
 
@@ -40,9 +39,9 @@ class HttpPeer {
  public:
   explicit HttpPeer(const orders::PacsSettings& settings) : settings_(settings) {}
 
-  // Throws PacsFailure kUnreachable or kTimeout, kUnauthorized when the file of the password or
-  // token cannot be read, Error kTooLarge when the answer has more than most_bytes, kOutOfSpace,
-  // and kCancelled when `stop` is requested.
+  // Throws PacsFailure kUnreachable or kTimeout; kUnauthorized if the file of the password or token
+  // cannot be read; Error kTooLarge if the response has more than most_bytes; kOutOfSpace;
+  // kCancelled if `stop` is requested.
   PeerAnswerHead send(const PeerRequest& request, const std::stop_token& stop) const;
 
  private:

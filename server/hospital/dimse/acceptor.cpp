@@ -22,16 +22,18 @@ namespace {
 constexpr int kMostEvents = 128;
 constexpr int kTickMilliseconds = 100;
 constexpr int kMostAcceptedAtOnce = 64;
-// What epoll calls the two that are no connections; those have higher numbers.
+// Identifiers in epoll of the two descriptors that are not peers' connections; those have greater
+// ones.
 constexpr std::uint64_t kListening = 0;
 constexpr std::uint64_t kWakeup = 1;
 
-// Every PDU begins with its kind, a reserved byte and the length of the rest (PS3.8, 9.3.1).
+// Every PDU starts with its type, a reserved byte and the length of the rest (PS3.8, 9.3.1).
 constexpr std::size_t kHeadBytes = 6;
 constexpr unsigned char kAssociateRequest = 1;
-// Longer than 128 presentation contexts with all transfer syntaxes.
+// More than 128 presentation contexts with all transfer syntaxes need.
 constexpr std::uint32_t kLongestRequest = 1U << 20;
-// Of a longer request the rest is read by the association: a socket does not buffer all of it.
+// A longer request is begun when this much has arrived, because a socket does not buffer all of it.
+// The association reads the rest.
 constexpr std::uint32_t kEnough = 32 * 1024;
 
 std::string address_of(const sockaddr_storage& peer) {
@@ -46,9 +48,9 @@ std::string address_of(const sockaddr_storage& peer) {
                                                                                    : text.data();
 }
 
-enum class Arrival { kPartly, kWhole, kNone };  // kNone: it will not become a request
+enum class Arrival { kPartly, kWhole, kNone };  // kNone: will not become a request
 
-// Takes nothing away from what has come.
+// Peeks without consuming received bytes.
 Arrival arrival_of(int peer) {
   std::array<unsigned char, kHeadBytes> head = {};
   const ssize_t count = ::recv(peer, head.data(), head.size(), MSG_PEEK | MSG_DONTWAIT);
@@ -123,12 +125,13 @@ void AssociationAcceptor::accept_some() {
   for (int n = 0; n < kMostAcceptedAtOnce && !stopping_; ++n) {
     sockaddr_storage from = {};
     socklen_t size = sizeof from;
-    // It blocks, as the association expects.
+    // Blocking, as the association expects.
     Descriptor peer(::accept4(listening_, reinterpret_cast<sockaddr*>(&from), &size, SOCK_CLOEXEC));
     if (peer.number() >= 0) {
       add(std::move(peer), net::party_of(address_of(from)));
     } else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-      // The oldest gives up its descriptor. Where there is none, others hold them all.
+      // Closing the oldest pending connection frees a descriptor. If there is none, the descriptors
+      // are used elsewhere.
       if (!make_room("")) std::this_thread::sleep_for(std::chrono::milliseconds(10));
       return;
     } else if (errno != ECONNABORTED && errno != EINTR) {
@@ -145,7 +148,7 @@ void AssociationAcceptor::add(Descriptor peer, std::string party) {
                          .place = places_.take(party),
                          .is_whole = false,
                          .deadline = Clock::now() + limits_.request_time};
-      // Edges, because what has come stays in the socket.
+      // Edge-triggered, because received bytes stay in the socket.
       watch(epoll_.number(), peer.number(), EPOLLIN | EPOLLRDHUP | EPOLLET, pending.id);
       pending.request = {.peer = std::move(peer), .party = std::move(party)};
       pending_.push_back(std::move(pending));
@@ -158,7 +161,8 @@ void AssociationAcceptor::add(Descriptor peer, std::string party) {
   }
 }
 
-// Of that party, or of all for "". False when all requests have come.
+// Closes the oldest pending connection of that party, or of all for "". Returns false if all their
+// requests have arrived.
 bool AssociationAcceptor::make_room(const std::string& party) {
   const auto oldest = std::ranges::find_if(pending_, [&](const Pending& pending) {
     return !pending.is_whole && (party.empty() || pending.request.party == party);

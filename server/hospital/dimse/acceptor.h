@@ -1,5 +1,5 @@
-// Accepts the connections of peers and keeps each until its association request has come, all on
-// one thread, so that a peer that is slow or silent holds no place of an association.
+// Accepts connections and keeps each until its association request has arrived. One thread serves
+// all, so a slow or silent peer occupies no place of an association.
 #pragma once
 
 #include <atomic>
@@ -18,43 +18,43 @@
 
 namespace isomesh::dimse {
 
-// A connection whose association request (PS3.8, A-ASSOCIATE-RQ) has come and is not read yet.
+// A connection whose association request (PS3.8, A-ASSOCIATE-RQ) has arrived but is not read yet.
 struct AssociationRequest {
   Descriptor peer = Descriptor();
   std::string party;  // net::party_of its address
 };
 
 struct AcceptorLimits {
-  std::size_t most_pending = 128;                 // connections, shared by address (FairPlaces)
-  std::chrono::milliseconds request_time{5'000};  // from the connection to the whole request
-  std::chrono::milliseconds wait_time{60'000};    // from then on, for a place
+  std::size_t most_pending = 128;                 // connections; addresses share them (FairPlaces)
+  std::chrono::milliseconds request_time{5'000};  // from accepting to the complete request
+  std::chrono::milliseconds wait_time{60'000};    // for a place, from the complete request on
 };
 
 class AssociationAcceptor {
  public:
-  // Takes the request and returns true, or leaves it to wait. Must not block. Called by the
-  // acceptor's thread, for each that waits: the oldest first, and all of them again soon.
+  // Takes the request and returns true, or leaves it waiting and returns false. Must not block. The
+  // acceptor's thread calls it for each waiting request, oldest first, and repeats that soon.
   using Begin = std::function<bool(AssociationRequest& request)>;
 
-  // `listening` is a listening socket, which stays the caller's and is made non-blocking. Where
-  // there is no room for a further connection, the oldest makes room whose request has not come,
-  // and else the new one is closed. Begins at once.
+  // `listening` is a listening socket; it stays the caller's, and is made non-blocking. If there is
+  // no place for another connection, closes the oldest one whose request is incomplete, or else the
+  // new one. Starts at once.
   AssociationAcceptor(int listening, const AcceptorLimits& limits, Begin begin);
   ~AssociationAcceptor() { stop(); }  // as stop()
   AssociationAcceptor(const AssociationAcceptor&) = delete;
   AssociationAcceptor& operator=(const AssociationAcceptor&) = delete;
 
-  // There may be a place for requests that wait. Thread safe.
+  // Call when places may be free for waiting requests. Thread safe.
   void wake() { wakeup_.ring(); }
 
-  // Closes all connections that no association was begun for. Thread safe.
+  // Closes all connections without an association. Thread safe.
   void stop();
 
  private:
   using Clock = std::chrono::steady_clock;
 
   struct Pending {
-    std::uint64_t id = 0;  // to epoll
+    std::uint64_t id = 0;  // identifier in epoll
     AssociationRequest request;
     net::FairPlaces::Place place;
     bool is_whole = false;
@@ -78,11 +78,11 @@ class AssociationAcceptor {
   net::Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;
   net::FairPlaces places_;
-  // Only the acceptor's thread touches the next three.
+  // Used by the acceptor's thread only, as are the next two members.
   PendingList pending_;  // oldest first
   std::unordered_map<std::uint64_t, PendingList::iterator> by_id_;
   std::uint64_t last_id_;
-  std::jthread thread_;  // declared last, so that it ends before what it uses
+  std::jthread thread_;  // last: uses the other members
 };
 
 }  // namespace isomesh::dimse

@@ -11,7 +11,7 @@ using orders::PacsFailure;
 using orders::PacsFault;
 using process::DimseEnd;
 
-// One answer is some bytes; a peer may be slow, as long as something moves.
+// A response has a few bytes. A peer may be slow as long as it makes progress.
 constexpr std::size_t kMostAnswerBytes = 4096;
 constexpr std::chrono::hours kLongest{24};
 
@@ -22,11 +22,11 @@ std::string hex_of(std::uint16_t status) {
   return text;
 }
 
-// What the status of a C-STORE response says (PS3.4, table B.2-1, and PS3.7, C).
+// Interprets the status of a C-STORE response (PS3.4, table B.2-1, and PS3.7, C).
 void check_stored(std::uint16_t status) {
   const int high_byte = status >> 8;
   const int high_nibble = status >> 12;
-  // A warning is of what was stored all the same.
+  // A warning means that the object was stored.
   constexpr int kWarning = 0xB;
   if (status == 0 || high_nibble == kWarning) return;
   const std::string said = "the PACS did not store the mesh; its status is " + hex_of(status);
@@ -35,7 +35,7 @@ void check_stored(std::uint16_t status) {
   if (high_byte == kDoesNotMatch || high_nibble == kCannotUnderstand) {
     throw PacsFailure(PacsFault::kRefused, said);
   }
-  // Out of resources, or refused for a reason that an operator may take away.
+  // Out of resources, or refused for a reason that an operator may remove.
   throw PacsFailure(PacsFault::kBusy, said);
 }
 
@@ -125,7 +125,7 @@ std::optional<bool> CStore::has_instance(const orders::InstancePlace& place,
 }
 
 void CStore::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
-  // As over DICOMweb: a second more for each 4 MiB that it is to store.
+  // As for DICOMweb: one more second for each 4 MiB to store.
   constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
   const process::DimseSending order = {
       .calling = settings_.calling_aet,

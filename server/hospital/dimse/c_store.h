@@ -1,4 +1,4 @@
-// A PACS that objects are sent to by C-STORE (PS3.4, B).
+// A PACS that receives objects by C-STORE (PS3.4, B).
 #pragma once
 
 #include <memory>
@@ -8,11 +8,11 @@
 
 namespace isomesh::dimse {
 
-// Sends by DIMSE; everything else is asked over DICOMweb, where the PACS has that.
+// Sends by DIMSE. Uses DICOMweb for everything else, if the PACS has it.
 class CStore : public orders::Pacs {
  public:
-  // `web` is null for a PACS that is only sent to. `processes` are of isomesh-dimse, and must
-  // outlive it.
+  // `web` is null for a PACS that only receives. `processes` run isomesh-dimse and must outlive
+  // this object.
   CStore(const orders::PacsSettings& settings, std::unique_ptr<orders::Pacs> web,
          process::PreparedProcesses& processes)
       : settings_(settings), web_(std::move(web)), processes_(processes) {}
@@ -35,7 +35,7 @@ class CStore : public orders::Pacs {
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:
-  // Throws PacsFailure kRefused when there is no DICOMweb.
+  // Throws PacsFailure kRefused if there is no DICOMweb.
   orders::Pacs& web() const;
 
   const orders::PacsSettings settings_;

@@ -23,16 +23,16 @@ using process::DimseRefusal;
 using process::DimseVerdict;
 using Clock = std::chrono::steady_clock;
 
-// From one object to the next, or to the end: longer than any object takes, and not for ever.
+// Limit of the time between two objects, or to the end; longer than any object takes.
 constexpr std::chrono::minutes kLongestObject{30};
 constexpr std::size_t kLongestLine = 4096;
 
-// What a process says, line by line.
+// Reads the lines that a process sends.
 class Lines {
  public:
   explicit Lines(const process::Child& child) : child_(child) {}
 
-  // Empty when it has ended, says too much or nothing for too long, or `stop` is requested.
+  // Empty if the process has ended, sends too much or nothing for too long, or `stop` is requested.
   std::string next(const std::stop_token& stop) {
     const auto deadline = Clock::now() + kLongestObject;
     std::size_t end = std::string::npos;
@@ -71,7 +71,7 @@ net::Address listen_address(const orders::DimseSettings& settings) {
     net::Address address = net::parse_address(settings.listen);
     if (!address.is_unix()) return address;
   } catch (const Error&) {
-    // It is told below, by the name that this file has for it.
+    // Reported below, with the key of the configuration file.
   }
   throw invalid_parameter("dimse.listen", "must be HOST:PORT");
 }
@@ -116,7 +116,8 @@ bool DimseListener::begin(AssociationRequest& request) {
   }
 }
 
-// Among those of that party, or of all for "". One at a time: it takes a moment to end.
+// Ends the association of that party (of all for "") that has been idle longest. Ends one at a
+// time, because ending takes a moment.
 void DimseListener::make_room(const std::string& party) {
   const Lock lock(mutex_);
   Association* idlest = nullptr;
@@ -133,12 +134,13 @@ void DimseListener::make_room(const std::string& party) {
   if (idlest != nullptr) idlest->end.request_stop();
 }
 
-// Sets for how long neither side has sent anything.
+// Returns true if the association counts as idle; sets `idle` to the time since either side sent
+// something.
 bool DimseListener::is_idle(const Association& association, std::chrono::milliseconds& idle) {
-  // A sender has what it sends first when it begins, and may need longer to read the next object.
+  // A sender has its first object ready when it begins, but may need longer to read the next one.
   constexpr std::chrono::seconds kBeforeTheFirst{1};
   constexpr std::chrono::seconds kBetween{10};
-  // From when it has begun until the peer hears of that: our time, not the peer's.
+  // The time from the start until the peer gets our response; it is our delay, not the peer's.
   constexpr std::chrono::seconds kUnanswered{5};
   const Clock::time_point told = association.told;
   if (told == Clock::time_point() || association.is_storing) return false;
@@ -212,7 +214,8 @@ void DimseListener::serve_association(Association& association) {
     association.is_storing = false;
   }
   if (stop.stop_requested()) return;
-  // It neither ended well nor did it say why: what it has read may be the reason.
+  // The process ended abnormally, perhaps because of its input, so the prepared copies are replaced
+  // too.
   services_.processes.renew();
   log_error("the process of an association ended {}",
             process::how_it_ended(child.ended_within(std::chrono::seconds(2))));
@@ -239,7 +242,8 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
   }
 }
 
-// At most once a second: whoever may connect could fill the trail, which nobody can empty.
+// At most once a second: otherwise anybody who can connect could fill the trail, which cannot be
+// emptied.
 void DimseListener::note_end(const DimseEnded& ended) {
   if (ended.refusal != DimseRefusal::kCalled && ended.refusal != DimseRefusal::kCalling) return;
   {

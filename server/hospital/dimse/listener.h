@@ -1,4 +1,4 @@
-// Takes series that peers send by C-STORE.
+// Receives series that peers send by C-STORE.
 #pragma once
 
 #include <atomic>
@@ -28,31 +28,31 @@ namespace isomesh::dimse {
 // Throws Error kInvalidParameter, field "dimse.listen".
 net::Address listen_address(const orders::DimseSettings& settings);
 
-// What it needs of everything else, which must outlive it.
+// Dependencies of the listener, which must outlive it.
 struct ListenerServices {
   const store::DataFolder& folder;
   const store::BlobStore& blobs;
   store::ReceivedStore& received;
   store::AuditTrail& audit;
-  process::PreparedProcesses& processes;  // of isomesh-dimse
+  process::PreparedProcesses& processes;  // running isomesh-dimse
 };
 
-// Listens from its making on. Each association has a thread here, which does not look at what the
-// peer sends, and a confined process, which does. An object is acknowledged when it is a blob on
-// the disk that a record names.
+// Listens as soon as it is constructed. Each association has a thread, which does not parse the
+// peer's bytes, and a confined process, which does. An object is acknowledged once it is a blob on
+// disk that a record names.
 //
-// Addresses share the associations (FairPlaces). Where there is no place for one more, the one that
-// has been idle for the longest time ends, if that is long enough.
+// Addresses share the associations (FairPlaces). If there is no place for another one, the
+// association that has been idle longest ends, if that is long enough.
 class DimseListener {
  public:
-  // Throws Error kInvalidParameter or kUnavailable when it cannot listen there.
+  // Throws Error kInvalidParameter, or kUnavailable if it cannot listen on the address.
   DimseListener(const ListenerServices& services, const orders::DimseSettings& settings);
   // Ends the associations.
   ~DimseListener() { stop(); }
   DimseListener(const DimseListener&) = delete;
   DimseListener& operator=(const DimseListener&) = delete;
 
-  // HOST:PORT, with the port that was found.
+  // HOST:PORT with the actual port.
   std::string authority() const { return listener_.authority(); }
 
   void stop();
@@ -63,9 +63,10 @@ class DimseListener {
     std::string party;
     net::FairPlaces::Place place;
     std::stop_source end = {};
-    std::atomic<bool> has_sent = false;    // an object
-    std::atomic<bool> is_storing = false;  // which the peer waits for
-    // When its process began, or an object was stored last; then it is the peer's turn.
+    std::atomic<bool> has_sent = false;    // at least one object
+    std::atomic<bool> is_storing = false;  // the peer waits for that
+    // When its process started or last stored an object; from then on the peer's next message is
+    // awaited.
     std::atomic<std::chrono::steady_clock::time_point> told = {};
   };
 
@@ -86,11 +87,11 @@ class DimseListener {
   net::FairPlaces places_;
   Mutex mutex_;
   Condition changed_;
-  // All that have begun, and those of them that no thread has taken yet.
+  // All open associations, and those that no thread has taken yet.
   std::vector<std::shared_ptr<Association>> open_ ISOMESH_GUARDED_BY(mutex_);
   std::deque<std::shared_ptr<Association>> ready_ ISOMESH_GUARDED_BY(mutex_);
   std::chrono::steady_clock::time_point next_note_ ISOMESH_GUARDED_BY(mutex_);
-  // Last: they run on all of the above.
+  // Last: its thread and these use the other members.
   AssociationAcceptor acceptor_;
   std::vector<std::jthread> threads_;
 };

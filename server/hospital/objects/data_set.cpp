@@ -17,7 +17,7 @@ void append_tag(Tag tag, std::string& text) {
   append_number(tag & 0xffff, 2, text);
 }
 
-// Those whose length has 32 bits.
+// Value representations with a 32-bit length.
 bool is_long(std::string_view vr) {
   constexpr std::array<std::string_view, 5> kLong = {"OB", "OW", "SQ", "UN", "UT"};
   return std::ranges::find(kLong, vr) != kLong.end();

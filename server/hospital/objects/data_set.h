@@ -1,4 +1,4 @@
-// Data sets to be written, in Explicit VR Little Endian (PS3.5, 7).
+// Writes data sets in Explicit VR Little Endian (PS3.5, 7).
 #pragma once
 
 #include <cstdint>
@@ -12,20 +12,20 @@ namespace isomesh::dicom {
 // Group and element: 0x00280010 is (0028,0010).
 using Tag = std::uint32_t;
 
-// Elements by their tags, so that they are written in the order that DICOM asks for, whatever the
-// order they were set in. Values are bytes as they go into the file, in UTF-8 where they are texts;
-// whoever sets them keeps to what the value representation allows.
+// Elements by tag, so they are written in ascending order as DICOM requires, whatever the order of
+// the calls. Values are bytes as in the file; texts are UTF-8. The caller ensures that values are
+// valid for their value representation.
 class DataSet {
  public:
-  // A text, padded to an even length; several values have backslashes between.
+  // Sets a text, padded to an even length; backslashes separate several values.
   void set(Tag tag, std::string_view vr, std::string_view text);
-  // Only where there is something to say.
+  // As set(), but skips an empty text.
   void set_told(Tag tag, std::string_view vr, std::string_view text);
   void set_long(Tag tag, std::uint32_t number);                          // UL
-  void set_bytes(Tag tag, std::string_view vr, std::string_view bytes);  // of an even number
+  void set_bytes(Tag tag, std::string_view vr, std::string_view bytes);  // an even number of bytes
   void set_sequence(Tag tag, const std::vector<DataSet>& items);
 
-  // All elements; those before `tag`, and those after it.
+  // All elements; or those before `tag`, or those after it.
   std::string bytes() const;
   std::string bytes_before(Tag tag) const;
   std::string bytes_after(Tag tag) const;
@@ -40,7 +40,7 @@ class DataSet {
   std::map<Tag, Element> elements_;
 };
 
-// What stands before the value of an element of so many bytes, an even number below 2^32 - 1.
+// The header of an element whose value has `bytes` bytes, an even number below 2^32 - 1.
 std::string element_head(Tag tag, std::string_view vr, std::uint32_t bytes);
 
 }  // namespace isomesh::dicom

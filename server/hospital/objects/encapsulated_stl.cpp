@@ -22,7 +22,8 @@ struct Moment {
   std::string time;  // TM
 };
 
-// In UTC. No offset from it is told, because that would be taken for the offset of the other times.
+// In UTC. Without a time zone offset, because that would apply to the other times of the object
+// too.
 Moment moment_of(std::chrono::system_clock::time_point time) {
   const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
   std::tm parts = {};
@@ -42,7 +43,8 @@ DataSet code_item(const DicomCode& code) {
   return item;
 }
 
-// What kind of model that is, by the images that it was made from (PS3.16, CID 7061).
+// Code of the kind of model: the segment's type, or else by the modality of the images (PS3.16, CID
+// 7061).
 std::optional<DicomCode> concept_of(const StlObject& object) {
   if (object.segment && !object.segment->type.value.empty()) return object.segment->type;
   const std::string& modality = object.identity.modality;
@@ -77,7 +79,7 @@ void add_series_and_equipment(const StlObject& object, const Moment& made, DataS
   data.set(0x0008103E, "LO", object.title);  // SeriesDescription
   data.set(0x0020000E, "UI", object.series_uid);
   data.set(0x00200011, "IS", std::to_string(object.series_number));
-  // Meshes of one series lie in one frame, also where the images do not name theirs.
+  // Meshes of one series share a frame of reference, even if the images have none.
   const std::string frame =
       identity.frame_of_reference_uid.empty()
           ? name_based_uid("frame of reference\n" + identity.study_uid + '\n' + identity.series_uid)

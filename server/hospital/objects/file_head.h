@@ -1,4 +1,4 @@
-// What stands before the data set in a DICOM file (PS3.10, 7.1).
+// The part of a DICOM file before its data set (PS3.10, 7.1).
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace isomesh::dicom {
 
-// Preamble, prefix and meta information of a file that isomesh writes. Pure function.
+// Preamble, prefix and file meta information. Pure function.
 std::string file_head(std::string_view sop_class, std::string_view instance,
                       std::string_view transfer_syntax);
 

@@ -14,11 +14,11 @@ namespace {
 constexpr std::size_t kUuidBytes = 16;
 constexpr std::size_t kSha1Bytes = 20;
 
-// 83c05459-1f3d-464d-b89f-b74feb95803f, made once by chance.
+// 83c05459-1f3d-464d-b89f-b74feb95803f, randomly chosen once.
 constexpr std::array<std::uint8_t, kUuidBytes> kNamespace = {
     0x83, 0xc0, 0x54, 0x59, 0x1f, 0x3d, 0x46, 0x4d, 0xb8, 0x9f, 0xb7, 0x4f, 0xeb, 0x95, 0x80, 0x3f};
 
-// A number of 128 bits, its most significant byte first.
+// A 128-bit number, most significant byte first, in decimal.
 std::string decimal(std::array<std::uint8_t, kUuidBytes> number) {
   std::string digits;
   while (std::ranges::any_of(number, [](std::uint8_t byte) { return byte != 0; })) {

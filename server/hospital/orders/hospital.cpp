@@ -6,7 +6,7 @@
 #include <set>
 #include <sstream>
 
-// Its values as JSON, and its parser, are compiled here and nowhere else.
+// Only this file compiles the parser.
 #include <toml++/toml.h>
 
 #include "base/files.h"
@@ -23,7 +23,7 @@ using std::chrono::seconds;
   throw invalid_parameter(key, message);
 }
 
-// One table of the file; what is left when all known keys were read is a mistake.
+// A table of the file. Keys that remain after all known ones were read are errors.
 class Section {
  public:
   Section(const toml::table& table, std::string name) : table_(table), name_(std::move(name)) {}
@@ -70,7 +70,7 @@ class Section {
     value = seconds(count);
   }
 
-  // A number of millimetres, which is more than none.
+  // Reads a number of millimetres greater than 0.
   void read(std::string_view key, std::optional<double>& value) {
     const toml::node* node = find(key);
     if (node == nullptr) return;
@@ -92,7 +92,7 @@ class Section {
     }
   }
 
-  // Empty where there is none.
+  // Empty if the section is missing.
   std::optional<Section> section(std::string_view key) {
     const toml::node* node = find(key);
     if (node == nullptr) return std::nullopt;
@@ -121,7 +121,7 @@ class Section {
     if (value.empty()) refuse(key_of(key), "is required");
   }
 
-  // To be called when all is read.
+  // Call after reading all known keys.
   void finish() const {
     for (const auto& [key, unused] : table_) {
       if (!known_.contains(key.str())) refuse(key_of(key.str()), "is not a known key");
@@ -338,7 +338,7 @@ std::optional<SyslogSettings> read_audit(Section section) {
   return syslog;
 }
 
-// Every name once, and none that does not stand for anything.
+// Checks that names are unique and that all references exist.
 void check_names(const Hospital& hospital) {
   std::set<std::string> names;
   for (const PacsSettings& pacs : hospital.pacs) {
@@ -415,7 +415,8 @@ Hospital read_hospital(const std::filesystem::path& file) {
 }
 
 bool matches(std::string_view pattern, std::string_view text) {
-  // Where the last * stands, and up to where it is taken to go: only that one is ever tried anew.
+  // The last * seen, and the end of the text it matches so far: backtracking only ever extends that
+  // match.
   std::size_t star = std::string_view::npos;
   std::size_t star_text = 0;
   std::size_t p = 0;

@@ -1,4 +1,4 @@
-// What the file of --hospital says: PACS, rules, and how patient orders are.
+// The configuration in the file of --hospital: PACS, rules, and defaults for orders.
 #pragma once
 
 #include <chrono>
@@ -14,73 +14,72 @@
 
 namespace isomesh::orders {
 
-// How objects are sent.
 enum class SendBy { kStow, kCStore };
 
-// A PACS that is spoken to by DICOMweb (PS3.18), and sent to by that or by DIMSE (PS3.7).
+// A PACS that is queried by DICOMweb (PS3.18), and receives by DICOMweb or DIMSE (PS3.7).
 struct PacsSettings {
-  std::string name;      // what requests call it
-  std::string dicomweb;  // URL below which /studies is; empty: it is only sent to, by C-STORE
+  std::string name;      // used in requests
+  std::string dicomweb;  // base URL of /studies; empty: only receives, by C-STORE
   std::string user;      // empty: none
   std::filesystem::path password_file;
-  std::filesystem::path token_file;  // of a bearer token
+  std::filesystem::path token_file;  // contains a bearer token
   std::filesystem::path ca_file;     // empty: the system's authorities
-  std::chrono::seconds timeout{30};  // without a byte
+  std::chrono::seconds timeout{30};  // without any byte
   std::string transfer_syntax = "*";
   SendBy send_by = SendBy::kStow;
-  std::string aet;  // of C-STORE: its title, ours, and where it listens
+  std::string aet;  // for C-STORE: its AE title, ours, and its address
   std::string calling_aet = "ISOMESH";
   std::string host;
   std::uint16_t port = 0;
   std::uint64_t max_send_bytes = 4'000'000'000;
-  std::vector<std::string> owners;  // who may order from it without a rule; empty: everybody
+  std::vector<std::string> owners;  // may order from it without a rule; empty: everybody
 };
 
-// Which series a watch takes. What is empty does not matter.
+// Selects series for a watch. Empty fields match everything.
 struct SeriesMatch {
   std::string modality;
-  std::string series_description;  // * stands for any text, ? for one character; in any case
+  std::string series_description;  // * matches any text, ? one character; ignores case
   std::uint32_t min_instances = 1;
-  std::uint32_t days = 2;  // of studies of today and so many days before
+  std::uint32_t days = 2;  // studies of today and this many days before
 };
 
 struct Rule {
   std::string name;
-  std::string owner;  // the name of the token that its orders belong to
-  std::string label;  // what its meshes are called
+  std::string owner;  // name of the token that owns its orders
+  std::string label;  // name of its meshes
   std::int64_t series_number = 9001;
-  std::optional<std::string> watch;  // the PACS that is asked for new series
+  std::optional<std::string> watch;  // the PACS to query for new series
   SeriesMatch match;
-  // What an object that is too large for its PACS may be simplified by; empty: it fails.
+  // Largest error of simplifying a mesh that is too large for its PACS; empty: such an order fails.
   std::optional<double> max_error_mm;
-  std::string parameters;  // of its jobs: JSON, as parse_order_parameters takes it
+  std::string parameters;  // JSON for its jobs, as parse_order_parameters reads it
   std::vector<SendTarget> send;
 };
 
-// Where series are received by C-STORE, and from whom.
+// Settings for receiving series by C-STORE.
 struct DimseSettings {
   std::string listen;                         // HOST:PORT
-  std::size_t associations = 8;               // at the same time; further ones wait
-  std::map<std::string, std::string> routes;  // rules by the titles that series are sent to
-  std::vector<std::string> calling;           // titles that may send
-  std::chrono::seconds idle{60};              // without a byte
+  std::size_t associations = 8;               // simultaneous; further ones wait
+  std::map<std::string, std::string> routes;  // AE title that series are sent to -> rule
+  std::vector<std::string> calling;           // AE titles that may send
+  std::chrono::seconds idle{60};              // without any byte
   std::uint64_t max_object_bytes = std::uint64_t{4} << 30;
-  std::uint64_t max_held_bytes = std::uint64_t{100} << 30;  // of all that orders do not have yet
+  std::uint64_t max_held_bytes = std::uint64_t{100} << 30;  // received but not used by an order yet
 };
 
-// Where the audit trail is sent, as syslog over TLS (RFC 5425).
+// Destination of the audit trail, syslog over TLS (RFC 5425).
 struct SyslogSettings {
   std::string host;
   std::uint16_t port = 6514;
   std::filesystem::path ca_file;           // empty: the system's authorities
-  std::filesystem::path certificate_file;  // ours; empty: none
+  std::filesystem::path certificate_file;  // client certificate; empty: none
   std::filesystem::path key_file;
 };
 
 struct Hospital {
-  std::chrono::seconds settle{60};  // the list of a series' instances is unchanged for so long
+  std::chrono::seconds settle{60};  // a series' list of instances must be unchanged for this long
   std::chrono::seconds poll{30};
-  std::chrono::seconds first_delay{5};  // after a failed attempt; doubles
+  std::chrono::seconds first_delay{5};  // after a failed attempt; doubles each time
   std::chrono::seconds longest_delay{std::chrono::hours(1)};
   std::chrono::seconds give_up{std::chrono::hours(72)};
   std::size_t most_open = 10'000;  // orders
@@ -90,17 +89,17 @@ struct Hospital {
   std::optional<DimseSettings> dimse;
   std::optional<SyslogSettings> syslog;
 
-  // Null when there is none of that name.
+  // Null if there is no PACS with that name.
   const PacsSettings* find_pacs(std::string_view name) const;
   const Rule* find_rule(std::string_view name) const;
 };
 
-// Reads TOML. Throws Error kInvalidParameter, without the value, that names the key which is
-// unknown, missing, of the wrong type or out of range, or the line that is no TOML.
+// Reads TOML. Throws Error kInvalidParameter that names the key that is unknown, missing, of the
+// wrong type or out of range (without its value), or the line with a syntax error.
 Hospital read_hospital(const std::filesystem::path& file);
 Hospital parse_hospital(std::string_view toml);
 
-// Whether a text is what the pattern stands for: see SeriesMatch.
+// True if the text matches the pattern: see SeriesMatch.
 bool matches(std::string_view pattern, std::string_view text);
 
 }  // namespace isomesh::orders

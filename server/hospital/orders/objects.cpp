@@ -16,10 +16,10 @@
 namespace isomesh::orders {
 namespace {
 
-// The bytes of one STL within a blob.
+// The bytes of one STL file within a blob.
 struct Part {
   std::optional<std::int64_t> label = {};
-  std::string name = {};  // the label's
+  std::string name = {};  // name of the label
   std::string blob;
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
@@ -53,7 +53,7 @@ std::vector<Part> parts_of(const Job& job, const store::BlobStore& blobs) {
   return parts;
 }
 
-// What determines the mesh, and not which other files were asked for.
+// Only the parameters that determine the mesh, not the other requested files.
 std::string canonical_parameters(MeshParameters parameters) {
   parameters.formats = {MeshFormat::kStl};
   parameters.draco = {};
@@ -81,7 +81,7 @@ std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& 
   return dicom::name_based_uid(name + part.sha256);
 }
 
-// In LO's 64 characters.
+// Truncates to 64 characters, the limit of LO.
 std::string in_short(const std::string& text) {
   constexpr std::size_t kLongest = 64;
   if (text.size() <= kLongest) return text;
@@ -95,7 +95,7 @@ std::string without_backslashes(std::string text) {
   return text;
 }
 
-// With three digits behind the point, which is a certificate still.
+// Rounded up to three decimals, so that it is still an upper bound.
 double rounded_up(double mm) {
   constexpr double kThousandths = 1000;
   return std::ceil(mm * kThousandths) / kThousandths;
@@ -108,7 +108,7 @@ std::string description_of(const Job& job) {
                                              : "iso otsu";
   std::string text = what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) +
                      ", " + std::to_string(parameters.passes) + " passes";
-  // How far the object's own bytes are from the surface as it was extracted.
+  // Distance of the object's vertices and triangles from the extracted surface.
   if (job.mesh->certificate) {
     text += ", within " + number_text(rounded_up(job.mesh->certificate->max_mm)) + " mm";
   }
@@ -140,14 +140,14 @@ void write(const std::string& text, store::BlobWriter& to) {
   to.write(std::as_bytes(std::span(text)));
 }
 
-// Throws where there is none.
+// Throws if there is none.
 std::vector<Part> parts_of_surface(const Job& job, const store::BlobStore& blobs) {
   std::vector<Part> parts = parts_of(job, blobs);
   if (job.mesh && job.mesh->triangles > 0 && !parts.empty()) return parts;
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
 
-// Names the object, too.
+// Also sets the UIDs of `object`.
 dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job, const Part& part,
                                const std::string& station_name,
                                std::chrono::system_clock::time_point made, MadeObject& object) {
@@ -174,7 +174,7 @@ std::uint64_t bytes_of(const dicom::StlEnvelope& envelope, const Part& part) {
   return envelope.before.size() + part.bytes + envelope.after.size();
 }
 
-// What the simplified mesh's object says of that besides.
+// Additional text in the object of a simplified mesh.
 constexpr std::uint64_t kGrowthOfText = 400;
 
 [[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
@@ -229,7 +229,7 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
                                                 const std::string& station_name,
                                                 std::uint64_t most_bytes,
                                                 const store::BlobStore& blobs) {
-  // An STL file has so many for each triangle.
+  // Bytes per triangle in an STL file.
   constexpr std::uint64_t kTriangleBytes = 50;
   double share = 1;
   for (const Part& part : parts_of_surface(job, blobs)) {
@@ -243,7 +243,8 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
         std::min(share, static_cast<double>(part.bytes - over) / static_cast<double>(part.bytes));
   }
   if (share == 1) return std::nullopt;
-  // Of labels the largest is to fit, which may keep another share than all of them together.
+  // With labels, the largest one must fit, and simplification may keep a larger fraction of it than
+  // of all labels together.
   constexpr double kOfLabels = 0.95;
   if (job.parameters.labels) share *= kOfLabels;
   return std::max<std::uint32_t>(

@@ -1,4 +1,4 @@
-// A finished job's meshes as DICOM objects.
+// Makes DICOM objects from a finished job's meshes.
 #pragma once
 
 #include <array>
@@ -15,7 +15,6 @@
 
 namespace isomesh::orders {
 
-// An object that lies in the store of blobs.
 struct MadeObject {
   std::optional<std::int64_t> label;
   std::string series_uid;
@@ -23,30 +22,29 @@ struct MadeObject {
   store::Blob blob;
 };
 
-// The most objects of an order, over all PACS that they are sent to: they are listed in its record
-// and in its JSON.
+// Limit of objects of an order, over all PACS they are sent to: its record and its JSON list them.
 inline constexpr std::size_t kMostObjects = 500;
 
-// Makes an object of each of the job's STL files: of the only one, or of each label's. Their UIDs
-// follow from what they are, so that objects of the same images with the same mesh have the same,
-// whoever makes them when. The blobs are not settled (BlobStore::settle). Throws Error
-// kUnusableVolume for an empty surface, kTooLarge when one has more than `most_bytes`, kOutOfSpace.
+// Makes an object from each STL file of the job: the only one, or one for each label. UIDs are
+// derived from the content, so the same images with the same mesh always have the same UIDs. The
+// blobs are not settled (BlobStore::settle). Throws Error kUnusableVolume for an empty surface,
+// kTooLarge if an object exceeds `most_bytes`, kOutOfSpace.
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
                                      const store::BlobStore& blobs);
 
-// Why a mesh without triangles has none, of samples in that range: kUnusableVolume.
+// The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
 Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);
 
-// How many triangles the job's mesh may have for no object to have more than `most_bytes`; empty
-// when none has. Throws Error kTooLarge when not even one triangle fits.
+// The number of triangles with which no object exceeds `most_bytes`; empty if none does. Throws
+// Error kTooLarge if not even one triangle fits.
 std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
                                                 const std::string& station_name,
                                                 std::uint64_t most_bytes,
                                                 const store::BlobStore& blobs);
 
-// Whether the files that objects are made of are there as they were written.
+// True if the blobs of the files from which objects are made are intact.
 bool can_make_objects(const Job& job, const store::BlobStore& blobs);
 
 }  // namespace isomesh::orders

@@ -19,8 +19,8 @@ constexpr milliseconds kLongestSleep{1'000};
 constexpr std::size_t kFirstDue = 200;
 constexpr std::size_t kMostMeshing = 1'000'000;
 
-// Doubles, and is spread over its upper half, so that what failed together does not come back
-// together.
+// Exponential back-off with jitter over the upper half, so that orders that failed together do not
+// retry together.
 milliseconds delay_after(std::uint32_t failures, const Hospital& hospital) {
   constexpr std::uint32_t kMostDoublings = 20;
   const milliseconds whole = std::min<milliseconds>(
@@ -31,7 +31,7 @@ milliseconds delay_after(std::uint32_t failures, const Hospital& hospital) {
       std::uniform_int_distribution<std::int64_t>(whole.count() / 2, whole.count())(random));
 }
 
-// What may be otherwise next time, for reasons of this machine.
+// True if a retry may succeed, because the cause may be temporary.
 bool may_pass(ErrorCode code) {
   switch (code) {
     case ErrorCode::kUnavailable:
@@ -56,7 +56,7 @@ Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOpt
       steps_(services, hospital, options_.now) {
   services_.audit.add({.event = store::AuditEvent::kStart});
   for (const PacsSettings& each : hospital_.pacs) status_[each.name].name = each.name;
-  // Their jobs may have ended while nobody waited for them.
+  // Their jobs may have ended while no process waited for them.
   for (const Order& order :
        services_.orders.list(std::nullopt, {.state = OrderState::kMeshing}, "", kMostMeshing)) {
     services_.orders.hurry(order.id);
@@ -70,7 +70,7 @@ Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOpt
       threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
     }
   } catch (...) {
-    stop();  // or what those that did start wait for would not be cut off
+    stop();  // otherwise what the running threads wait for would not be aborted
     throw;
   }
 }
@@ -183,7 +183,7 @@ void Orders::changed() {
 }
 
 std::optional<std::string> Orders::take(std::stop_token& cancelled) {
-  // What waits for PACS that hang may be more than was looked at.
+  // More orders than were fetched may wait for a PACS that hangs.
   for (std::size_t limit = kFirstDue;; limit *= 4) {
     const std::vector<store::OrderRecord> due = services_.orders.due(options_.now(), limit);
     if (auto id = take_one_of(due, cancelled)) return id;
@@ -228,7 +228,7 @@ void Orders::work(const std::stop_token& stop) {
           const std::string& id;
           ~GiveBack() { orders.give_back(id); }
         } give_back{*this, *id};
-        // Read once more: another thread may have made the step meanwhile.
+        // Read again, because another thread may have made the step meanwhile.
         auto record = services_.orders.if_due(*id, options_.now());
         if (record) advance(*std::move(record), cancelled);
         continue;
@@ -239,7 +239,7 @@ void Orders::work(const std::stop_token& stop) {
       }
     } catch (const std::exception& error) {
       log_error("orders could not be processed and are retried: {}", error.what());
-      is_in_trouble = true;  // such as a database that cannot be written: not at once again
+      is_in_trouble = true;  // for example, the database is read-only: wait before the next attempt
     }
     Lock lock(mutex_);
     changed_.wait_for(lock, stop, sleep, [&]() ISOMESH_REQUIRES(mutex_) {
@@ -264,7 +264,7 @@ void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
     note_failure(pacs, failure, record.order.id);
     fail_step(record, before, failure, failure.may_pass(), failure.retry_after());
   } catch (const Error& error) {
-    // It was cancelled, or goes on in the next process.
+    // The order was cancelled, or the next process continues it.
     if (stop.stop_requested()) return;
     fail_step(record, before, error, may_pass(error.code()), {});
   } catch (const std::exception& error) {
@@ -277,7 +277,7 @@ void Orders::wait_for_job(const Order& order) {
     const Lock lock(mutex_);
     by_job_[*order.job] = order.id;
   }
-  // It may have ended before anybody waited for it.
+  // The job may have ended before by_job_ was set.
   if (is_final(services_.jobs.get(std::nullopt, *order.job).state)) job_ended(*order.job);
 }
 

@@ -1,5 +1,4 @@
-// The hospital's loop: orders go their way, whoever asked for them, however often a peer or this
-// process ends on it.
+// Executes orders, across failures of peers and restarts of the daemon.
 #pragma once
 
 #include <atomic>
@@ -17,7 +16,7 @@
 
 namespace isomesh::orders {
 
-// Attempts that failed, for the metrics.
+// Counts of failed attempts, for the metrics.
 struct Attempts {
   std::string pacs;
   PacsFault fault = PacsFault::kUnreachable;
@@ -25,36 +24,37 @@ struct Attempts {
 };
 
 struct OrderOptions {
-  std::chrono::hours keep{30 * 24};  // orders that have ended
+  std::chrono::hours keep{30 * 24};  // for ended orders
   std::function<store::Time()> now = [] { return std::chrono::system_clock::now(); };
-  // The same as far as it can be believed, for what is not kept any longer; empty: the same.
+  // The believed clock, which decides what expires; empty: the same as `now`.
   std::function<store::Time()> believed_now = {};
-  // Ends what steps may wait for long, such as imports; called when this stops.
+  // Called on stop; aborts long operations of steps, such as imports.
   std::function<void()> cut_off = {};
   std::size_t threads = 6;
-  std::size_t per_pacs = 2;  // steps at the same time that speak to one PACS: one that hangs holds
-                             // up nobody else
+  // Simultaneous steps per PACS, so that one that hangs does not block the others.
+  std::size_t per_pacs = 2;
 };
 
-// Thread safe. What it is made of must outlive it.
+// Thread safe. Its dependencies must outlive it.
 class Orders {
  public:
-  // Begins to work on what is open.
+  // Starts work on open orders.
   Orders(const OrderServices& services, const Hospital& hospital, OrderOptions options);
 
-  // Cuts off what is under way; the next process goes on with it.
+  // Aborts running steps; the next process continues them.
   ~Orders();
   Orders(const Orders&) = delete;
   Orders& operator=(const Orders&) = delete;
 
-  // The same, before its life is over. To be called by one thread; nothing else is called later but
-  // what only reads.
+  // As the destructor, but earlier. Call from one thread; afterwards call only methods that read.
   void stop();
 
-  // Has that called with each order that ends, by the thread that ended it; at most one.
+  // Sets the listener for ended orders, which is called on the thread that ended the order. At most
+  // one.
   void on_end(std::function<void(const std::string& order)> listener);
 
-  // Throws as make_order does, Error kKeyReused and kUnavailable. Second: whether it is new.
+  // Throws as make_order does, and Error kKeyReused, kUnavailable. Second: true if the order is
+  // new.
   std::pair<Order, bool> submit(const Orderer& orderer, const OrderRequest& request,
                                 const std::string& idempotency_key,
                                 const std::string& request_digest);
@@ -71,7 +71,7 @@ class Orders {
     return services_.orders.list(viewer, filter, after, limit);
   }
 
-  // A job has ended: an order may wait for it.
+  // Tells that a job has ended; an order may wait for it.
   void job_ended(const std::string& job);
 
   // In the order of the configuration.
@@ -80,7 +80,7 @@ class Orders {
   std::vector<Attempts> attempts() const;
   store::OrderCounts counts() const { return services_.orders.counts(); }
 
-  // Looks at what is due: for those who set the clock.
+  // Checks for due orders; call after setting the clock.
   void wake();
 
  private:
@@ -95,13 +95,13 @@ class Orders {
   void receive(const std::stop_token& stop);
   store::ReceivedFate look_at_received(const store::HeldSeries& series);
   void look_at_rule(const Rule& rule, const std::stop_token& stop);
-  // The next order that may be worked on, which is this thread's then; empty when there is none.
+  // Takes the next due order for this thread; empty if there is none.
   std::optional<std::string> take(std::stop_token& cancelled);
   std::optional<std::string> take_one_of(const std::vector<store::OrderRecord>& due,
                                          std::stop_token& cancelled);
   void give_back(const std::string& id);
   void advance(store::OrderRecord record, const std::stop_token& stop);
-  // The record may be at an earlier step by now than the one that failed.
+  // `record` may already be at an earlier step than the failed one.
   void fail_step(store::OrderRecord& record, OrderState failed, const Error& error, bool may_pass,
                  std::chrono::seconds retry_after);
   void end(store::OrderRecord& record, const Error& error);
@@ -123,10 +123,10 @@ class Orders {
   std::function<void(const std::string&)> on_end_ ISOMESH_GUARDED_BY(mutex_);
   std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;
   std::map<std::string, Running> running_ ISOMESH_GUARDED_BY(mutex_);     // by order
-  std::map<std::string, std::string> by_job_ ISOMESH_GUARDED_BY(mutex_);  // orders that wait
+  std::map<std::string, std::string> by_job_ ISOMESH_GUARDED_BY(mutex_);  // waiting orders by job
   std::map<std::string, PacsStatus> status_ ISOMESH_GUARDED_BY(mutex_);
   std::map<std::pair<std::string, PacsFault>, std::uint64_t> failed_ ISOMESH_GUARDED_BY(mutex_);
-  std::vector<std::jthread> threads_;  // last: run on all of the above
+  std::vector<std::jthread> threads_;  // last: use all other members
 };
 
 }  // namespace isomesh::orders

@@ -94,17 +94,18 @@ void Received::store(const OutgoingObject&, const std::stop_token&) {
   throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
 }
 
-// What was held for the order, or came once more, goes when that has ended.
+// Submits an order for the held series if it needs one. Releases the held instances once an order
+// has covered all of them.
 store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
   const auto& [title, study, series] = held.series;
   const auto route = hospital_.dimse->routes.find(title);
-  // Kept: the route may come back.
+  // Kept, because the route may be configured again.
   if (route == hospital_.dimse->routes.end()) return store::ReceivedFate::kOpen;
   const Rule& rule = *hospital_.find_rule(route->second);
   const FoundSeries found = {
       .study = study, .series = series, .modality = "", .description = "", .instances = held.known};
   store::OrderRecord record = make_order(rule, received_by(title), found);
-  // It has been seen to be still.
+  // The series has settled already, so the order gets its list and does not wait.
   for (const auto& each : services_.received.instances(held.series)) {
     record.work.listed.push_back(each.instance);
   }
@@ -126,9 +127,9 @@ store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
 
 void Orders::receive(const std::stop_token& stop) {
   constexpr std::chrono::milliseconds kPause{500};
-  // Nobody could send before.
+  // Peers could not send before this process started.
   const store::Time begun = options_.now();
-  // When to look again at series whose orders are open.
+  // Time of the next check of each waiting series.
   std::map<store::ReceivedSeries, store::Time> waiting;
   while (!stop.stop_requested()) {
     try {
@@ -137,7 +138,7 @@ void Orders::receive(const std::stop_token& stop) {
       for (const store::HeldSeries& held : services_.received.held()) {
         if (std::max(held.last, begun) + hospital_.settle > now || waiting.contains(held.series))
           continue;
-        // First, so that one that fails waits, too, and holds up no other.
+        // Set first, so that a series that fails also waits and does not block others.
         waiting[held.series] = now + hospital_.poll;
         if (look_at_received(held) == store::ReceivedFate::kDone) waiting.erase(held.series);
       }

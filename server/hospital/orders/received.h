@@ -1,4 +1,4 @@
-// Series that peers have sent by themselves, as a PACS that orders take their images from.
+// Received series, as a PACS that orders fetch their images from.
 #pragma once
 
 #include <string>
@@ -9,11 +9,12 @@
 
 namespace isomesh::orders {
 
-// What an order's source calls what was sent to that title. No configured PACS has such a name.
+// Name of the source of orders for series sent to that AE title. No configured PACS can have it.
 std::string received_by(const std::string& title);
 bool is_received(std::string_view pacs);
 
-// What was sent to one title. Thread safe; the stores must outlive it. Nothing can be stored in it.
+// The series sent to one AE title. Nothing can be stored in it. Thread safe; the stores must
+// outlive it.
 class Received : public Pacs {
  public:
   Received(std::string title, const store::ReceivedStore& received, const store::BlobStore& blobs)
@@ -25,7 +26,7 @@ class Received : public Pacs {
                                          const std::stop_token& stop) override;
   std::vector<std::string> list_instances(const std::string& study, const std::string& series,
                                           const std::stop_token& stop) override;
-  // Throws PacsFailure kIncomplete when some of the instances were held once, and are not now.
+  // Throws PacsFailure kIncomplete if some instances are known but no longer held.
   std::string fetch_series(const std::string& study, const std::string& series,
                            const std::filesystem::path& target,
                            const std::stop_token& stop) override;

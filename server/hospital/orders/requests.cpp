@@ -23,7 +23,7 @@ const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const Orde
   return rule;
 }
 
-// Only names are taken from a request, never addresses.
+// A request contains names of PACS, never addresses.
 const PacsSettings& pacs_of(const Hospital& hospital, const std::string& name,
                             std::string_view field) {
   const PacsSettings* pacs = hospital.find_pacs(name);
@@ -37,7 +37,7 @@ void check_owner(const PacsSettings& pacs, const Orderer& orderer) {
   throw Error(ErrorCode::kForbidden, "this PACS can be used only by a rule");
 }
 
-// Whatever else is asked for, an object is made of the STL.
+// Objects are made from files of these formats, so these are requested too.
 void add_sent_formats(Order& order) {
   std::vector<MeshFormat>& formats = order.parameters.formats;
   for (const SendTarget& target : order.send) {

@@ -1,4 +1,4 @@
-// Orders as they begin: what a client or a watch asks for, with what its rule says.
+// Makes orders from requests and rules.
 #pragma once
 
 #include <string>
@@ -9,18 +9,18 @@
 
 namespace isomesh::orders {
 
-// Whoever orders: a token's name, and whether it may do everything.
+// The sender of an order: a token's name, and whether it is an administrator.
 struct Orderer {
   std::string name;
   bool is_administrator = false;
 };
 
-// The order of a request. Throws Error kInvalidParameter that names what is wrong, kForbidden for
-// a rule of another owner, or a PACS whose owners the orderer is none of.
+// Makes the order of a request. Throws Error kInvalidParameter that names the field; kForbidden for
+// another owner's rule, or a PACS that excludes the orderer.
 store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
                               const OrderRequest& request);
 
-// The order of a rule for a series that its watch has found, or that was received, in that PACS.
+// Makes the order of a rule for a series that its watch has found or that was received.
 store::OrderRecord make_order(const Rule& rule, const std::string& pacs, const FoundSeries& series);
 
 }  // namespace isomesh::orders

@@ -18,13 +18,13 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using store::Time;
 
-// A series that was not there so often will not come.
+// After this many queries without a result the series is given up.
 constexpr std::uint32_t kMostLooks = 4;
-// The end of a job is told at once; this is for an end that was missed.
+// Jobs report their end at once; this detects a lost report.
 constexpr seconds kJobLook{30};
 
-// An order that begins anew, or fetches its images again, has another job, even if the volume is
-// the same.
+// An order that is restarted or fetches its images again gets a new job, even if the volume is the
+// same.
 std::string job_key(const store::OrderRecord& record) {
   constexpr std::size_t kEnough = 12;
   const std::string what =
@@ -35,7 +35,7 @@ std::string job_key(const store::OrderRecord& record) {
   return "order-" + record.order.id + '-' + what;
 }
 
-// The parameters of a job whose mesh fits into its object.
+// Limits the parameters so that the mesh fits into its object.
 void simplify(const OrderWork& work, JobParameters& parameters) {
   parameters.triangles = std::min(*work.triangles, parameters.triangles.value_or(*work.triangles));
   parameters.max_error_mm =
@@ -53,7 +53,7 @@ void check_count_of_objects(const Order& order, const Job& job) {
                   std::to_string(kMostObjects) + " objects; order fewer labels");
 }
 
-// Forgets the list of instances, the images, and all that was made of them.
+// Resets the list of instances, the images, and all results from them.
 void forget_images(store::OrderRecord& record) {
   record.order.state = OrderState::kWaiting;
   record.order.volume.reset();
@@ -111,7 +111,8 @@ Time OrderSteps::save(store::OrderRecord& record, Time next) const {
   return next;
 }
 
-// A series that can be listed and not fetched would otherwise be fetched again without a pause.
+// Forgets failures only if they were in `step` or before. Otherwise a series that can be listed but
+// not fetched would be fetched repeatedly without a pause.
 Time OrderSteps::save_after(OrderState step, store::OrderRecord& record, Time next) const {
   if (record.work.failed_in <= step) {
     record.order.error.reset();
@@ -121,7 +122,7 @@ Time OrderSteps::save_after(OrderState step, store::OrderRecord& record, Time ne
   return save(record, next);
 }
 
-// Later queries of an order ask for the same again, so that only its first one is kept.
+// Only the first query of an order is recorded; the later ones are the same.
 void OrderSteps::note_query(store::OrderRecord& record, bool success) const {
   const OrderSource& source = record.order.source;
   if (record.work.queried || is_received(source.pacs)) return;
@@ -196,7 +197,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
     record.work.identity = std::move(identity);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kSeriesIncomplete) throw;
-    // Never a mesh of half a head: it is listed anew, too.
+    // An incomplete series is listed again, so that no mesh is made from a part of it.
     forget_images(record);
     throw PacsFailure(PacsFault::kIncomplete, error.what());
   }
@@ -224,7 +225,7 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   return save_after(OrderState::kMeshing, record, now_() + kJobLook);
 }
 
-// Whether the volume or the job has expired, was removed, or the volume is damaged.
+// True if the volume or the job has expired or was removed, or the volume is damaged.
 bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) const {
   if (error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kGone) return true;
   return error.code() == ErrorCode::kUnusableVolume &&
@@ -308,7 +309,7 @@ bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderRe
   const DicomIdentity& identity = *record.work.identity;
   const auto patient = pacs(result.pacs).patient_of(identity.study_uid, stop);
   if (patient) return *patient == identity.patient_id;
-  // A PACS that the images did not come from need not know the study.
+  // Only the PACS of the images must know the study.
   if (result.pacs != record.order.source.pacs) return true;
   throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
 }
@@ -317,7 +318,8 @@ void OrderSteps::check_before_sending(store::OrderRecord& record, std::size_t in
                                       const std::stop_token& stop) const {
   if (!is_same_patient(record, record.order.results[index], stop)) {
     forget_images(record);
-    // Until the order succeeds: other objects of it may be stored each time.
+    // Failures are kept until the order succeeds, because each attempt may store other objects of
+    // it.
     record.work.failed_in = OrderState::kSucceeded;
     throw PacsFailure(PacsFault::kChanged,
                       "the study has another Patient ID than the images; they are fetched again");
@@ -355,7 +357,7 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
                             std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
                 .file = services_.blobs.local(record.work.blobs[index])},
                stop);
-    // What it says is one thing.
+    // A confirmed store proves nothing, so the object is queried.
     if (peer.has_instance(place, stop) == false) {
       throw PacsFailure(PacsFault::kNotStored,
                         "the PACS confirmed that it stored the mesh, but does not find it");

@@ -1,4 +1,3 @@
-// What an order does, one step at a time.
 #pragma once
 
 #include <chrono>
@@ -25,7 +24,6 @@ namespace isomesh::orders {
 
 using PacsByName = std::map<std::string, std::unique_ptr<Pacs>, std::less<>>;
 
-// What orders need of everything else.
 struct OrderServices {
   const store::DataFolder& folder;
   const store::BlobStore& blobs;
@@ -36,15 +34,15 @@ struct OrderServices {
   store::OrderStore& orders;
   store::AuditTrail& audit;
   store::ReceivedStore& received;
-  const PacsByName& pacs;  // and what stands for series that were received
+  const PacsByName& pacs;  // including those that represent received series
 };
 
-// The order has ended, by somebody else's wish, while a step was made.
+// The order ended during a step, for example because it was cancelled.
 struct OrderIsOver {};
 
-// Steps follow from the order's record alone, so that any process can make the next one, and each
-// may be made again: it saves what it has come to before anything follows from that. Thread safe
-// for different orders; what it is made of must outlive it.
+// Each step depends on the order's record only, so any process can make the next one. A step can be
+// repeated: it saves its result before anything depends on it. Thread safe for different orders;
+// its dependencies must outlive it.
 class OrderSteps {
  public:
   using Clock = std::function<store::Time()>;
@@ -52,17 +50,16 @@ class OrderSteps {
   OrderSteps(const OrderServices& services, const Hospital& hospital, Clock now)
       : services_(services), hospital_(hospital), now_(std::move(now)) {}
 
-  // Makes the next step of an open order and saves it. Returns when the next one is due. Throws
-  // PacsFailure and Error when the step failed; the record is then what is to be saved of that.
-  // Every return to an earlier step is such a failure, so that none repeats without a pause.
-  // Throws OrderIsOver.
+  // Makes and saves the next step of an open order; returns when the following one is due. Throws
+  // PacsFailure and Error if the step failed; `record` then has the state to save. Every return to
+  // an earlier step is such a failure, so that none repeats without a pause. Throws OrderIsOver.
   store::Time advance(store::OrderRecord& record, const std::stop_token& stop) const;
 
-  // The PACS that the next step speaks to; empty for none.
+  // The PACS of the next step; empty if it uses none.
   static std::string pacs_of(const store::OrderRecord& record);
 
  private:
-  // Puts a query of the order's PACS into the audit trail, with its outcome.
+  // Adds a query of the order's PACS, and its success, to the audit trail.
   void note_query(store::OrderRecord& record, bool success) const;
   store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
@@ -71,18 +68,18 @@ class OrderSteps {
   store::Time submit_job(store::OrderRecord& record) const;
   store::Time make(store::OrderRecord& record, const Job& job) const;
   store::Time send(store::OrderRecord& record, const std::stop_token& stop) const;
-  // False when the study is another patient's now.
+  // False if the study belongs to another patient now.
   bool is_same_patient(const store::OrderRecord& record, const OrderResult& result,
                        const std::stop_token& stop) const;
-  // Throws PacsFailure kChanged when the study is another patient's now, and Error kUnavailable
-  // when the object is damaged or missing. The record is then at the step that repairs that.
+  // Throws PacsFailure kChanged if the study belongs to another patient now, and Error kUnavailable
+  // if the object is damaged or missing. The record is then at the step that repairs this.
   void check_before_sending(store::OrderRecord& record, std::size_t index,
                             const std::stop_token& stop) const;
   void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
-  // Saves the order after `step` has succeeded, which forgets failures of that and of earlier
-  // steps. Returns `next`. Throws OrderIsOver.
+  // Saves the order after `step` has succeeded, and resets failures of that and earlier steps.
+  // Returns `next`. Throws OrderIsOver.
   store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;
-  // The same, forgetting no failures.
+  // As above, without resetting failures.
   store::Time save(store::OrderRecord& record, store::Time next) const;
   Pacs& pacs(const std::string& name) const;
 

@@ -1,4 +1,4 @@
-// What rules find by themselves, and what is forgotten.
+// Watches of rules, and the removal of old orders.
 #include <array>
 #include <ctime>
 #include <utility>
@@ -11,10 +11,10 @@ namespace isomesh::orders {
 namespace {
 
 constexpr std::chrono::minutes kForgetPause{10};
-// What this makes itself is never taken for images.
+// The modality of our own objects, which are not images.
 constexpr std::string_view kOwnModality = "M3D";
 
-// DA of so many days before. Studies have dates without time zones, so one day more is asked for.
+// The day that many days ago (DA), minus one, because studies have dates without time zones.
 std::string day_before(store::Time now, std::uint32_t days) {
   const std::time_t moment =
       std::chrono::system_clock::to_time_t(now - std::chrono::days(days) - std::chrono::days(1));
@@ -54,7 +54,7 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
            .instances = series.instances.value_or(0)},
           hospital_.most_open);
       if (!is_new) continue;
-      // A watch asks the same all day; what is kept is when that led to something.
+      // A watch repeats its query all day; only queries that led to orders are recorded.
       if (!std::exchange(is_told, true)) {
         services_.audit.add(
             {.event = store::AuditEvent::kQuery, .owner = rule.owner, .pacs = *rule.watch});

@@ -83,6 +83,12 @@ std::vector<std::string> accepted_of(std::string_view text) {
   return codes;
 }
 
+std::array<double, 3> spacing_of(std::string_view text) {
+  const auto spacing = array_of<3>("spacing", text);
+  if (std::ranges::all_of(spacing, [](double length) { return length > 0; })) return spacing;
+  throw invalid_parameter("spacing", "must be three numbers above 0, separated by commas");
+}
+
 NiftiForm nifti_form_of(std::string_view text) {
   const auto form = from_string<NiftiForm>(text);
   if (!form) throw invalid_parameter("nifti_form", "must be " + names_of<NiftiForm>());
@@ -160,6 +166,7 @@ process::ImportOptions import_options_of(const Request& request) {
   take("volume", volume_of, options.volume);
   take("accept", accepted_of, options.accept);
   take("nifti_form", nifti_form_of, options.nifti_form);
+  take("spacing", spacing_of, options.spacing);
   return options;
 }
 
@@ -167,7 +174,8 @@ std::optional<RawDescription> raw_description_of(const Request& request) {
   const auto text = [&](const char* name) { return request.parameter(name); };
   if (!request.has_parameter("dims")) {
     for (const std::string& name : raw_parameters()) {
-      if (request.has_parameter(name)) {
+      // A file may have everything but its spacing.
+      if (name != "spacing" && request.has_parameter(name)) {
         throw invalid_parameter("dims", "is required, because " + name + " describes raw samples");
       }
     }

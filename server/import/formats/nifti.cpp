@@ -10,6 +10,7 @@
 #include "base/text.h"
 #include "server/import/formats/nifti_extensions.h"
 #include "server/import/formats/nifti_header.h"
+#include "server/import/formats/placing.h"
 #include "server/import/source/gzip.h"
 
 namespace isomesh::import {
@@ -248,7 +249,11 @@ void note_other_pixdim(const NiftiHeader& header, const Placement& sform, Source
   }
 }
 
-Placement without_forms(const Vector3& spacing) {
+Placement without_forms(const Vector3& spacing, SourceVolume& volume) {
+  volume.notes.push_back(
+      note_of(NoteCode::kSpaceAssumed,
+              "The NIfTI header has neither an sform nor a qform (both codes are 0). The axes were "
+              "read as those of LPS, with the first sample at (0,0,0)."));
   Placement placement;
   // The LPS axes, in RAS.
   placement.steps[0][0] = -spacing[0];
@@ -306,7 +311,7 @@ Placement placement_of(const NiftiHeader& header, const ImportOptions& options,
   if (!takes_sform) {
     const Vector3 spacing = spacing_of(header, volume.dims);
     if (header.is_analyze) return analyze_placement(spacing, volume);
-    if (!has_qform) return without_forms(spacing);
+    if (!has_qform) return without_forms(spacing, volume);
     const Placement qform = qform_of(header, spacing);
     if (has_sform) note_other_form(header, qform, sform_of(header), "qform", volume);
     return qform;
@@ -346,11 +351,22 @@ std::uint64_t payload_offset(const NiftiHeader& header) {
   return static_cast<std::uint64_t>(header.vox_offset);
 }
 
+// CIFTI-2 keeps values of vertices and voxels as a matrix in the fifth and sixth dimension.
+void check_intent(const NiftiHeader& header) {
+  constexpr int kFirstOfCifti = 3000;
+  constexpr int kLastOfCifti = 3099;
+  if (header.intent < kFirstOfCifti || header.intent > kLastOfCifti) return;
+  throw_unusable(
+      "This is a CIFTI-2 file: a matrix of values of a brain's vertices and voxels, not a volume.");
+}
+
 // Everything except the location of the samples.
 SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   SourceVolume volume;
+  check_intent(header);
   const std::vector<std::uint64_t> sizes = sizes_of(header);
   volume.dims = volume_dims(std::span(sizes).first(std::min<std::size_t>(sizes.size(), 3)));
+  check_is_lattice(volume.dims);
   volume.layout = {type_of(header), header.big_endian, rescale_of(header)};
   choose_volume(volumes_beyond(sizes), difference_of(header), options, volume);
   volume.encoding = Encoding::kRaw;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <optional>
+
+#include "server/import/source/header_bytes.h"
 
 namespace isomesh::import {
 namespace {
@@ -11,32 +12,7 @@ namespace {
 constexpr std::size_t kNifti1Bytes = 348;
 constexpr std::size_t kNifti2Bytes = 540;
 
-class Fields {
- public:
-  Fields(std::string_view bytes, bool big_endian) : bytes_(bytes), big_endian_(big_endian) {}
-
-  template <class Stored>
-  Stored at(std::size_t offset) const {
-    std::array<std::byte, sizeof(Stored)> raw;
-    std::memcpy(raw.data(), bytes_.data() + offset, sizeof(Stored));
-    if (big_endian_) std::reverse(raw.begin(), raw.end());
-    Stored value;
-    std::memcpy(&value, raw.data(), sizeof(Stored));
-    return value;
-  }
-
-  template <class Stored, class Value, std::size_t Count>
-  void read(std::size_t offset, std::array<Value, Count>& values) const {
-    for (Value& value : values) {
-      value = at<Stored>(offset);
-      offset += sizeof(Stored);
-    }
-  }
-
- private:
-  std::string_view bytes_;
-  bool big_endian_;
-};
+using Fields = HeaderBytes;
 
 enum class Version { kOne, kTwo };
 
@@ -88,6 +64,7 @@ std::optional<Kind> kind_of(std::string_view head) {
 NiftiHeader read_nifti1(const Fields& fields) {
   NiftiHeader header;
   fields.read<std::int16_t>(40, header.dim);
+  header.intent = fields.at<std::int16_t>(68);
   header.datatype = fields.at<std::int16_t>(70);
   header.bits = fields.at<std::int16_t>(72);
   fields.read<float>(76, header.pixdim);
@@ -118,6 +95,7 @@ NiftiHeader read_nifti2(const Fields& fields) {
   fields.read<double>(376, header.qoffset);
   fields.read<double>(400, header.srow);
   header.units = fields.at<std::int32_t>(500);
+  header.intent = fields.at<std::int32_t>(504);
   return header;
 }
 
@@ -126,6 +104,7 @@ void forget_what_is_no_analyze(NiftiHeader& header) {
   constexpr int kUint16OfSpm = 132;
   constexpr int kUint16 = 512;
   if (header.datatype == kUint16OfSpm) header.datatype = kUint16;
+  header.intent = 0;
   header.intercept = 0;
   header.units = 0;
   header.qform_code = 0;

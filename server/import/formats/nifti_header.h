@@ -21,6 +21,7 @@ struct NiftiHeader {
   std::int64_t bytes = 0;    // of the header
   std::array<std::int64_t, 8> dim = {};
   std::array<double, 8> pixdim = {};
+  int intent = 0;
   int datatype = 0;
   int bits = 0;
   double vox_offset = 0;

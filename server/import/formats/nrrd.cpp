@@ -260,11 +260,15 @@ SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
-  const bool is_layered = sizes.volumes > 1 && !options.volume && has_segments(fields) &&
+  // Layers are consecutive or take turns with each sample.
+  const bool is_interleaved = sizes.run == 1;
+  const bool is_consecutive = sizes.run >= volume.sample_count();
+  const bool is_layered = (is_interleaved || is_consecutive) && sizes.volumes > 1 &&
+                          !options.volume && has_segments(fields) &&
                           is_integer(canonical_type(volume.layout));
   if (is_layered) {
     volume.chosen.count = sizes.volumes;
-    set_segments(fields, sizes.is_interleaved, false, volume);
+    set_segments(fields, is_interleaved, false, volume);
     return volume;
   }
   choose_volume(
@@ -273,8 +277,8 @@ SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
        .title =
            [&](std::uint64_t index) { return sizes.volume_kind + ' ' + std::to_string(index); }},
       options, volume);
-  volume.chosen.is_interleaved = sizes.is_interleaved && sizes.volumes > 1;
-  set_segments(fields, sizes.is_interleaved, true, volume);
+  if (sizes.volumes > 1 && !is_consecutive) volume.chosen.run = sizes.run;
+  set_segments(fields, is_interleaved, true, volume);
   return volume;
 }
 
@@ -302,7 +306,7 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
     volume.payload.offset = payload_offset(file, header, volume);
     volume.payload.bytes = file.size() - volume.payload.offset;
   }
-  volume.geometry = nrrd_geometry(fields, sizes.all, volume.notes);
+  volume.geometry = nrrd_geometry(fields, sizes.all, options, volume.notes);
   return volume;
 }
 

@@ -57,6 +57,9 @@ struct Space {
   std::array<double, 3> to_lps;
 };
 
+// Read unchanged, but only if the request accepts it.
+constexpr std::string_view kLeftHanded = "3d-left-handed";
+
 // The header's space. Throws for spaces without a known relation to LPS.
 std::optional<Space> space_of(const NrrdFields& fields) {
   static constexpr std::array<double, 3> kSame = {1, 1, 1};
@@ -69,15 +72,12 @@ std::optional<Space> space_of(const NrrdFields& fields) {
       {"las", {1, -1, 1}},
       {"scanner-xyz", kSame},
       {"3d-right-handed", kSame},
+      {kLeftHanded, kSame},
   };
   const std::string name = lower(value_of(fields, "space"));
   if (name.empty()) return std::nullopt;
   for (const Space& space : kReadable) {
     if (space.name == name) return space;
-  }
-  if (name.starts_with("3d-left-handed")) {
-    throw_unusable("The NRRD header's space " + in_quotes(name) +
-                   " is left-handed. Its directions in the patient are unknown.");
   }
   throw_unusable("The NRRD header's space " + in_quotes(name) +
                  " is unknown or has more than three dimensions.");
@@ -316,20 +316,19 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
       continue;
     }
     if (sizes[axis] == 1) continue;
-    const bool is_at_end = axis == 0 || axis + 1 == sizes.size();
     if (!is_volume_kind(kind) && !is_lattice_kind(kind)) {
       throw_unusable("Each sample has " + std::to_string(sizes[axis]) +
                      " components (an axis of kind " + in_quotes(kind) +
                      "). A sample must be one real number.");
     }
-    if (!is_at_end || result.volumes > 1) {
-      throw_unusable("The NRRD header's axis " + axis_name(axis) + " holds several volumes (kind " +
-                     in_quotes(kind) +
-                     "). Only volumes along the first or the last axis are supported.");
+    if (result.volumes > 1) {
+      throw_unusable("The NRRD header has a second axis of several volumes, " + axis_name(axis) +
+                     " (kind " + in_quotes(kind) + "). Only one such axis is supported.");
     }
     result.volumes = sizes[axis];
     result.volume_kind = is_volume_kind(kind) ? kind : "axis " + axis_name(axis);
-    result.is_interleaved = axis == 0;
+    for (const std::uint64_t faster : result.lattice)
+      result.run *= std::max<std::uint64_t>(faster, 1);
   }
   return result;
 }
@@ -380,8 +379,28 @@ bool is_unnamed_4d(const NrrdFields& fields, std::size_t dimension) {
 
 }  // namespace
 
+namespace {
+
+void check_handedness(const NrrdFields& fields, const ImportOptions& options,
+                      std::vector<Note>& notes) {
+  if (lower(value_of(fields, "space")) != kLeftHanded) return;
+  if (!options.accepts(NoteCode::kSpaceAssumed)) {
+    throw_overridable(
+        NoteCode::kSpaceAssumed,
+        "The NRRD header's space is left-handed (3D-left-handed), and its directions in "
+        "the patient are unknown. If accepted, its axes are read as those of LPS, so "
+        "shapes may be mirrored.");
+  }
+  notes.push_back(note_of(NoteCode::kSpaceAssumed,
+                          "The NRRD header's space is left-handed. Its axes were read as those of "
+                          "LPS, so shapes may be mirrored."));
+}
+
+}  // namespace
+
 Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
-                       std::vector<Note>& notes) {
+                       const ImportOptions& options, std::vector<Note>& notes) {
+  check_handedness(fields, options, notes);
   const std::vector<std::string> kinds = kinds_of(fields, sizes.size());
   const auto apart = static_cast<std::size_t>(
       std::ranges::count_if(kinds, [](const std::string& kind) { return !is_lattice_kind(kind); }));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "proto/types.h"
+#include "server/import/source/names.h"
 
 namespace isomesh::import {
 
@@ -29,22 +30,23 @@ struct NrrdSizes {
   std::vector<std::uint64_t> lattice;  // of the axes of samples, at most three
   std::uint64_t volumes = 1;           // the size of another axis with several elements
   std::string volume_kind;             // "list", "time", ...
-  bool is_interleaved = false;         // that axis is the first and runs fastest
+  std::uint64_t run = 1;               // samples of a volume that lie together
 };
 
-// Axes of components, lists and time have their own kinds and may be anywhere; one of them, the
-// first or the last, may have several volumes. Throws Error kUnusableVolume for components such as
+// Axes of components, lists and time have their own kinds and may be anywhere; one of them may have
+// several volumes. Throws Error kUnusableVolume for components such as
 // colours, and for several such axes.
 NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes);
 
 // The geometry of the lattice's first three axes, in LPS millimetres. Converts RAS and LAS to LPS.
 // Other right-handed spaces are used unchanged, because their relation to the patient is unknown;
-// left-handed ones are rejected. An unnamed space of four dimensions is a segmentation of an old
-// Slicer version: RAS, with the samples' position in Segment0_Extent, which a note reports. An axis
-// without a spacing or a direction gets it from its min and max, otherwise 1 mm. Without an origin
-// the first sample is at (0,0,0). Both are as in the format's other readers. Throws Error
-// kUnusableVolume if the fields contradict each other or the format.
+// a left-handed one must be accepted by the options and is noted. An unnamed space of four
+// dimensions is a segmentation of an old Slicer version: RAS, with the samples' position in
+// Segment0_Extent, which a note reports. An axis without a spacing or a direction gets it from its
+// min and max, otherwise 1 mm. Without an origin the first sample is at (0,0,0). Both are as in the
+// format's other readers. Throws Error kUnusableVolume if the fields contradict each other or the
+// format.
 Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
-                       std::vector<Note>& notes);
+                       const ImportOptions& options, std::vector<Note>& notes);
 
 }  // namespace isomesh::import

@@ -94,23 +94,47 @@ StoredType type_of(const VtiArray& array) {
                  " is not supported. A sample must be one real number.");
 }
 
-// The image's samples: the array that is the point data's Scalars, or the only one.
-const VtiArray& scalars_of(const VtiDocument& document) {
-  const std::string_view scalars = attribute_of(document.point_data, "Scalars");
+// The array that is the scalars of points or cells, or the only one; null if there is none.
+const VtiArray* find_scalars(const VtiAttributes& data, const std::vector<VtiArray>& arrays) {
+  const std::string_view scalars = attribute_of(data, "Scalars");
   const VtiArray* found = nullptr;
-  for (const VtiArray& array : document.arrays) {
+  for (const VtiArray& array : arrays) {
     if (!scalars.empty() && attribute_of(array.attributes, "Name") != scalars) continue;
     if (found != nullptr) {
       throw_unusable(
-          "The VTK file has several arrays of point data, but does not say which one is its "
-          "scalars.");
+          "The VTK file has several arrays of data, but does not say which one is its scalars.");
     }
     found = &array;
   }
-  if (found != nullptr) return *found;
-  throw_unusable(scalars.empty() ? "The VTK file has no point data. Samples must be point data."
-                                 : "The VTK file has no array " + in_quotes(scalars) +
-                                       ", which it names as its scalars.");
+  if (found != nullptr || scalars.empty()) return found;
+  throw_unusable("The VTK file has no array " + in_quotes(scalars) +
+                 ", which it names as its scalars.");
+}
+
+struct Scalars {
+  const VtiArray& array;
+  bool is_of_cells = false;
+};
+
+// Cells count only without any point data.
+Scalars scalars_of(const VtiDocument& document) {
+  if (const VtiArray* found = find_scalars(document.point_data, document.point_arrays)) {
+    return {*found, false};
+  }
+  if (const VtiArray* found = find_scalars(document.cell_data, document.cell_arrays)) {
+    return {*found, true};
+  }
+  throw_unusable("The VTK file has neither point data nor cell data.");
+}
+
+// The lattice of the cells' centres. An axis of one point has one cell without extent.
+void move_to_cells(SourceVolume& volume) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (volume.dims[axis] == 1) continue;
+    --volume.dims[axis];
+    const Vector3 step = step_of(volume.geometry, static_cast<int>(axis));
+    for (std::size_t row = 0; row < 3; ++row) volume.geometry.origin[row] += step[row] / 2;
+  }
 }
 
 void check_components(const VtiArray& array) {
@@ -243,14 +267,15 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   if (extent_of(document.piece, "Extent") != extent) {
     throw_unusable("The VTK file's piece does not fill its whole extent.");
   }
-  const VtiArray& array = scalars_of(document);
+  const auto [array, is_of_cells] = scalars_of(document);
   check_components(array);
   SourceVolume volume;
   volume.dims = extent.dims;
+  volume.geometry = geometry_of(document.image, extent);
+  if (is_of_cells) move_to_cells(volume);
   choose_volume(1, {}, options, volume);
   volume.layout.type = type_of(array);
   place_samples(file, document, array, volume);
-  volume.geometry = geometry_of(document.image, extent);
   return volume;
 }
 

@@ -15,9 +15,10 @@ bool is_vti(std::string_view head);
 // True if such a file may hold an image, by its beginning.
 bool may_hold_image(std::string_view head);
 
-// Reads the XML up to the samples. They are the point data's scalars, of one component, in one
-// piece that fills the whole extent. VTK does not define its space's relation to the patient; LPS
-// is assumed, as programs based on ITK write it. Throws Error kUnusableVolume.
+// Reads the XML up to the samples. They are the scalars, of one component, in one piece that fills
+// the whole extent: of the point data, or, if there are none, of the cell data at the cells'
+// centres. VTK does not define its space's relation to the patient; LPS is assumed, as programs
+// based on ITK write it. Throws Error kUnusableVolume.
 SourceVolume parse_vti(const InputFile& file, const Companions& companions,
                        const ImportOptions& options);
 

@@ -69,8 +69,10 @@ class Parser : public XmlHandler {
       ++document_.pieces;
     } else if (place == "VTKFile/ImageData/Piece/PointData") {
       document_.point_data = std::move(attributes);
-    } else if (place == kArrayPlace) {
-      add_array(std::move(attributes));
+    } else if (place == "VTKFile/ImageData/Piece/CellData") {
+      document_.cell_data = std::move(attributes);
+    } else if (auto* arrays = arrays_at(place)) {
+      add_array(std::move(attributes), *arrays);
     } else if (place == "VTKFile/AppendedData") {
       document_.appended = std::move(attributes);
       document_.appended_at = reader_.end();
@@ -79,8 +81,8 @@ class Parser : public XmlHandler {
   }
 
   void end_element(std::string_view) override {
-    if (joined_path() == kArrayPlace) {
-      CompressedRange& text = document_.arrays.back().text;
+    if (auto* arrays = arrays_at(joined_path())) {
+      CompressedRange& text = arrays->back().text;
       text.bytes = reader_.begin() - std::min(reader_.begin(), text.offset);
     }
     path_.pop_back();
@@ -92,12 +94,19 @@ class Parser : public XmlHandler {
     throw_unusable("The VTK file holds " + in_quotes(type) + ", not ImageData.");
   }
 
-  void add_array(VtiAttributes attributes) {
+  // The list that an array at this place belongs to; null for no array.
+  std::vector<VtiArray>* arrays_at(std::string_view place) {
+    if (place == "VTKFile/ImageData/Piece/PointData/DataArray") return &document_.point_arrays;
+    if (place == "VTKFile/ImageData/Piece/CellData/DataArray") return &document_.cell_arrays;
+    return nullptr;
+  }
+
+  void add_array(VtiAttributes attributes, std::vector<VtiArray>& arrays) const {
     constexpr std::size_t kMostArrays = 1000;
-    if (document_.arrays.size() == kMostArrays) {
+    if (arrays.size() == kMostArrays) {
       throw_unusable("The VTK file has more than the 1000 arrays that are supported.");
     }
-    document_.arrays.push_back({std::move(attributes), {reader_.end(), 0}});
+    arrays.push_back({std::move(attributes), {reader_.end(), 0}});
   }
 
   std::string joined_path() const {
@@ -105,8 +114,6 @@ class Parser : public XmlHandler {
     for (const std::string& name : path_) path += (path.empty() ? "" : "/") + name;
     return path;
   }
-
-  static constexpr std::string_view kArrayPlace = "VTKFile/ImageData/Piece/PointData/DataArray";
 
   const InputFile& file_;
   const Until until_;

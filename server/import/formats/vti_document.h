@@ -30,8 +30,10 @@ struct VtiDocument {
   VtiAttributes image;
   VtiAttributes piece;
   VtiAttributes point_data;
+  VtiAttributes cell_data;
   std::size_t pieces = 0;
-  std::vector<VtiArray> arrays;
+  std::vector<VtiArray> point_arrays;
+  std::vector<VtiArray> cell_arrays;
   VtiAttributes appended;
   std::uint64_t appended_at = 0;  // file offset of its data; 0: none
 };

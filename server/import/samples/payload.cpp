@@ -10,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "server/import/samples/reorder.h"
 #include "server/import/samples/vtk_data.h"
 #include "server/import/source/bzip2.h"
 
@@ -147,6 +148,41 @@ void decode_text(const Part& part, ScratchFile& scratch) {
   decoded.finish();
 }
 
+// The value of a float of 16 bits (IEEE 754 binary16).
+float float_of_half(std::uint16_t half) {
+  constexpr int kBias = 15;
+  constexpr int kFractionBits = 10;
+  const int exponent = half >> kFractionBits & 0x1f;
+  const int fraction = half & 0x3ff;
+  const float sign = (half & 0x8000) != 0 ? -1.0F : 1.0F;
+  if (exponent == 0x1f) {
+    return fraction != 0 ? std::numeric_limits<float>::quiet_NaN()
+                         : sign * std::numeric_limits<float>::infinity();
+  }
+  if (exponent == 0)
+    return sign * std::ldexp(static_cast<float>(fraction), 1 - kBias - kFractionBits);
+  return sign * std::ldexp(static_cast<float>(fraction + 1024), exponent - kBias - kFractionBits);
+}
+
+void decode_half(const Part& part, bool big_endian, ScratchFile& scratch) {
+  std::vector<std::uint16_t> halves(kPieceBytes);
+  std::vector<float> floats;
+  const std::uint64_t stored = part.bytes / 2;
+  for (std::uint64_t done = 0; done < stored;) {
+    const std::size_t count =
+        std::min<std::uint64_t>(halves.size(), (stored - done) / sizeof(std::uint16_t));
+    const std::span<std::byte> bytes = std::as_writable_bytes(std::span(halves).first(count));
+    const std::size_t found = part.file.read(part.range.offset + done, bytes);
+    if (found < bytes.size()) throw_short(stored, done + found);
+    if (big_endian) swap_bytes(bytes, sizeof(std::uint16_t));
+    floats.resize(count);
+    std::transform(halves.begin(), halves.begin() + static_cast<std::ptrdiff_t>(count),
+                   floats.begin(), float_of_half);
+    scratch.write(std::as_bytes(std::span(floats)));
+    done += found;
+  }
+}
+
 std::optional<unsigned> hex_digit(char letter) {
   if (letter >= '0' && letter <= '9') return static_cast<unsigned>(letter - '0');
   if (letter >= 'a' && letter <= 'f') return static_cast<unsigned>(letter - 'a') + 10;
@@ -188,6 +224,8 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
       return decode_text(part, scratch);
     case Encoding::kHex:
       return decode_hex(part, scratch);
+    case Encoding::kHalf:
+      return decode_half(part, volume.layout.big_endian, scratch);
     case Encoding::kVtk:
       return decode_vtk(part.file, part.range, part.bytes, volume.vtk, folder, scratch);
   }
@@ -197,6 +235,7 @@ std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume) 
   const std::uint64_t expected = volume.stored_bytes();
   const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
   if (found < expected) throw_short(expected, found);
+  if (volume.has_footer) return 0;
   if (!may_trail(found - expected, volume)) throw_long(expected);
   return found - expected;
 }
@@ -216,17 +255,20 @@ Payload::Payload(const InputFile& file, const SourceVolume& volume,
   } else {
     decode(volume, scratch);
   }
-  if (volume.chosen.is_interleaved) {
-    pick_interleaved(volume, scratch);
+  if (volume.chosen.run != 0) {
+    pick(volume, scratch);
   } else {
     offset_ += volume.chosen.index * volume.volume_bytes();
   }
+  if (volume.stored_axes != kXFastest) reorder(volume, scratch);
 }
 
 void Payload::decode(const SourceVolume& volume, const std::filesystem::path& scratch) {
   scratch_.emplace(scratch, ".samples");
   const StoredType type = layout_.type;
-  if (volume.encoding == Encoding::kText) layout_.big_endian = false;
+  if (volume.encoding == Encoding::kText || volume.encoding == Encoding::kHalf) {
+    layout_.big_endian = false;
+  }
   if (volume.data_files.empty()) {
     decode_part(volume, {file_, volume.payload, volume.stored_bytes(), volume.decoded_skip, type},
                 scratch, *scratch_);
@@ -240,28 +282,56 @@ void Payload::decode(const SourceVolume& volume, const std::filesystem::path& sc
   offset_ = volume.decoded_skip.value_or(decoded_->size() - volume.stored_bytes());
 }
 
-// Copies the samples of one interleaved volume into a file of their own.
-void Payload::pick_interleaved(const SourceVolume& volume, const std::filesystem::path& scratch) {
+// Copies the samples of one volume, which takes turns with others sample by sample, into a file of
+// their own.
+void Payload::pick_interleaved(const SourceVolume& volume, ScratchFile& target) {
   const std::size_t size = bytes_per_sample(layout_.type);
   const std::size_t step = size * volume.chosen.count;
   const std::size_t at_once = std::max<std::size_t>(kPieceBytes / step, 1);
-  ScratchFile& picked = picked_.emplace(scratch, ".volume");
   std::vector<std::byte> piece(at_once * step);
   std::vector<std::byte> samples;
   for (std::uint64_t left = volume.sample_count(); left > 0;) {
     const std::size_t count = std::min<std::uint64_t>(left, at_once);
     const std::span<std::byte> whole = std::span(piece).first(count * step);
-    if (this->file().read(offset_, whole) != whole.size()) throw_short(volume.stored_bytes(), 0);
+    if (file().read(offset_, whole) != whole.size()) throw_short(volume.stored_bytes(), 0);
     samples.clear();
     for (std::size_t at = volume.chosen.index * size; at < whole.size(); at += step) {
       samples.insert(samples.end(), whole.begin() + static_cast<std::ptrdiff_t>(at),
                      whole.begin() + static_cast<std::ptrdiff_t>(at + size));
     }
-    picked.write(samples);
+    target.write(samples);
     offset_ += whole.size();
     left -= count;
   }
-  decoded_.emplace(picked.path());
+}
+
+// The same for volumes that take turns with rows or planes.
+void Payload::pick_runs(const SourceVolume& volume, ScratchFile& target) {
+  const std::uint64_t run = volume.chosen.run * bytes_per_sample(layout_.type);
+  const std::uint64_t runs = volume.sample_count() / volume.chosen.run;
+  for (std::uint64_t at = 0; at < runs; ++at) {
+    const std::uint64_t place = (at * volume.chosen.count + volume.chosen.index) * run;
+    copy_part({file(), {offset_ + place, run}, run}, target);
+  }
+}
+
+void Payload::pick(const SourceVolume& volume, const std::filesystem::path& scratch) {
+  ScratchFile& target = picked_.emplace(scratch, ".volume");
+  if (volume.chosen.run == 1) {
+    pick_interleaved(volume, target);
+  } else {
+    pick_runs(volume, target);
+  }
+  decoded_.emplace(target.path());
+  offset_ = 0;
+}
+
+// Copies the samples into a file of their own, with x running fastest.
+void Payload::reorder(const SourceVolume& volume, const std::filesystem::path& scratch) {
+  const std::size_t size = bytes_per_sample(layout_.type);
+  ScratchFile& target = reordered_.emplace(scratch, ".ordered");
+  write_reordered({file(), offset_, size}, volume.dims, volume.stored_axes, target);
+  decoded_.emplace(target.path());
   offset_ = 0;
 }
 

@@ -17,8 +17,26 @@
 namespace isomesh::import {
 namespace {
 
-Geometry usable_geometry(const SourceVolume& source) {
-  const Geometry geometry = normalised(source.geometry);
+// The geometry of a file that has a spacing, or of the request's.
+Geometry spaced_geometry(const SourceVolume& source, const ImportOptions& options) {
+  if (source.has_spacing && options.spacing) {
+    throw invalid_parameter("spacing",
+                            "applies to files without a spacing, but this file has its own");
+  }
+  if (source.has_spacing) return source.geometry;
+  if (!options.spacing) {
+    throw_choice(
+        "The file does not say how far apart its samples are. Give the distances along x, y and z "
+        "in millimetres: spacing=X,Y,Z.",
+        {{"spacing", "1,1,1", "1 mm along x, y and z"}});
+  }
+  Geometry geometry = source.geometry;
+  geometry.spacing = *options.spacing;
+  return geometry;
+}
+
+Geometry usable_geometry(const SourceVolume& source, const ImportOptions& options) {
+  const Geometry geometry = normalised(spaced_geometry(source, options));
   if (const auto fault = find_fault(source.dims, geometry)) {
     throw_unusable("The file's geometry cannot be used: " + fault->message + ".");
   }
@@ -67,7 +85,7 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task) {
   Volume volume;
   volume.dims = source.dims;
-  volume.geometry = usable_geometry(source);
+  volume.geometry = usable_geometry(source, task.options);
   // Raw samples are compared with the file's size first, so that a truncated file is reported as
   // truncated even if its header declares more samples than allowed.
   if (source.encoding != Encoding::kRaw) check_limits(source, task.limits);

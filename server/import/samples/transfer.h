@@ -25,8 +25,9 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target);
 
 // Writes the canonical file of the volume `source`, whose samples are in `file` or in the data
-// files of `source`. Throws Error kUnusableVolume also if its geometry is invalid or its samples
-// cannot be decoded, kTooLarge beyond the task's limits.
+// files of `source`. Throws Error kInvalidParameter for the option `spacing` if the file has its
+// own, kUnusableVolume with a choice if neither has one, also if its geometry is invalid or its
+// samples cannot be decoded, kTooLarge beyond the task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
 // Completes a canonical file: measures and flushes the samples. `volume` has dims, type and

@@ -33,16 +33,20 @@ struct Input {
   const FormatListener& listener;
 };
 
-// The content of a file: a volume, slices of a volume, or other files.
-enum class Content { kVolume, kSlices, kFiles };
+// The content of a file: a volume, slices of a volume, pages of which a stack of files is a volume,
+// or other files.
+enum class Content { kVolume, kSlices, kPages, kFiles };
 
 // A row of the table in readers.cpp.
 struct Reader {
-  std::string_view name;   // as in the API; "archive" has no volume format
-  std::string_view title;  // for a person
+  // A row of proto/volume_formats.h, or "archive", which is no volume format.
+  std::string_view name;
   Content content = Content::kVolume;
   // Recognises the beginning of a file. Null for raw samples, which have no signature.
   bool (*sniff)(std::string_view head) = nullptr;
+  // False for a file that is recognised but cannot hold a volume, by its beginning, such as a
+  // surface. An archive may hold it beside a volume. Null if all may.
+  bool (*may_hold_volume)(std::string_view head) = nullptr;
   // Reads the input and writes the task's target. Throws as import_volume does.
   Volume (*parse)(const Input& input) = nullptr;
   // The largest possible size of a file, by its plain beginning: the whole file or at least its

@@ -27,6 +27,8 @@ std::uint64_t SourceVolume::most_encoded_bytes() const {
       return sample_count() * chosen.count * kTextPerSample;
     case Encoding::kHex:
       return stored_bytes() * kHexPerByte;
+    case Encoding::kHalf:
+      return stored_bytes() / 2;
     case Encoding::kRaw:
     case Encoding::kDeflate:
     case Encoding::kBzip2:

@@ -34,6 +34,7 @@ enum class Encoding {
   kText,  // numbers separated by white space
   kHex,   // pairs of hexadecimal digits; white space is ignored
   kVtk,   // see VtkEncoding
+  kHalf,  // floats of 16 bits, which become float32
 };
 
 // VTK's encoding of an array: a header of counts, then the bytes, optionally compressed in blocks;
@@ -64,11 +65,12 @@ struct DataFile {
   CompressedRange range;
 };
 
-// The volume to read from a file. Volumes are consecutive or interleaved by sample.
+// The volume to read from a file. Volumes are consecutive, or take turns: `run` samples of the
+// first, as many of the second, ...
 struct VolumeOfFile {
   std::uint64_t index = 0;
   std::uint64_t count = 1;
-  bool is_interleaved = false;
+  std::uint64_t run = 0;  // 0: consecutive
 };
 
 // The start of the samples in their decoded stream: bytes to skip, or, if empty, the samples are at
@@ -83,16 +85,25 @@ struct SegmentLayers {
   std::map<std::pair<std::uint64_t, std::int64_t>, std::uint32_t> labels;
 };
 
+// The axes of a lattice as they are stored, the fastest first: 0 is x, 1 is y, 2 is z.
+using StoredAxes = std::array<std::size_t, 3>;
+inline constexpr StoredAxes kXFastest = {0, 1, 2};
+
 struct SourceVolume {
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  StoredAxes stored_axes = kXFastest;
   VolumeOfFile chosen;
   SampleLayout layout;
   Encoding encoding = Encoding::kRaw;
   Skip decoded_skip = 0;    // for encoded samples
   CompressedRange payload;  // the samples' range, unless there are data files
-  VtkEncoding vtk;          // for Encoding::kVtk
+  // The format has more data behind the samples, which no note reports.
+  bool has_footer = false;
+  VtkEncoding vtk;  // for Encoding::kVtk
   // For a detached header: the files with equal parts of the samples, in this order.
   std::vector<DataFile> data_files;
+  // Without a spacing, the request must give one; `geometry` then has steps of 1.
+  bool has_spacing = true;
   Geometry geometry;
   std::vector<Note> notes;
   std::vector<LabelEntry> labels;       // see label_table()

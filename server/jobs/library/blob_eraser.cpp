@@ -10,7 +10,8 @@
 namespace isomesh::jobs {
 namespace {
 
-// An answer is on its way then. The thread that sends it would wait for a processor meanwhile.
+// Erasing waits this long, so that it does not compete for a processor with the thread that sends
+// the response to the deletion.
 constexpr std::chrono::milliseconds kPause{100};
 
 }  // namespace
@@ -47,11 +48,13 @@ void BlobEraser::run(const std::stop_token& stop) {
 
 void BlobEraser::erase_now(const std::string& key) {
   try {
-    // The disk takes long to free the bytes of a large one, and nobody is to wait for that.
+    // Freeing the bytes of a large blob takes long. Holding them until the lock is released keeps
+    // others from waiting for it.
     const std::shared_ptr<const void> held = blobs_.hold_bytes(key);
     const std::scoped_lock lock(coming_);
     const auto names = [this](const std::string& asked) { return volumes_.names(asked); };
-    // Whoever of another daemon has stored it, at any time, may be about to name it.
+    // Another daemon may have stored the same blob at any time and be about to name it, so every
+    // blob counts as recent.
     blobs_.erase_unnamed(std::span(&key, 1), store::Steady(), names);
   } catch (const std::exception& error) {
     log_error("the samples of a deleted volume could not be erased and are removed later: {}",

@@ -11,12 +11,12 @@
 
 namespace isomesh::jobs {
 
-// Takes the samples of erased volumes away in a thread of its own: how long an answer takes tells
-// neither how large they were nor whether another owner has them still. Thread safe.
+// Erases the samples of deleted volumes in a thread of its own. So the response time of a deletion
+// reveals neither their size nor whether another owner still has them. Thread safe.
 class BlobEraser {
  public:
-  // `coming` is held by those who bring blobs and their records, and alone while a blob goes. All
-  // must outlive this.
+  // `coming` is held shared while a blob and its record are added, and exclusively while a blob is
+  // erased. All arguments must outlive this object.
   BlobEraser(const store::BlobStore& blobs, const store::VolumeStore& volumes,
              std::shared_mutex& coming)
       : blobs_(blobs),
@@ -24,13 +24,13 @@ class BlobEraser {
         coming_(coming),
         thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-  // What waits goes first.
+  // Erases all queued blobs first.
   ~BlobEraser() = default;
 
-  // Erases the blob soon, unless a record names it then.
+  // Queues the blob. It is erased soon, unless a record names it by then.
   void erase(const std::string& key);
 
-  // Waits until all that was to be erased is.
+  // Returns once all queued blobs are erased.
   void finish();
 
  private:
@@ -42,9 +42,11 @@ class BlobEraser {
   std::shared_mutex& coming_;
   Mutex mutex_;
   Condition changed_;
-  std::deque<std::string> waiting_ ISOMESH_GUARDED_BY(mutex_);  // the first is under way
-  int hurries_ ISOMESH_GUARDED_BY(mutex_) = 0;                  // of those that wait for the end
-  std::jthread thread_;                                         // last, because it uses the others
+  std::deque<std::string> waiting_ ISOMESH_GUARDED_BY(mutex_);  // the first is being erased
+  // Callers of finish() that are waiting.
+  int hurries_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  // Last, because it uses the other members.
+  std::jthread thread_;
 };
 
 }  // namespace isomesh::jobs

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t kBlockBytes = std::uint64_t{4} << 20;
 
-// Counts the samples that begin at these bytes of them, at most a block in memory.
+// Counts the samples in these bytes, with at most one block of them in memory.
 void add_part(const volume::CanonicalFile& canonical, std::uint64_t begin, std::uint64_t end,
               volume::ValueCounts& counts) {
   std::vector<std::byte> block;

@@ -12,19 +12,19 @@
 
 namespace isomesh::jobs {
 
-// Histograms of stored volumes. The first one of a volume reads all of its samples; the counts of
-// the last kVolumes volumes are kept, so that others of any width cost nothing. They are kept for
-// each viewer: a quick answer would tell that somebody else has the same volume. Thread safe;
-// `blobs` must outlive it.
+// Histograms of stored volumes. The first histogram of a volume reads all samples. The counts of
+// the last kVolumes volumes are cached, so further histograms with any number of bins are fast. The
+// cache is separate for each viewer: otherwise a fast response would reveal that somebody else has
+// the same volume. Thread safe; `blobs` must outlive it.
 class Histograms {
  public:
-  static constexpr std::size_t kVolumes = 32;  // half a megabyte each at most
+  static constexpr std::size_t kVolumes = 32;  // at most half a megabyte each
   static constexpr std::size_t kMostWaiting = 12;
 
   explicit Histograms(const store::BlobStore& blobs) : blobs_(blobs) {}
 
-  // Throws Error kUnavailable when too many wait for one already, kUnusableVolume when the
-  // stored samples are damaged, kInternal.
+  // Throws Error kUnavailable if too many callers wait already, kUnusableVolume if the stored
+  // samples are damaged, kInternal otherwise.
   Histogram of(const store::Viewer& viewer, const Volume& volume, std::size_t bins);
 
  private:

@@ -19,7 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kEnd{2000};  // how long a process may go on after it has closed its end
+constexpr milliseconds kEnd{2000};  // for a process to exit after it closed its socket
 constexpr std::size_t kMostAnswerBytes = std::size_t{16} << 20;
 
 std::string while_reading(const process::ImportReport& report) {
@@ -36,8 +36,8 @@ std::string while_reading(const process::ImportReport& report) {
   throw Error(ErrorCode::kInternal, "An import's response does not match its canonical file.");
 }
 
-// The process may have been taken over by the file that it read, so its answer is compared with the
-// canonical file.
+// A malicious file may have taken over the process, so its response is compared with the canonical
+// file.
 void check(const Volume& volume, const process::ImportTask& task) {
   if (!std::filesystem::exists(task.target)) throw_lying();
   for (const Note& note : volume.notes) {
@@ -68,7 +68,7 @@ Volume volume_of(process::ImportReport report, const process::ImportTask& task) 
   return *std::move(report.volume);
 }
 
-// Of a file that is not there, nothing: the import says so.
+// 0 if the file is missing; the import reports that error.
 std::uint64_t size_of(const std::filesystem::path& upload) {
   std::error_code absent;
   const std::uintmax_t bytes = std::filesystem::file_size(upload, absent);
@@ -95,7 +95,7 @@ ImportRunner::ImportRunner(const RunnerOptions& options)
 }
 
 Volume ImportRunner::run(const process::ImportTask& task) {
-  // Checked here, because a message of JSON cannot carry numbers that are not finite.
+  // Checked here because a JSON message cannot carry non-finite numbers.
   if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
   const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
   return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds})), task);
@@ -123,7 +123,7 @@ process::ImportReport ImportRunner::report_of(const std::string& message) {
   } leave{*this};
 
   const auto deadline = Clock::now() + options_.bounds.time;
-  // One that has died while it waited has not touched the file. More than one is no accident.
+  // A process that died while idle has not touched the file. Several in a row are a defect.
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
     if (auto report = run_in(prepared_.take(deadline), message)) return *std::move(report);
@@ -152,7 +152,8 @@ std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
     prepared_.renew();
     refuse_dead(process::how_it_ended(status), report);
   }
-  // Ended before the file is checked, so that nothing can change it afterwards.
+  // The process must have ended before the file is checked; otherwise it could still change the
+  // file.
   child.end();
   return report;
 }

@@ -1,4 +1,4 @@
-// Runs each import in a process of its own, which may do little else than read the one file.
+// Runs each import in a sandboxed process of its own, which can read little but its one file.
 #pragma once
 
 #include <condition_variable>
@@ -16,12 +16,13 @@ namespace isomesh::jobs {
 
 struct RunnerOptions {
   process::ImportBounds bounds;
-  std::size_t at_once = 2;        // further imports wait; so many processes are kept prepared
+  // Further imports wait; also the number of idle processes kept ready.
+  std::size_t at_once = 2;
   std::filesystem::path program;  // isomesh-import
 };
 
-// The bounds of one import: no more than `most`, and less processor time for a small upload, which
-// takes long only when it is made to. What is small unpacked is read at many megabytes a second.
+// The bounds of one import: at most `most`, and less time for a small upload, which takes long only
+// if it is malicious. Honest uploads are read at many megabytes per second.
 process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
 
 // Thread safe.
@@ -29,24 +30,24 @@ class ImportRunner {
  public:
   explicit ImportRunner(const RunnerOptions& options);
 
-  // Imports as import_volume does, in a process that does nothing else, before or after, and has
-  // ended when this returns or throws; only files in the scratch folder may remain of it. Throws
-  // what import_volume throws, and Error kUnusableVolume when the process crashes or exceeds its
-  // bounds, kUnavailable once stopped. The volume has been compared with the canonical file.
+  // Imports as import_volume does, in a process used for this import only. The process has ended
+  // when this returns or throws, and leaves files only in the scratch folder. The returned volume
+  // has been compared with the canonical file. Throws what import_volume throws; Error
+  // kUnusableVolume if the process crashes or exceeds its bounds; kUnavailable after stop().
   Volume run(const process::ImportTask& task);
 
-  // Reads what a PACS has answered, in such a process. Throws Error kPacsUnreachable when it cannot
-  // be read, also when the process crashes or exceeds its bounds, kUnavailable once stopped.
+  // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
+  // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
   process::PeersAnswer read_answer(const std::filesystem::path& file);
 
-  // Ends the imports that run or wait, and refuses further ones.
+  // Aborts running and waiting imports, and rejects further ones.
   void stop();
 
  private:
-  // What a process says that is told so; it has ended when this returns. Throws as run() does,
-  // when it says neither what was asked for nor why there is nothing.
+  // Sends `message` to a process and returns its report. The process has ended when this returns.
+  // Throws as run() does if the report has neither a result nor an error.
   process::ImportReport report_of(const std::string& message);
-  // Empty when the process had ended before it began.
+  // Returns nothing if the process ended before it began its work.
   std::optional<process::ImportReport> run_in(process::Child child, const std::string& message);
   void take_place();
   void give_place_back();

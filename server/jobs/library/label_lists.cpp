@@ -19,7 +19,7 @@ namespace {
 using mesh::LabelVoxels;
 using Dims = std::array<std::uint32_t, 3>;
 
-// A box of samples that lie one behind the other in their file.
+// A box of samples that are contiguous in the file.
 struct Block {
   Dims first;
   Dims dims;
@@ -27,7 +27,8 @@ struct Block {
   std::size_t samples() const { return std::size_t{dims[0]} * dims[1] * dims[2]; }
 };
 
-// Cuts a volume into blocks: parts of rows, of planes or of the whole, as large as may be.
+// Divides a volume into blocks: parts of a row or plane, whole planes, or the whole volume; as
+// large as the limit allows.
 class Blocks {
  public:
   Blocks(const Dims& dims, std::uint64_t most_samples) : dims_(dims) {
@@ -51,7 +52,7 @@ class Blocks {
     return block;
   }
 
-  // Where the block begins, in samples.
+  // The offset of the block's first sample, in samples.
   std::uint64_t place(const Block& block) const {
     return (std::uint64_t{block.first[2]} * dims_[1] + block.first[1]) * dims_[0] + block.first[0];
   }
@@ -90,7 +91,7 @@ double voxel_mm3(const Volume& volume) {
   return std::abs(mesh::lattice_to_space(volume.geometry).determinant());
 }
 
-// All values that the samples have, ascending; some megabytes for each thread.
+// All distinct values of the samples, ascending. Takes a few megabytes per thread.
 template <class Sample>
 std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
                                       const Volume& volume) {
@@ -136,7 +137,8 @@ std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
   });
 }
 
-// The corners of the box of these voxels, each of which reaches half a step around its sample.
+// Corners of the bounding box of these voxels, in millimetres. A voxel extends half a step around
+// its sample.
 std::array<std::array<double, 3>, 2> bounds_of(const LabelVoxels& voxels,
                                                const mesh::LatticeToSpace& to_space) {
   std::array<std::array<double, 3>, 2> bounds;

@@ -17,32 +17,32 @@
 
 namespace isomesh::jobs {
 
-// The values of the volume's labels that are not the samples of their own value alone.
+// Labels of the volume that stand for other values than their own number.
 LabelValues values_of(const Volume& volume);
 
-// Which labels stored volumes have. The first list of a volume reads all of its samples; what the
-// last kVolumes volumes have is kept for each viewer, as histograms are. Thread safe; `blobs` must
-// outlive it.
+// Lists the labels in stored volumes. The first list of a volume reads all samples. The results of
+// the last kVolumes volumes are cached for each viewer, for the reason given at Histograms. Thread
+// safe; `blobs` must outlive it.
 class LabelLists {
  public:
-  static constexpr std::size_t kVolumes = 16;  // 3 MB each at most
-  static constexpr std::size_t kLists = 4;     // some 10 MB each at most
+  static constexpr std::size_t kVolumes = 16;  // at most 3 MB each
+  static constexpr std::size_t kLists = 4;     // at most about 10 MB each
   static constexpr std::size_t kMostWaiting = 12;
 
   explicit LabelLists(const store::BlobStore& blobs) : blobs_(blobs) {}
 
-  // Samples of the value `background` belong to no label. Labels without a voxel are not listed.
-  // Throws Error kUnusableVolume when the samples are not whole numbers, of more than
-  // Volume::kMostLabels labels, or damaged, kUnavailable when too many wait for a list already,
-  // kInternal.
+  // Samples of the value `background` belong to no label. Labels without voxels are omitted. Throws
+  // Error kUnusableVolume if the samples are damaged, not integers, or have more than
+  // Volume::kMostLabels labels; kUnavailable if too many callers wait already; kInternal otherwise.
   VolumeLabels of(const store::Viewer& viewer, const Volume& volume, std::int64_t background);
 
-  // All values that the samples have, the background's too, ascending. Throws as `of` does.
+  // All distinct values of the samples with their voxels, ascending, including the background.
+  // Throws as of() does.
   std::shared_ptr<const std::vector<mesh::LabelVoxels>> counts(const store::Viewer& viewer,
                                                                const Volume& volume);
 
   // The first labels of that list after the label `after`, at most MeshSummary::kMostListedLabels
-  // of them. Its `next` is the last of them, as a text, if there are more.
+  // of them. If more follow, `next` is the last label of the page as text.
   VolumeLabels page_of(const store::Viewer& viewer, const Volume& volume, std::int64_t background,
                        std::optional<std::int64_t> after);
 
@@ -51,7 +51,8 @@ class LabelLists {
 
   const store::BlobStore& blobs_;
   Memo<std::pair<store::Viewer, std::string>, Counts> counts_{kVolumes, kMostWaiting};
-  // By when the record was made, too: the same samples may come again with other names.
+  // The key has the record's creation time, because the same samples may be uploaded again with
+  // other names.
   Memo<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
       kLists, kMostWaiting};
 };

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kPerPage = MeshSummary::kMostListedLabels;
 constexpr std::size_t kNumberBytes = 8;
 constexpr std::size_t kEntryBytes = 2 * kNumberBytes;
-// Far more than a page with long names and a file in every format has.
+// Far more than a page with long names and files in every format needs.
 constexpr std::uint64_t kMostPageBytes = std::uint64_t{64} << 20;
 
 [[noreturn]] void throw_damaged() {

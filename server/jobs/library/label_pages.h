@@ -1,8 +1,8 @@
 // The labels of a finished job, read in pages. A job with few labels has them in its record. A job
-// with more has them in a file beside its mesh: pages of JSON, each of up to
-// MeshSummary::kMostListedLabels labels in ascending order, and then an index. The index has an
-// entry for each page: the page's first label and the offset of its first byte, each as a
-// little-endian number of 64 bits.
+// with more has them in a file beside its mesh: JSON pages, each with up to
+// MeshSummary::kMostListedLabels labels in ascending order, followed by an index. The index has one
+// entry per page: its first label and the offset of its first byte, each as a little-endian 64-bit
+// number.
 #pragma once
 
 #include <cstddef>
@@ -18,10 +18,10 @@
 
 namespace isomesh::jobs {
 
-// Writes the file of a job's labels, which are ascending.
+// Writes the file of a job's labels. `labels` must be ascending.
 void write_label_pages(std::span<const LabelSummary> labels, const codec::Sink& sink);
 
-// Reads the labels of a job that has a mesh. The job must outlive the object. Not thread safe. All
+// Reads the labels of a job that has a mesh. The job must outlive this object. Not thread safe. All
 // methods but count() throw Error kInternal if the file is damaged.
 class JobLabels {
  public:
@@ -31,11 +31,11 @@ class JobLabels {
   // Zero for a job at an iso-value.
   std::uint64_t count() const { return count_; }
 
-  // The labels after that one, or the first ones, in ascending order: at least one and at most
-  // MeshSummary::kMostListedLabels, or none at the end of the list. Their files have addresses.
+  // The labels after `label`, or from the first one, in ascending order: between one and
+  // MeshSummary::kMostListedLabels; none at the end of the list. Their files have addresses.
   std::vector<LabelSummary> after(std::optional<std::int64_t> label) const;
 
-  // True if more labels follow the last one that after() returned. It reads nothing.
+  // True if more labels follow the last one that after() returned. Reads nothing.
   bool has_after(std::int64_t last) const;
 
   // Empty if the job has no such label. Its files may have no addresses.
@@ -49,7 +49,7 @@ class JobLabels {
 
   void read_index(const LabelListFile& file);
   std::vector<LabelSummary> page(std::size_t n) const;
-  // The page in which the label is if the job has it.
+  // The page that contains the label if the job has it.
   std::size_t page_of(std::int64_t label) const;
 
   const Job& job_;

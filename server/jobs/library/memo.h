@@ -13,19 +13,19 @@
 
 namespace isomesh::jobs {
 
-// Keeps the last answers to questions that take long to answer and whose answers never change. A
-// question that several callers ask at the same time is answered once, for all of them. Thread
-// safe.
+// Caches the results of slow computations that never change. Concurrent callers with the same key
+// share one computation. Thread safe.
 template <class Key, class Value>
 class Memo {
  public:
-  // Keeps `capacity` answers, and lets at most `most_waiting` callers at a time find an answer or
-  // wait for another caller to find it.
+  // Caches `capacity` results. At most `most_waiting` callers may compute a result or wait for one
+  // at the same time.
   Memo(std::size_t capacity, std::size_t most_waiting)
       : capacity_(capacity), most_waiting_(most_waiting) {}
 
-  // The answer to `key`, which `find` finds when it is not kept. Throws Error kUnavailable when too
-  // many callers wait already, and what `find` throws; then nothing is kept.
+  // Returns the value of `key`, computed by `find` unless it is cached. Throws Error kUnavailable
+  // if too many callers wait already. If `find` throws, all callers with that key get its exception
+  // and nothing is cached.
   std::shared_ptr<const Value> get(const Key& key, const std::function<Value()>& find) {
     std::promise<std::shared_ptr<const Value>> promise;
     std::shared_future<std::shared_ptr<const Value>> answer;
@@ -62,7 +62,6 @@ class Memo {
     typename std::list<Key>::iterator place;
   };
 
-  // Gives a caller's place among those that wait back when it goes.
   class Leave {
    public:
     explicit Leave(Memo& memo) : memo_(memo) {}
@@ -91,7 +90,7 @@ class Memo {
     }
   }
 
-  // Callers that still wait for an answer that is forgotten hold its future themselves.
+  // Callers that still wait for the removed value hold its future themselves.
   void forget_oldest() ISOMESH_REQUIRES(mutex_) {
     while (order_.size() > capacity_) {
       answers_.erase(order_.back());
@@ -102,7 +101,7 @@ class Memo {
   const std::size_t capacity_;
   const std::size_t most_waiting_;
   Mutex mutex_;
-  std::list<Key> order_ ISOMESH_GUARDED_BY(mutex_);  // the last asked for first
+  std::list<Key> order_ ISOMESH_GUARDED_BY(mutex_);  // most recently used first
   std::map<Key, Entry> answers_ ISOMESH_GUARDED_BY(mutex_);
   std::size_t waiting_ ISOMESH_GUARDED_BY(mutex_) = 0;
 };

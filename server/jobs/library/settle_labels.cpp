@@ -47,7 +47,8 @@ JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewe
   }
   keep_chosen(labels, parameters.label_names);
   keep_chosen(labels, parameters.label_colors);
-  // Of all labels, a value that is one's is none of its own; of some, the others' do not matter.
+  // With all labels, a value assigned to one label is no label of its own. With chosen labels, only
+  // their own values matter.
   if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
   if (!parameters.max_displacement_mm) {
     parameters.max_displacement_mm = std::ranges::min(volume.geometry.spacing) / 2;

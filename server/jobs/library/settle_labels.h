@@ -1,4 +1,4 @@
-// What a request for a job by labels leaves to the volume.
+// Completes the parameters of a job by labels from its volume.
 #pragma once
 
 #include "proto/types.h"
@@ -7,15 +7,15 @@
 
 namespace isomesh::jobs {
 
-// Says that samples of that type, which is no integer, are no labels.
+// Throws Error kInvalidParameter: samples of this type, which are not integers, have no labels.
 [[noreturn]] void throw_no_labels(SampleType type);
 
-// The parameters, which have labels, with all that the volume says where they say nothing: the
-// names, colours and values of the labels that are chosen, and how far smoothing may move a vertex,
-// half the smallest spacing. Whoever asks for the same in other words asks for the same mesh.
-// Throws Error kInvalidParameter, field "labels", when the samples are no integers, and
-// kUnusableVolume when labels are not there, naming them, or when there are none; and as
-// LabelLists::counts does.
+// Completes parameters that have labels: the names, colours and values of the chosen labels from
+// the volume, unless given, and the default displacement limit of smoothing, half the smallest
+// spacing. Equivalent requests therefore get equal parameters, and share one result. Throws Error
+// kInvalidParameter, field "labels", if the samples are not integers; kUnusableVolume if an axis
+// has fewer than two samples, if chosen labels are missing (naming them) or if there are none; and
+// as LabelLists::counts does.
 JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewer,
                             const Volume& volume, LabelLists& lists);
 

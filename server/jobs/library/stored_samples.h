@@ -8,15 +8,15 @@
 
 namespace isomesh::jobs {
 
-// A volume's file, once its bytes are known to be those that its id names: what is made of samples
-// that a disk has spoilt looks like any other. Throws Error kUnusableVolume when they are not, and
-// kCancelled when `stop` is requested. Thread safe.
+// Returns a volume's file after verifying its bytes against the volume's id. A mesh made from
+// corrupted samples would not look wrong. Throws Error kUnusableVolume if the file is missing or
+// corrupt, kCancelled if `stop` is requested. Thread safe.
 store::LocalBlob stored_samples(const store::BlobStore& blobs, const std::string& volume,
                                 const std::stop_token& stop = {});
 
-// What `make` returns, which has a process work on a file of stored_samples(). A file that was cut
-// meanwhile ends the process, or is none of a volume any more; then the volume is told to be the
-// reason, by kUnusableVolume.
+// Runs `make`, in which a process works on a file of stored_samples(). If `make` fails with
+// kInternal, verifies the blob again and throws kUnusableVolume if it is corrupt: a file truncated
+// meanwhile kills the process or is no canonical volume any more.
 template <class Make>
 auto made_of_intact(const store::BlobStore& blobs, const std::string& volume,
                     const std::stop_token& stop, const Make& make) {

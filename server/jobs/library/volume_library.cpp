@@ -6,7 +6,7 @@
 namespace isomesh::jobs {
 namespace {
 
-// Whether the upload was refused only because it holds several volumes.
+// True if the upload was rejected only because it has several volumes.
 bool leaves_members_open(const Error& error, const process::ImportOptions& options) {
   const std::vector<Choice>& choices = error.remedy().choices;
   return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
@@ -52,14 +52,15 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
                                             const store::ScratchFolder& scratch) {
   const store::Blob blob = store::digest_of(canonical_in(scratch));
   const std::shared_lock lock(mutex_);
-  // Also for what another owner has: whether there was room for it would tell.
+  // Also required if another owner has the same samples; otherwise the outcome on a full disk would
+  // reveal that.
   if (!volumes_.contains(owner, blob.key)) retention_.make_room(blob.bytes);
   blobs_.adopt(canonical_in(scratch), blob);
   volume.id = blob.key;
   volume.created = timestamp();
   auto [stored, is_new] = volumes_.add(owner, volume);
   blobs_.settle(blob.key);
-  // They are of the file that has been read, which may be another one than the first.
+  // These describe this upload, which may differ from the one that created the record.
   stored.notes = std::move(volume.notes);
   stored.ignored = std::move(volume.ignored);
   return {std::move(stored), is_new};

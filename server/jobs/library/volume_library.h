@@ -17,8 +17,8 @@
 
 namespace isomesh::jobs {
 
-// Takes uploads in and volumes out, so that records, blobs and the jobs that need them agree.
-// Thread safe; what it is made of must outlive it.
+// Adds and erases volumes so that records, blobs and the jobs that need them stay consistent.
+// Thread safe; its dependencies must outlive it.
 class VolumeLibrary {
  public:
   VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
@@ -31,49 +31,49 @@ class VolumeLibrary {
         limits_(limits),
         runner_(runner) {}
 
-  // Imports an uploaded file, in a process of its own. `name` is what the client calls it, for a
-  // volume that has no name of its own within the file. Second: false when the owner had the same
-  // samples and geometry already; the record stays what it was then, but the volume that is
-  // returned has the notes and the ignored files of this upload. Throws what ImportRunner::run
-  // throws, and kOutOfSpace.
+  // Imports an uploaded file in a process of its own. `name` is the client's name for the upload,
+  // used if the file contains no name. Second: false if the owner already had the same samples and
+  // geometry. Then the record stays unchanged, but the returned volume has the notes and ignored
+  // files of this upload. Throws what ImportRunner::run throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
                               const std::string& name = {});
 
-  // The same for what a PACS has sent of a series. Second: whose images these are, as they say
-  // themselves. The record may be of another upload of the same samples, with other names.
+  // Imports a series from a PACS response. Second: the patient, study and series according to the
+  // images themselves; the record may be of an earlier upload of the same samples.
   std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
                                              const std::filesystem::path& answer,
                                              const process::PeersSeries& series);
 
-  // The same for an upload that may hold several volumes: each is imported by a process of its own,
-  // one after the other, and answered for. One that the options choose or that is alone is the only
-  // element, with an empty member; its error is thrown.
+  // Imports all volumes of an upload, each in a process of its own, one after the other. Each
+  // element has a volume or its error, unless that is an internal one, which is thrown. If the
+  // options choose a member or the upload has only one volume, there is one element with the chosen
+  // member, and its error is thrown.
   std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
                                       const process::ImportOptions& options,
                                       const std::string& name);
 
-  // Gives the owner's volume another name, or none. Throws Error kNotFound, kGone.
+  // Renames the owner's volume; an empty name removes it. Throws Error kNotFound, kGone.
   Volume rename(const std::string& owner, const std::string& id,
                 const std::optional<std::string>& name) {
     return volumes_.rename(owner, id, name);
   }
 
-  // Ends the imports that run or wait, and refuses further ones.
+  // Aborts running and waiting imports, and rejects further ones.
   void stop_imports() { runner_.stop(); }
 
-  // The records that the viewer sees; the samples go soon after the last. Throws Error kNotFound,
-  // kGone, and kNotReady while a job needs the volume.
+  // Erases the records visible to the viewer. The samples are erased soon after the last record.
+  // Throws Error kNotFound, kGone, and kNotReady while a job needs the volume.
   void erase(const store::Viewer& viewer, const std::string& id);
 
-  // Waits until the samples of erased volumes are gone.
+  // Returns once the samples of erased volumes are gone.
   void finish_erasing() { eraser_.finish(); }
 
  private:
-  // Writes the upload's canonical file into the scratch folder.
+  // Writes the canonical file of the upload into the scratch folder.
   Volume import_file(const std::filesystem::path& upload, const process::ImportOptions& options,
                      const store::ScratchFolder& scratch);
-  // Makes that file a blob, and the volume a record of the owner's.
+  // Makes that file a blob, and adds the volume to the owner's records.
   std::pair<Volume, bool> keep(const std::string& owner, Volume volume,
                                const store::ScratchFolder& scratch);
 
@@ -83,8 +83,8 @@ class VolumeLibrary {
   store::Retention& retention_;
   const volume::SizeLimits limits_;
   ImportRunner runner_;
-  // Held while a blob and its record come or go together: shared by those that come, which wait for
-  // the disk side by side.
+  // Held while a blob and its record are added or erased together. Additions share it, so that they
+  // wait for the disk concurrently.
   std::shared_mutex mutex_;
   BlobEraser eraser_{blobs_, volumes_, mutex_};
 };

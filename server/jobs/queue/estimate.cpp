@@ -13,12 +13,10 @@
 namespace isomesh::jobs {
 namespace {
 
-// Calibrating looks at these many finished jobs, the youngest.
+// The model learns from this many of the most recent finished jobs.
 constexpr std::size_t kJobsLookedAt = 50;
 
-double as_double(std::uint64_t count) { return static_cast<double>(count); }
-
-// Files of labels have the triangles of each label's own surface.
+// A file of labels contains each label's own surface, so a triangle between two labels is in both.
 SurfaceSize surface_in_files(const CountedSurface& counted) {
   if (counted.labels.empty()) return counted.size;
   SurfaceSize all;
@@ -35,12 +33,13 @@ SurfaceSize surface_in_files(const MeshSummary& mesh) {
   return surface_in_files(counted);
 }
 
-// What tells surfaces of a volume apart beside iso-value, scheme and whether they are closed.
+// A key of what determines the surface of a volume besides iso-value, scheme and whether it is
+// closed.
 std::string key_of_part(const MeshParameters& parameters) {
   if (!parameters.labels && !parameters.crop && !parameters.regularize) return {};
   MeshParameters part;
   part.regularize = parameters.regularize;
-  // Which vertices are joined depends on where they lie.
+  // The positions of crossings decide which of them are joined.
   if (part.regularize) part.interpolation = parameters.interpolation;
   part.crop = parameters.crop;
   part.labels = parameters.labels;
@@ -70,13 +69,14 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
     if (elapsed != nullptr) add(stages_[n], job.timing.*elapsed, guessed.*elapsed);
   }
   if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
-    add(share_, as_double(surface.triangles),
-        as_double(extracted.triangles) * share_within(*job.parameters.max_error_mm, spacing_mm));
+    add(share_, static_cast<double>(surface.triangles),
+        static_cast<double>(extracted.triangles) *
+            share_within(*job.parameters.max_error_mm, spacing_mm));
   }
-  if (job.mesh->labels_count) return;  // how many triangles their files have is not in the record
+  if (job.mesh->labels_count) return;  // the record does not list their triangles
   const SurfaceSize in_files = surface_in_files(*job.mesh);
   for (const auto& [format, file] : job.mesh->files) {
-    add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),
+    add(files_.try_emplace(format, kFewBytes).first->second, static_cast<double>(file.bytes),
         codec::describe(format).bytes(in_files, job.parameters));
   }
 }
@@ -98,7 +98,7 @@ SurfaceSize CostModel::simplified(const SurfaceSize& surface, const MeshParamete
   if (parameters.max_error_mm) {
     share = std::min(1.0, share_.factor() * share_within(*parameters.max_error_mm, spacing_mm));
   }
-  double triangles = share * as_double(surface.triangles);
+  double triangles = share * static_cast<double>(surface.triangles);
   if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
   SurfaceSize result = surface;
   result.triangles = static_cast<std::uint64_t>(std::llround(triangles));

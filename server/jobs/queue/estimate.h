@@ -1,4 +1,4 @@
-// What a job would take, told before it runs.
+// Estimates the time and the files of a job before it runs.
 #pragma once
 
 #include <cstdint>
@@ -21,31 +21,32 @@ namespace isomesh::jobs {
 
 using mesh::SurfaceSize;
 
-// How a job's time and files follow from its surface: the first guesses of stage_times.h and of the
-// formats, corrected by finished jobs. Plain values.
+// Predicts a job's time and file sizes from the size of its surface. Starts from the initial
+// guesses of stage_times.h and of the formats, and corrects them from finished jobs. Not thread
+// safe.
 class CostModel {
  public:
-  // Takes a job that succeeded into account; `samples` is the size of its volume, and the spacing
-  // its smallest. Jobs without a run of their own, whose stages took no time, change nothing.
+  // Learns from a successful job; `samples` is the number of its volume's samples, and `spacing_mm`
+  // its smallest spacing. Ignores jobs that took their result from another job: their stages have
+  // no times.
   void learn(const Job& job, std::uint64_t samples, double spacing_mm);
 
-  // What is left of a surface of which fewer triangles are asked for. A guess.
+  // The predicted size of the surface after simplification.
   SurfaceSize simplified(const SurfaceSize& surface, const MeshParameters& parameters,
                          double spacing_mm) const;
 
-  // Load to certify, in milliseconds, without the queue: of a surface as it is extracted and as it
-  // is written.
+  // Predicted milliseconds from loading to certifying, without the time in the queue. `surface` is
+  // the extracted surface, `written` the one in the files.
   double milliseconds(const SurfaceSize& surface, const SurfaceSize& written, std::uint64_t samples,
                       const JobParameters& parameters) const;
 
-  // Of one file. Exact for STL.
+  // The predicted size of one file. Exact for STL.
   std::uint64_t file_bytes(MeshFormat format, const SurfaceSize& surface,
                            const MeshParameters& parameters) const;
 
  private:
-  // Sums over the jobs that have finished: what was seen, and what the first guess for them was.
-  // Their quotient corrects later guesses. Both sums begin above zero, so that one small job alone
-  // changes the quotient little.
+  // Sums over finished jobs: the observed values and the initial guesses. Their quotient corrects
+  // later guesses. Both sums start above zero, so that a single small job has little effect.
   struct Correction {
     double seen;
     double guessed;
@@ -58,30 +59,30 @@ class CostModel {
   static constexpr Correction kFewBytes = {100'000, 100'000};
 
   std::vector<Correction> stages_ = std::vector(kStages.size(), kFewMilliseconds);
-  Correction share_ = kFewTriangles;        // that simplification leaves
-  std::map<MeshFormat, Correction> files_;  // kFewBytes for those that are not here
+  Correction share_ = kFewTriangles;        // fraction that simplification keeps
+  std::map<MeshFormat, Correction> files_;  // kFewBytes for missing formats
 };
 
-// Estimates jobs on stored volumes, whose surfaces a process of its own counts. Counts of the last
-// surfaces are kept. Thread safe; what it is
-// made of must outlive it.
+// Estimates jobs on stored volumes. A process of its own counts the surface. The counts of recent
+// surfaces are cached. Thread safe; its dependencies must outlive it.
 class Estimator {
  public:
   Estimator(const store::VolumeStore& volumes, const store::BlobStore& blobs,
             const store::JobStore& jobs, const PipelineLimits& limits, const JobProgram& program)
       : volumes_(volumes), blobs_(blobs), jobs_(jobs), limits_(limits), process_(program) {}
 
-  // Triangles and vertices are exact, before the filter of components; the rest follows from them
-  // and from the jobs of the viewer's that are finished: those of others would tell of them. Throws
-  // Error kNotFound without the volume, kUnusableVolume when the stored samples are damaged,
-  // ProcessEnded, kUnavailable when too many wait for an estimate already or after stop().
+  // Triangles and vertices are exact, before components are filtered. The rest is predicted from
+  // them and from the viewer's own finished jobs; those of others would reveal facts about them.
+  // Throws Error kNotFound without the volume, kUnusableVolume if the stored samples are damaged,
+  // ProcessEnded, kUnavailable if too many callers wait already or after stop().
   Estimate estimate(const store::Viewer& viewer, const JobParameters& parameters);
 
-  // Ends the counting that is under way, for good.
+  // Aborts the current count and all later ones.
   void stop() { stop_.request_stop(); }
 
  private:
-  // Viewer (see Histograms), volume, iso-value or labels, scheme, whether it is closed.
+  // Viewer (see Histograms), volume, iso-value, key of the other parameters, scheme, whether it is
+  // closed.
   using Surface = std::tuple<store::Viewer, std::string, double, std::string, Scheme, bool>;
 
   static constexpr std::size_t kSurfaces = 1024;
@@ -97,7 +98,7 @@ class Estimator {
   const PipelineLimits limits_;
   std::stop_source stop_;
   Mutex process_mutex_;
-  JobProcess process_ ISOMESH_GUARDED_BY(process_mutex_);  // counts, one surface after the other
+  JobProcess process_ ISOMESH_GUARDED_BY(process_mutex_);  // counts one surface at a time
   Memo<Surface, CountedSurface> counts_{kSurfaces, kMostWaiting};
 };
 

@@ -7,11 +7,10 @@
 
 namespace isomesh::jobs {
 
-// The thread that has retention remove what is not to be kept any longer. `retention` must outlive
-// it.
+// A thread that lets `retention` remove expired data. `retention` must outlive it.
 class Housekeeper {
  public:
-  // Looks at once and every `interval` from then on.
+  // Runs at once and then every `interval`.
   Housekeeper(store::Retention& retention, std::chrono::milliseconds interval);
 
  private:

@@ -17,29 +17,28 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// How long a process that closed its end may take to be gone.
+// Wait this long for a process to exit after it closed its socket.
 constexpr milliseconds kGone{2000};
-// How long one that was asked to stop may go on: kernels look once per slab, but a stream of
-// libdraco's is encoded as a whole.
+// Kill a process that does not stop within this time. Kernels check for cancellation once per slab,
+// but libdraco encodes a whole stream without checking.
 constexpr milliseconds kPatience{300};
-// More than most lines, and enough at once for what is of a file.
+// Longer than most lines, and large enough for efficient reading of files.
 constexpr std::size_t kHeardBytes = std::size_t{256} << 10;
-// The triangles of 65 535 labels take some 3 MB.
+// The triangles of 65 535 labels take about 3 MB.
 constexpr std::size_t kLongestLine = std::size_t{16} << 20;
-// More than one process that ends before it begins is no accident.
+// A process may die while idle; several in a row are a defect.
 constexpr int kMostEarlyEnds = 3;
 
 }  // namespace
 
-// An order under way.
 struct JobProcess::Talk {
   const JobOrder& order;
   std::span<const codec::Sink> sinks;
   const std::stop_token& stop;
   const Report& report;
-  std::optional<Stage> stage = {};              // none before it began
-  std::exception_ptr failure = {};              // of a sink or the report
-  std::optional<Clock::time_point> asked = {};  // to stop
+  std::optional<Stage> stage = {};              // none until the process reports one
+  std::exception_ptr failure = {};              // exception thrown by a sink or the report
+  std::optional<Clock::time_point> asked = {};  // when the process was asked to stop
 };
 
 JobProcess::JobProcess(const JobProgram& program) : program_(program) {}
@@ -56,7 +55,7 @@ CountedSurface JobProcess::count(const JobOrder& order, const std::stop_token& s
 
 JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink> sinks,
                              const std::stop_token& stop, const Report& report) {
-  if (begin_ == end_ && heard_.size() > kHeardBytes) {  // one long line is no reason to keep it
+  if (begin_ == end_ && heard_.size() > kHeardBytes) {  // free the memory of an unusually long line
     heard_.resize(kHeardBytes);
     heard_.shrink_to_fit();
     begin_ = end_ = 0;
@@ -74,12 +73,12 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
         continue;
       }
       if (talk.failure) std::rethrow_exception(talk.failure);
-      // Also what had ended before it could be told to stop.
+      // Also if the process finished before it could be asked to stop.
       if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
       if (const auto* const error = std::get_if<Error>(&*end)) throw *error;
       return *std::move(end);
     } catch (const Error& error) {
-      // After a defect, and after words that are none of ours, nothing of the process is believed.
+      // Do not reuse a process after an internal error or a malformed message.
       if (error.code() == ErrorCode::kInternal) child_.reset();
       throw;
     } catch (...) {
@@ -91,7 +90,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
 }
 
 void JobProcess::start() {
-  if (child_ && child_->has_ended()) child_.reset();  // idle, so no job's doing
+  if (child_ && child_->has_ended()) child_.reset();  // it ended while idle, so no job caused it
   if (child_) return;
   heard_.resize(std::max(heard_.size(), kHeardBytes));
   child_ = process::start_program(program_.file);
@@ -169,7 +168,7 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
 }
 
 bool JobProcess::hear(Talk& talk) {
-  if (begin_ > 0) {  // or a long line that comes in pieces would be moved for each of them
+  if (begin_ > 0) {  // only then: otherwise each piece of a long line would move the whole line
     std::copy(heard_.begin() + static_cast<std::ptrdiff_t>(begin_),
               heard_.begin() + static_cast<std::ptrdiff_t>(end_), heard_.begin());
     end_ -= std::exchange(begin_, 0);

@@ -1,5 +1,5 @@
-// Meshes are made in a process that makes nothing else meanwhile, so that whatever ends it is known
-// to have been the job's doing. It is kept from one job to the next: its memory is mapped already.
+// Runs jobs in a separate process, one at a time, so that a crash can be attributed to its job. The
+// process is reused for later jobs, because its memory is already mapped.
 #pragma once
 
 #include <chrono>
@@ -19,14 +19,13 @@
 
 namespace isomesh::jobs {
 
-// The processes that make meshes.
 struct JobProgram {
   std::filesystem::path file;  // isomesh-job
   JobSetup setup;
 };
 
-// The process ended in the middle of an order. The text says how, without anything of the machine,
-// and may be shown to a client.
+// The process ended during an order. The text says how, without details of the machine, so clients
+// may see it.
 class ProcessEnded : public Error {
  public:
   explicit ProcessEnded(const std::string& text) : Error(ErrorCode::kInternal, text) {}
@@ -37,11 +36,11 @@ class JobProcess {
  public:
   explicit JobProcess(const JobProgram& program);
 
-  // Makes a mesh in the process, which is started where there is none. `sinks` has one for each of
-  // files_of(the parameters), and gets its bytes on this thread. When `stop` is requested or a sink
-  // throws, the process is asked to stop, and is killed when it has not done so soon. Throws what
-  // make_mesh and the sinks throw, ProcessEnded, and Error kInternal or kUnavailable when no
-  // process can be started.
+  // Makes a mesh in the process, and starts the process if there is none. `sinks` has one element
+  // for each of files_of(parameters) and one more for the list of labels; they are called on this
+  // thread. If `stop` is requested or a sink throws, the process is asked to stop, and killed if it
+  // does not stop soon. Throws what make_mesh and the sinks throw, ProcessEnded, and Error
+  // kInternal or kUnavailable if no process can be started.
   MadeMesh make(const JobOrder& order, std::span<const codec::Sink> sinks,
                 const std::stop_token& stop, const Report& report);
 
@@ -54,22 +53,23 @@ class JobProcess {
   JobAnswer end_of(const JobOrder& order, std::span<const codec::Sink> sinks,
                    const std::stop_token& stop, const Report& report);
   void start();
-  // Empty when the process had ended before it began.
+  // Returns nothing if the process ended before it began the order.
   std::optional<JobAnswer> follow(Talk& talk);
   void pass_on(const JobPiece& piece, Talk& talk);
   void pass_on(const JobProgress& progress, Talk& talk);
-  // Empty when the process has ended.
+  // Returns nothing if the process has ended.
   std::optional<std::string_view> next_line(Talk& talk);
-  // Adds to what was heard; false when the process has ended.
+  // Appends received bytes to heard_. Returns false if the process has ended.
   bool hear(Talk& talk);
-  // Asks the process to stop when it is to; throws when it does not.
+  // If the order should stop, asks the process to; kills the process and throws if it does not stop
+  // in time.
   void look_at_stop(Talk& talk);
   [[noreturn]] void throw_ended(const Talk& talk);
 
   const JobProgram program_;
   std::optional<process::Child> child_;
   std::vector<char> heard_;
-  std::size_t begin_ = 0;  // of what was heard and is not taken yet
+  std::size_t begin_ = 0;  // start of the unread bytes in heard_
   std::size_t end_ = 0;
 };
 

@@ -17,7 +17,7 @@ double milliseconds_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-// What the disk could hold of the files: the volume has to be there too.
+// Disk capacity for the files, excluding the volume's own bytes.
 std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume) {
   const std::uint64_t capacity = blobs.capacity();
   return capacity - std::min(capacity, blobs.size(volume.id).value_or(0));
@@ -33,11 +33,11 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   const store::LocalBlob file = stored_samples(blobs, volume.id, stop);
   const double checking = milliseconds_since(began);
 
-  // Committed together at the end: a job that ends on the way leaves no file of it.
+  // All are committed at the end, so an unfinished job leaves no files.
   std::vector<std::unique_ptr<store::BlobWriter>> writers;
   std::vector<codec::Sink> sinks;
   const std::vector<MeshFormat> files = files_of(parameters);
-  // One more than files: for the labels, if they are many.
+  // One more than files: the last is for the list of labels, if it is long.
   for (std::size_t i = 0; i <= files.size(); ++i) {
     store::BlobWriter& writer = *writers.emplace_back(blobs.begin());
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });

@@ -1,5 +1,5 @@
-// One job's way from a stored volume to stored meshes: the daemon's part of it. The samples are
-// looked at by a process that the job has for itself.
+// Processes one job from a stored volume to stored meshes: the daemon's side. A process used by
+// this job alone reads the samples.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 namespace isomesh::jobs {
 
 struct PipelineResult {
-  MeshSummary mesh;  // the files' hrefs are empty
+  MeshSummary mesh;  // the hrefs of its files are empty
   Timing timing;     // load, extract, smooth and encode
 };
 
@@ -21,14 +21,14 @@ struct PipelineLimits {
   std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job
 };
 
-// Changes whenever the same volume and parameters would give other bytes than before.
+// Increment whenever the same volume and parameters would give different bytes than before.
 inline constexpr const char* kMesherVersion = "8";
 
-// Has `process` load the volume's samples, extract, smooth and encode in every format, and stores
-// the results. The mesh is the same to the byte for the same volume and parameters. Throws Error
-// kCancelled when `stop` is requested, kTooLarge with the estimate when the job would exceed the
-// limits (told before memory is taken), kUnusableVolume when the stored samples are not those of
-// the volume, kOutOfSpace or kInternal, and ProcessEnded.
+// Lets `process` load the samples, extract, smooth and encode in every format, and stores the
+// results. The same volume and parameters give the same bytes. Throws Error kCancelled if `stop` is
+// requested; kTooLarge with the estimate if the job would exceed the limits (before it allocates
+// memory); kUnusableVolume if the stored samples are corrupt; kOutOfSpace, kInternal, and
+// ProcessEnded.
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, const store::BlobStore& blobs,
                             JobProcess& process, std::stop_token stop, const Report& report);

@@ -17,17 +17,17 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// How often a running job tells how far it is and learns that it is to stop.
+// Interval at which a running job reports its progress and checks whether it should stop.
 constexpr milliseconds kBetweenRenewals{100};
 constexpr milliseconds kBetweenReaps{1000};
 constexpr milliseconds kLongestIdle{1000};
-// How long a job that found the disk full waits before it is run again: the first time, and at
-// most. It doubles each time.
+// Initial and maximum delay before a job that found the disk full runs again. The delay doubles
+// each time.
 constexpr milliseconds kFullDiskDelay{5000};
 constexpr milliseconds kLongestFullDiskDelay{60'000};
-// The same of one that found no descriptor or memory.
+// Delay before a job that lacked descriptors or memory runs again.
 constexpr milliseconds kExhaustedDelay{5000};
-// How long until a job's end that the queue could not take is told it again.
+// Interval between attempts to record a job's end.
 constexpr milliseconds kEndRetry{500};
 
 // Why a run was asked to stop.
@@ -47,7 +47,7 @@ void pause(const std::stop_token& stop, milliseconds time) {
 
 }  // namespace
 
-// A job under way, as its worker and the thread that looks after leases share it. Thread safe.
+// A running job, shared by its worker and the thread that renews leases. Thread safe.
 class Workers::Run {
  public:
   explicit Run(const store::Lease& lease) : lease_(lease) {}
@@ -57,14 +57,14 @@ class Workers::Run {
   Reason reason() const { return reason_; }
   Clock::duration age() const { return Clock::now() - began_; }
 
-  // Only the first reason counts.
+  // Later reasons are ignored.
   void stop(Reason reason) {
     Reason none = Reason::kNone;
     reason_.compare_exchange_strong(none, reason);
     stop_.request_stop();
   }
 
-  // True when it is in another stage than before.
+  // Returns true if the stage has changed.
   bool advance(const store::Progress& progress) {
     const Lock lock(mutex_);
     const bool is_other_stage = progress.stage != progress_.stage;
@@ -72,7 +72,7 @@ class Workers::Run {
     return is_other_stage;
   }
 
-  // Prolongs the lease unless the run is over, and stops the run when it is not to go on.
+  // Renews the lease unless the run is over. Stops the run if it was cancelled or lost its lease.
   void renew(store::JobStore& jobs, milliseconds lease) {
     const Lock renewing(renewal_);
     if (is_over_) return;
@@ -81,7 +81,7 @@ class Workers::Run {
     if (standing == store::Standing::kLost) stop(Reason::kLost);
   }
 
-  // No renewal is under way any more, and none begins.
+  // Once this returns, no renewal is running and none will start.
   void end() {
     const Lock renewing(renewal_);
     is_over_ = true;
@@ -112,7 +112,7 @@ Workers::Workers(const WorkerOptions& options, store::JobStore& jobs,
     }
     leases_ = std::jthread([this](const std::stop_token& stop) { look_after_leases(stop); });
   } catch (...) {
-    end_threads();  // or those that did start would work on
+    end_threads();  // otherwise the threads already started would go on
     throw;
   }
 }
@@ -122,7 +122,7 @@ Workers::~Workers() { end_threads(); }
 void Workers::end_threads() {
   claims_.request_stop();
   running_.request_stop();
-  threads_.clear();  // the leases are looked after until the last has ended
+  threads_.clear();  // leases are renewed until all have ended
 }
 
 bool Workers::drain(milliseconds wait) {
@@ -173,7 +173,7 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
     outcome.timing = result.timing;
   } catch (const ProcessEnded& end) {
     outcome.error = to_problem(end, path);
-    outcome.error->detail = end.what();  // of the job rather than of the service, so it is told
+    outcome.error->detail = end.what();  // about the job, not the service, so clients may see it
     outcome.may_retry = true;
     log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, end.what());
   } catch (const Error& error) {
@@ -185,7 +185,7 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
       log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
     }
   } catch (const std::bad_alloc&) {
-    // The service's memory, not the job's.
+    // The service is out of memory, not the job.
     run->stop(Reason::kExhausted);
     log_error("job {}, attempt {} failed: the service is out of memory", lease.id, lease.attempt);
   } catch (const std::exception& error) {
@@ -202,8 +202,7 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
   conclude(*run, outcome);
 }
 
-// Tells the queue how the run ended, and again while its disk has no room for that or it does not
-// answer.
+// Records how the run ended. Retries if the database has no space or does not respond.
 void Workers::conclude(const Run& run, store::Outcome outcome) {
   const store::Lease& lease = run.lease();
   const bool was_stopped = !outcome.mesh && !outcome.error;
@@ -214,7 +213,7 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
         "/v1/jobs/" + lease.id);
   }
   const auto tell = [&] {
-    // Without an outcome it would end cancelled, should the lease hold after all.
+    // Finishing without a result would cancel the job if the lease were valid after all.
     if (was_stopped && run.reason() == Reason::kLost) return false;
     if (was_stopped && run.reason() == Reason::kEnding) {
       return jobs_.put_back(lease, milliseconds(0));
@@ -244,7 +243,7 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
   }
 }
 
-// Known to this process only: after a restart it is tried again soon.
+// Kept in memory only: after a restart the job is retried soon.
 milliseconds Workers::full_disk_delay(const std::string& job) {
   const Lock lock(runs_mutex_);
   milliseconds& next = full_disk_delays_.try_emplace(job, kFullDiskDelay).first->second;

@@ -20,25 +20,24 @@ struct WorkerOptions {
   std::size_t threads = 2;
   JobProgram program = {};
   PipelineLimits limits = {};
-  std::chrono::milliseconds lease{30'000};  // how soon a dead worker's job is run again
-  std::chrono::minutes longest_job{60};     // one that runs longer fails
+  std::chrono::milliseconds lease{30'000};  // a dead worker's job runs again after this
+  std::chrono::minutes longest_job{60};     // longer jobs fail
 };
 
-// The threads that run jobs, one job each at a time, in a process that each keeps. One more thread
-// prolongs their leases and looks after those that ran out. The stores must outlive it. Thread
-// safe.
+// Threads that run jobs, one job at a time each; each thread keeps one process. A further thread
+// renews their leases and reaps expired ones. The stores must outlive it. Thread safe.
 class Workers {
  public:
   Workers(const WorkerOptions& options, store::JobStore& jobs, const store::VolumeStore& volumes,
           const store::BlobStore& blobs);
 
-  // Running jobs are stopped and put back; returns when all threads have ended.
+  // Stops running jobs and puts them back into the queue. Returns once all threads have ended.
   ~Workers();
 
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  // No job is begun any more; returns when no job runs or `wait` is over. True when none runs.
+  // Starts no further jobs. Returns once no job runs or `wait` has passed; true if none runs.
   bool drain(std::chrono::milliseconds wait);
 
  private:
@@ -57,14 +56,14 @@ class Workers {
   store::JobStore& jobs_;
   const store::VolumeStore& volumes_;
   const store::BlobStore& blobs_;
-  std::stop_source claims_;   // ends the taking of jobs
-  std::stop_source running_;  // interrupts those that run
+  std::stop_source claims_;   // stops claiming jobs
+  std::stop_source running_;  // interrupts running jobs
   Mutex alive_mutex_;
   Condition ended_;
   std::size_t alive_ ISOMESH_GUARDED_BY(alive_mutex_);  // threads that may still run a job
   Mutex runs_mutex_;
-  std::vector<std::shared_ptr<Run>> runs_ ISOMESH_GUARDED_BY(runs_mutex_);  // under way
-  // How long jobs that wait for room on the disk wait the next time.
+  std::vector<std::shared_ptr<Run>> runs_ ISOMESH_GUARDED_BY(runs_mutex_);  // the running jobs
+  // The next delay of each job that waits for disk space.
   std::map<std::string, std::chrono::milliseconds> full_disk_delays_
       ISOMESH_GUARDED_BY(runs_mutex_);
   std::vector<std::jthread> threads_;

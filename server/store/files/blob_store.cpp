@@ -16,16 +16,16 @@
 namespace isomesh::store {
 namespace {
 
-// Folders of many thousand files are slow to list; the first byte of the key splits them.
+// Folders with many thousand files are slow to list, so the first byte of the key selects a folder.
 constexpr std::size_t kPrefix = 2;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 constexpr std::chrono::hours kBelieved{1};
 constexpr std::chrono::minutes kBetweenForgetting{5};
 constexpr const char* kMark = "identity";
-// Of a shared folder: what is to be free.
+// Free space required in a shared folder.
 constexpr std::uint64_t kLeastShared = std::uint64_t{64} << 20;
 
-// What changes when somebody writes to a file or puts another in its place; empty without a file.
+// A file's properties that change if it is written to or replaced; empty if it is missing.
 std::string traits_of(const std::filesystem::path& file) {
   struct stat status = {};
   if (::stat(file.c_str(), &status) != 0) return {};
@@ -41,7 +41,7 @@ std::string traits_of(const std::filesystem::path& file) {
   return text;
 }
 
-// The digest of all bytes, which passes in blocks.
+// SHA-256 of a file, read block by block.
 Blob digest_of(const File& file, const std::stop_token& stop) {
   Sha256 digest;
   std::vector<std::byte> block(kBlockBytes);
@@ -77,7 +77,7 @@ class FileBlobStore::Writer : public BlobWriter {
         file_(File::create(path_)) {}
 
   ~Writer() override {
-    std::error_code ignored;  // a blob that was committed is no longer here
+    std::error_code ignored;  // a committed blob has moved away
     std::filesystem::remove(path_, ignored);
     store_.room_.give(taken_);
   }
@@ -87,7 +87,7 @@ class FileBlobStore::Writer : public BlobWriter {
     if (bytes_ > store_.capacity()) {
       throw Error(ErrorCode::kTooLarge, "the file is larger than all available space");
     }
-    store_.reserve_.check_room();  // which is there to free more, not to be filled
+    store_.reserve_.check_room();  // the reserve must not be used for new blobs
     store_.room_.take(bytes.size());
     taken_ += bytes.size();
     file_.write(bytes);
@@ -107,10 +107,10 @@ class FileBlobStore::Writer : public BlobWriter {
   File file_;
   Sha256 digest_;
   std::uint64_t bytes_ = 0;
-  std::uint64_t taken_ = 0;  // of the room, until it is a blob
+  std::uint64_t taken_ = 0;  // from the room, until committed
 };
 
-// Has others that ask for the same blob wait.
+// Registers the check of a blob, so that others that need it wait for its result.
 class FileBlobStore::CheckUnderWay {
  public:
   CheckUnderWay(const FileBlobStore& store, const std::string& key) : store_(store), key_(key) {}
@@ -191,7 +191,7 @@ void FileBlobStore::set_mark(const std::string& text) const {
 bool FileBlobStore::has_room() const {
   if (!reserve_.has_room()) return false;
   if (!holds_) return true;
-  std::error_code unknown;  // writing will tell
+  std::error_code unknown;  // writing reports the error
   const auto space = std::filesystem::space(folders_.blobs, unknown);
   return unknown || space.available > kLeastShared;
 }
@@ -216,7 +216,7 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) c
     return;
   }
   reserve_.check_room();
-  // One that is there already makes place for this one.
+  // An existing blob is replaced, so only the difference takes room.
   const std::uint64_t more = blob.bytes - std::min(blob.bytes, size(blob.key).value_or(0));
   room_.take(more);
   try {
@@ -227,7 +227,7 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) c
   }
 }
 
-// A shared folder is on another file system, to which nothing is moved.
+// A shared folder is on another file system, so the file cannot be moved.
 void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob) const {
   const File source = File::open(file);
   const std::unique_ptr<BlobWriter> writer = begin();
@@ -285,7 +285,7 @@ bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& sto
 void FileBlobStore::believe(const std::string& key, const std::string& traits) const {
   const auto now = std::chrono::steady_clock::now();
   const Lock lock(intact_mutex_);
-  if (now >= next_forgetting_) {  // not at every blob: there may be a million
+  if (now >= next_forgetting_) {  // not on each call: there may be a million blobs
     std::erase_if(intact_, [&](const auto& entry) { return now - entry.second.when >= kBelieved; });
     next_forgetting_ = now + kBetweenForgetting;
   }
@@ -319,8 +319,8 @@ std::filesystem::path FileBlobStore::path_of(const std::string& key) const {
 
 std::string FileBlobStore::publish_as(const std::filesystem::path& path, const File& file,
                                       const std::string& key, std::uint64_t taken) const {
-  // The time is a finer one than the system gives to files that are written, so a write within the
-  // same tick changes it.
+  // The times of written files are coarse. An exact time makes any later write within the same tick
+  // change it.
   touch(path);
   const std::filesystem::path place = path_of(key);
   make_folder_for(place);
@@ -332,9 +332,10 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
     unsettled_.note(key, hold);
     traits = traits_of(place);
   };
-  // Where nothing is there, no record that survives can name the place before both are synced. The
-  // file's sync then brings its name to disk too on most file systems, and the folder's finds
-  // nothing to do. What is there may be named already and must not be lost in between.
+  // If the place is free, no surviving record can name the blob before both syncs. On most file
+  // systems the file's sync also persists its name, so the folder's sync is free. If the place is
+  // taken, a record may name that file already, so it must survive a crash at any moment: the new
+  // file is synced before it replaces the old one.
   bool has_moved = false;
   {
     const Lock lock(places_);
@@ -344,7 +345,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   try {
     if (folders_.outlive_crashes) file.sync();
   } catch (...) {
-    // It stays counted until it is swept, and whoever took the bytes gives them back.
+    // The file counts until it is swept; the caller gives back the bytes that it took.
     if (has_moved) room_.settle(0, taken);
     throw;
   }
@@ -358,8 +359,8 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   return traits;
 }
 
-// A folder that is there is not yet on the disk when another thread has just made it, or when the
-// process that made it was killed. So all are synced once by this process, whoever made them.
+// A folder may exist but not be on disk, if another thread has just made it or the process that
+// made it was killed. So this process syncs all of them once.
 void FileBlobStore::make_folder_for(const std::filesystem::path& place) const {
   const Lock lock(folders_mutex_);
   std::error_code error;

@@ -21,21 +21,21 @@
 
 namespace isomesh::store {
 
-// Blobs as files: of the data folder, or of one that several daemons share.
+// Stores blobs as files in the data folder, or in a folder that several daemons share.
 class FileBlobStore : public BlobStore {
  public:
-  // Of the data folder, which must outlive it.
+  // Uses the data folder, which must outlive this object.
   explicit FileBlobStore(const DataFolder& folder)
       : FileBlobStore(folder.blob_folders(), folder.reserve()) {}
 
-  // Of folders anywhere. The reserve is that of this machine's disk, and must outlive it.
+  // Uses any folders. `reserve` is that of the local disk and must outlive this object.
   FileBlobStore(BlobFolders folders, Reserve& reserve);
 
   void limit_room(std::uint64_t max_bytes, MakeRoom make) override {
     room_.limit(max_bytes, std::move(make));
   }
 
-  // One that is shared makes and removes a file.
+  // For a shared folder: creates and removes a file.
   bool answers() const override;
   bool is_shared() const override { return holds_.has_value(); }
   bool is_empty() const override;
@@ -48,8 +48,7 @@ class FileBlobStore : public BlobStore {
   void adopt(const std::filesystem::path& file, const Blob& blob) const override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
-  // A file that was hashed whole, to become a blob or by this, is believed for an hour, unless its
-  // device, inode, size or times change.
+  // A verified file is trusted for an hour, unless its device, inode, size or times change.
   bool is_intact(const std::string& key, const std::stop_token& stop) const override;
   std::optional<std::uint64_t> size(const std::string& key) const override;
   std::optional<std::string> link(const std::string& /*key*/,
@@ -64,58 +63,59 @@ class FileBlobStore : public BlobStore {
   Swept sweep(Steady unsettled, const Names& names) const override;
   std::size_t empty_quarantine(Time before, const Names& names) const override;
 
-  // The keys of all blobs that are not in quarantine.
+  // The keys of all blobs outside the quarantine.
   std::vector<std::string> keys() const;
 
-  // Where a blob lies or would.
+  // The place of a blob, whether it exists or not.
   std::filesystem::path path_of(const std::string& key) const;
 
  private:
   class Writer;
   class CheckUnderWay;
 
-  // When a file was found intact, and what it looked like then.
+  // The time of a successful check and the file's properties then.
   struct Check {
     std::string traits;
     Steady when;
   };
 
   void believe(const std::string& key, const std::string& traits) const;
-  // `file` is the open one of that path, and `taken` of its bytes are taken from the room already.
-  // Returns its traits in its place.
+  // Publishes `path`, open as `file`, as a blob. `taken` bytes are already taken from the room.
+  // Returns the properties of the published file.
   std::string publish_as(const std::filesystem::path& path, const File& file,
                          const std::string& key, std::uint64_t taken) const;
   void make_folder_for(const std::filesystem::path& place) const;
-  // As path_of, for reading: what is in quarantine is put back.
+  // As path_of, for reading: brings the blob back from quarantine.
   std::filesystem::path found(const std::string& key) const;
   void copy_in(const std::filesystem::path& file, const Blob& blob) const;
-  // Bytes of the disk that the blobs are on.
+  // Size of the disk that has the blobs.
   std::uint64_t disk_capacity() const;
-  // Of a shared folder: erases the blob unless somebody holds or names it; false when it is there
-  // still.
+  // For a shared folder: erases the blob unless it is held or named. Returns false if it still
+  // exists.
   bool take_out(const std::string& key, std::chrono::nanoseconds oldest_hold,
                 const Names& names) const ISOMESH_REQUIRES(places_);
-  // Into quarantine. Returns whether it is there now and was not before.
+  // Moves a blob into quarantine. Returns false if another daemon has moved or erased it.
   bool put_aside(const std::string& key) const ISOMESH_REQUIRES(places_);
-  // Of a shared folder: takes those back that somebody held or named meanwhile. Returns how many.
+  // For a shared folder: brings back those that were held or named meanwhile. Returns their number.
   std::size_t look_again(std::span<const std::string> keys, std::chrono::nanoseconds oldest_hold,
                          const Names& names) const;
-  // Of a shared folder: what daemons that died have left, and what all blobs take.
+  // For a shared folder: removes files left by dead daemons, and recounts the size of all blobs.
   void tidy_shared(std::chrono::nanoseconds oldest_hold) const;
   std::uint64_t counted_bytes() const;
   std::set<std::string> held(std::chrono::nanoseconds oldest) const;
 
   const BlobFolders folders_;
   Reserve& reserve_;
-  const std::optional<FolderHolds> holds_;  // of a folder that others may have too
+  const std::optional<FolderHolds> holds_;  // only for a shared folder
   mutable Probe probe_;
   mutable Room room_;
-  // Held while a file takes its place or is swept, so that the sweeper never erases a file that has
-  // just been put there anew.
+  // Held while a file is moved to its place or is swept, so that a sweep never erases a file that
+  // was just stored again.
   mutable Mutex places_;
   mutable Unsettled unsettled_ ISOMESH_GUARDED_BY(places_);
   mutable Mutex folders_mutex_;
-  mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;  // all, on the disk
+  // True once all folders are on disk.
+  mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;
   mutable Mutex intact_mutex_;
   mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
   mutable Steady next_forgetting_ ISOMESH_GUARDED_BY(intact_mutex_);

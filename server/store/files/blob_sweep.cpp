@@ -1,4 +1,4 @@
-// How files that nothing names go: what FileBlobStore does of erasing and sweeping.
+// FileBlobStore's erasing and sweeping of unnamed blobs.
 #include <algorithm>
 #include <vector>
 
@@ -10,10 +10,10 @@
 namespace isomesh::store {
 namespace {
 
-// Of all blobs, what one sweep may take: a tenth, but a few always.
+// One sweep takes at most a tenth of all blobs, but always a few.
 constexpr std::size_t kSweptShare = 10;
 constexpr std::size_t kSweptAtLeast = 16;
-// What a daemon that has died leaves in a shared folder.
+// Age at which files of dead daemons in a shared folder are removed.
 constexpr std::chrono::hours kLongestHold{24};
 constexpr std::chrono::hours kLongestDraft{48};
 
@@ -64,17 +64,17 @@ bool FileBlobStore::take_out(const std::string& key, std::chrono::nanoseconds ol
   if (look_again(std::span(&key, 1), oldest_hold, names) > 0) return false;
   const std::filesystem::path aside = folders_.quarantine / key;
   const std::uint64_t bytes = size_of(aside);
-  std::error_code gone;  // somebody has asked for it
+  std::error_code gone;  // it was requested and brought back
   if (std::filesystem::remove(aside, gone)) room_.give(bytes);
   return true;
 }
 
 bool FileBlobStore::put_aside(const std::string& key) const {
-  touch(path_of(key));  // when it came there
+  touch(path_of(key));  // records when it entered the quarantine
   try {
     move_to(path_of(key), folders_.quarantine / key);
   } catch (const Error& error) {
-    // Another daemon that has the folder was quicker.
+    // Another daemon on this folder was faster.
     if (holds_ && error.code() == ErrorCode::kNotFound) return false;
     throw;
   }
@@ -89,7 +89,7 @@ std::size_t FileBlobStore::look_again(std::span<const std::string> keys,
   std::size_t back = 0;
   for (const std::string& key : keys) {
     if (!held_now.contains(key) && !names(key)) continue;
-    std::error_code absent;  // whoever asked for it has put it back already
+    std::error_code absent;  // it was requested and is already back
     std::filesystem::rename(folders_.quarantine / key, path_of(key), absent);
     ++back;
   }
@@ -133,7 +133,7 @@ void FileBlobStore::tidy_shared(std::chrono::nanoseconds oldest_hold) const {
 
 std::size_t FileBlobStore::empty_quarantine(Time before, const Names& names) const {
   std::size_t removed = 0;
-  std::error_code gone;  // one that is asked for is put back while we look
+  std::error_code gone;  // requested blobs are brought back meanwhile
   for (const auto& entry : std::filesystem::directory_iterator(folders_.quarantine, gone)) {
     struct stat status = {};
     if (::stat(entry.path().c_str(), &status) != 0) continue;
@@ -151,10 +151,10 @@ std::size_t FileBlobStore::empty_quarantine(Time before, const Names& names) con
   return removed;
 }
 
-// Only what has a blob's place: the folder has other files too.
+// Only files at a blob's place; the folder has other files too.
 std::vector<std::string> FileBlobStore::keys() const {
   std::vector<std::string> keys;
-  std::error_code gone;  // files come and go while we look
+  std::error_code gone;  // files come and go meanwhile
   std::filesystem::recursive_directory_iterator entry(folders_.blobs, gone);
   for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
     const std::string key = entry->path().filename();

@@ -46,7 +46,7 @@ BlobFolders shared_blob_folders(const std::filesystem::path& root) {
 DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve)
     : root_(root) {
   std::error_code error;
-  // What it holds tells of patients. One that was there has the rights that somebody gave it.
+  // The contents may identify patients. The rights of an existing folder stay as they are.
   if (std::filesystem::create_directories(root_, error)) {
     std::filesystem::permissions(root_, std::filesystem::perms::owner_all, error);
   }
@@ -66,7 +66,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }
   std::filesystem::remove_all(scratch());
-  // Before anything is written: on a full disk it makes the room for that.
+  // Before anything is written: on a full disk this frees the necessary space.
   reserve_ =
       std::make_unique<Reserve>(root_ / "reserve", reserve.value_or(Reserve::usual_bytes(root_)));
   make_folders({blobs(), quarantine(), scratch()});
@@ -109,7 +109,7 @@ ScratchFolder::ScratchFolder(const std::filesystem::path& parent) : path_(parent
 }
 
 ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;  // what stays is removed when the daemon starts next
+  std::error_code ignored;  // leftovers are removed at the next start
   std::filesystem::remove_all(path_, ignored);
 }
 

@@ -10,31 +10,31 @@
 
 namespace isomesh::store {
 
-// A file in a data folder that is being put back from a backup.
+// Exists in a data folder while a backup is being restored into it.
 inline constexpr const char* kUnfinishedRestore = "restoring";
 
-// Where a store of files has its blobs.
+// The folders of a FileBlobStore.
 struct BlobFolders {
   std::filesystem::path blobs;       // finished files, by digest
-  std::filesystem::path quarantine;  // blobs that nothing names, before they are removed for good
+  std::filesystem::path quarantine;  // unnamed blobs, before they are removed for good
   std::filesystem::path drafts;      // unfinished files; on the same file system as the blobs
-  std::filesystem::path holds = {};  // of a folder that several daemons share; see FolderHolds
-  bool outlive_crashes = true;       // each file is brought to the disk before it is a blob
+  std::filesystem::path holds = {};  // only for a shared folder; see FolderHolds
+  bool outlive_crashes = true;       // sync each file before it becomes a blob
 };
 
-// The folders of blobs below one that several daemons may share, which is there: one that is not
-// mounted is not made. Throws Error kUnavailable when it is not there, and what making folders
-// throws.
+// The blob folders below `root`, a folder that several daemons may share. `root` must exist,
+// because creating it would hide a missing mount. Throws Error kUnavailable if it is missing, and
+// what creating folders throws.
 BlobFolders shared_blob_folders(const std::filesystem::path& root);
 
-// The one folder that a daemon keeps everything in. Holding it locks it: a second daemon on the
-// same folder is refused. Thread safe.
+// The folder with all of a daemon's data. Holds a lock, so a second daemon cannot use the same
+// folder. Thread safe.
 class DataFolder {
  public:
-  // Creates what is missing and empties the scratch folder, which holds what a crash cut short.
-  // Keeps so many bytes in reserve; by default as many as are usual on a disk of that size. Throws
-  // Error kUnavailable when another process holds the folder or its restore did not end,
-  // kOutOfSpace or kInternal otherwise.
+  // Creates missing folders and empties the scratch folder, which may have unfinished files of a
+  // crashed process. Keeps `reserve` bytes in reserve; without a value, as many as usual for the
+  // size of the disk. Throws Error kUnavailable if another process has the folder or its restore
+  // did not finish; kOutOfSpace or kInternal otherwise.
   explicit DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve = 0);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;
@@ -42,17 +42,17 @@ class DataFolder {
 
   std::filesystem::path blobs() const { return root_ / "blobs"; }  // finished files, by digest
   BlobFolders blob_folders() const { return {blobs(), quarantine(), scratch()}; }
-  // Copies of blobs that are elsewhere, in folders of the same form. Created when it is asked for.
+  // Folders for local copies of remote blobs. Created on the first call.
   BlobFolders cache_folders() const;
-  // Blobs that nothing names, before they are removed for good.
+  // Unnamed blobs, before they are removed for good.
   std::filesystem::path quarantine() const { return root_ / "quarantine"; }
   std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
   std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
-  // Bodies that come in parts, which outlive the process. Made by who keeps them.
+  // Multipart uploads, which outlive the process. Created by their owner.
   std::filesystem::path uploads() const { return root_ / "uploads"; }
   Reserve& reserve() const { return *reserve_; }
 
-  // A name of its own, given when it is asked for first. Throws Error kOutOfSpace or kInternal.
+  // A unique name, generated on the first call. Throws Error kOutOfSpace or kInternal.
   std::string name() const;
 
  private:
@@ -61,7 +61,7 @@ class DataFolder {
   std::unique_ptr<Reserve> reserve_;
 };
 
-// A folder of its own below `parent`, removed with all it holds when it goes. Not thread safe.
+// A new folder below `parent`, removed with its contents on destruction. Not thread safe.
 class ScratchFolder {
  public:
   explicit ScratchFolder(const std::filesystem::path& parent);

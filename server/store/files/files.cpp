@@ -50,7 +50,7 @@ std::uint64_t File::size() const {
 }
 
 void File::begin_sync() const {
-  // A hint: not every file system knows it.
+  // A hint only; not every file system supports it.
   ::sync_file_range(descriptor_.number(), 0, 0, SYNC_FILE_RANGE_WRITE);
 }
 
@@ -64,7 +64,8 @@ void move_to(const std::filesystem::path& from, const std::filesystem::path& to)
 
 bool move_to_free_place(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
-  // EINVAL: the file system cannot do it, so the place counts as taken.
+  // EINVAL means that the file system does not support this; the caller then treats the place as
+  // taken.
   if (errno == EEXIST || errno == EINVAL || errno == ENOSYS) return false;
   throw_file_error("renaming a file", errno);
 }

@@ -1,4 +1,4 @@
-// Files that are either whole or not there.
+// Files that appear atomically.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,14 @@
 
 namespace isomesh::store {
 
-// An open file, closed when it goes.
 class File {
  public:
-  // Throws Error kOutOfSpace or kInternal. The file is created new; it must not exist.
+  // Creates a file that must not exist. Throws Error kOutOfSpace or kInternal.
   static File create(const std::filesystem::path& path);
   // Throws Error kNotFound or kInternal.
   static File open(const std::filesystem::path& path);
 
-  // All of `bytes`, or Error kOutOfSpace or kInternal.
+  // Writes all bytes, or throws Error kOutOfSpace or kInternal.
   void write(std::span<const std::byte> bytes);
 
   // Reads up to bytes.size() bytes from `offset`; fewer only at the end of the file.
@@ -27,10 +26,10 @@ class File {
 
   std::uint64_t size() const;
 
-  // The disk begins to write what it has not; only sync() tells when that is done.
+  // Starts writing cached data to disk; does not wait for the end as sync() does.
   void begin_sync() const;
 
-  // To disk, not only to the system. Throws Error kOutOfSpace or kInternal.
+  // Returns once the data is on disk, not only in the cache. Throws Error kOutOfSpace or kInternal.
   void sync() const;
 
  private:
@@ -39,21 +38,21 @@ class File {
   Descriptor descriptor_;
 };
 
-// Moves a file within its file system, over what is there. A crash leaves either the one or the
-// other there once sync_folder has returned.
+// Moves a file within its file system and replaces an existing one. After a crash one of both is
+// there, and the new one once sync_folder has returned.
 void move_to(const std::filesystem::path& from, const std::filesystem::path& to);
 
-// The same where nothing is there; false, and nothing has changed, where something is.
+// As move_to, but returns false and changes nothing if `to` exists.
 bool move_to_free_place(const std::filesystem::path& from, const std::filesystem::path& to);
 
-// 0 when it is not there.
+// Size in bytes; 0 if the file is missing.
 std::uint64_t size_of(const std::filesystem::path& file);
 
-// Gives a file the present time, which is a finer one than the system gives to what is written.
-// Nothing happens when it is not there.
+// Sets a file's time to the exact present; the times of written files are coarser. Does nothing if
+// the file is missing.
 void touch(const std::filesystem::path& file);
 
-// Makes renames and new names in a folder survive a crash.
+// Makes new names and renames in a folder survive a crash.
 void sync_folder(const std::filesystem::path& folder);
 
 }  // namespace isomesh::store

@@ -8,7 +8,7 @@
 
 namespace isomesh::store {
 
-// A name is the blob's key, a point, and what makes it one of its own.
+// The name is the blob's key, a dot and random digits.
 std::string FolderHolds::hold(const std::string& key) const {
   std::string name = key + '.' + random_hex(8);
   File::create(folder_ / name);
@@ -16,7 +16,7 @@ std::string FolderHolds::hold(const std::string& key) const {
 }
 
 void FolderHolds::let_go(const std::string& name) const {
-  std::error_code ignored;  // one that stays is too old some day
+  std::error_code ignored;  // a leftover hold expires
   std::filesystem::remove(folder_ / name, ignored);
 }
 
@@ -27,7 +27,7 @@ std::set<std::string> FolderHolds::held(std::chrono::nanoseconds oldest) const {
   std::filesystem::directory_iterator entry(folder_, error);
   if (error) throw_system_error("reading the folder of holds", error.value());
   for (; entry != std::filesystem::directory_iterator(); entry.increment(error)) {
-    std::error_code gone;  // let go meanwhile
+    std::error_code gone;  // removed meanwhile
     const auto made = entry->last_write_time(gone);
     if (gone || now - made > oldest) continue;
     const std::string name = entry->path().filename();

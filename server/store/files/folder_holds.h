@@ -7,13 +7,13 @@
 
 namespace isomesh::store {
 
-// What several daemons that share a folder of blobs tell each other: which blobs somebody stores,
-// or has stored and not named yet. A hold is an empty file. Thread safe.
+// Marks for other daemons, in a shared folder, the blobs that a daemon is storing or has stored and
+// not named yet. A hold is an empty file. Thread safe.
 //
-// Who stores a blob makes a hold and then puts the file into its place; who erases one takes the
-// file out of its place and then looks for holds, and puts it back where there is one. So whatever
-// the order, a file that was put there under a hold stays. Ages are by the clock that gives the
-// folder's files their times, never by a node's own.
+// To store a blob, a daemon makes a hold and then moves the file to its place. To erase one, it
+// moves the file away and then checks for holds; if there is one, it moves the file back. So in any
+// order, a file stored under a hold stays. Ages are measured by the clock that sets the times of
+// files in this folder, not by the clock of a node.
 class FolderHolds {
  public:
   explicit FolderHolds(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -23,11 +23,11 @@ class FolderHolds {
 
   void let_go(const std::string& name) const;
 
-  // The blobs that are held, but for holds that are older than that: their daemon has died. Throws
-  // Error kInternal when the folder cannot be read.
+  // The held blobs. Older holds are ignored: their daemon has died. Throws Error kInternal if the
+  // folder cannot be read.
   std::set<std::string> held(std::chrono::nanoseconds oldest) const;
 
-  // Removes holds that are older than that.
+  // Removes holds older than that.
   void forget(std::chrono::nanoseconds oldest) const;
 
  private:

@@ -15,8 +15,8 @@
 namespace isomesh::store {
 namespace {
 
-// What is to be free besides, as a share of the reserve: the records have room to grow in while
-// nothing new is begun, and a few bytes more or less do not take the reserve and let it go.
+// Divisor: this fraction of the reserve must be free besides. It lets records grow while no new
+// work starts, and keeps small changes from taking and releasing the reserve repeatedly.
 constexpr std::uint64_t kMargin = 4;
 
 std::filesystem::space_info space_of(const std::filesystem::path& folder) {
@@ -24,7 +24,7 @@ std::filesystem::space_info space_of(const std::filesystem::path& folder) {
   const auto space = std::filesystem::space(folder, unknown);
   if (!unknown) return space;
   constexpr auto kMuch = std::numeric_limits<std::uintmax_t>::max();
-  return {kMuch, kMuch, kMuch};  // writing will tell
+  return {kMuch, kMuch, kMuch};  // writing reports the error
 }
 
 }  // namespace
@@ -75,7 +75,7 @@ std::uint64_t Reserve::usual_bytes(const std::filesystem::path& folder) {
   return std::clamp<std::uint64_t>(space_of(folder).capacity / kShare, kLeast, kMost);
 }
 
-// All or nothing.
+// Takes the whole reserve or nothing.
 bool Reserve::take() {
   if (free_bytes() < bytes_ + bytes_ / kMargin) return false;
   const Descriptor file(::open(file_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));

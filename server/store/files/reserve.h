@@ -7,31 +7,32 @@
 
 namespace isomesh::store {
 
-// A file that takes up room on the disk, to be let go when there is none left for what frees more:
-// removing, cancelling, expiring, starting. Nothing new is begun until it is back. Thread safe.
+// A file that occupies disk space. It is released when the disk is full, so that operations which
+// free space (delete, cancel, expire, start) still work. No new work starts until it is back.
+// Thread safe.
 class Reserve {
  public:
-  // Takes `bytes`, or what the file had when that is refused; with 0 bytes there is no reserve.
-  // When the disk is full already, the room of an earlier one is let go.
+  // Reserves `bytes`; 0 disables the reserve. If the disk is already full, an existing reserve is
+  // released.
   Reserve(std::filesystem::path file, std::uint64_t bytes);
 
-  // Whether something new may be begun: the reserve is there, or can be taken again, and a little
-  // more than that is free.
+  // True if new work may start: the reserve is there, or can be taken again, and some more space is
+  // free.
   bool has_room();
 
   // Throws Error kOutOfSpace unless has_room().
   void check_room();
 
-  // Gives its room to the disk. False when it had been let go before.
+  // Releases the reserve. Returns false if it was released before.
   bool let_go();
 
-  // Bytes that may be written besides, as the disk is now.
+  // Bytes free on the disk now, besides the reserve.
   std::uint64_t free_bytes() const;
 
-  // Bytes of the whole disk but for the reserve: what could be written if nothing else were there.
+  // Size of the disk without the reserve and its margin.
   std::uint64_t capacity() const;
 
-  // What is kept on a disk of the size of this folder's, unless somebody says.
+  // The default reserve for the disk of this folder.
   static std::uint64_t usual_bytes(const std::filesystem::path& folder);
 
  private:

@@ -13,7 +13,7 @@ void Room::limit(std::uint64_t max_bytes, MakeRoom make) {
 }
 
 void Room::take(std::uint64_t bytes) {
-  // Others may take what was made.
+  // Others may take the space that was freed.
   constexpr int kTries = 3;
   for (int n = 0; n < kTries; ++n) {
     if (try_take(bytes)) return;

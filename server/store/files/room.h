@@ -7,24 +7,24 @@
 
 namespace isomesh::store {
 
-// What all blobs take, those included that are being written, and how much that may be. Thread
+// Counts the bytes of all blobs, including those being written, and enforces their limit. Thread
 // safe.
 class Room {
  public:
-  // To be called before the first take(). 0: as much as the disk holds.
+  // Call before the first take(). 0: no limit but the disk.
   void limit(std::uint64_t max_bytes, MakeRoom make);
 
-  // Bytes that are about to be written; has room made for them where there is none. Throws Error
+  // Takes room for bytes to be written; lets `make` free space if necessary. Throws Error
   // kOutOfSpace.
   void take(std::uint64_t bytes);
 
-  // Of so many bytes that were taken, so many are there in the end.
+  // Replaces `taken` bytes by the `bytes` that were stored in the end.
   void settle(std::uint64_t taken, std::uint64_t bytes);
 
-  // Bytes that are not there any more.
+  // Gives back the bytes of removed files.
   void give(std::uint64_t bytes);
 
-  // So many bytes are there, whoever has stored them.
+  // Sets the count, for example after other daemons stored blobs.
   void recount(std::uint64_t bytes);
 
   std::uint64_t used() const;

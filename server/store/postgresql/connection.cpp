@@ -19,13 +19,13 @@
 namespace isomesh::store::postgresql {
 namespace {
 
-// What a statement may take: far more than any of ours does, so that one that hangs does not keep
-// its connection for ever. Locks are held for milliseconds.
+// Limits far above what our statements need, so that a hanging statement does not occupy its
+// connection forever. Locks are held for milliseconds.
 constexpr const char* kSession =
     "SET statement_timeout = '60s'; SET lock_timeout = '4s'; "
     "SET idle_in_transaction_session_timeout = '60s'; SET bytea_output = 'hex'";
 
-// Of what the other side has said, only its own words: they hold neither addresses nor passwords.
+// Only the primary message and the SQLSTATE: they contain neither addresses nor passwords.
 std::string message_of(const PGresult* result) {
   const char* text = PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const char* state = PQresultErrorField(result, PG_DIAG_SQLSTATE);
@@ -33,7 +33,7 @@ std::string message_of(const PGresult* result) {
          (state == nullptr ? "-" : state) + ")";
 }
 
-// By the code's class (PostgreSQL, appendix A).
+// By SQLSTATE and its class (PostgreSQL documentation, appendix A).
 [[noreturn]] void throw_error(const PGresult* result) {
   const char* code = PQresultErrorField(result, PG_DIAG_SQLSTATE);
   const std::string_view state = code == nullptr ? "" : code;
@@ -41,7 +41,8 @@ std::string message_of(const PGresult* result) {
   if (state == "53100") {
     throw Error(ErrorCode::kOutOfSpace, "the database has no space left");
   }
-  // Another transaction came first; or it ends, starts, or has become a standby.
+  // Conflicts with another transaction; or the server is stopping, starting, or has become a
+  // standby.
   for (const std::string_view passing :
        {"40001", "40P01", "55P03", "57P01", "57P02", "57P03", "25006"}) {
     if (state == passing) throw Interrupted(ErrorCode::kUnavailable, text);
@@ -51,7 +52,7 @@ std::string message_of(const PGresult* result) {
   throw Error(ErrorCode::kInternal, text);
 }
 
-// What PostgreSQL's system catalogue calls the types.
+// Object identifiers of types in PostgreSQL's system catalogue.
 Oid type_of(const Parameter& parameter) {
   constexpr Oid kBigint = 20;
   constexpr Oid kText = 25;
@@ -77,7 +78,7 @@ std::string text_of(const Parameter& parameter) {
   return {text.data(), end};
 }
 
-// With the parameters as PostgreSQL has them.
+// Replaces ?1, ?2 by PostgreSQL's $1, $2.
 std::string with_dollars(std::string_view sql) {
   std::string text(sql);
   std::ranges::replace(text, '?', '$');
@@ -121,11 +122,11 @@ namespace {
 
 using UrlParts = std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)>;
 
-// Null where it is not valid.
+// Null if the URL is invalid.
 UrlParts parts_of(const std::string& url) {
   char* complaint = nullptr;
   UrlParts parts(PQconninfoParse(url.c_str(), &complaint), &PQconninfoFree);
-  PQfreemem(complaint);  // it repeats what it complains of
+  PQfreemem(complaint);  // the message repeats the URL
   return parts;
 }
 
@@ -141,7 +142,7 @@ std::vector<std::pair<std::string, std::filesystem::path>> files_of_url(const st
     const char* file = part->val;
     if (file == nullptr && part->envvar != nullptr) file = std::getenv(part->envvar);
     const std::string_view name = file == nullptr ? "" : file;
-    // The authorities of the system, and a key in an engine of OpenSSL, are no files.
+    // The system's authorities and a key in an OpenSSL engine are not files.
     const bool is_file = !name.empty() && name != "system" &&
                          (name.find(':') == std::string_view::npos || name.starts_with('/'));
     if (is_file) files.emplace_back(part->keyword, file);
@@ -169,7 +170,7 @@ void check_url(const std::string& url) {
 
 namespace {
 
-// Waits until something can be read or written. False when it is too late.
+// Waits until the socket is readable or writable. Returns false at the deadline.
 bool waits_for(int socket, short events, Connection::Clock::time_point deadline) {
   while (true) {
     const auto left =
@@ -183,10 +184,10 @@ bool waits_for(int socket, short events, Connection::Clock::time_point deadline)
   }
 }
 
-// To be finished by the caller, also where it has failed. libpq's own limit of time is for each
-// address, and a URL may have another, so this one counts here.
+// Connects by the deadline. The caller must call PQfinish, also after a failure. libpq's own
+// timeout applies per address, and the URL may set another one, so the deadline is enforced here.
 pg_conn* connected(const std::string& url, Connection::Clock::time_point deadline) {
-  // What the URL says comes later and wins.
+  // Parameters in the URL override those before "dbname".
   const std::array<const char*, 7> names = {"tcp_user_timeout",
                                             "keepalives_idle",
                                             "fallback_application_name",
@@ -213,7 +214,7 @@ std::string reason_of_no_connection(const std::string& url) {
   const std::unique_ptr<pg_conn, decltype(&PQfinish)> handle(
       connected(url, Connection::Clock::now() + Connection::kPatience), &PQfinish);
   if (PQstatus(handle.get()) == CONNECTION_OK) return "";
-  // A line for each address that was tried.
+  // One line per address that was tried.
   std::string reason;
   for (const std::string_view line : split(PQerrorMessage(handle.get()), '\n')) {
     if (!line.empty()) reason += (reason.empty() ? "" : "; ") + std::string(trimmed(line));
@@ -224,7 +225,7 @@ std::string reason_of_no_connection(const std::string& url) {
 Connection::Connection(const std::string& url, Clock::time_point deadline)
     : handle_(connected(url, deadline)), deadline_(deadline) {
   if (PQstatus(handle_) != CONNECTION_OK) {
-    // libpq's own text may name hosts, users and files, and this one goes to clients.
+    // The text of libpq may name hosts, users and files, and clients see this one.
     PQfinish(handle_);
     throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
@@ -238,7 +239,8 @@ Connection::Connection(const std::string& url, Clock::time_point deadline)
   }
 }
 
-// A commit whose wait for the synchronous standby was cut short is told as done, with a warning.
+// PostgreSQL reports a commit as successful, with a warning, if its wait for the synchronous
+// standby was interrupted.
 void Connection::take_notice(void* connection, const pg_result* notice) {
   const char* state = PQresultErrorField(notice, PG_DIAG_SQLSTATE);
   const char* severity = PQresultErrorField(notice, PG_DIAG_SEVERITY_NONLOCALIZED);
@@ -264,7 +266,7 @@ void Connection::wait_for(short events) {
   throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
 }
 
-// The last result of what was asked; null when the connection is lost.
+// Returns the last result of a query; null if the connection is lost.
 pg_result* Connection::answer_to(bool is_asked) {
   if (!is_asked) return nullptr;
   for (int left = PQflush(handle_); left != 0; left = PQflush(handle_)) {
@@ -276,7 +278,7 @@ pg_result* Connection::answer_to(bool is_asked) {
   while (true) {
     while (PQisBusy(handle_) == 1) {
       wait_for(POLLIN);
-      if (PQconsumeInput(handle_) == 0) break;  // what has come is told by the next result
+      if (PQconsumeInput(handle_) == 0) break;  // PQgetResult reports the failure
     }
     Result result(PQgetResult(handle_));
     if (!result) return last.release();
@@ -355,7 +357,7 @@ Transaction::~Transaction() {
   try {
     connection_.run("ROLLBACK");
   } catch (const Error&) {
-    // Lost, and with it the transaction.
+    // The connection is lost, and its transaction with it.
     return;
   }
 }

@@ -1,4 +1,4 @@
-// PostgreSQL behind the interface of SQL: a connection, its statements, transactions. Private to
+// Connections, statements and transactions of PostgreSQL for the interface in sql.h. Private to
 // this folder.
 #pragma once
 
@@ -21,58 +21,58 @@ struct pg_result;
 
 namespace isomesh::store::postgresql {
 
-// Nothing is known of what was asked: the connection is gone, or the database has ended the
-// transaction in favour of another one. What may be repeated may be asked again.
+// The outcome of a statement is unknown: the connection is lost, or the database aborted the
+// transaction in favour of another one. Repeatable work may be retried.
 class Interrupted : public Error {
  public:
   using Error::Error;
 };
 
-// Throws Error kInvalidParameter for a URL that libpq does not read, or that holds a password: it
-// would be seen in the list of processes and in what `isomeshd check` prints.
+// Throws Error kInvalidParameter if libpq cannot parse the URL, or if it contains a password: the
+// list of processes and the output of `isomeshd check` would reveal it.
 void check_url(const std::string& url);
 
-// Files of certificates, keys and passwords that the URL or the environment names, by libpq's words
-// for them. None where the URL is not valid.
+// Certificates, keys and password files named by the URL or the environment, each with libpq's name
+// of the parameter. Empty if the URL is invalid.
 std::vector<std::pair<std::string, std::filesystem::path>> files_of_url(const std::string& url);
 
-// Why no connection can be made, as libpq says it; empty if one can. The text may name hosts, users
-// and files, so it is for the operator alone. libpq never puts a password into it.
+// The reason of libpq why no connection can be made; empty if one can. The text may name hosts,
+// users and files, so show it to operators only. libpq never includes the password.
 std::string reason_of_no_connection(const std::string& url);
 
-// One connection. Not thread safe. What it throws tells neither the address nor the password. Its
-// texts may also have their parameters as PostgreSQL has them, $1, $2 and so on.
+// One connection. Not thread safe. Its errors reveal neither the address nor the password.
+// Statements may also use PostgreSQL's parameters $1, $2 and so on.
 class Connection : public SqlConnection {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::seconds kPatience{5};
 
-  // Throws Interrupted when nobody answers until then, whatever the URL says of time.
+  // Throws Interrupted if there is no connection by the deadline, whatever timeouts the URL sets.
   explicit Connection(const std::string& url,
                       Clock::time_point deadline = Clock::now() + kPatience);
   ~Connection() override;
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  // Until when answers are waited for, from now on. An answer that has not come by then makes the
-  // connection a lost one, and throws Interrupted.
+  // Sets the deadline for all further responses. A response that misses it makes the connection a
+  // lost one, and throws Interrupted.
   void wait_until(Clock::time_point deadline) { deadline_ = deadline; }
 
-  // Throw Interrupted, Error kOutOfSpace, kUnavailable or kInternal.
+  // Throws Interrupted, Error kOutOfSpace, kUnavailable or kInternal. tell() throws the same.
   Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
   std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) override;
   const char* for_update() const override { return " FOR UPDATE"; }
   void lock_table(const std::string& name) override;
 
-  // Several statements without parameters.
+  // Runs several statements without parameters.
   void script(const std::string& sql);
 
-  // False once it has been lost.
+  // False once the connection is lost.
   bool is_open() const;
 
-  // A descriptor that is readable when something has come.
+  // Becomes readable when data arrives.
   int socket() const;
-  // What was told to the channels that it listens to, by other connections.
+  // Notifications from other connections on the channels that this one listens to.
   std::vector<std::string> take_messages();
 
  private:
@@ -88,17 +88,17 @@ class Connection : public SqlConnection {
   Result checked(pg_result* result);
   const std::string& prepared(std::string_view sql, std::span<const Parameter> parameters);
 
-  // Sees what the other side warns of.
+  // Receives warnings of the server.
   static void take_notice(void* connection, const pg_result* notice);
 
   pg_conn* handle_ = nullptr;
   Clock::time_point deadline_;
-  bool is_given_up_ = false;  // an answer may still come, to nobody
-  bool is_warned_ = false;    // by the last statement: it may be on this machine only
+  bool is_given_up_ = false;  // a response may still arrive; ignore it
+  bool is_warned_ = false;    // the last commit may be on this machine only
   std::unordered_map<std::string, std::string> names_;  // of prepared statements
 };
 
-// All or nothing: what was not committed is rolled back when it goes.
+// A transaction. Rolled back on destruction unless committed.
 class Transaction {
  public:
   explicit Transaction(Connection& connection) : connection_(connection) {

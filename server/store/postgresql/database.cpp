@@ -13,7 +13,7 @@ namespace isomesh::store::postgresql {
 namespace {
 
 constexpr std::chrono::milliseconds kBetweenQuestions{50};
-// Lives that ended longer ago, and whose runs are over, are forgotten.
+// Nodes that ended longer ago and have no runs are removed.
 constexpr std::int64_t kNodesKeptUs = std::int64_t{7 * 24 * 3600} * 1'000'000;
 
 std::string random_uuid() {
@@ -32,7 +32,7 @@ std::int64_t to_steady_us(std::chrono::steady_clock::time_point time) {
 
 std::int64_t steady_us() { return to_steady_us(std::chrono::steady_clock::now()); }
 
-// How many connections this thread has, of whatever database.
+// Number of connections that this thread holds, of any database.
 thread_local int borrowed = 0;
 
 }  // namespace
@@ -86,8 +86,9 @@ std::int64_t Database::us_of(std::chrono::steady_clock::time_point time) const {
   return to_steady_us(time) + beyond_steady_us_;
 }
 
-// The answer that took the least time tells it best. It is taken for the time when that was asked
-// for, so that what the database has written is never later than now.
+// Of several measurements, the one with the shortest round trip is the most accurate. The
+// database's time is taken as that at the start of the request, so that times it has written are
+// never in the future.
 void Database::look_at_clock(Connection& connection) {
   constexpr std::int64_t kQuickUs = 5000;
   std::int64_t quickest = std::numeric_limits<std::int64_t>::max();
@@ -127,7 +128,8 @@ Rows Database::ask(std::string_view sql, std::span<const Parameter> parameters) 
 
 std::unique_ptr<Connection> Database::take(std::chrono::steady_clock::time_point deadline) {
   {
-    // Who has one already does not wait for another, or all might wait for each other.
+    // A thread that holds a connection does not wait for another one; otherwise all threads might
+    // wait for each other.
     const bool waits = borrowed == 0;
     Lock lock(mutex_);
     const bool has_one = given_.wait_until(lock, deadline, [&]() ISOMESH_REQUIRES(mutex_) {
@@ -153,7 +155,7 @@ std::unique_ptr<Connection> Database::take(std::chrono::steady_clock::time_point
   }
 }
 
-// Where one is lost the others most likely are, too.
+// If one connection is lost, the others most likely are too.
 void Database::give(std::unique_ptr<Connection> connection) {
   --borrowed;
   const Lock lock(mutex_);

@@ -19,32 +19,32 @@
 namespace isomesh::store::postgresql {
 
 struct DatabaseOptions {
-  std::string url;   // as libpq takes it; passwords may come from PGPASSFILE
-  std::string node;  // the name of this process's data folder: it has one process at a time
+  std::string url;   // in libpq's syntax; passwords may come from PGPASSFILE
+  std::string node;  // of this process's data folder, which only one process uses at a time
   std::size_t connections = 16;
-  // For how long an answer is waited for, and what was interrupted is asked again, before that is
-  // an error.
+  // Time to wait for a response, and to retry interrupted work, before that is an error.
   std::chrono::milliseconds patience{5000};
 };
 
-// The records of a cluster: one PostgreSQL database that any number of processes use, this one with
-// a small pool of connections. What a process does in the database it does under the name of one
-// life, its node. Thread safe.
+// The records of a cluster: one PostgreSQL database used by any number of processes. Each has a
+// small pool of connections, and a node id that is new at every start and marks what it does in the
+// database. Thread safe.
 class Database : public SqlDatabase {
  public:
-  // Creates what is missing and brings the tables of an older version up to date. Throws Error
-  // kUnavailable, with libpq's reason, if no connection can be made, or if a newer version made
-  // them, kInternal otherwise. The text is for the operator.
+  // Creates missing tables and migrates those of an older version. Throws Error kUnavailable, with
+  // libpq's reason, if no connection can be made or a newer version made the tables; kInternal
+  // otherwise. The text is for the operator.
   explicit Database(DatabaseOptions options);
 
-  // Runs `act(connection)` and again while it is interrupted, so `act` must be one that may be
-  // asked twice; is_again says that it is not the first time. Throws what it throws.
+  // Runs `act(connection, is_again)`, and repeats it while it is interrupted, so `act` must be
+  // repeatable. is_again is true after the first time. Throws what `act` throws.
   template <class Act>
   auto ask(const Act& act) {
     return ask_for(options_.patience, act);
   }
 
-  // The same for what may take longer. What has to be repeated is begun anew for options.patience.
+  // As ask(), but a response may take `longest`. Interrupted work is restarted only within
+  // options.patience of the call.
   template <class Act>
   auto ask_for(std::chrono::milliseconds longest, const Act& act) {
     const auto deadline = std::chrono::steady_clock::now() + options_.patience;
@@ -62,29 +62,28 @@ class Database : public SqlDatabase {
     }
   }
 
-  // Whether the database answers now.
   bool answers();
 
-  const std::string& node() const { return node_; }  // a UUID of this life
+  const std::string& node() const { return node_; }  // a UUID, new at each start of the process
   const std::string& node_name() const { return options_.node; }
   const std::string& url() const { return options_.url; }
 
-  // Microseconds since 1970 by the database's clock: how the tables keep time. It is asked for with
-  // each new connection, and the time that passes is added.
+  // Microseconds since 1970 by the database's clock, as in the tables. Each new connection reads
+  // that clock; in between, the steady clock advances it.
   std::int64_t now_us() const;
-  // Of a time by this machine's clock, and back.
+  // Converts between this machine's clock and the database's.
   std::int64_t to_us(Time time) const override;
   Time from_us(std::int64_t us) const override;
   std::size_t most_at_once() const override { return 1; }
-  // When that was, as the time that passes is counted here.
+  // The steady clock's value at that time.
   std::chrono::steady_clock::time_point steady_of(std::int64_t us) const;
   std::int64_t us_of(std::chrono::steady_clock::time_point time) const;
 
  private:
-  // One connection of the pool, for as long as it lives.
+  // A connection borrowed from the pool until destruction.
   class Borrowed {
    public:
-    // Waits for it, and it for its answers, until then.
+    // Waits until the deadline for a connection; its responses have the same deadline.
     Borrowed(Database& database, std::chrono::steady_clock::time_point deadline)
         : database_(database), connection_(database.take(deadline)) {}
     ~Borrowed() { database_.give(std::move(connection_)); }
@@ -107,14 +106,14 @@ class Database : public SqlDatabase {
   void give(std::unique_ptr<Connection> connection);
   static void pause();
 
-  // What is to be added to this machine's clock to get the database's.
+  // Microseconds from this machine's clock to the database's.
   std::int64_t shift() const;
   void look_at_clock(Connection& connection);
 
   const DatabaseOptions options_;
   const std::string node_;
-  // The database's clock less the steady one, and less this machine's. They change when they are
-  // wrong by a second, so that a time that goes there and back is the same.
+  // The database's clock minus the steady clock, and minus this machine's clock. They are adjusted
+  // only when wrong by a second, so that a time converted there and back is unchanged.
   std::atomic<std::int64_t> beyond_steady_us_ = 0;
   mutable std::atomic<std::int64_t> shift_us_ = 0;
 

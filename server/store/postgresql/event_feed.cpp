@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::size_t kMostRecent = 4000;
 constexpr std::size_t kMostEvents = 500;
-// The lower bits of a number are the place in the transaction; those that are not kept come in the
-// upper half of these, after all that are.
+// The lower bits of an event's number are its place in the transaction. Events that are not stored
+// use the upper half of these places, after all stored ones.
 constexpr int kPlaceBits = 20;
 constexpr std::uint64_t kFirstTold = std::uint64_t{1} << (kPlaceBits - 1);
 
@@ -42,7 +42,8 @@ Event event_of(const Rows& row, const std::string& node) {
 }  // namespace
 
 EventFeed::EventFeed(Database& database) : database_(database) {
-  // Those of a database that was copied to another server may have numbers that come only later.
+  // If the database was copied to another server, events may have numbers that this server has not
+  // reached yet. They are removed.
   database_.query(
       "DELETE FROM events WHERE tx >= pg_snapshot_xmax(pg_current_snapshot())::text::bigint");
   Rows row = database_.query(std::string("SELECT ") + kHorizon);
@@ -59,7 +60,7 @@ void EventFeed::fetch() {
     const Lock lock(mutex_);
     end = end_;
   }
-  // The horizon is there though there may be no event before it.
+  // The left join returns the horizon even if there are no events before it.
   Rows rows =
       database_.query(std::string("SELECT ") + kColumns + ", horizon FROM (SELECT " + kHorizon +
                           " AS horizon) AS h LEFT JOIN events ON tx >= ?1 AND tx < "
@@ -72,7 +73,7 @@ void EventFeed::fetch() {
     constexpr int kHorizonColumn = 9;
     end_ = std::max(end_, rows.integer(kHorizonColumn));
     if (rows.is_null(0)) continue;
-    // A run's own news comes before its end.
+    // Progress of a run precedes its end.
     number_told(rows.integer(0));
     const Event event = event_of(rows, database_.node());
     if (event.is_elsewhere && event.state == JobState::kRunning) has_runs_elsewhere_ = true;
@@ -85,8 +86,8 @@ void EventFeed::fetch() {
   changed_.notify_all();
 }
 
-// A run's row goes in the transaction that writes its end, so one that is there has not ended for
-// whoever has read all events of before.
+// The transaction that writes a run's end also deletes the run's row. So a run with a row has not
+// ended for readers of all events so far.
 void EventFeed::look_at_runs() {
   const Lock fetching(fetching_);
   Rows rows = database_.query(
@@ -96,7 +97,7 @@ void EventFeed::look_at_runs() {
   std::map<std::string, Seen> now;
   while (rows.next()) {
     const std::string job = rows.text(0);
-    Seen run = {.fence = rows.integer(1)};  // as its claim told it
+    Seen run = {.fence = rows.integer(1)};  // with the fence of its claim
     if (const auto before = seen_.find(job);
         before != seen_.end() && before->second.fence == run.fence) {
       run = before->second;
@@ -141,7 +142,7 @@ void EventFeed::number_told(std::int64_t before) {
       continue;
     }
     told.event.id = std::max(last_ + 1, number_of(told.after, 0) + kFirstTold);
-    // Thousands in which no transaction ended: one more is no news.
+    // Progress is dropped if thousands of events came while no transaction ended.
     if (told.event.id < number_of(before, 0)) remember({std::move(told.event), false});
   }
   told_ = std::move(later);
@@ -161,7 +162,7 @@ EventFeed::Recent EventFeed::recent(const Viewer& viewer, const std::string& job
   Recent result;
   result.generation = generation_;
   result.end = end_;
-  // Those of one job are removed with it, but not from here.
+  // The database removes a job's events with the job, but this list does not.
   result.is_complete = job.empty() && since >= complete_after_;
   const auto begin = std::ranges::upper_bound(recent_, since, {}, &Entry::id);
   for (auto entry = begin; entry != recent_.end(); ++entry) {

@@ -14,29 +14,29 @@
 
 namespace isomesh::store::postgresql {
 
-// The events of all nodes as this one has read them, and those that only this one knows.
+// Events of all nodes, as read by this one, and unstored events known only to this node.
 //
-// An event's number is the transaction that wrote it and its place there. Transactions do not end
-// in the order of their numbers, so what is read ends before the first that is still under way:
-// whoever goes on after a number that was seen misses nothing. Thread safe.
+// An event's number consists of the transaction that wrote it and its place there. Transactions do
+// not end in the order of their numbers. So reading stops before the first transaction that is
+// still open, and a reader that continues after a number it has seen misses nothing. Thread safe.
 class EventFeed {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Begins after all that is there. `database` must outlive it.
+  // Starts after all existing events. `database` must outlive this object.
   explicit EventFeed(Database& database);
 
-  // Reads what has come. Throws Error kUnavailable or kInternal.
+  // Reads new events. Throws Error kUnavailable or kInternal.
   void fetch();
 
-  // Tells how far the runs of other nodes are by their last renewals, where that is news. What they
-  // tell meanwhile is not seen. Throws as fetch().
+  // Reads the latest renewals of runs on other nodes, and emits an event if they show progress.
+  // Progress between two calls is not seen. Throws as fetch().
   void look_at_runs();
 
-  // False until a run of another node was seen, and after a look that found none.
+  // False until a run of another node was seen, and after a call of look_at_runs() that found none.
   bool has_runs_elsewhere() const { return has_runs_elsewhere_; }
 
-  // An event that is not kept; it is seen after those of the transaction `after`.
+  // Adds an event that is not stored; it comes after those of the transaction `after`.
   void tell(Event event, std::int64_t after);
 
   // As JobStore::events.
@@ -60,19 +60,19 @@ class EventFeed {
   };
   struct Recent {
     std::vector<Event> events;
-    bool is_complete = false;  // false: those that are kept have to be read
+    bool is_complete = false;  // false: stored events must be read from the database
     std::uint64_t generation = 0;
-    std::int64_t end = 0;  // the first transaction that is not read
+    std::int64_t end = 0;  // the first transaction not yet read
   };
 
   Recent recent(const Viewer& viewer, const std::string& job, std::uint64_t since) const;
   std::vector<Event> kept(const Viewer& viewer, const std::string& job, std::uint64_t since,
                           std::int64_t end);
   void remember(Entry entry) ISOMESH_REQUIRES(mutex_);
-  // Those that come before what that transaction has written.
+  // Numbers the unstored events whose transaction is before `before`.
   void number_told(std::int64_t before) ISOMESH_REQUIRES(mutex_);
 
-  // A run of another node, as it was told last.
+  // A run of another node, as last reported.
   struct Seen {
     std::int64_t fence = 0;
     Stage stage = Stage::kLoad;
@@ -85,13 +85,13 @@ class EventFeed {
   std::atomic<bool> has_runs_elsewhere_ = false;
   mutable Mutex mutex_;
   mutable Condition changed_;
-  std::int64_t end_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the first transaction that is not read
+  std::int64_t end_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the first transaction not yet read
   std::uint64_t last_ ISOMESH_GUARDED_BY(mutex_) = 0;
   std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;
   std::deque<Entry> recent_ ISOMESH_GUARDED_BY(mutex_);  // by number
   // recent_ holds all events with greater numbers than this.
   std::uint64_t complete_after_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  std::vector<Told> told_ ISOMESH_GUARDED_BY(mutex_);  // whose transaction is not read yet
+  std::vector<Told> told_ ISOMESH_GUARDED_BY(mutex_);  // whose transaction is not yet read
   bool closed_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 

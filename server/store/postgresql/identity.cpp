@@ -9,7 +9,7 @@
 namespace isomesh::store::postgresql {
 namespace {
 
-// The first word: SQLite's engine writes a number behind it.
+// The first word of the mark: SQLite's engine appends a number.
 std::string name_of(const BlobStore& blobs) {
   const std::string mark = blobs.mark();
   return mark.substr(0, mark.find_first_of(" \n"));
@@ -17,7 +17,7 @@ std::string name_of(const BlobStore& blobs) {
 
 void name(const BlobStore& blobs, const std::string& name) { blobs.set_mark(name + '\n'); }
 
-// The database's name; `proposed` where it has none yet.
+// The database's name; sets it to `proposed` if there is none.
 std::string name_of_database(Database& database, const std::string& proposed) {
   return database.ask([&](Connection& connection, bool) {
     Transaction transaction(connection);
@@ -34,7 +34,7 @@ std::string name_of_database(Database& database, const std::string& proposed) {
   });
 }
 
-// Whether anything is recorded that may be in a blob.
+// True if there are records that may name blobs.
 bool has_records(Database& database) {
   Rows row = database.query(
       "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
@@ -43,14 +43,14 @@ bool has_records(Database& database) {
   return row.boolean(0);
 }
 
-// Has both carry one name. Of daemons that start at once each comes to the same one; and after a
-// crash in the middle the next start goes on.
+// Gives both the same name. Daemons that start at the same time get the same one, and a start after
+// a crash completes it.
 void check(Database& database, const BlobStore& blobs, bool may_adopt) {
   std::string mark = name_of(blobs);
   std::string proposed = random_hex(16);
   if (!blobs.is_shared() && blobs.is_empty()) {
     if (mark.empty()) name(blobs, mark = proposed);
-    proposed = mark;  // nothing is lost with what it was called before
+    proposed = mark;  // reusing the old name loses nothing
   }
   const std::string named = name_of_database(database, proposed);
   if (mark == named) return;

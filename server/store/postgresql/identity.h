@@ -10,25 +10,26 @@
 
 namespace isomesh::store::postgresql {
 
-// That the database and the store of blobs belong together, and which time it is: by the
-// database's clock, as far as that can be believed. Both carry one name: a sweep after a mix-up
-// would take everything that the database does not name, and a daemon with files of its own would
-// not find those of the others. Thread safe; what it is made of must outlive it.
+// Ensures that the database and the blobs belong together, and provides a believed clock based on
+// the database's. Both carry one name: after a mix-up, a sweep would remove all blobs that the
+// database does not name, and a daemon with its own files would miss those of others. Thread safe;
+// its dependencies must outlive it.
 class Identity {
  public:
-  // Throws Error kUnavailable when the one is not the other's and that was not allowed. Names both
-  // where neither has a name.
+  // Names both if neither has a name. Throws Error kUnavailable if they do not belong together and
+  // `word` does not allow that.
   Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
            std::chrono::milliseconds tolerance);
-  // The same with another clock, which tells the database's time.
+  // As above, with another clock for the database's time.
   Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
            const BelievedClock::Options& clock);
 
-  // By this machine's clock, as all times of the stores' interfaces are. Leaves a mark of it.
+  // The believed time, converted to this machine's clock as the interfaces of stores require.
+  // Records it in the database.
   Time now();
 
  private:
-  // Of the database, in its own time.
+  // The last recorded time, by the database's clock.
   static Time last_seen(Database& database);
 
   Database& database_;

@@ -1,4 +1,4 @@
-// What changes jobs, one function of the database a verb; job_store.cpp has what is asked.
+// Changes of jobs, each one call of a database function; queries are in job_store.cpp.
 #include <algorithm>
 
 #include <nlohmann/json.hpp>
@@ -12,29 +12,29 @@
 
 namespace isomesh::store::postgresql {
 
-// How a run is to end.
 struct PostgresJobStore::Ending {
-  bool ends_others = false;  // it is not this process's own; refused unless its lease is over
+  // Ends a run of another process; only possible if its lease has expired.
+  bool ends_others = false;
   JobState state = JobState::kQueued;
-  std::string record = {};     // of those that do not run again
-  std::string cancelled = {};  // the record, should it have been asked to stop
+  std::string record = {};     // for jobs that do not run again
+  std::string cancelled = {};  // the record to use if the job was cancelled
   const MeshSummary* mesh = nullptr;
-  std::chrono::milliseconds delay{0};  // of those that do, until they may
+  std::chrono::milliseconds delay{0};  // for jobs that run again
   std::optional<WaitingFor> waiting_for = {};
-  bool counts = false;  // as an attempt
+  bool counts = false;  // the attempt counts
 };
 
 namespace {
 
-// How often a run tells the database how far it is, and otherwise renews its lease and learns that
-// it is to stop if it missed what was told.
+// Interval at which a run writes its progress to the database. This also renews its lease, and
+// detects a cancellation whose message was lost.
 constexpr std::chrono::milliseconds kBetweenReports{500};
 constexpr std::chrono::milliseconds kBetweenRenewals{1000};
 
-// Expired leases are looked for every second. Whoever could not for longer has seen an outage.
+// reap() runs every second. A longer gap between its successes means an outage.
 constexpr std::chrono::milliseconds kLongestGap{2500};
 
-// How the functions of the database are told.
+// Arguments of the database's functions.
 using Json = nlohmann::json;
 
 std::string text_of(const Json& json) {
@@ -65,7 +65,7 @@ Submission PostgresJobStore::submit(const JobSpec& spec) {
   job.id = time_ordered_id(store::from_us(now));
   job.parameters = spec.parameters;
   job.created = timestamp_of_us(now);
-  // Each time somebody else has made, or removed, the like of it meanwhile.
+  // Repeated if another process stored or removed an equal job meanwhile.
   for (int tries = 0; tries < 20; ++tries) {
     if (auto submission = try_to_submit(spec, job)) return std::move(*submission);
   }
@@ -137,7 +137,7 @@ std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
     asked = options_.now();
     std::optional<Rows> rows;
     if (is_again) {
-      // What it got when it was interrupted: a worker has one run at a time.
+      // A worker has one run at a time, so its current run is what the interrupted claim returned.
       rows = connection.query(
           "SELECT j.id, r.fence, j.attempts, j.owner, j.record, j.accepted, r.claimed, 0 FROM runs "
           "r JOIN jobs j ON j.id = r.job WHERE r.node = ?1::uuid AND r.worker = ?2 AND "
@@ -289,7 +289,7 @@ void PostgresJobStore::note_answer() {
   answered_ = now;
 }
 
-// Asks until the database has been told of all jobs that end with it.
+// Repeats until the records of all equal jobs that end with this run were passed to the database.
 bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const Ending& ending) {
   Json asked = {
       {"id", id},
@@ -329,7 +329,7 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
     } while (rows.next());
   }
   forget_run(id, fence);
-  // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
+  // Without a mesh, this job or an equal one may be ready again. With one, no job becomes ready.
   if (ending.mesh == nullptr) {
     wake_workers();
   } else {
@@ -346,7 +346,7 @@ Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
   Rows answer = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_record(ended),
                                 database_.node());
   answer.next();
-  if (answer.is_null(0)) return get(viewer, id);  // gone meanwhile
+  if (answer.is_null(0)) return get(viewer, id);  // removed meanwhile
   const auto state = static_cast<JobState>(answer.integer(0));
   if (state == JobState::kCancelled) wake_workers();
   if (state == JobState::kRunning) {

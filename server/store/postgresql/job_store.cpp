@@ -1,4 +1,4 @@
-// What is asked about jobs; job_queue.cpp has what changes them.
+// Queries about jobs; changes are in job_queue.cpp.
 #include "server/store/postgresql/job_store.h"
 
 #include <algorithm>
@@ -22,13 +22,13 @@ PostgresJobStore::PostgresJobStore(Database& database, const BlobStore& blobs,
       feed_(database),
       messages_(database, [this](const News& news) { return hear(news); }) {}
 
-// Returns whether others run jobs, whose progress is to be looked at.
+// Returns true if other processes run jobs, so that their progress should be read.
 bool PostgresJobStore::hear(const News& news) {
   {
     const Lock lock(live_mutex_);
     for (const std::string& job : news.cancelled) {
       const auto run = live_.find(job);
-      // Renewed at once, it learns for certain whether it is to stop.
+      // Forces a renewal, which tells for certain whether the run should stop.
       if (run != live_.end()) run->second.lease_until = {};
     }
   }
@@ -102,7 +102,7 @@ PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
   if (!rows.is_null(9)) {
     row.job.stage = static_cast<Stage>(rows.integer(9));
     row.job.progress = rows.real(10);
-    // None where a daemon of the first version runs it.
+    // Daemons of the first version write no timings.
     if (!rows.is_null(11)) row.job.timing = timing_from_record(rows.text(11));
   }
   row.job.timing.queue = milliseconds_between(row.accepted, rows.integer(8));

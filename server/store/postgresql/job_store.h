@@ -12,13 +12,13 @@
 
 namespace isomesh::store::postgresql {
 
-// Jobs in a database that several processes share. A lease is a row that names the life of a
-// process (Database::node) and is over by the database's clock; while the row is there it is still
-// its holder's. What a run tells on its way reaches the database at most twice a second, and from
-// there the other processes within a second.
+// Jobs in a database that several processes share. A lease is a row that names a node
+// (Database::node) and expires by the database's clock. Its holder keeps it as long as the row
+// exists. Progress reaches the database at most twice a second, and the other processes within
+// another second.
 class PostgresJobStore : public SqlJobStore {
  public:
-  // Both must outlive it.
+  // `database` and `blobs` must outlive this object.
   PostgresJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
 
   Submission submit(const JobSpec& spec) override;
@@ -42,10 +42,10 @@ class PostgresJobStore : public SqlJobStore {
 
  private:
   struct Ending;
-  // What a job like it has made last, if there is such a job.
+  // The latest result of an equal job.
   struct Made {
     std::string job;
-    std::optional<MeshSummary> mesh;  // empty when it is not there whole
+    std::optional<MeshSummary> mesh;  // empty if its blobs are incomplete
   };
 
   Row row_of(const Rows& rows) const override;
@@ -56,26 +56,26 @@ class PostgresJobStore : public SqlJobStore {
   void close_events() override { feed_.close(); }
 
   std::optional<Made> made_like(const std::string& owner, const std::string& key) const;
-  // One try; empty where it is to be looked again at what is like it.
+  // One attempt; empty if equal jobs changed meanwhile, so that the caller must retry.
   std::optional<Submission> try_to_submit(const JobSpec& spec, Job job);
   Job cancelled(Job job, std::int64_t accepted) const;
   bool end_run(const std::string& id, std::uint64_t fence, const Ending& ending);
   std::optional<Live> live_run(const Lease& lease) const;
   bool hear(const News& news);
-  // Whether the database has answered for as long as holders of leases need to renew them.
+  // True if the database has responded for so long that every living holder has renewed its lease.
   bool has_answered_for_long() const;
   void note_answer();
   void wake_workers();
 
   Database& database_;
   mutable Mutex answers_mutex_;
-  std::optional<Steady> answered_ ISOMESH_GUARDED_BY(answers_mutex_);  // as reap() saw it last
-  Steady answers_since_ ISOMESH_GUARDED_BY(answers_mutex_);  // the end of the last outage, or start
+  std::optional<Steady> answered_ ISOMESH_GUARDED_BY(answers_mutex_);  // the last success of reap()
+  // The end of the last outage, or the start.
+  Steady answers_since_ ISOMESH_GUARDED_BY(answers_mutex_);
   mutable EventFeed feed_;
-  Messages messages_;  // last: its thread uses the others
+  Messages messages_;  // last: its thread uses the other members
 };
 
-// How a time of the tables is told.
 std::string timestamp_of_us(std::int64_t us);
 
 }  // namespace isomesh::store::postgresql

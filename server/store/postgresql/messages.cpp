@@ -22,9 +22,9 @@ constexpr std::chrono::milliseconds kBetweenLooks{300};
 constexpr std::chrono::milliseconds kBetweenTries{200};
 constexpr char kWork = 'w';
 constexpr char kEvents = 'e';
-constexpr char kCancelled = 'c';  // a job's id follows
+constexpr char kCancelled = 'c';  // followed by a job's id
 
-// Waits until one of both is readable.
+// Waits until either descriptor is readable.
 void wait_for(int first, int second, std::chrono::milliseconds longest) {
   std::array<pollfd, 2> watched = {pollfd{first, POLLIN, 0}, pollfd{second, POLLIN, 0}};
   ::poll(watched.data(), watched.size(), static_cast<int>(longest.count()));
@@ -43,7 +43,7 @@ News read(const std::vector<std::string>& messages) {
   return news;
 }
 
-// What is heard when something may have been missed.
+// Reported if messages may have been missed.
 const News kAnything = {
     .has_work = true, .has_events = true, .has_progress = true, .cancelled = {}};
 
@@ -82,7 +82,7 @@ void Messages::tell(const News& news) {
 
 void Messages::wake() const {
   const std::uint64_t one = 1;
-  // It fails only when enough wakes are in it already.
+  // Fails only if enough wake-ups are pending already.
   if (::write(wake_, &one, sizeof one) < 0) return;
 }
 
@@ -119,7 +119,7 @@ void Messages::listen(const std::stop_token& stop) {
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next - Clock::now());
     wait_for(connection.socket(), wake_, std::max(wait, std::chrono::milliseconds(0)));
     std::uint64_t count = 0;
-    // What this process tells is heard by it, too.
+    // This process also receives its own messages.
     News news;
     connection.wait_until(Connection::Clock::now() + Connection::kPatience);
     if (::read(wake_, &count, sizeof count) > 0) news = send(connection);

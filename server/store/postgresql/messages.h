@@ -10,30 +10,30 @@
 
 namespace isomesh::store::postgresql {
 
-// What a node has told the others, or what may have been missed.
+// Changes reported by a node, or possibly missed.
 struct News {
   bool has_work = false;
   bool has_events = false;
-  bool has_progress = false;        // runs of other nodes may be further; nobody tells that
-  std::set<std::string> cancelled;  // jobs that were asked to stop
+  bool has_progress = false;        // runs of other nodes may have advanced; not part of messages
+  std::set<std::string> cancelled;  // jobs that should stop
 };
 
-// What nodes tell each other by NOTIFY, so that nobody has to ask the database all the time. It is
-// no more than a hint: `hear` is also called every second as if there were work and events, and
-// after a lost connection. One connection and one thread; what many tell at a time goes as one
-// message, because a NOTIFY makes commits wait for each other. Thread safe.
+// Messages between nodes by NOTIFY, which spare them polling the database. They are hints only:
+// `hear` is also called every second, and after a lost connection, as if there were work and
+// events. Uses one connection and one thread. Messages sent at the same time are combined, because
+// NOTIFY serialises commits. Thread safe.
 class Messages {
  public:
   using Hear = std::function<bool(const News&)>;
 
-  // `hear` is called by the thread and must not throw. While it returns true it is also called
-  // every 300 ms because of progress.
+  // The thread calls `hear`, which must not throw. While it returns true, it is also called every
+  // 300 ms to read progress.
   Messages(const Database& database, Hear hear);
   ~Messages();
   Messages(const Messages&) = delete;
   Messages& operator=(const Messages&) = delete;
 
-  // Tells all nodes, this one too.
+  // Sends to all nodes, including this one.
   void tell(const News& news);
 
  private:

@@ -21,14 +21,14 @@ using Source = store::Connection;
 
 constexpr std::chrono::hours kLongestMove{24};
 
-// A table of SQLite's and the columns of PostgreSQL's that take its rows.
+// A table in SQLite and the columns in PostgreSQL that receive its rows.
 struct Table {
   const char* columns;  // with the table's name
   const char* rows;
   int count;
 };
 
-// Events stay behind: their numbers are of another kind, and nobody waits for them.
+// Events are not copied: their numbers have another form, and nobody waits for them.
 constexpr std::array kAsTheyAre = {
     Table{"volumes(owner, id, created, used, bytes, record, labelled)",
           "SELECT owner, id, created, used, bytes, record, labelled FROM volumes", 7},
@@ -49,7 +49,7 @@ constexpr std::array kAsTheyAre = {
     Table{"audit(id, at, record, chain)", "SELECT id, at, record, chain FROM audit ORDER BY id",
           4}};
 
-// A row's values, as the columns take them.
+// The values of a row, converted for the columns.
 class Values {
  public:
   Values(const Rows& row, int count) {
@@ -89,7 +89,7 @@ std::uint64_t copy(Source& from, Connection& to, const Table& table) {
   return count;
 }
 
-// In the order of their ids, which is that of their age.
+// Ordered by id, that is, by age.
 std::uint64_t copy_jobs(Source& from, Connection& to) {
   constexpr Table kTable = {
       "jobs(id, owner, state, priority, volume, result_key, accepted, finished, not_before, "
@@ -112,7 +112,7 @@ std::uint64_t copy_jobs(Source& from, Connection& to) {
   return count;
 }
 
-// What the folder's blobs are called, which the database is called from now on.
+// The name in the mark of the folder's blobs, which the database gets too.
 std::string name_of_blobs(Source& from) {
   Rows row = from.query("SELECT id FROM identity");
   return row.next() ? row.text(0) : random_hex(16);
@@ -125,7 +125,7 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
     throw Error(ErrorCode::kInvalidParameter, "the data folder has no records to move");
   }
   store::Database source(folder);
-  // Nobody runs what ran: it is queued there as it is here.
+  // Nobody runs these jobs any more. They are queued again, here as in the copy.
   SqliteJobStore(source, FileBlobStore(folder), {}).reap();
   const store::Reading reading(source.writer());
   Database target({.url = url, .node = "move " + random_hex(8), .connections = 1});

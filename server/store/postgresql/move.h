@@ -7,7 +7,6 @@
 
 namespace isomesh::store::postgresql {
 
-// What was brought to a database.
 struct Moved {
   std::uint64_t volumes = 0;
   std::uint64_t jobs = 0;
@@ -16,10 +15,10 @@ struct Moved {
   bool operator==(const Moved&) const = default;
 };
 
-// Brings all records of a data folder, which no daemon uses meanwhile, to a database that has none,
-// all or nothing. The folder keeps its blobs, which belong to the database from then on, and its
-// records, which nobody looks at any more. Throws Error kInvalidParameter where the folder has no
-// records or the database has some, kUnavailable or kInternal.
+// Copies all records of an unused data folder to a database without records, all or nothing. From
+// then on the folder's blobs belong to the database, and its records are ignored. Throws Error
+// kInvalidParameter if the folder has no records or the database has some; kUnavailable or
+// kInternal.
 Moved move_records(const DataFolder& folder, const std::string& url);
 
 }  // namespace isomesh::store::postgresql

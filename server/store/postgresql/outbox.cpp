@@ -16,7 +16,8 @@ std::vector<Delivery> PostgresOutbox::due(Time now, std::size_t per_receiver) co
   while (rows.next()) {
     Delivery& delivery = deliveries.emplace_back(delivery_of(rows));
     const bool is_job = rows.boolean(5);
-    if (is_job) delivery.body = to_json(job_from_record(delivery.body));  // which has its record
+    // Its body is the job's stored record.
+    if (is_job) delivery.body = to_json(job_from_record(delivery.body));
   }
   return deliveries;
 }

@@ -8,8 +8,8 @@
 
 namespace isomesh::store::postgresql {
 
-// Callbacks in a database that several processes share, which must outlive it: who has got one to
-// deliver has it for some time.
+// Callbacks in a database that several processes share. A process that gets one to deliver has it
+// reserved for some time. The database must outlive this object.
 class PostgresOutbox : public SqlOutbox {
  public:
   explicit PostgresOutbox(Database& database) : SqlOutbox(database), database_(database) {}

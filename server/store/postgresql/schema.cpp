@@ -8,15 +8,15 @@
 namespace isomesh::store::postgresql {
 namespace {
 
-// What keeps processes apart that bring the tables up to date.
+// Advisory lock that serialises migrations by several processes.
 constexpr std::int64_t kMigrationLock = 0x69736f6d65736831;  // "isomesh1"
 
-// The tables of the first version, then what each later one changed. Never to be edited once it is
-// released, only to be added to.
+// The tables of the first version, then the changes of each later one. Only append; never edit a
+// released version.
 //
-// States are the values of JobState and OrderState, times are microseconds since 1970 by the
-// database's clock. A job's record is what the API tells of it as it was submitted, and once it has
-// ended, as it ended; what changes in between stands in columns and in its run.
+// States are the values of JobState and OrderState. Times are microseconds since 1970 by the
+// database's clock. A job's record is its JSON in the API as submitted, and after its end as ended.
+// Columns and the row of its run have what changes in between.
 constexpr std::array kTables = {R"sql(
 CREATE FUNCTION isomesh_now() RETURNS bigint LANGUAGE sql VOLATILE AS
   $$ SELECT (extract(epoch FROM clock_timestamp()) * 1000000)::bigint $$;
@@ -227,8 +227,8 @@ CREATE TABLE turns(                    -- of owners' last claims; see turns.h
 ) WITH (fillfactor = 50);
 )sql"};
 
-// As the newest version has them, each a verb in one round trip. Whoever changes one adds a
-// version, so that no older daemon that starts puts its own in place.
+// The functions of the newest version; each executes one method in one round trip. A changed
+// function needs a new version, so that an older daemon that starts does not restore its own.
 constexpr const char* kFunctions = R"sql(
 -- Of those that make the same mesh: who submits one looks whether there is a mesh while nobody stores it.
 CREATE OR REPLACE FUNCTION alike_lock(p_owner text, p_key text) RETURNS bigint LANGUAGE sql IMMUTABLE AS

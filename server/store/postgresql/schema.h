@@ -5,8 +5,8 @@
 
 namespace isomesh::store::postgresql {
 
-// Creates what is missing and brings the tables of an older version up to date, in one transaction
-// and one process at a time. Throws Error kUnavailable when a newer version made them.
+// Creates missing tables and migrates those of an older version, in one transaction and by one
+// process at a time. Throws Error kUnavailable if a newer version made them.
 void migrate(Connection& connection);
 
 }  // namespace isomesh::store::postgresql

@@ -6,11 +6,11 @@
 
 namespace isomesh::store::postgresql {
 
-// What one process of a cluster does at a time: a lock of the database that is held as long as its
-// connection lives, so that it is free when the process dies.
+// Exclusive task of one process in a cluster. An advisory lock of the database, held while its
+// connection lives, so it is released when the process dies.
 class Turn {
  public:
-  // `what` names it. Throws Error kUnavailable when nobody answers.
+  // `what` names the task. Throws Error kUnavailable if the database does not respond.
   Turn(const std::string& url, const std::string& what) : connection_(url) {
     Rows row = connection_.query(
         "SELECT pg_try_advisory_lock(hashtext('isomesh ' || ?1), hashtext(current_schema()))",
@@ -19,7 +19,7 @@ class Turn {
     is_taken_ = row.boolean(0);
   }
 
-  // False: another process has it.
+  // False if another process has it.
   bool is_taken() const { return is_taken_; }
 
  private:

@@ -20,7 +20,7 @@ bool consists_of(std::string_view text, std::string_view others) {
   });
 }
 
-// Names of buckets are parts of names of hosts, and never have to be escaped.
+// A bucket's name may be part of a host name, and never needs escaping.
 std::string checked_bucket(std::string_view text) {
   constexpr std::size_t kShortest = 3;
   constexpr std::size_t kLongest = 63;
@@ -49,7 +49,7 @@ void check_endpoint(std::string_view endpoint) {
   }
 }
 
-// The same endpoint with the bucket in front of its host.
+// The endpoint with the bucket as a subdomain.
 std::string with_bucket(const std::string& endpoint, const std::string& bucket) {
   const std::size_t host = endpoint.find("://") + 3;
   return endpoint.substr(0, host) + bucket + '.' + endpoint.substr(host);
@@ -104,7 +104,7 @@ S3Address parse_s3_url(std::string_view text) {
   if (!consists_of(address.region, "-_ABCDEFGHIJKLMNOPQRSTUVWXYZ")) {
     throw wrong_place("the region may contain only letters, digits, hyphens and underscores");
   }
-  // Services of one's own seldom have a name for every bucket.
+  // Self-hosted services rarely have a host name for every bucket.
   if (style.empty()) style = address.endpoint.empty() ? "host" : "path";
   if (address.endpoint.empty())
     address.endpoint = "https://s3." + address.region + ".amazonaws.com";

@@ -1,4 +1,4 @@
-// Where blobs are in S3, and who may use them.
+// Address of the blobs in S3, and its credentials.
 #pragma once
 
 #include <filesystem>
@@ -7,32 +7,32 @@
 
 namespace isomesh::store {
 
-// A bucket of some service that speaks S3, or a part of one.
+// A bucket of a service that speaks S3, or a part of a bucket.
 struct S3Address {
-  std::string endpoint;  // http://HOST[:PORT] or https://HOST[:PORT], to which requests are sent
-  std::string path;    // of the bucket there: empty where the endpoint's name has the bucket in it
-  std::string prefix;  // of all keys: empty, or with a slash at its end
+  // http://HOST[:PORT] or https://HOST[:PORT]; receives the requests.
+  std::string endpoint;  // http://HOST[:PORT] or https:
+  std::string path;      // of the bucket; empty if the endpoint's host contains the bucket
+  std::string prefix;    // of all keys; empty, or ends in a slash
   std::string region;
 };
 
-// Whether the value of --blobs is one of these.
 bool is_s3_url(std::string_view text);
 
-// Of s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&style=path|host]. Without an endpoint it is
-// that of AWS in the region, us-east-1 when there is none. Throws Error kInvalidParameter for
+// Parses s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&style=path|host]. The default endpoint
+// is that of AWS in the region; the default region is us-east-1. Throws Error kInvalidParameter for
 // "blobs".
 S3Address parse_s3_url(std::string_view text);
 
 struct S3Credentials {
   std::string access_key;
   std::string secret_key;
-  std::string session_token;  // empty without one
+  std::string session_token;  // may be empty
 };
 
-// Of a file as AWS' tools have it: lines NAME = VALUE with aws_access_key_id, aws_secret_access_key
-// and maybe aws_session_token, those below [default] where there are sections. Without a file those
-// of AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN. Throws Error kInvalidParameter
-// for "blob-credentials", never with what is in the file.
+// Reads a file in the format of AWS' tools: lines NAME = VALUE with aws_access_key_id,
+// aws_secret_access_key and optionally aws_session_token, those in [default] if there are sections.
+// Without a file, uses AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN. Throws Error
+// kInvalidParameter for "blob-credentials", never with the file's content.
 S3Credentials read_s3_credentials(const std::filesystem::path& file);
 
 }  // namespace isomesh::store

@@ -1,4 +1,4 @@
-// What S3 answers in XML.
+// Reads the XML of S3's responses.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace isomesh::store {
 
-// The name of the outermost element, and all elements that hold nothing but text.
+// The name of the root element, and all elements that contain only text.
 struct S3Text {
   struct Leaf {
     std::string parent;
@@ -18,14 +18,14 @@ struct S3Text {
   std::string root;
   std::vector<Leaf> leaves;
 
-  // The text of the first of that name, in any place; empty without one.
+  // The text of the first element with that name, at any depth; empty if there is none.
   std::string_view find(std::string_view name) const;
 };
 
-// Empty for what is no XML, or is cut off.
+// Empty if the body is not XML or is truncated.
 S3Text read_s3_text(std::string_view body);
 
-// The code of an error that was answered, as it may stand in a log; empty where there is none.
+// The code of an S3 error, safe for a log; empty if there is none.
 std::string s3_error_code(std::string_view body);
 
 }  // namespace isomesh::store

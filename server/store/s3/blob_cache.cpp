@@ -26,7 +26,7 @@ void BlobCache::let_go(const std::string& key) const {
   if (found->second.bytes == 0) {
     copies_.erase(found);
   } else {
-    shrink_to(most_bytes_, key);  // who has asked for it often asks again
+    shrink_to(most_bytes_, key);  // a client that requested it often requests it again
   }
 }
 

@@ -13,41 +13,41 @@
 
 namespace isomesh::store {
 
-// Copies of blobs on this machine's disk, up to so many bytes: those that were not used for longest
-// go first, and none that is in use or was so last. So it may take more for as long as these do. A
-// copy is never truth: it may be gone, or be of what no record names any more. Thread safe.
+// Local copies of remote blobs. If they exceed the limit, the least recently used are removed,
+// except those in use and the last one used; so the limit may be exceeded while they are. A copy
+// may be missing, or belong to a blob that no record names any more. Thread safe.
 class BlobCache {
  public:
-  // Takes over what an earlier life has left; its bytes are checked when they are asked for.
+  // Adopts the copies of an earlier process; they are verified when used.
   BlobCache(const BlobFolders& folders, Reserve& reserve, std::uint64_t most_bytes);
 
-  // The copies; whoever adds one keeps it in use from before, and tells of it by note().
+  // The copies. To add one, hold use() from before, then call note().
   const FileBlobStore& files() const { return files_; }
 
-  // The blob is in use until that is let go, whether there is a copy of it or not.
+  // Marks the blob as in use until the result is released, even if there is no copy.
   std::shared_ptr<const void> use(const std::string& key) const;
 
   void note(const std::string& key, std::uint64_t bytes) const;
 
-  // Those that have it open keep what they have.
+  // Open readers stay valid.
   void erase(const std::string& key) const;
 
-  // Lets copies go until so many bytes more fit, as far as they are not in use.
+  // Removes unused copies until `bytes` more fit.
   void make_room(std::uint64_t bytes) const;
 
-  // Lets all go that are not in use.
+  // Removes all copies that are not in use.
   void empty() const;
 
-  // Lets those go of which nobody says that they are to stay, and that are not in use.
+  // Removes copies for which `stays` returns false, unless they are in use.
   void keep_only(const std::function<bool(const std::string& key)>& stays) const;
 
   std::uint64_t bytes() const;
 
  private:
   struct Copy {
-    std::uint64_t bytes = 0;  // 0: there may be none
+    std::uint64_t bytes = 0;  // 0: there may be no copy
     std::uint64_t last_use = 0;
-    std::size_t uses = 0;  // at the same time
+    std::size_t uses = 0;  // current users
   };
 
   void let_go(const std::string& key) const;
@@ -60,7 +60,7 @@ class BlobCache {
   mutable Mutex mutex_;
   mutable std::map<std::string, Copy> copies_ ISOMESH_GUARDED_BY(mutex_);
   mutable std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  mutable std::uint64_t uses_ ISOMESH_GUARDED_BY(mutex_) = 0;  // so far
+  mutable std::uint64_t uses_ ISOMESH_GUARDED_BY(mutex_) = 0;  // counter of uses
 };
 
 }  // namespace isomesh::store

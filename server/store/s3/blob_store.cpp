@@ -35,7 +35,7 @@ class S3BlobStore::Writer : public BlobWriter {
   std::uint64_t bytes_ = 0;
 };
 
-// One that fetches a blob; others that want it wait.
+// Registers the fetch of a blob, so that others wait for it.
 class S3BlobStore::Fetching {
  public:
   Fetching(const S3BlobStore& store, const std::string& key, const std::stop_token& stop)
@@ -98,8 +98,8 @@ void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob) con
 
 void S3BlobStore::store(const Blob& blob) const {
   const auto in_use = cache_.use(blob.key);
-  cache_.files().settle(blob.key);       // who names it, names it in the bucket
-  if (!cache_.files().size(blob.key)) {  // an older copy went, and took this one's place with it
+  cache_.files().settle(blob.key);       // records name the blob in the bucket, not this copy
+  if (!cache_.files().size(blob.key)) {  // evicting an older copy may have removed the new one
     throw Error(ErrorCode::kUnavailable, "there is no space for a copy in the cache: try again");
   }
   cache_.note(blob.key, blob.bytes);
@@ -163,14 +163,14 @@ bool S3BlobStore::is_intact(const std::string& key, const std::stop_token& stop)
   const auto in_use = cache_.use(key);
   const Fetching fetching(*this, key, stop);
   if (is_there_and_intact(cache_.files(), key, stop)) return true;
-  cache_.erase(key);  // what the disk has spoilt
+  cache_.erase(key);  // a copy that the disk has corrupted
   return fetch(key, stop);
 }
 
-// Twice, because the second time it may be another machine that sends it.
+// Tries twice, because another server may send the bytes the second time.
 bool S3BlobStore::fetch(const std::string& key, const std::stop_token& stop) const {
   const auto bytes = client_.size(blob_object(key));
-  if (!bytes && !client_.answers()) {  // where there is no bucket nothing is there either
+  if (!bytes && !client_.answers()) {  // a missing bucket also looks like a missing object
     throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes does not respond");
   }
   if (!bytes) throw Error(ErrorCode::kNotFound, "the file does not exist");

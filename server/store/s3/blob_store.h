@@ -23,27 +23,27 @@ namespace isomesh::store {
 struct S3Options {
   S3ClientOptions client;
   std::uint64_t cache_bytes = std::uint64_t{8} << 30;
-  // To sweep is to list all of the bucket.
+  // A sweep lists the whole bucket.
   std::chrono::milliseconds between_sweeps = std::chrono::minutes(10);
 };
 
-// Blobs as objects of a bucket that any number of daemons have, with copies of some on this
-// machine's disk. Below the prefix:
+// Blobs as objects in a bucket that several daemons share, with a local cache of copies. Objects
+// below the prefix:
 //
 //   blobs/KEY            the bytes
-//   quarantine/KEY       empty: since then nothing names the blob, which stays where it is
-//   holds/KEY/RANDOM     empty: somebody stores the blob, or has stored and not named it yet
-//   going/KEY/RANDOM     empty: somebody is about to erase the blob
+//   quarantine/KEY       empty: the blob is unnamed since this object was made; it stays in place
+//   holds/KEY/RANDOM     empty: a daemon stores the blob, or has stored and not named it yet
+//   going/KEY/RANDOM     empty: a daemon is about to erase the blob
 //   identity             mark()
 //
-// Who stores a blob first makes a hold, and then waits until it is nobody's who is about to erase
-// it. Who erases one first says so, and then looks for holds and names. Whoever is second sees the
-// other, since what is listed is what is there (S3 promises that), so nothing that was stored under
-// a hold is erased. What somebody that died has left is too old some day, by the peer's clock. No
-// node's clock is asked.
+// To store a blob, a daemon first makes a hold, and then waits until no daemon is about to erase
+// the blob. To erase one, it first announces that, and then checks for holds and names. S3 lists
+// new objects at once, so the second of two daemons sees the first, and a blob stored under a hold
+// is never erased. Objects left by dead daemons expire by the peer's clock; the clocks of nodes do
+// not matter.
 class S3BlobStore : public BlobStore {
  public:
-  // The data folder must outlive it. Asks nothing of the peer yet.
+  // `folder` must outlive this object. Sends no request yet.
   S3BlobStore(const DataFolder& folder, S3Options options);
 
   void limit_room(std::uint64_t max_bytes, MakeRoom make) override {
@@ -55,14 +55,14 @@ class S3BlobStore : public BlobStore {
   std::string mark() const override;
   void set_mark(const std::string& text) const override;
   std::unique_ptr<BlobWriter> begin() const override;
-  // Of the disk of this machine, from which copies are removed first.
+  // About the local disk; removes copies first if it is full.
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
   void adopt(const std::filesystem::path& file, const Blob& blob) const override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
-  // A copy that is here is asked, as FileBlobStore does; else one is fetched.
+  // Checks the local copy as FileBlobStore does; fetches one if there is none.
   bool is_intact(const std::string& key, const std::stop_token& stop) const override;
   std::optional<std::uint64_t> size(const std::string& key) const override;
   std::optional<std::string> link(const std::string& key, const LinkedAs& as) const override;
@@ -80,7 +80,7 @@ class S3BlobStore : public BlobStore {
   class Writer;
   class Fetching;
 
-  // The copy becomes a blob.
+  // Uploads the local copy as a blob.
   void store(const Blob& blob) const;
   void put(const Blob& blob) const;
   void wait_until_not_going(const std::string& key) const;
@@ -90,7 +90,7 @@ class S3BlobStore : public BlobStore {
   bool take_out(const std::string& key, Steady unsettled, const Names& names) const;
   bool has_unsettled(const std::string& key, Steady since) const;
   bool is_time_to_sweep() const;
-  // The blobs that are held, but for holds that are too old.
+  // The held blobs. Removes holds that are too old.
   std::set<std::string> tidy_holds(std::chrono::nanoseconds oldest) const;
   void tidy_going() const;
 
@@ -102,9 +102,10 @@ class S3BlobStore : public BlobStore {
   mutable Probe probe_;
   mutable Mutex mutex_;
   mutable Unsettled unsettled_ ISOMESH_GUARDED_BY(mutex_);
-  mutable std::set<std::string> damaged_ ISOMESH_GUARDED_BY(mutex_);  // there, with other bytes
+  // Blobs in the bucket with wrong bytes.
+  mutable std::set<std::string> damaged_ ISOMESH_GUARDED_BY(mutex_);
   mutable Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
-  // What the last sweep was told; everything is young before the first.
+  // As given to the last sweep; before the first one every blob counts as recent.
   mutable Steady unsettled_since_ ISOMESH_GUARDED_BY(mutex_);
   mutable Condition fetched_;
   mutable std::set<std::string> coming_ ISOMESH_GUARDED_BY(mutex_);

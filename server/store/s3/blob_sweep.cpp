@@ -1,4 +1,4 @@
-// How objects that nothing names go: what S3BlobStore does of erasing and sweeping.
+// S3BlobStore's erasing and sweeping of unnamed objects.
 #include <algorithm>
 #include <utility>
 
@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kSweptShareOfObjects = 10;
 constexpr std::size_t kSweptObjectsAtLeast = 16;
 constexpr std::chrono::hours kLongestObjectHold{24};
-// Times of objects are whole seconds.
+// Times of objects have whole seconds.
 constexpr std::chrono::seconds kClockStep{1};
 
 }  // namespace
@@ -26,7 +26,7 @@ void S3BlobStore::erase(const std::string& key) const {
   room_.give(*bytes);
 }
 
-// One that stays is too old some day.
+// A leftover hold expires.
 void S3BlobStore::settle(const std::string& key) const {
   const std::string hold = [&] {
     const Lock lock(mutex_);
@@ -57,7 +57,7 @@ std::vector<std::string> S3BlobStore::erase_unnamed(std::span<const std::string>
   return left;
 }
 
-// False when somebody holds or names it.
+// Returns false if the blob is held or named.
 bool S3BlobStore::take_out(const std::string& key, Steady unsettled, const Names& names) const {
   const std::string going = going_object(key);
   client_.put_text(going, "");
@@ -74,7 +74,8 @@ bool S3BlobStore::take_out(const std::string& key, Steady unsettled, const Names
   }
   const S3Client::Erased erased = client_.erase(blob_object(key));
   client_.erase(quarantine_object(key));
-  // A request that is late must find nobody who has stored it again.
+  // If a repeated request may still take effect later, the mark stays until it expires, so that
+  // nobody stores the blob again before that.
   if (erased == S3Client::Erased::kAtOnce) client_.erase(going);
   cache_.erase(key);
   room_.give(bytes.value_or(0));
@@ -106,7 +107,7 @@ Swept S3BlobStore::sweep(Steady unsettled, const Names& names) const {
   for (const S3Object& object : client_.list(kQuarantineObjects).objects) {
     in_quarantine.insert(blob_of(object.key));
   }
-  // After the blobs: one that is listed there was held before.
+  // Listed after the blobs, so every listed blob already had its hold.
   const std::set<std::string> held = tidy_holds(age_of(unsettled));
   tidy_going();
   const std::size_t most = std::max(kSweptObjectsAtLeast, keys.size() / kSweptShareOfObjects);

@@ -24,7 +24,7 @@ constexpr std::chrono::seconds kLongestPause{2};
 constexpr std::size_t kReadAtOnce = std::size_t{1} << 20;
 constexpr int kListedAtOnce = 1000;
 constexpr int kMostPages = 100'000;
-// S3 takes 10 000.
+// S3 allows 10 000.
 constexpr std::uint64_t kMostParts = 9'000;
 
 [[noreturn]] void throw_silent() {
@@ -32,7 +32,7 @@ constexpr std::uint64_t kMostParts = 9'000;
               "the storage of volumes and meshes does not respond; nothing is lost");
 }
 
-// The pause before a request is repeated, once more after each.
+// Pauses between repeated requests; each is twice as long as the one before.
 class Pauses {
  public:
   Pauses(std::chrono::milliseconds first, std::chrono::milliseconds patience)
@@ -45,7 +45,7 @@ class Pauses {
     end_ = Clock::now() + patience_;
   }
 
-  // Throws when it has gone on for too long, or when `stop` is requested.
+  // Throws if the time is over or `stop` is requested.
   void wait(const std::stop_token& stop) {
     if (Clock::now() + next_ > end_) throw_silent();
     const auto until = Clock::now() + next_;
@@ -127,7 +127,7 @@ bool S3Client::put_file(const std::string& key, const File& file, const Blob& bl
       const S3Answer answer = put_at_once(key, file, blob, if_there);
       is_stored = answer.status / 100 == 2;
     }
-    // What a peer says of a PUT is not yet that it has the object.
+    // A successful PUT does not prove that the object is stored.
     if (size(key) == blob.bytes) return is_stored;
     if_there = IfThere::kReplace;
   }
@@ -170,8 +170,8 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
     const std::string whole =
         "<CompleteMultipartUpload xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\">" + parts +
         "</CompleteMultipartUpload>";
-    // Its status may come before it is known how it ends, and one that was repeated may be told
-    // that there is no such upload any more. What is there then says more.
+    // The status may be sent before the outcome is known, and a repeated request may find that the
+    // upload no longer exists. The object's size then decides.
     const S3Answer ended = ask({.method = "POST", .key = key, .query = upload, .text = whole});
     if (ended.status == kS3Ok && read_s3_text(ended.text).root == "CompleteMultipartUploadResult") {
       return;
@@ -257,8 +257,8 @@ void S3Client::try_to_erase(const std::string& key) const {
   }
 }
 
-// By the last key of the page before, not by the token that came with it: tokens may have "+",
-// which libcurl 8.14 signs as a space.
+// Continues by the last key of the previous page, not by its token: tokens may contain "+", which
+// libcurl 8.14 signs as a space.
 S3Request S3Client::listing(const std::string& beginning, const std::string& last, int most) const {
   std::string query = "list-type=2&max-keys=" + std::to_string(most) +
                       "&prefix=" + uri_escaped(options_.address.prefix + beginning);
@@ -279,7 +279,7 @@ S3Listing S3Client::list(const std::string& beginning) const {
     for (const auto& [parent, name, value] : text.leaves) {
       if (parent != "Contents") continue;
       if (name == "Key") {
-        // A peer that lists what it was not asked for is not to have it swept.
+        // If the peer lists other objects than requested, they must not be swept.
         if (!value.starts_with(options_.address.prefix + beginning)) {
           throw Error(ErrorCode::kInternal, "the storage lists objects that were not requested");
         }

@@ -1,4 +1,4 @@
-// Requests to a service that speaks S3. What objects are for is not known here.
+// Requests to a service that speaks S3, independent of the purpose of objects.
 #pragma once
 
 #include <atomic>
@@ -15,14 +15,13 @@
 
 namespace isomesh::store {
 
-// What a list tells of an object.
 struct S3Object {
   std::string key;  // without the prefix
   std::uint64_t bytes = 0;
   Time modified = {};
 };
 
-// Objects whose keys begin alike, and what the peer's clock said then.
+// Objects with a common prefix of their keys, and the time by the peer's clock.
 struct S3Listing {
   std::vector<S3Object> objects;
   Time now;
@@ -30,45 +29,44 @@ struct S3Listing {
 
 enum class IfThere { kKeep, kReplace };
 
-// Keys are of plain characters and without the prefix. Everything is repeated, with pauses that
-// grow, while the peer does not answer, breaks off or says that it is busy, and throws Error
-// kUnavailable when that goes on, or when the peer refuses; kInternal for answers that make no
-// sense. Neither credentials nor what a peer writes gets into a message. Thread safe.
+// Keys have plain characters only and no prefix. Requests are repeated, with growing pauses, while
+// the peer does not respond, disconnects or is busy. Throws Error kUnavailable if that continues or
+// the peer denies access; kInternal for other rejections and invalid responses. Messages contain
+// neither credentials nor text of the peer. Thread safe.
 class S3Client {
  public:
   explicit S3Client(S3ClientOptions options) : options_(std::move(options)) {}
 
-  // One request that is not repeated, within about two seconds: whether the bucket can be read.
+  // True if the bucket can be read. One request without repetition, limited to about two seconds.
   bool answers() const;
 
-  // Stores so many bytes from the beginning of a file, of that digest (hex SHA-256), which the peer
-  // checks. With kKeep false, and nothing is replaced, where an object of that size is there
-  // already. Afterwards the peer says that it has an object of that size.
+  // Stores the first `blob.bytes` bytes of a file; the peer verifies their SHA-256. With kKeep,
+  // returns false and replaces nothing if an object of that size exists. Checks afterwards that the
+  // object has that size.
   bool put_file(const std::string& key, const File& file, const Blob& blob, IfThere if_there) const;
 
   void put_text(const std::string& key, std::string_view text) const;
   std::optional<std::string> get_text(const std::string& key) const;
 
-  // Passes on all of an object that has so many bytes, in order. A transfer that is cut off goes on
-  // where it was. Throws Error kNotFound, and kCancelled when `stop` is requested.
+  // Passes the object's `bytes` bytes to `sink` in order. An interrupted transfer continues where
+  // it stopped. Throws Error kNotFound; kCancelled if `stop` is requested.
   void get(const std::string& key, std::uint64_t bytes, const S3Sink& sink,
            const std::stop_token& stop) const;
 
-  // In bytes; empty when it is not there.
+  // Size in bytes; empty if the object is missing.
   std::optional<std::uint64_t> size(const std::string& key) const;
 
   enum class Erased { kAtOnce, kMaybeLater };
-  // kMaybeLater: it is gone, but a request that was repeated may be late, and erase what is there
-  // then.
+  // kMaybeLater: the object is gone, but a repeated request may arrive late and erase a new object
+  // with the same key.
   Erased erase(const std::string& key) const;
 
-  // Tried once: for what does no harm where it stays.
+  // Erases without repetition or error, for objects that do no harm if they stay.
   void try_to_erase(const std::string& key) const;
 
-  // All of them, however many requests that takes.
+  // Lists all objects, with as many requests as necessary.
   S3Listing list(const std::string& beginning) const;
 
-  // Whether there is one at all.
   bool has_any(const std::string& beginning) const;
 
   // See BlobStore::link.
@@ -85,7 +83,7 @@ class S3Client {
 
   const S3ClientOptions options_;
   const S3Connections connections_{options_};
-  mutable std::atomic<bool> knows_conditions_ = true;  // the peer has If-None-Match
+  mutable std::atomic<bool> knows_conditions_ = true;  // the peer supports If-None-Match
 };
 
 }  // namespace isomesh::store

@@ -25,7 +25,7 @@ std::string mac_of(std::string_view key, std::string_view text) {
   return {reinterpret_cast<const char*>(mac.data()), size};
 }
 
-// 20130524T000000Z
+// For example 20130524T000000Z.
 std::string compact_time(std::chrono::system_clock::time_point time) {
   const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
   std::tm utc = {};
@@ -60,7 +60,7 @@ std::string presigned_url(const S3Address& address, const S3Credentials& credent
   const std::string day = time.substr(0, 8);
   const std::string scope = day + '/' + address.region + "/s3/aws4_request";
   const std::string disposition = "attachment; filename=\"" + as.name + '"';
-  // In the order of their names, as what is signed has them.
+  // Sorted by name, as the signature requires.
   std::string query = "X-Amz-Algorithm=AWS4-HMAC-SHA256&X-Amz-Credential=" +
                       uri_escaped(credentials.access_key + '/' + scope) + "&X-Amz-Date=" + time +
                       "&X-Amz-Expires=" + std::to_string(as.lasts.count());

@@ -9,11 +9,11 @@
 
 namespace isomesh::store {
 
-// As it stands in a query: all but letters, digits and "-._~" as %XX.
+// Escapes all but letters, digits and "-._~" as %XX.
 std::string uri_escaped(std::string_view text);
 
-// The address under which anybody gets an object, from then on for as long as `as` says (AWS
-// Signature Version 4, in the query). `key` is the whole one, with the prefix.
+// A presigned URL at which anybody can fetch the object from now on, for the time in `as` (AWS
+// Signature Version 4 in the query). `key` includes the prefix.
 std::string presigned_url(const S3Address& address, const S3Credentials& credentials,
                           const std::string& key, const LinkedAs& as,
                           std::chrono::system_clock::time_point from);

@@ -1,4 +1,4 @@
-// What the objects of a bucket are called; see S3BlobStore.
+// Names of the objects in a bucket; see S3BlobStore.
 #pragma once
 
 #include <chrono>
@@ -15,8 +15,8 @@ inline constexpr const char* kQuarantineObjects = "quarantine/";
 inline constexpr const char* kHoldObjects = "holds/";
 inline constexpr const char* kGoingObjects = "going/";
 
-// A request that erases is valid for a quarter of an hour, by the peer's clock; so nothing is
-// erased any more by who said this long ago that it would be.
+// A signed request is valid for 15 minutes by the peer's clock. So a daemon that announced an
+// erasure this long ago can no longer erase.
 inline constexpr std::chrono::minutes kLongestGoing{20};
 
 inline std::string blob_object(const std::string& key) { return kBlobObjects + key; }
@@ -28,7 +28,7 @@ inline std::string going_object(const std::string& key) {
 }
 inline std::string hold_object(const std::string& key) { return hold_objects(key) + random_hex(8); }
 
-// The blob that an object of those four kinds is of.
+// The key of the blob to which an object of these four kinds belongs.
 inline std::string blob_of(std::string_view object) {
   object.remove_prefix(object.find('/') + 1);
   return std::string(object.substr(0, object.find('/')));

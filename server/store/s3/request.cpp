@@ -14,12 +14,12 @@
 namespace isomesh::store {
 namespace {
 
-// Of answers that are not passed on, such as a page of a list.
-constexpr std::uint64_t kAskedFor = 1 << 20;  // bytes, for which the peer is asked first
+// Limit for responses without a sink, such as a page of a list.
+constexpr std::uint64_t kAskedFor = 1 << 20;  // bytes; larger bodies wait for "100 Continue"
 constexpr std::size_t kLongestText = std::size_t{4} << 20;
 constexpr std::size_t kIdleConnections = 16;
 
-// They were there when the daemon started; a file may be about to be replaced.
+// The file existed at the start; a read error may mean that it is being replaced.
 S3Credentials credentials_now(const std::filesystem::path& file) {
   try {
     return read_s3_credentials(file);
@@ -30,7 +30,7 @@ S3Credentials credentials_now(const std::filesystem::path& file) {
   }
 }
 
-// A transfer under way; libcurl is given pointers to it.
+// A running transfer; libcurl has pointers to it.
 class Attempt {
  public:
   Attempt(const S3ClientOptions& options, const S3Request& request, std::stop_token stop,
@@ -94,8 +94,8 @@ class Attempt {
     if (method == "HEAD") {
       curl_easy_setopt(easy_, CURLOPT_NOBODY, 1L);
     } else if (method == "PUT") {
-      // To ask first whether a small body is wanted takes longer than to send it. (A removed header
-      // "Expect" would be signed by libcurl as an empty one.)
+      // For a small body, waiting for "100 Continue" takes longer than sending it. (If the header
+      // "Expect" were removed, libcurl would sign it as an empty one.)
       if (body_bytes() < kAskedFor) curl_easy_setopt(easy_, CURLOPT_EXPECT_100_TIMEOUT_MS, 1L);
       curl_easy_setopt(easy_, CURLOPT_UPLOAD, 1L);
       curl_easy_setopt(easy_, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(body_bytes()));
@@ -106,7 +106,7 @@ class Attempt {
       curl_easy_setopt(easy_, CURLOPT_POST, 1L);
       curl_easy_setopt(easy_, CURLOPT_POSTFIELDSIZE_LARGE,
                        static_cast<curl_off_t>(request_.text.size()));
-      // Without a text it would be asked for one.
+      // Without a body, libcurl would read one from its callback.
       curl_easy_setopt(easy_, CURLOPT_POSTFIELDS,
                        request_.text.empty() ? "" : request_.text.data());
     } else if (method != "GET") {
@@ -157,14 +157,14 @@ class Attempt {
     return true;
   }
 
-  // A peer that does not know ranges sends all of it again.
+  // A peer without support for ranges sends the whole object again.
   void pass_on(std::span<const std::byte> bytes, bool is_part) {
     const std::uint64_t unwanted = is_part ? 0 : request_.sink_begin;
     const std::uint64_t skipped = std::min<std::uint64_t>(
         bytes.size(), unwanted - std::min<std::uint64_t>(unwanted, received_));
     received_ += bytes.size();
     bytes = bytes.subspan(static_cast<std::size_t>(skipped));
-    // More than the object has is nothing of it.
+    // Bytes beyond the object's size are ignored.
     bytes = bytes.first(static_cast<std::size_t>(
         std::min<std::uint64_t>(bytes.size(), request_.bytes - answer_.taken)));
     if (!bytes.empty()) (*request_.sink)(bytes);
@@ -173,7 +173,7 @@ class Attempt {
 
   void take_header(std::string_view line) {
     const std::size_t colon = line.find(':');
-    // "100 Continue" comes before, with headers of its own.
+    // "100 Continue" precedes the response and has headers of its own.
     if (line.starts_with("HTTP/")) answer_.headers.clear();
     constexpr std::size_t kMostHeaders = 100;
     if (colon != line.npos && answer_.headers.size() < kMostHeaders) {
@@ -215,7 +215,7 @@ curl::Easy S3Connections::take() const {
   return curl::make_easy();
 }
 
-// With its open connection, and nothing else of what it was used for.
+// Keeps the open connection and resets all options.
 void S3Connections::give_back(curl::Easy connection) const {
   curl_easy_reset(connection.get());
   const Lock lock(mutex_);
@@ -225,7 +225,7 @@ void S3Connections::give_back(curl::Easy connection) const {
 S3Answer S3Connections::attempt(const S3Request& request, const std::stop_token& stop) const {
   curl::Easy connection = take();
   S3Answer answer = Attempt(options_, request, stop, connection.get()).perform();
-  // A connection on which a transfer was cut off may still have bytes of it.
+  // A connection with an aborted transfer may still have bytes of it.
   if (answer.status != 0) give_back(std::move(connection));
   return answer;
 }

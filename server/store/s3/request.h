@@ -1,4 +1,4 @@
-// One request to a service that speaks S3, and its answer.
+// One request to a service that speaks S3, and its response.
 #pragma once
 
 #include <chrono>
@@ -22,42 +22,41 @@ namespace isomesh::store {
 
 struct S3ClientOptions {
   S3Address address;
-  std::filesystem::path credentials;  // a file, read for each request; empty: of the environment
-  std::filesystem::path authorities;  // of certificates; empty: those of the system
+  std::filesystem::path credentials;  // a file, read for each request; empty: from the environment
+  std::filesystem::path authorities;  // a file of certificates; empty: those of the system
   std::chrono::milliseconds connect{5'000};
-  // A peer that sends or takes less than 1 KiB a second for so long does not answer.
+  // A peer that transfers less than 1 KiB per second for this long counts as unresponsive.
   std::chrono::seconds stall{20};
-  // How long a request is repeated for. A transfer that gets on is repeated for as long as it does.
+  // A request is repeated for this long; a transfer that advances is repeated for longer.
   std::chrono::milliseconds patience{20'000};
-  std::chrono::milliseconds first_pause{100};  // before it is repeated; doubles up to 2 s
+  std::chrono::milliseconds first_pause{100};  // before the first repetition; doubles up to 2 s
   std::uint64_t multipart_above = std::uint64_t{64} << 20;
   std::uint64_t part_bytes = std::uint64_t{16} << 20;
 };
 
-// Takes the next bytes of an object. What it throws ends the transfer.
+// Receives the next bytes of an object. An exception aborts the transfer.
 using S3Sink = std::function<void(std::span<const std::byte> bytes)>;
 
-// One request, with everything but who sends it and where to.
+// A request without its sender and its address.
 struct S3Request {
   const char* method = "GET";
   std::string key = {};
-  // Of names in their order, each with "=", escaped: as it is signed.
+  // Names in ascending order, each with "=", escaped: the form that is signed.
   std::string query = {};
-  std::string condition = {};    // a header's line
+  std::string condition = {};    // a header line
   std::string_view text = {};    // the body, or
-  const File* file = nullptr;    // what it is a part of
-  std::uint64_t begin = 0;       // of that part
-  std::uint64_t bytes = 0;       // of it
-  std::string sha256 = {};       // of the body; empty: of the text
-  const S3Sink* sink = nullptr;  // takes the body of an answer 200 or 206
-  std::uint64_t sink_begin = 0;  // where the first byte that the sink wants lies in the object
-  bool is_quick = false;         // no more than two seconds
-  // Over a connection of its own: what fails on one that was used before, libcurl sends again and
-  // does not say so.
+  const File* file = nullptr;    // a file with the body
+  std::uint64_t begin = 0;       // where the body begins in the file
+  std::uint64_t bytes = 0;       // size of the body
+  std::string sha256 = {};       // of the body; empty: computed from the text
+  const S3Sink* sink = nullptr;  // receives the body of a response 200 or 206
+  std::uint64_t sink_begin = 0;  // offset in the object of the sink's first byte
+  bool is_quick = false;         // limited to two seconds
+  // Uses a new connection: libcurl silently repeats requests that fail on a reused one.
   bool is_sent_once = false;
 };
 
-// Statuses of answers that mean something of their own.
+// Statuses with a specific meaning.
 inline constexpr long kS3Ok = 200;
 inline constexpr long kS3Partial = 206;
 inline constexpr long kS3Forbidden = 403;
@@ -66,28 +65,27 @@ inline constexpr long kS3Conflict = 409;
 inline constexpr long kS3PreconditionFailed = 412;
 inline constexpr long kS3NotImplemented = 501;
 
-// What came of it.
 struct S3Answer {
-  long status = 0;                                  // 0: there was none, or it was cut off
+  long status = 0;                                  // 0: none, or the transfer was aborted
   std::map<std::string, std::string> headers = {};  // names in lower case
   std::string text = {};
-  std::uint64_t taken = 0;  // bytes that the sink got
+  std::uint64_t taken = 0;  // bytes passed to the sink
   int attempts = 1;
 
-  // Empty without it.
+  // Empty if the header is missing.
   std::string header(const std::string& name) const;
 
-  // What the peer's clock said; that of this machine where the peer does not tell.
+  // The time by the peer's clock; by this machine's if the response has none.
   Time now() const;
 };
 
-// Sends requests, over connections that stay open. Thread safe.
+// Sends requests over persistent connections. Thread safe.
 class S3Connections {
  public:
   explicit S3Connections(const S3ClientOptions& options) : options_(options) {}
 
-  // Throws what the request's sink throws, Error kCancelled when `stop` is requested, and
-  // kUnavailable when the credentials cannot be read.
+  // Throws what the request's sink throws; Error kCancelled if `stop` is requested; kUnavailable if
+  // the credentials cannot be read.
   S3Answer attempt(const S3Request& request, const std::stop_token& stop) const;
 
  private:

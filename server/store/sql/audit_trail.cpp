@@ -14,8 +14,8 @@ struct Entry {
   std::optional<std::string> chain;
 };
 
-// Those after a number, oldest first, as long as `take` returns true. A piece at a time, so that
-// who reads slowly holds nobody up.
+// Calls `take` for the entries after `after`, oldest first, while it returns true. Reads in pieces,
+// so that a slow reader blocks nobody.
 template <class Ask, class Take>
 void read_pieces(const Ask& ask, std::uint64_t after, const Take& take) {
   constexpr int kPiece = 500;
@@ -51,7 +51,7 @@ AuditCheck check(const Ask& ask) {
   return result;
 }
 
-// Of all entries so far: the last that has a digest, and what follows it.
+// The chain over all entries so far: from the last entry that has a digest, and all after it.
 AuditChain chain_of(SqlConnection& connection) {
   std::uint64_t after = 0;
   AuditChain chain;
@@ -75,8 +75,8 @@ AuditChain chain_of(SqlConnection& connection) {
 
 }  // namespace
 
-// One at a time, so that nobody who reads after a number misses one that comes later. Asked again
-// after a lost connection it may be there twice, which is better than not at all.
+// Locks the table, so that numbers become visible in order and no reader misses an entry. If the
+// connection is lost, a repetition may add the entry twice; that is better than losing it.
 void SqlAuditTrail::add(const AuditEntry& entry) {
   const std::string record = audit_record(entry);
   database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {

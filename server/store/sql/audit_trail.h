@@ -5,8 +5,8 @@
 
 namespace isomesh::store {
 
-// The audit trail in a database, which must outlive it. Its table has triggers that let nobody
-// change, replace or remove a row, and digests that tell of one that was all the same.
+// The audit trail in a database, which must outlive this object. Triggers prevent changing,
+// replacing or removing rows; digests detect it if it happens nevertheless.
 class SqlAuditTrail : public AuditTrail {
  public:
   explicit SqlAuditTrail(SqlDatabase& database) : database_(database) {}
@@ -14,7 +14,7 @@ class SqlAuditTrail : public AuditTrail {
   void add(const AuditEntry& entry) override;
   void read(std::uint64_t after,
             const std::function<void(std::string_view line)>& line) const override;
-  // Reads every entry. Throws as the others do.
+  // Reads every entry. Throws as the other methods do.
   AuditCheck verify() const;
   std::uint64_t sent() const override;
   void note_sent(std::uint64_t number) override;
@@ -23,7 +23,7 @@ class SqlAuditTrail : public AuditTrail {
   SqlDatabase& database_;
 };
 
-// The same as verify() and read(), of a connection.
+// As verify() and read(), on a connection.
 AuditCheck verify_audit_trail(SqlConnection& connection);
 void read_audit_trail(SqlConnection& connection, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line);

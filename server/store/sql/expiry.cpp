@@ -5,7 +5,7 @@
 namespace isomesh::store {
 namespace {
 
-// One that was removed: its id is known from now on as one that has expired.
+// Remembers the id of a removed record as expired.
 void note(SqlConnection& connection, const Expirable& record, const std::vector<Blob>& blobs,
           Expired& expired) {
   connection.run(

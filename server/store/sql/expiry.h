@@ -1,4 +1,4 @@
-// What the expiry of jobs and that of volumes share. For stores only.
+// Shared code for the expiry of jobs and of volumes. For stores only.
 #pragma once
 
 #include <functional>
@@ -13,24 +13,24 @@
 
 namespace isomesh::store {
 
-// Of rows that are an owner, an id and when it was used last.
+// From rows of owner, id and time of last use.
 std::vector<Expirable> read_expirable(const SqlDatabase& database, RecordKind kind, Rows rows);
 
-// Of rows that are a key and bytes.
+// From rows of key and bytes.
 std::vector<Blob> read_blobs(Rows rows);
 
-// Of rows that are an owner and a sum of bytes.
+// From rows of owner and sum of bytes.
 OwnedBytes read_owned_bytes(Rows rows);
 
-// Whether any record, of a volume or of a mesh, names the blob.
+// True if any record, of a volume, mesh, order or received instance, names the blob.
 bool is_named(SqlConnection& connection, const std::string& blob);
 
-// Whether a job or a volume of that id was there that the viewer saw.
+// True if a job or volume with that id, visible to the viewer, has expired.
 bool has_expired(SqlConnection& connection, const std::optional<std::string>& viewer,
                  const std::string& id);
 
-// Removes records in their order until that frees `enough` bytes. `remove` removes one and returns
-// the blobs that it named; empty when it does not expire.
+// Removes records in the given order until that frees `enough` bytes. `remove` removes one and
+// returns the blobs that it named; empty if the record does not expire.
 using Remove =
     std::function<std::optional<std::vector<Blob>>(SqlConnection& connection, const Expirable&)>;
 Expired expire_records(SqlDatabase& database, std::span<const Expirable> records,

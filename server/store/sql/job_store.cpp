@@ -9,7 +9,7 @@
 
 namespace isomesh::store {
 
-// --- What can be asked
+// --- Queries
 
 Job SqlJobStore::get(const Viewer& viewer, const std::string& id) const {
   return records_.read(
@@ -25,7 +25,7 @@ JobAccount SqlJobStore::account(const std::string& id) const {
 
 std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState> state,
                                    const std::string& after, std::size_t limit) const {
-  // A condition that is not there costs no index.
+  // Conditions that are absent from the text let the query use an index.
   Rows rows = records_.query(select_ + "WHERE " + (viewer ? "j.owner = ?1" : "?1 IS NULL") +
                                  (state ? " AND j.state = ?2" : " AND ?2 IS NULL") +
                                  (after.empty() ? " AND ?3 = ''" : " AND j.id < ?3") +
@@ -93,7 +93,7 @@ Job SqlJobStore::with_progress(const Row& row) const {
   return job;
 }
 
-// --- What is asked before one is stored
+// --- Before a submission
 
 std::optional<SqlJobStore::Asked> SqlJobStore::look_up(SqlConnection& connection,
                                                        const JobSpec& spec) const {
@@ -143,7 +143,7 @@ Job SqlJobStore::remake(const std::string& id) {
     if (is_final(youngest.job.state) && !youngest.job.error) return std::nullopt;
     return with_progress(youngest);
   });
-  // Outside of the transaction, because it may read the whole volume.
+  // Outside the transaction, because this may read the whole volume.
   if (like && !is_repaired(*like)) return *like;
   try {
     return job_of(submit(spec));
@@ -153,7 +153,7 @@ Job SqlJobStore::remake(const std::string& id) {
   }
 }
 
-// --- Runs of this process, and who waits for more
+// --- Runs of this process, and waiting workers
 
 SqlJobStore::Live* SqlJobStore::live(const std::string& id, std::uint64_t fence) {
   const auto run = live_.find(id);
@@ -229,7 +229,7 @@ void SqlJobStore::close() {
   wake_all_workers();
 }
 
-// --- What removes jobs that have ended, and what is known of them
+// --- Expiry and statistics of ended jobs
 
 std::vector<Expirable> SqlJobStore::ended(const ExpiryFilter& filter, Ended which,
                                           std::size_t limit) const {

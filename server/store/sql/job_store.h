@@ -14,8 +14,8 @@
 
 namespace isomesh::store {
 
-// What is the same of jobs in whatever database: what can be asked about them and what removes
-// them. How they are queued and run is each engine's own. Thread safe.
+// The part of the job store that is the same for all databases: queries and expiry. Each engine
+// implements the queue and the runs. Thread safe.
 class SqlJobStore : public JobStore {
  public:
   Job remake(const std::string& id) override;
@@ -46,28 +46,28 @@ class SqlJobStore : public JobStore {
     bool cancelling = false;
     std::int64_t cost_us = 0;  // see turns.h
   };
-  // What is known of a job that is to be stored.
+  // Properties of a job to be stored.
   struct Asked {
     std::string result_key;
     std::int64_t cost_us = 0;
   };
-  // A run that this process has claimed.
+  // A run claimed by this process.
   struct Live {
     std::uint64_t fence = 0;
     Steady claimed;
     Steady lease_until;  // as far as this process knows
     bool cancelling = false;
     std::optional<Progress> progress = {};  // none before the first renewal
-    double recorded = 0;                    // the share of it that the last renewal recorded
+    double recorded = 0;                    // of the progress, at the last renewal that recorded it
     Steady told = {};
-    // Where a record does not say it: the job as it was claimed, and by which transaction.
+    // For engines whose record lacks it: the job as claimed, and the claim's transaction.
     Job job = {};
     std::int64_t accepted = 0;
     std::int64_t transaction = 0;
   };
 
-  // Both must outlive it. `select` reads what row_of() takes, from `jobs j`; `blobs` is asked
-  // whether a mesh that is to be reused is still there.
+  // `select` reads the columns that row_of() takes, from `jobs j`. `blobs` tells whether a mesh to
+  // be reused still exists. `database` and `blobs` must outlive this object.
   SqlJobStore(SqlDatabase& database, const BlobStore& blobs, JobStoreOptions options,
               std::string select)
       : blobs_(blobs),
@@ -76,34 +76,34 @@ class SqlJobStore : public JobStore {
         records_(database) {}
 
   virtual Row row_of(const Rows& rows) const = 0;
-  // Until the first of the jobs may be claimed that wait; empty when there is none.
+  // Time until the first waiting job can be claimed; empty if none waits.
   virtual std::optional<std::chrono::microseconds> until_ready() const = 0;
-  // Has an event seen that is not kept, after those of the run's transaction.
+  // Adds an event that is not stored, after those of the run's transaction.
   virtual void tell(Event event, std::int64_t transaction) = 0;
   virtual void close_events() = 0;
 
   std::optional<Row> find(SqlConnection& connection, const Viewer& viewer,
                           const std::string& id) const;
-  // Throws Error kGone or kNotFound for a row that is not there.
+  // Throws Error kGone or kNotFound if there is no such row.
   Row found(SqlConnection& connection, const Viewer& viewer, const std::string& id) const;
-  // What this process knows of its own runs is newer than what is recorded.
+  // Replaces recorded progress by newer progress of this process's own runs.
   Job with_progress(const Row& row) const;
-  // Empty when its volume is not there.
+  // Empty if the volume is missing.
   std::optional<Asked> look_up(SqlConnection& connection, const JobSpec& spec) const;
-  // Throws that it is not, or not any more.
+  // Throws Error kNotFound, or kGone if the volume has expired.
   [[noreturn]] static void throw_no_volume_of(SqlConnection& connection, const JobSpec& spec);
   bool is_full(SqlConnection& connection) const;
-  // Whether the queue has room for one more of its owner.
+  // True if the queue has room for another job of the owner.
   bool has_share(SqlConnection& connection, const JobSpec& spec) const;
 
-  // Null when the process has no such run; to be called with the lock.
+  // Null if this process has no such run.
   Live* live(const std::string& id, std::uint64_t fence) ISOMESH_REQUIRES(live_mutex_);
-  // Tells how far it is, where that is news.
+  // Emits an event if the progress is new.
   void note(const Lease& lease, const Progress& progress);
-  // A later run of the job stays known.
+  // Removes the run, unless the job has a later run.
   void forget_run(const std::string& id, std::uint64_t fence);
 
-  // For one job that has become ready, or for more.
+  // For one job that has become ready; wake_all_workers() for more.
   void wake_a_worker();
   void wake_all_workers();
 
@@ -116,18 +116,18 @@ class SqlJobStore : public JobStore {
   std::map<std::string, Live> live_ ISOMESH_GUARDED_BY(live_mutex_);  // of running jobs
 
  private:
-  // Whether the job failed because of a damaged volume that is intact now.
+  // True if the job failed because of a damaged volume that is intact now.
   bool is_repaired(const Job& job) const;
 
   SqlDatabase& records_;
 
   Mutex work_mutex_;
   Condition work_;
-  // Grows whenever a job may have become ready.
+  // Increments whenever a job may have become ready.
   std::uint64_t work_generation_ ISOMESH_GUARDED_BY(work_mutex_) = 0;
 };
 
-// Since one time of the tables until another, in milliseconds; never nothing.
+// Milliseconds between two times of the tables; always positive.
 double milliseconds_between(std::int64_t begin_us, std::int64_t end_us);
 
 inline std::int64_t microseconds(std::chrono::milliseconds time) {

@@ -10,7 +10,7 @@
 namespace isomesh::store {
 namespace {
 
-// Who makes an order looks first at those that are there, while nobody else makes one.
+// Locked while an order is made, because that depends on the existing orders.
 constexpr const char* kOrders = "orders";
 
 OrderRecord record_of(const Rows& row) {
@@ -19,7 +19,7 @@ OrderRecord record_of(const Rows& row) {
           .work = order_work_from_record(row.text(2))};
 }
 
-// Empty when the viewer sees none.
+// Empty if the viewer sees no such order.
 std::optional<OrderRecord> find(SqlConnection& connection, const Viewer& viewer,
                                 const std::string& id, const char* lock = "") {
   Rows row = connection.query(
@@ -43,7 +43,7 @@ std::size_t count_open(SqlConnection& connection) {
   return row.count(0);
 }
 
-// Whether it was made when this was asked for before.
+// True if the order was stored by an earlier attempt of this transaction.
 bool is_made(const SqlTransaction& transaction, const OrderSpec& spec) {
   return transaction.is_again() &&
          transaction->query("SELECT 1 FROM orders WHERE id = ?1", spec.record.order.id).next();
@@ -60,7 +60,7 @@ void insert(SqlConnection& connection, const OrderSpec& spec) {
       spec.request_digest, to_json(order), to_record(work));
 }
 
-// What the same key made before.
+// The result of an earlier submission with the same key.
 std::optional<OrderSubmission> made_before(SqlConnection& connection, const OrderSpec& spec) {
   using Kind = OrderSubmission::Kind;
   if (spec.idempotency_key.empty()) return std::nullopt;
@@ -105,7 +105,7 @@ void name_blobs(SqlConnection& connection, const OrderRecord& record) {
   }
 }
 
-// Writes the record of an order that is there, which is due at that time, or else now.
+// Updates the record of an existing order, which is due at `next`, or now if that is empty.
 void write(SqlConnection& connection, const OrderRecord& record,
            std::optional<std::int64_t> next = {}) {
   const Order& order = record.order;
@@ -119,7 +119,7 @@ void write(SqlConnection& connection, const OrderRecord& record,
   name_blobs(connection, record);
 }
 
-// Who has ended is told of, and the series is known by what it was in the end.
+// Adds the order's callback, and records the final number of instances for its watched series.
 void tell_of_end(SqlConnection& connection, const OrderRecord& record) {
   const Order& order = record.order;
   if (record.work.callback) {
@@ -286,10 +286,10 @@ OrderCounts SqlOrderStore::counts() const {
 
 std::size_t SqlOrderStore::forget(Time before) {
   return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
-    // Orders tell when they ended by the clock of who carried them out.
+    // Orders record their end by the clock of the process that carried them out.
     const std::size_t removed =
         transaction->run("DELETE FROM orders WHERE finished < ?1", to_us(before));
-    // A series that is not in the time that watches look at any more.
+    // Series older than this are beyond the period that watches query.
     constexpr std::chrono::days kWatched{90};
     transaction->run("DELETE FROM watched WHERE seen < ?1", database_.to_us(before - kWatched));
     transaction.commit();

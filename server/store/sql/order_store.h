@@ -8,7 +8,8 @@
 
 namespace isomesh::store {
 
-// Orders in a database, which must outlive it. One of the processes that share it carries them out.
+// Orders in a database, which must outlive this object. One of the processes that share the
+// database carries them out.
 class SqlOrderStore : public OrderStore {
  public:
   explicit SqlOrderStore(SqlDatabase& database) : database_(database) {}

@@ -8,7 +8,7 @@
 
 namespace isomesh::store {
 
-// Callbacks in the database of one process, which must outlive it.
+// Callbacks in the database of one process, which must outlive this object.
 class SqlOutbox : public Outbox {
  public:
   explicit SqlOutbox(SqlDatabase& database) : database_(database) {}
@@ -20,14 +20,14 @@ class SqlOutbox : public Outbox {
   std::size_t count() const override;
 
  protected:
-  // Of a row whose first columns are job, url, body, attempts and created.
+  // From a row that starts with job, url, body, attempts and created.
   Delivery delivery_of(const Rows& row) const;
 
  private:
   SqlDatabase& database_;
 };
 
-// Has the end of anything delivered, under its id; part of the open transaction.
+// Adds a callback for the end of a job or an order to the open transaction.
 void add_callback(SqlConnection& connection, const std::string& id, const std::string& url,
                   const std::string& body);
 

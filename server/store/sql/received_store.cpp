@@ -42,7 +42,7 @@ std::vector<ReceivedInstance> SqlReceivedStore::instances(const ReceivedSeries& 
   return all;
 }
 
-// Who asks again after a lost connection gets no blobs: those that were held are swept.
+// If the connection is lost, a repetition returns no blobs; the released ones are swept.
 std::vector<std::string> SqlReceivedStore::release(const HeldSeries& series) {
   const ReceivedSeries& of = series.series;
   const std::int64_t last = database_.to_us(series.last);
@@ -60,7 +60,7 @@ std::vector<std::string> SqlReceivedStore::release(const HeldSeries& series) {
         blobs.push_back(rows.text(0));
       }
     }
-    // One that comes meanwhile is newer.
+    // Instances that arrived meanwhile are newer and stay.
     transaction->run(
         "UPDATE received SET blob = NULL, at = isomesh_kept(at) WHERE route = ?1 AND study = ?2 "
         "AND series = ?3 AND at <= ?4",

@@ -5,7 +5,7 @@
 
 namespace isomesh::store {
 
-// Received instances in a database, which must outlive it.
+// Received instances in a database, which must outlive this object.
 class SqlReceivedStore : public ReceivedStore {
  public:
   explicit SqlReceivedStore(SqlDatabase& database) : database_(database) {}

@@ -1,10 +1,9 @@
-// SQL of whatever engine: one text for all, and what engines differ in behind interfaces. For
-// stores only.
+// SQL for all engines: one text for each statement, and interfaces for the differences. For stores
+// only.
 //
-// A text has its parameters as ?1, ?2 and so on, and may have `isomesh_now()`, which is the time
-// as the tables keep it: microseconds since 1970. What decides how long something is kept is
-// written as `isomesh_kept(time)`: that time, or the newest that is known for certain where the
-// clock has gone back behind that.
+// Parameters are ?1, ?2 and so on. `isomesh_now()` is the current time in the tables' form:
+// microseconds since 1970. `isomesh_kept(time)` is used for times that decide how long something is
+// kept: it is that time, or the newest certain time if the clock has gone back.
 #pragma once
 
 #include <array>
@@ -23,13 +22,13 @@
 
 namespace isomesh::store {
 
-// What is given for a parameter; a text must outlive it. Its type is known also where it is NULL.
+// The value of a parameter. A text must outlive it. The type is known even if the value is NULL.
 struct Parameter {
   enum class Type {
     kInteger,
     kReal,
     kText,
-    kOfColumn,  // a text that is read as what it is compared with or stored in
+    kOfColumn,  // a text, converted to the type of the column it is used with
   };
 
   template <class T>
@@ -59,7 +58,7 @@ struct Parameter {
   }
 };
 
-// What a statement has answered. Not thread safe.
+// The result of a statement. Not thread safe.
 class Rows {
  public:
   class Source {
@@ -74,7 +73,7 @@ class Rows {
 
   explicit Rows(std::unique_ptr<Source> source) : source_(std::move(source)) {}
 
-  // The next row; false after the last.
+  // Advances to the next row; returns false after the last.
   bool next() { return source_->next(); }
 
   bool is_null(int column) const { return source_->is_null(column); }
@@ -88,17 +87,16 @@ class Rows {
   std::unique_ptr<Source> source_;
 };
 
-// One connection. Statements are prepared once and kept.
+// One connection. Caches prepared statements.
 class SqlConnection {
  public:
   virtual ~SqlConnection() = default;
 
-  // At most one use of the same text at a time; rows are to be gone when a transaction commits.
+  // The same text may be in use once at a time. Destroy the rows before the transaction commits.
   virtual Rows ask(std::string_view sql, std::span<const Parameter> parameters) = 0;
-  // Runs a statement to its end; returns how many rows it changed.
+  // Runs a statement to its end; returns the number of changed rows.
   virtual std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) = 0;
 
-  // The same with values.
   template <class... Values>
   Rows query(std::string_view sql, const Values&... values) {
     const std::array<Parameter, sizeof...(Values)> parameters{Parameter(values)...};
@@ -110,14 +108,14 @@ class SqlConnection {
     return tell(sql, parameters);
   }
 
-  // What ends a SELECT of rows that the transaction may change, so that nobody else does meanwhile:
-  // " FOR UPDATE" where others can.
+  // The end of a SELECT whose rows the transaction may change, so that no other transaction changes
+  // them meanwhile: " FOR UPDATE" if there may be others.
   virtual const char* for_update() const = 0;
-  // Until the transaction ends, nobody else changes that table.
+  // Prevents other changes of the table until the transaction ends.
   virtual void lock_table(const std::string& name) = 0;
 };
 
-// All or nothing: what was not committed is rolled back.
+// A transaction. Rolled back on destruction unless committed.
 class SqlTransaction {
  public:
   SqlTransaction(SqlConnection& connection, bool is_again, const std::function<void()>& commit)
@@ -126,7 +124,7 @@ class SqlTransaction {
   SqlConnection* operator->() const { return &connection_; }
   SqlConnection& connection() const { return connection_; }
 
-  // The same was asked for before, and it is not known what became of that.
+  // True if this repeats a transaction with unknown outcome.
   bool is_again() const { return is_again_; }
 
   void commit() { commit_(); }
@@ -137,50 +135,50 @@ class SqlTransaction {
   const std::function<void()>& commit_;
 };
 
-// What a transaction is to the disk.
+// Importance of a transaction if the disk is full.
 enum class Change {
-  kNew,         // refused where there is no room
-  kNeeded,      // frees room, or has to be kept whatever the disk is like
-  kRepeatable,  // the same, and it may be lost with the power: it is made again without harm
+  kNew,         // rejected if there is no space
+  kNeeded,      // frees space, or must be stored in any case
+  kRepeatable,  // as kNeeded, but a power failure may lose it: repeating it does no harm
 };
 
-// The records that stores share. Thread safe. All may throw Error kOutOfSpace, kUnavailable or
+// The database of all stores. Thread safe. All methods may throw Error kOutOfSpace, kUnavailable or
 // kInternal.
 class SqlDatabase {
  public:
   virtual ~SqlDatabase() = default;
 
-  // Runs `act(transaction)`, which commits or changes nothing. It may be run more than once.
+  // Runs `act(transaction)`, which commits or changes nothing. `act` may run more than once.
   template <class Act>
   auto change(Change kind, const Act& act) {
     return result_of<SqlTransaction>(
         act, [&](const std::function<void(SqlTransaction&)>& run) { in_transaction(kind, run); });
   }
-  // One statement; returns how many rows it changed.
+  // Runs one statement; returns the number of changed rows.
   template <class... Values>
   std::size_t run(Change kind, std::string_view sql, const Values&... values) {
     const std::array<Parameter, sizeof...(Values)> parameters{Parameter(values)...};
     return tell(kind, sql, parameters);
   }
 
-  // Runs `act(connection)`, which only reads. It may be run more than once.
+  // Runs `act(connection)`, which only reads. `act` may run more than once.
   template <class Act>
   auto read(const Act& act) {
     return result_of<SqlConnection>(
         act, [&](const std::function<void(SqlConnection&)>& run) { while_reading(run); });
   }
-  // One statement. Its rows hold nothing that others wait for.
+  // Runs one query. Its rows block nobody.
   template <class... Values>
   Rows query(std::string_view sql, const Values&... values) {
     const std::array<Parameter, sizeof...(Values)> parameters{Parameter(values)...};
     return ask(sql, parameters);
   }
 
-  // The tables' time of one by this machine's clock, and back.
+  // Converts between this machine's clock and the tables' time.
   virtual std::int64_t to_us(Time time) const = 0;
   virtual Time from_us(std::int64_t us) const = 0;
 
-  // How many records one transaction may remove: one where others wait for it.
+  // Limit of records that one transaction removes: one if others wait for it.
   virtual std::size_t most_at_once() const = 0;
 
  protected:

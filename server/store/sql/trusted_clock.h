@@ -1,4 +1,4 @@
-// What --trust-clock means to records. For identities of databases only.
+// Effect of --trust-clock on records. For the identities of databases only.
 #pragma once
 
 #include <chrono>
@@ -9,14 +9,15 @@
 
 namespace isomesh::store {
 
-// For the believed clock: the last time that was seen, or what the clock says if that is trusted.
+// The start value of the believed clock: the last recorded time, or the clock's time if that is
+// later and the operator trusts it.
 Time time_to_start_with(Time last_seen, const OperatorsWord& word,
                         const BelievedClock::Options& clock);
 
-// An operator says that so much time has passed. Records cannot tell whether it has: the clock may
-// have been behind until then. So what was used shortly before counts as used now, and only what
-// was old already is as old as the clock says. Times are the database's; `tolerance` is by how much
-// its clock may be wrong unnoticed. Throws Error kOutOfSpace, kUnavailable or kInternal.
+// Adjusts records after an operator has confirmed that this much time has passed. The clock may
+// have been behind until then. So records used shortly before count as used now, and only those
+// already old keep their age. Times are the database's; `tolerance` is the undetected error of its
+// clock. Throws Error kOutOfSpace, kUnavailable or kInternal.
 void trust(SqlDatabase& database, Time last_seen, Time now, std::chrono::milliseconds tolerance);
 
 }  // namespace isomesh::store

@@ -1,22 +1,22 @@
-// Whose turn it is in the queue: start-time fair queuing (Goyal, Vin and Cheng, SIGCOMM 1996). For
+// Turns of owners in the queue: start-time fair queuing (Goyal, Vin and Cheng, SIGCOMM 1996). For
 // engines only.
 //
-// Within a priority, each owner's oldest ready job has a start tag, and the least one is claimed. A
-// job's start tag is the finish tag of its owner's last claim, or the virtual time where the owner
-// has none: that is the start tag of the priority's last claim. The finish tag is the start tag and
-// the job's expected run time. So an owner that was idle saves nothing up, and of two that both
-// have ready jobs neither is ever claimed more than one job of each ahead of the other. A claim
-// that finds nothing ready in a priority forgets its tags: while nobody waits, nobody is owed.
+// Within a priority, each owner's oldest ready job has a start tag, and the job with the least tag
+// is claimed. A job's start tag is the finish tag of its owner's last claim. If the owner has none,
+// it is the virtual time: the start tag of the priority's last claim. The finish tag is the start
+// tag plus the job's expected run time. So an idle owner accumulates no credit, and while two
+// owners have ready jobs, one gets ahead of the other by at most one job of each. A claim that
+// finds no ready job in a priority deletes its tags: while nobody waits, nobody is owed anything.
 //
-// All is evaluated by the claim. A submission changes no tag, so submissions do not wait for each
+// The claim computes everything. A submission changes no tag, so submissions do not block each
 // other, and jobs that are cancelled or reuse a mesh cost their owner nothing.
 #pragma once
 
 namespace isomesh::store {
 
-// Owners with queued jobs, each with the start tag of its next job; found by one step of the index
-// from owner to owner, however many jobs they have. The numbers are the values of Priority. Tables
-// are in each engine: `turns` has no row whose finish tag is not beyond the virtual time.
+// Owners with queued jobs, each with the start tag of its next job. Takes one index step per owner,
+// however many jobs they have. The numbers are the values of Priority. Each engine has its own
+// tables; `turns` has only rows whose finish tag is beyond the virtual time.
 inline constexpr const char* kQueuedOwners = R"sql(
 DROP VIEW IF EXISTS queued_owners;
 CREATE VIEW queued_owners AS

@@ -12,7 +12,7 @@
 namespace isomesh::store {
 namespace {
 
-// The record as it is listed, and whole where that is more.
+// The record for lists, and the complete one if that is larger.
 struct Records {
   explicit Records(Volume volume)
       : labelled(volume.labels.empty() ? std::nullopt : std::optional(to_record(volume))) {
@@ -24,8 +24,8 @@ struct Records {
   std::string listed;
 };
 
-// Empty if the record cannot be read, as after damage or a change by hand. One such record must not
-// hide all others.
+// Empty if the record is unreadable because of damage or a manual change. Such a record must not
+// hide the others.
 std::optional<Volume> readable(const std::string& record, const std::string& id) {
   try {
     return volume_from_record(record);
@@ -41,7 +41,7 @@ std::optional<Volume> readable(const std::string& record, const std::string& id)
   throw Error(ErrorCode::kInternal, kReason, {{"id", kReason}});
 }
 
-// Empty when there is none. Throws Error kInternal if its record is damaged.
+// Empty if there is none. Throws Error kInternal if the record is damaged.
 std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, const std::string& id,
                            const char* lock = "") {
   Rows row = connection.query(
@@ -70,7 +70,7 @@ void throw_if_needed(SqlConnection& connection, const Viewer& viewer, const std:
   if (needed.next()) throw Error(ErrorCode::kNotReady, "unfinished jobs need this volume");
 }
 
-// The one that the owner has already, which is used now.
+// The owner's existing record; sets its time of last use.
 std::optional<Volume> use(SqlConnection& connection, const std::string& owner,
                           const std::string& id) {
   Rows known = connection.query(
@@ -101,12 +101,12 @@ bool insert(SqlConnection& connection, const std::string& owner, const Volume& v
 std::pair<Volume, bool> SqlVolumeStore::add(const std::string& owner, const Volume& volume) {
   const Records records(volume);
   return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
-    // One that is there may be erased before it is used.
+    // An existing record may be erased before it is used.
     while (!insert(transaction.connection(), owner, volume, records)) {
       const auto known = use(transaction.connection(), owner, volume.id);
       if (!known) continue;
       transaction.commit();
-      // Asked again, it may be there by the first time: what is stored is the same then.
+      // After a repetition, an identical record was stored by the first attempt.
       return std::pair(*known, transaction.is_again() && *known == volume);
     }
     transaction.commit();
@@ -154,7 +154,8 @@ std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string
                              (is_descending ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
                                             : "> (?2, ?3) ORDER BY created, id LIMIT ?4");
   std::vector<Volume> volumes;
-  // Again only if records were passed over: fewer than `limit` would mean that no more follow.
+  // Repeats only if unreadable records were skipped, because fewer than `limit` records mean the
+  // end of the list.
   for (bool is_over = false; !is_over && volumes.size() < limit;) {
     std::size_t left = std::min<std::size_t>(limit - volumes.size(), 1 << 30);
     Rows rows = database_.query(select, viewer, created, id, left);
@@ -168,11 +169,11 @@ std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string
   return volumes;
 }
 
-// The rows are locked before their jobs are looked at, so that nobody submits one meanwhile.
+// Locks the rows before checking for jobs, so that no job is submitted in between.
 void SqlVolumeStore::erase(const Viewer& viewer, const std::string& id) {
   database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
-    // A damaged record can be erased, too, so it is not read.
+    // Checks existence only, so that damaged records can be erased too.
     const bool is_there =
         connection
             .query(std::string("SELECT 1 FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = "

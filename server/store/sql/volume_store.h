@@ -10,7 +10,7 @@
 
 namespace isomesh::store {
 
-// Volumes in a database, which must outlive it.
+// Volumes in a database, which must outlive this object.
 class SqlVolumeStore : public VolumeStore {
  public:
   explicit SqlVolumeStore(SqlDatabase& database) : database_(database) {}

@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kCopiedAtOnce = std::size_t{1} << 20;
 constexpr int kTries = 5;
-// As DataFolder and FileBlobStore lay them out.
+// The layout of DataFolder and FileBlobStore.
 constexpr const char* kRecords = "isomesh.sqlite";
 constexpr const char* kBlobs = "blobs";
 constexpr const char* kIdentity = "identity";
@@ -52,7 +52,7 @@ struct Amount {
   std::set<std::string> damaged;  // keys
 };
 
-// Copies one file and brings it to the disk. False, and nothing is there, where there is none.
+// Copies one file and syncs it. Returns false, leaving nothing, if the source is missing.
 bool copy_file(const fs::path& from, const fs::path& to, Amount& copied) {
   std::optional<File> source;
   try {
@@ -81,10 +81,10 @@ bool copy_file(const fs::path& from, const fs::path& to, Amount& copied) {
   return true;
 }
 
-// The names of all blobs that are there now, below their folders.
+// Paths of all existing blobs, below their folders.
 std::vector<std::string> blobs_of(const fs::path& data) {
   std::vector<std::string> names;
-  std::error_code gone;  // folders and files come and go
+  std::error_code gone;  // folders and files come and go meanwhile
   for (const auto& folder : fs::directory_iterator(data / kBlobs, gone)) {
     if (!folder.is_directory(gone)) continue;
     for (const auto& file : fs::directory_iterator(folder.path(), gone)) {
@@ -96,7 +96,6 @@ std::vector<std::string> blobs_of(const fs::path& data) {
   return names;
 }
 
-// Where a blob lies below the folder of blobs.
 std::string place_of(const std::string& key) { return key.substr(0, 2) + '/' + key; }
 
 class Copy {
@@ -106,7 +105,7 @@ class Copy {
     make_folder(to_ / kBlobs);
   }
 
-  // False where it is gone.
+  // Returns false if the blob is gone.
   bool take(const std::string& blob) {
     if (taken_.contains(blob)) return true;
     const fs::path target = to_ / kBlobs / blob;
@@ -131,7 +130,7 @@ class Copy {
     }
   }
 
-  // Names are on the disk, too.
+  // Syncs the folders, so that the names are on disk too.
   void sync() const {
     for (const auto& folder : fs::directory_iterator(to_ / kBlobs)) {
       if (folder.is_directory()) sync_folder(folder.path());
@@ -149,17 +148,16 @@ class Copy {
   Amount copied_;
 };
 
-// The records as they are at one moment.
+// Writes a consistent snapshot of the records.
 void snapshot(const fs::path& data, const fs::path& file) {
   std::error_code absent;
   fs::remove(file, absent);
-  File::create(file);  // with the rights that records have
+  File::create(file);  // with the access rights of records
   Connection connection(data / kRecords, Connection::Mode::kRead);
   connection.run("VACUUM INTO ?", file.string());
   File::open(file).sync();
 }
 
-// What the records name.
 std::set<std::string> named_blobs(const fs::path& records) {
   Connection connection(records, Connection::Mode::kRead);
   std::set<std::string> blobs;
@@ -168,7 +166,7 @@ std::set<std::string> named_blobs(const fs::path& records) {
   return blobs;
 }
 
-// What these blobs are to whoever has lost them.
+// Describes lost blobs by the volumes and jobs that used them.
 std::vector<std::string> told(const fs::path& records, const std::set<std::string>& keys) {
   Connection connection(records, Connection::Mode::kRead);
   std::vector<std::string> lost;
@@ -194,11 +192,12 @@ Copied described(const Amount& amount, const std::set<std::string>& missing_plac
           .missing = told(records, missing)};
 }
 
-// What says that the blobs belong to those records (Identity): they do, as far as these name any.
+// Writes the mark by which Identity knows that the blobs belong to these records. That is true for
+// the blobs that the records name.
 void mark_blobs(const fs::path& folder) {
   Connection connection(folder / kRecords, Connection::Mode::kRead);
   Rows query = connection.query("SELECT id, number FROM identity");
-  if (!query.next()) return;  // of a version that marked nothing yet
+  if (!query.next()) return;  // written by a version without marks
   const std::string text = query.text(0) + ' ' + std::to_string(query.integer(1)) + '\n';
   File file = File::create(folder / kBlobs / kIdentity);
   file.write(std::as_bytes(std::span(text)));
@@ -222,9 +221,9 @@ void check_is_data_folder(const fs::path& folder) {
   }
 }
 
-// Blobs first, then the records, then what these name and what was not there before. Where one of
-// that is gone, a later state of the records does not name it any more; what even that names has
-// been lost before.
+// Copies the blobs, then the records, then blobs that these name and that were not there before. If
+// such a blob is missing, a later state of the records no longer names it, so the records are
+// copied again. A blob missing twice was already lost.
 Copied copy_consistently(const fs::path& data, const fs::path& target) {
   Copy copy(data, target);
   std::set<std::string> missed_before;
@@ -245,9 +244,9 @@ Copied copy_consistently(const fs::path& data, const fs::path& target) {
   throw Error(ErrorCode::kUnavailable, "too much changed during the copy: try again");
 }
 
-// --- Putting back --------------------------------------------------------------------------------
+// --- Restore
 
-// Into an empty folder.
+// `data` is empty.
 Copied put_back(const fs::path& backup, const fs::path& data) {
   File::create(data / kUnfinishedRestore).sync();
   sync_folder(data);
@@ -280,7 +279,7 @@ void give_to(uid_t user, gid_t group, const fs::path& folder) {
 Copied back_up(const fs::path& data, const fs::path& named) {
   check_is_data_folder(data);
   std::error_code error;
-  // Shells complete the name of a folder with a slash.
+  // Shell completion appends a slash to a folder's name.
   const fs::path target = named.has_filename() ? named : named.parent_path();
   if (is_in(target, data)) refuse(target, "is inside the data folder and would be lost with it");
   if (fs::exists(fs::symlink_status(target, error))) refuse(target, "already exists");
@@ -296,7 +295,7 @@ Copied back_up(const fs::path& data, const fs::path& named) {
     sync_folder(fs::absolute(target).parent_path());
     return copied;
   } catch (...) {
-    fs::remove_all(part, error);  // why it failed is what counts
+    fs::remove_all(part, error);  // report the first error, not this one
     throw;
   }
 }
@@ -311,7 +310,7 @@ Copied restore(const fs::path& backup, const fs::path& data) {
   }
   fs::create_directories(data, error);
   if (error) throw Error(ErrorCode::kInternal, data.string() + ": " + error.message());
-  // As DataFolder locks it: a daemon that starts meanwhile is refused.
+  // The lock of DataFolder: a daemon started meanwhile fails.
   const Descriptor lock(::open((data / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
   if (lock.number() < 0 || ::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) {
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using " + data.string());
@@ -323,7 +322,8 @@ Copied restore(const fs::path& backup, const fs::path& data) {
     if (has_owner && ::geteuid() == 0) give_to(owner.st_uid, owner.st_gid, data);
     return copied;
   } catch (...) {
-    // Why it failed is what counts. The lock goes last: until then no daemon starts there.
+    // Errors of the removal are ignored; the original one is reported. The lock is removed last:
+    // until then no daemon can start there.
     for (const char* made : {kBlobs, kRecords, kUnfinishedRestore, "lock"})
       fs::remove_all(data / made, error);
     if (!is_there) fs::remove(data, error);

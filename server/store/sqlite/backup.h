@@ -1,4 +1,4 @@
-// A copy of a data folder, made while a daemon uses it, and put back.
+// Backs up a data folder in use, and restores it.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,22 @@ namespace isomesh::store {
 
 struct Copied {
   std::uint64_t blobs = 0;           // files of volumes and meshes
-  std::uint64_t bytes = 0;           // of them
-  std::vector<std::string> damaged;  // whose bytes are not what their name says: "the volume ID"
-  std::vector<std::string> missing;  // whose files are not there: "a mesh of the job ID"
+  std::uint64_t bytes = 0;           // of those files
+  std::vector<std::string> damaged;  // with wrong bytes; described as "the volume ID"
+  std::vector<std::string> missing;  // without a file; described as "a mesh of the job ID"
 
   bool operator==(const Copied&) const = default;
 };
 
-// Copies all volumes, meshes and records of `data` to `target`, which must not exist, as they were
-// at one moment of the run. Whoever uses `data` is neither stopped nor waited for. `target` appears
-// when all of it is on the disk. Throws Error kInvalidParameter where `data` is no data folder or
-// `target` is there, kUnavailable when too much changed meanwhile, kOutOfSpace or kInternal.
+// Copies all volumes, meshes and records of `data` to `target`, which must not exist, as of one
+// moment during the run. A daemon that uses `data` is neither stopped nor blocked. `target` appears
+// once everything is on disk. Throws Error kInvalidParameter if `data` is not a data folder or
+// `target` exists; kUnavailable if too much changed meanwhile; kOutOfSpace or kInternal.
 Copied back_up(const std::filesystem::path& data, const std::filesystem::path& target);
 
-// Copies what back_up made to `data`, which must be missing or empty. Where root does that, the
-// files belong to whom an empty `data` belonged. No daemon starts there before it is whole, also
-// where this was killed; where it fails, `data` is as before. Throws as back_up.
+// Copies a backup to `data`, which must be missing or empty. If root does this, the files get the
+// owner of an existing empty `data`. No daemon can start there before the restore is complete, even
+// if it was killed. If it fails, `data` is as before. Throws as back_up.
 Copied restore(const std::filesystem::path& backup, const std::filesystem::path& data);
 
 }  // namespace isomesh::store

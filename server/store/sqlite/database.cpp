@@ -11,11 +11,10 @@
 namespace isomesh::store {
 namespace {
 
-// The tables of the first version, then what each later one changed. Never to be edited, only to be
-// added to.
+// The tables of the first version, then the changes of each later one. Only append; never edit.
 //
 // States are the values of JobState: 0 queued, 1 running, 2 succeeded, 3 failed, 4 cancelled. A
-// record is the JSON of the API; the columns beside it are what is searched for.
+// record is the JSON of the API; the other columns serve queries.
 constexpr std::array kSteps = {R"sql(
 CREATE TABLE volumes(
   owner TEXT NOT NULL,
@@ -208,9 +207,9 @@ std::int64_t version_of(Connection& connection) {
   return query.integer(0);
 }
 
-// Brings the tables up to date before anything else looks at them.
+// Migrates the tables before any other access.
 Connection::Mode migrated(const std::filesystem::path& file) {
-  // Records may tell of patients; SQLite's other files get the rights of this one.
+  // Records may identify patients. SQLite's other files get the access rights of this one.
   if (!std::filesystem::exists(file)) File::create(file);
   Connection connection(file, Connection::Mode::kWrite);
   const std::int64_t version = version_of(connection);
@@ -233,9 +232,8 @@ Connection::Mode migrated(const std::filesystem::path& file) {
   return Connection::Mode::kWrite;
 }
 
-// How long the log of changes may be before they are brought into the file itself: 16 MiB, so that
-// a commit seldom has to do that, and pages that changed often are written once; less on a small
-// disk.
+// Size of the write-ahead log at which it is checkpointed: 16 MiB, so that few commits have to
+// checkpoint and frequently changed pages are written once; less on a small disk.
 std::uint64_t log_bytes(std::uint64_t disk) {
   constexpr std::uint64_t kShare = 256;
   return std::clamp<std::uint64_t>(disk / kShare, std::uint64_t{1} << 20, std::uint64_t{16} << 20);
@@ -247,7 +245,7 @@ Database::Database(const DataFolder& folder)
     : folder_(folder), writer_(folder.records(), migrated(folder.records())) {
   for (auto& reader : readers_) {
     reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);
-    // SQLite opens its files when they are read first, and then there may be no descriptor left.
+    // SQLite opens its files at the first read, when there may be no descriptor left.
     const Reading reading(*reader);
     reading->query("SELECT count(*) FROM sqlite_schema").next();
   }
@@ -301,7 +299,7 @@ void Database::while_reading(const std::function<void(SqlConnection&)>& act) {
   act(reading.connection());
 }
 
-// All rows are read, so that nobody waits for what is done with them.
+// Reads all rows, so that nobody waits while they are processed.
 Rows Database::ask(std::string_view sql, std::span<const Parameter> parameters) {
   const Reading reading(reader());
   return reading->take(sql, parameters);

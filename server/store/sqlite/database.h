@@ -18,32 +18,31 @@
 
 namespace isomesh::store {
 
-// The records of a data folder: one SQLite file (WAL, synchronous=FULL), with a connection that
-// writes and some that read side by side, so that readers wait neither for the disk nor for whoever
-// reads much. Thread safe; `folder` must outlive it.
+// The records of a data folder: one SQLite file (WAL, synchronous=FULL). One connection writes and
+// several read concurrently, so readers wait neither for syncs nor for long queries of others.
+// Thread safe; `folder` must outlive this object.
 class Database : public SqlDatabase {
  public:
-  // Creates what is missing and brings the tables of an older version up to date. Throws Error
-  // kUnavailable when another version made it that this one does not know, kOutOfSpace or
-  // kInternal.
+  // Creates missing tables and migrates those of an older version. Throws Error kUnavailable if a
+  // newer, unknown version made them; kOutOfSpace or kInternal.
   explicit Database(const DataFolder& folder);
 
   Connection& writer() { return writer_; }
-  // One that nobody uses, where there is one.
+  // An idle connection if there is one.
   Connection& reader();
 
-  // Tells which time it is for certain: what is kept from now on is never older.
+  // Sets a time that is certain to have passed: times that decide about expiry are never older.
   void know_newest(Time time) { newest_us_ = store::to_us(time); }
 
-  // How many rows were changed since it was opened.
+  // Number of rows changed since the file was opened.
   std::int64_t changes();
 
   std::int64_t to_us(Time time) const override { return store::to_us(time); }
   Time from_us(std::int64_t us) const override { return store::from_us(us); }
   std::size_t most_at_once() const override { return std::numeric_limits<std::size_t>::max(); }
 
-  // Does what frees room, or has to be kept in mind whatever the disk is like: where there is no
-  // room for that, the reserve is let go first. `run` is one transaction. Throws what it throws.
+  // Runs one transaction that frees space or must be stored in any case. If there is no space for
+  // it, releases the reserve first. Throws what `run` throws.
   template <class Run>
   auto freeing(const Run& run) {
     try {
@@ -67,7 +66,7 @@ class Database : public SqlDatabase {
   Connection writer_;
   static constexpr std::size_t kReaders = 6;
   std::array<std::unique_ptr<Connection>, kReaders> readers_;
-  std::atomic<std::size_t> next_ = 0;  // whose turn it is when all are used
+  std::atomic<std::size_t> next_ = 0;  // the next reader if all are busy
 };
 
 // Microseconds since 1970 by this machine's clock.

@@ -90,7 +90,7 @@ std::uint64_t EventLog::next_number() {
   return last_;
 }
 
-// What was told while a transaction was open has greater numbers than the events of that.
+// Unstored events added while a transaction was open have greater numbers than its events.
 void EventLog::remember(Entry entry) {
   const auto place = std::ranges::upper_bound(recent_, entry.id(), {}, &Entry::id);
   recent_.insert(place, std::move(entry));

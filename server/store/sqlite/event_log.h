@@ -1,5 +1,5 @@
-// Events of this process: their numbers, the latest of them, and who waits for them. Private to
-// this folder.
+// Events of this process: their numbers, the latest events, and the readers that wait for them.
+// Private to this folder.
 #pragma once
 
 #include <chrono>
@@ -12,48 +12,47 @@
 
 namespace isomesh::store {
 
-// Numbers follow the clock, so that they also grow over restarts. Thread safe.
+// Numbers are derived from the clock, so that they increase over restarts. Thread safe.
 class EventLog {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // `last` is the greatest number that was given ever.
+  // `last` is the greatest number ever used.
   explicit EventLog(std::uint64_t last) : last_(last), complete_after_(last) {}
 
-  // Numbers an event that the open transaction writes. Until settle() nobody sees it, nor any event
-  // with a greater number: a reader that went on after the greater one would miss this one. One
-  // transaction at a time.
+  // Numbers an event written by the open transaction. Neither this event nor any with a greater
+  // number is visible until settle(); otherwise a reader that continues after the greater one would
+  // miss this one. One transaction at a time.
   std::uint64_t reserve(Event event);
 
-  // The last `count` of them never were: their part of the transaction was rolled back.
+  // Removes the last `count` events, because their part of the transaction was rolled back.
   void withdraw(std::size_t count);
 
-  // The transaction has ended; wakes everybody. Events of one that was not committed never were.
+  // Ends the transaction and wakes all readers. Discards its events unless it was committed.
   void settle(bool is_committed);
 
-  // An event that is not kept.
+  // Adds an event that is not stored.
   void tell(Event event);
 
-  // Events that may be seen now have smaller numbers.
+  // Visible events have smaller numbers than this.
   std::uint64_t end() const;
 
   struct Recent {
     std::vector<Event> events;  // oldest first
-    // True: these are all events that were asked for. False: the events that the database keeps
-    // are left out and have to be read there. That is so when `since` is older than what is
-    // remembered, and whenever one job is asked for: its events are removed from the database when
-    // it expires, but not from here.
+    // True: these are all requested events. False: stored events are omitted and must be read from
+    // the database. That is the case if `since` is older than the oldest event here, and for a
+    // single job: when a job expires, the database removes its events but this list does not.
     bool is_complete = false;
   };
 
-  // Those after `since` and before `end` that this process remembers.
+  // The events here after `since` and before `end`.
   Recent recent(const Viewer& viewer, const std::string& job, std::uint64_t since,
                 std::uint64_t end) const;
 
-  // Grows whenever anything is settled or told.
+  // Increments with each settle() and tell().
   std::uint64_t generation() const;
 
-  // Waits until the generation is another one, `deadline` or close().
+  // Waits until the generation changes, the deadline, or close().
   void wait_beyond(std::uint64_t generation, Clock::time_point deadline) const;
 
   void close();

@@ -13,10 +13,9 @@
 namespace isomesh::store {
 namespace {
 
-// How often the time is marked although nothing was stored.
+// Interval of marks while nothing is stored.
 constexpr std::chrono::minutes kBetweenIdleMarks{10};
 
-// Whether anything is recorded.
 bool has_records(Connection& connection) {
   Rows query = connection.query(
       "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
@@ -25,7 +24,7 @@ bool has_records(Connection& connection) {
   return query.integer(0) != 0;
 }
 
-// When the youngest record was made or used; the beginning of time without any.
+// The time of the newest record or use; the smallest time if there is none.
 std::int64_t newest_record(Connection& connection) {
   Rows query = connection.query(
       "SELECT max(coalesce((SELECT max(used) FROM volumes), 0), coalesce((SELECT max(finished) "
@@ -113,9 +112,9 @@ void Identity::check(const Mark& records, const Mark& blobs) const {
     refuse("the storage of volumes and meshes belongs to another database");
   }
   if (!is_recorded && !is_stored) return;  // nothing can be lost
-  // Written by versions that did not mark anything yet.
+  // Written by versions without marks.
   if (records.id.empty() && blobs.id.empty() && is_recorded) return;
-  // The database's mark is made first, so that a crash leaves it ahead by one.
+  // The database is marked first, so a crash may leave it one ahead.
   if (blobs.id.empty() && records.number == 1) return;
   if (!is_recorded && records.id != blobs.id) {
     refuse("there are files of volumes and meshes, but the database that names them is missing");
@@ -131,7 +130,7 @@ void Identity::check(const Mark& records, const Mark& blobs) const {
   }
 }
 
-// The database's mark is never ahead by more than one.
+// The database's mark is never more than one ahead.
 void Identity::write_mark(Time time) {
   Mark next = mark_;
   next.number += 1;

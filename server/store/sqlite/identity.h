@@ -11,29 +11,29 @@
 
 namespace isomesh::store {
 
-// That the database and the store of blobs belong together, and which time it is. Both
-// carry one name, and a number that grows with what is stored: a sweep after a mix-up would take
-// everything that the database does not name. Thread safe; what it is made of must outlive it.
+// Ensures that the database and the blobs belong together, and provides a believed clock. Both
+// carry the same name, and a number that grows as data is stored: after a mix-up, a sweep would
+// remove all blobs that the database does not name. Thread safe; its dependencies must outlive it.
 class Identity {
  public:
-  // Throws Error kUnavailable when the one is not the other's, or older than it, and that was not
-  // allowed. Names both anew where it was, or where there is nothing to lose yet.
+  // Throws Error kUnavailable if the two do not belong together, or one is older than the other,
+  // and `word` does not allow that. Assigns a new name if it does, or if there is nothing to lose
+  // yet.
   Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
            const BelievedClock::Options& clock);
 
-  // The time as far as the clock can be believed. Leaves a mark of it and of what was stored since
-  // the last mark, or the next time when the disk has no room for that. To be called every minute
-  // or so.
+  // The believed time. Records it, and marks what was stored since the last mark; if the disk has
+  // no space for that, the next call retries. Call about every minute.
   Time now();
 
-  // Whether the clock says quite another time than that.
+  // True if the system's clock deviates from the believed time.
   bool doubts_clock() const { return clock_.doubt() != BelievedClock::Doubt::kNone; }
 
  private:
   struct Mark {
     std::string id;  // empty: not marked yet
     std::int64_t number = 0;
-    std::int64_t seen = 0;  // of the database's: the believed time when it was made
+    std::int64_t seen = 0;  // in the database's mark only: the believed time of the mark
   };
 
   static Time last_seen(Database& database, const BelievedClock::Options& clock);
@@ -48,8 +48,9 @@ class Identity {
   BelievedClock clock_;
   mutable Mutex mutex_;
   Mark mark_ ISOMESH_GUARDED_BY(mutex_);
-  std::int64_t changes_ ISOMESH_GUARDED_BY(mutex_) = 0;  // of the database when it was made
-  bool is_told_ ISOMESH_GUARDED_BY(mutex_) = false;      // the blobs' mark is the database's
+  std::int64_t changes_ ISOMESH_GUARDED_BY(mutex_) = 0;  // of the database at the last mark
+  // The mark of the blobs equals the database's.
+  bool is_told_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace isomesh::store

@@ -1,4 +1,4 @@
-// What changes jobs, one transaction a function; job_store.cpp has what is asked.
+// Changes of jobs, one transaction per function; queries are in job_store.cpp.
 #include <algorithm>
 
 #include "base/clock.h"
@@ -37,7 +37,7 @@ std::optional<Submission> SqliteJobStore::known(Connection& connection, const Jo
 Submission SqliteJobStore::submit(const JobSpec& spec) {
   Row row;
   row.owner = spec.owner;
-  // Read before the transaction, because others wait for that.
+  // Read before the transaction, because others wait for the transaction.
   const auto spoilt = spoilt_mesh_for(spec);
   {
     Change change(*this);
@@ -82,7 +82,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
 
 std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
                                            std::chrono::milliseconds lease) {
-  // A claim that a power cut takes back leaves the job queued, and its worker is gone.
+  // If a power failure reverts a claim, the job is queued again and its worker is gone anyway.
   Change change(*this, Durability::kProcess);
   const std::int64_t now = now_us();
   auto next = take_turn(change, now);
@@ -104,7 +104,7 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
       row.attempts, row.fence, now, worker, to_record(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
   {
-    // Before anybody else's transaction, which may ask the run to stop or end its lease.
+    // Before any other transaction, which may cancel the run or end its lease.
     const Lock lock(live_mutex_);
     const Steady began = Steady::clock::now();
     live_[row.job.id] = {.fence = row.fence, .claimed = began, .lease_until = began + lease};
@@ -138,7 +138,7 @@ std::optional<SqliteJobStore::Row> SqliteJobStore::take_turn(Change& change,
   }
   std::optional<Row> row;
   if (!id.empty()) row = find(change.connection(), std::nullopt, id);
-  // Nothing of a higher priority is ready, or nothing at all.
+  // No job of a higher priority is ready, or none at all.
   constexpr int kAfterAll = static_cast<int>(Priority::kBulk) + 1;
   const int priority = row ? static_cast<int>(row->job.parameters.priority) : kAfterAll;
   change->run("DELETE FROM turns WHERE (priority, finish_tag) <= (?, ?)", priority, start_tag);
@@ -189,7 +189,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
   if (has_mesh) {
     for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.settle(blob.key);
   }
-  // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
+  // Without a mesh, this job or an equal one may be ready again. With one, no job becomes ready.
   if (!has_mesh) wake_all_workers();
   return true;
 }

@@ -1,4 +1,4 @@
-// What the two halves of SqliteJobStore share: a transaction that tells what it changed. Private to
+// Shared by the two halves of SqliteJobStore: a transaction that announces its changes. Private to
 // this folder.
 #pragma once
 
@@ -9,12 +9,12 @@
 
 namespace isomesh::store {
 
-// One transaction of the writer and its events, which are seen when it is over.
+// One transaction and its events, which become visible when it ends.
 class SqliteJobStore::Change {
  public:
   Change(const SqliteJobStore& store, Durability durability = Durability::kFull)
       : log_(store.log_), transaction_(store.database_.writer(), durability) {}
-  // The transaction's lock is still held, so its events are the last.
+  // The transaction's lock is still held, so its events are the last ones.
   ~Change() {
     if (announced_ > 0 && transaction_.is_open()) log_.withdraw(announced_);
   }
@@ -24,7 +24,7 @@ class SqliteJobStore::Change {
   Connection* operator->() const { return &transaction_.connection(); }
   Connection& connection() const { return transaction_.connection(); }
 
-  // Keeps the event of the row's present state.
+  // Stores an event with the row's present state.
   void announce(const Row& row, EventKind kind);
 
   void commit() {
@@ -40,7 +40,7 @@ class SqliteJobStore::Change {
   Transaction transaction_;  // last: its lock is held until the events are withdrawn
 };
 
-// A job is not kept waiting for longer: if one seems to be, the clock was set back.
+// The longest possible delay of a job. A longer one means that the clock was set back.
 inline constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;
 
 }  // namespace isomesh::store

@@ -1,4 +1,4 @@
-// What is asked about jobs and events; job_queue.cpp has what changes jobs.
+// Queries about jobs and events; changes of jobs are in job_queue.cpp.
 #include "server/store/sqlite/job_store.h"
 
 #include <algorithm>
@@ -101,7 +101,7 @@ void SqliteJobStore::forget_events(Time before) {
   database_.run(store::Change::kRepeatable, "DELETE FROM events WHERE id < ?1", to_us(before));
 }
 
-// --- Meshes that serve more than one job
+// --- Meshes shared by several jobs
 
 std::optional<MeshSummary> SqliteJobStore::mesh_like(
     SqlConnection& connection, const std::string& owner, const std::string& result_key,

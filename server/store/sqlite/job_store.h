@@ -10,12 +10,12 @@
 
 namespace isomesh::store {
 
-// Jobs in the database of a data folder. Leases count the time that passes, whatever
-// the system's clock is set to; who holds which is known to this process alone. What changes wakes
-// those who wait in this process only; the data folder has one process at a time.
+// Jobs in the database of a data folder. Leases use the steady clock, so setting the system's clock
+// does not affect them. Only this process knows who holds a lease, and changes wake only waiters in
+// this process; a data folder has one process at a time.
 class SqliteJobStore : public SqlJobStore {
  public:
-  // Both must outlive it.
+  // `database` and `blobs` must outlive this object.
   SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
 
   Submission submit(const JobSpec& spec) override;
@@ -31,7 +31,7 @@ class SqliteJobStore : public SqlJobStore {
                             std::chrono::milliseconds timeout) const override;
   std::uint64_t last_event() const override { return log_.end() - 1; }
   bool answers() const override { return true; }
-  // The data folder has one process, whose turn it always is.
+  // Always granted, because a data folder has one process only.
   std::shared_ptr<const void> turn_to_remove() override { return std::make_shared<char>(); }
   std::optional<Steady> oldest_run() const override;
   void forget_events(Time before) override;
@@ -44,22 +44,21 @@ class SqliteJobStore : public SqlJobStore {
   void tell(Event event, std::int64_t) override { log_.tell(std::move(event)); }
   void close_events() override { log_.close(); }
 
-  // The job that is to run next, whose owner's turn is over with that.
+  // Selects the next job to run and charges its owner's turn.
   std::optional<Row> take_turn(Change& change, std::int64_t now) const;
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
-  // The job that the same key made before.
+  // The job submitted before with the same key.
   std::optional<Submission> known(Connection& connection, const JobSpec& spec) const;
-  // What a job like it has made; empty when that is `spoilt`.
+  // The mesh of an equal job; empty if that is `spoilt`.
   std::optional<MeshSummary> mesh_like(SqlConnection& connection, const std::string& owner,
                                        const std::string& result_key,
                                        const std::optional<MeshSummary>& spoilt) const;
-  // What a job like this one has made, when the bytes of its blobs are damaged; empty otherwise.
-  // Reads them.
+  // The mesh of an equal job if its blobs are damaged; empty otherwise. Reads the blobs.
   std::optional<MeshSummary> spoilt_mesh_for(const JobSpec& spec) const;
   void end(Change& change, Row& row, JobState state) const;
   void succeed(Change& change, Row& row, const MeshSummary& mesh) const;
   void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const;
-  // Queues a job again whose run counts as no attempt, or ends it cancelled.
+  // Queues a job again without counting the attempt, or ends it as cancelled.
   void give_back(Change& change, Row& row, std::chrono::milliseconds delay) const;
   void queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const;
   std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,

@@ -17,7 +17,7 @@ namespace {
 constexpr int kBusyTimeoutMs = 10'000;
 Error error_of(sqlite3* handle, int code) {
   const int primary = code & 0xFF;
-  // Most of what SQLite calls an I/O error is a write that found no room, too.
+  // Most I/O errors of SQLite are writes without space, too.
   if (primary == SQLITE_FULL || code == SQLITE_IOERR_WRITE || code == SQLITE_IOERR_SHMSIZE) {
     return {ErrorCode::kOutOfSpace, "the data folder has no space left"};
   }
@@ -32,13 +32,13 @@ Error error_of(sqlite3* handle, int code) {
 
 [[noreturn]] void fail(sqlite3* handle, int code) { throw error_of(handle, code); }
 
-// Locks, and is counted meanwhile among those that are coming.
+// Locks the mutex; `coming` counts the threads that wait for it.
 Mutex& counted(Mutex& mutex, std::atomic<std::size_t>& coming) {
   ++coming;
   return mutex;
 }
 
-// A prepared statement in use; its parameters are cleared when it goes.
+// A prepared statement in use. Clears its parameters on destruction.
 class Statement : public Rows::Source {
  public:
   Statement(sqlite3_stmt* statement, std::span<const Parameter> parameters)
@@ -90,12 +90,12 @@ class Statement : public Rows::Source {
   sqlite3_stmt* statement_;
 };
 
-// Rows that were read.
+// Rows held in memory.
 class Taken : public Rows::Source {
  public:
   explicit Taken(sqlite3_stmt* statement) : columns_(sqlite3_column_count(statement)) {}
 
-  // As what they are: to make texts of numbers takes time.
+  // Keeps the types, because converting numbers to text takes time.
   void add(const Statement& row) {
     for (int column = 0; column < columns_; ++column) {
       Cell& cell = cells_.emplace_back();
@@ -154,7 +154,7 @@ void give_kept(sqlite3_context* context, int, sqlite3_value** values) {
 Connection::Connection(const std::filesystem::path& path, Mode mode) {
   const int access =
       mode == Mode::kWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
-  // Our own mutex keeps threads apart.
+  // The connection's own mutex serialises threads.
   const int code = sqlite3_open_v2(path.c_str(), &handle_, access | SQLITE_OPEN_NOMUTEX, nullptr);
   try {
     if (code != SQLITE_OK) fail(handle_, code);
@@ -175,7 +175,7 @@ Connection::~Connection() {
 }
 
 void Connection::know_newest(const std::atomic<std::int64_t>& newest_us) {
-  // SQLite gives it back as it was given.
+  // SQLite passes the pointer back unchanged.
   auto* given = const_cast<std::atomic<std::int64_t>*>(&newest_us);
   const int code = sqlite3_create_function_v2(handle_, "isomesh_kept", 1, SQLITE_UTF8, given,
                                               give_kept, nullptr, nullptr, nullptr);
@@ -201,7 +201,8 @@ void Connection::limit_log(std::uint64_t bytes) {
   sqlite3_wal_hook(handle_, look_at_log, this);
 }
 
-// After a commit, which counts whatever becomes of this: what fails is tried after the next one.
+// Runs after a commit, which is valid whatever happens here. A failed checkpoint is retried after
+// the next commit.
 int Connection::look_at_log(void* connection, sqlite3* handle, const char* name, int pages) {
   const int limit = static_cast<Connection*>(connection)->log_pages_;
   if (pages < limit) return SQLITE_OK;
@@ -290,7 +291,8 @@ void Transaction::at_end(std::function<void(bool is_committed)> call) {
 
 void Transaction::begin(Durability durability) {
   std::shared_ptr<Batch>& batch = connection_.batch_;
-  // What needs no sync must not wait for one; and it cannot be asked for any more.
+  // A batch without sync cannot be upgraded, so a transaction that needs a sync ends it and starts
+  // a new one.
   const bool is_too_weak = batch && batch->durability == Durability::kProcess;
   if (is_too_weak && durability == Durability::kFull) connection_.end_batch();
   if (!batch) {
@@ -308,7 +310,7 @@ void Transaction::commit() {
   const std::shared_ptr<Batch> batch = connection_.batch_;
   ++batch->members;
   std::ranges::move(at_end_, std::back_inserter(batch->at_end));
-  // Whoever comes takes its part first, and commits for all, or leaves it to the next.
+  // Waiting threads first add their parts. The last one commits for all.
   constexpr std::size_t kMostMembers = 64;
   if (connection_.coming_ == 0 || batch->members == kMostMembers) {
     connection_.end_batch();
@@ -321,7 +323,7 @@ void Transaction::commit() {
 void Transaction::leave() noexcept {
   Batch* const batch = connection_.batch_.get();
   if (batch == nullptr) return;
-  // SQLite itself rolls back everything when the disk is full or fails.
+  // SQLite rolls back the whole transaction if the disk is full or fails.
   if (!connection_.has_open_transaction()) return connection_.end_batch(connection_.last_error());
   try {
     connection_.run("ROLLBACK TO part");

@@ -1,4 +1,4 @@
-// SQLite behind the interface of SQL: a connection, its statements, transactions. Private to this
+// Connections, statements and transactions of SQLite for the interface in sql.h. Private to this
 // folder.
 #pragma once
 
@@ -24,77 +24,77 @@ struct sqlite3_stmt;
 
 namespace isomesh::store {
 
-// What a commit outlives. All of them outlive the process, however it ends.
+// Failures that a commit survives. All commits survive any end of the process.
 enum class Durability {
-  kFull,     // also a machine that loses its power
-  kProcess,  // what a power cut may take back, for changes that are made again without harm
+  kFull,     // also a power failure
+  kProcess,  // not a power failure; for changes that can be repeated without harm
 };
 
-// What several threads commit together: one transaction of SQLite, each thread's part a savepoint
-// in it. Guarded by the connection's mutex.
+// A group commit of several threads: one transaction of SQLite, in which each thread's part is a
+// savepoint. Guarded by the connection's mutex.
 struct Batch {
   Durability durability = Durability::kFull;
-  std::size_t members = 0;  // whose part is done
+  std::size_t members = 0;  // number of completed parts
   bool has_ended = false;
-  std::optional<Error> failure;  // of the commit: then no part took place
+  std::optional<Error> failure;  // of the commit; then no part took effect
   std::vector<std::function<void(bool is_committed)>> at_end;
 };
 
-// One connection. What it does is done under the lock of a Transaction or a Reading.
+// One connection. Use it only under the lock of a Transaction or a Reading.
 class Connection : public SqlConnection {
  public:
   enum class Mode { kWrite, kRead };
 
-  // Opens the file; creates it for writing. Throws Error kInternal when it is no database.
+  // Opens the file; creates it for writing. Throws Error kInternal if it is not a database.
   Connection(const std::filesystem::path& path, Mode mode);
   ~Connection() override;
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
   Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
-  // The same with all rows read, so that these hold nothing any more.
+  // As ask(), but reads all rows, so that they block nothing.
   Rows take(std::string_view sql, std::span<const Parameter> parameters);
   std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) override;
-  // A transaction has the connection, and no other one writes.
+  // Not needed: a transaction has the connection exclusively, and no other connection writes.
   const char* for_update() const override { return ""; }
   void lock_table(const std::string&) override {}
 
-  // Gives texts `isomesh_kept`, by the newest time that is known, which must outlive this.
+  // Sets the newest certain time for `isomesh_kept`. `newest_us` must outlive this object.
   void know_newest(const std::atomic<std::int64_t>& newest_us);
 
-  // Several statements without parameters.
+  // Runs several statements without parameters.
   void script(const char* sql);
 
-  // From now on the log of changes is brought into the file when it is so long; at twice that it is
-  // cut, for which those who read are waited for.
+  // Checkpoints the write-ahead log when it reaches this size, and truncates it at twice the size,
+  // which waits for readers.
   void limit_log(std::uint64_t bytes);
 
-  // Does both now. Throws Error kOutOfSpace or kInternal.
+  // Checkpoints and truncates now. Throws Error kOutOfSpace or kInternal.
   void empty_log();
 
-  // How many rows were changed since it was opened.
+  // Number of rows changed since the file was opened.
   std::int64_t all_changes() const;
 
   Mutex& mutex() { return mutex_; }
 
-  // Whether a Reading has it or waits for it; another thread may change that at once.
+  // True if a Reading has or awaits the connection; may change at once.
   bool is_busy() const { return readings_ > 0; }
 
-  // How many threads wait to begin a transaction; others may come at once.
+  // Number of threads that wait to begin a transaction; may change at once.
   std::size_t coming() const { return coming_; }
 
  private:
   friend class Reading;
   friend class Transaction;
 
-  // What the next transaction's commit outlives.
+  // For the next transaction's commit.
   void set_durability(Durability durability);
 
-  // Rolls back what is open.
+  // Rolls back an open transaction.
   void roll_back() noexcept;
   bool has_open_transaction() const;
 
-  // Those that hold the mutex share this.
+  // For holders of the mutex.
   void end_batch(std::optional<Error> failure = std::nullopt) noexcept;
   Error last_error() const;
 
@@ -110,14 +110,14 @@ class Connection : public SqlConnection {
     using is_transparent = void;  // NOLINT(readability-identifier-naming)
   };
   std::unordered_map<std::string, sqlite3_stmt*, Hash, std::equal_to<>> statements_;
-  std::shared_ptr<Batch> batch_;         // of the transaction that is open
+  std::shared_ptr<Batch> batch_;         // of the open transaction
   std::atomic<std::size_t> coming_ = 0;  // threads that wait to begin a transaction
   Condition batch_ended_;
 };
 
-// All or nothing: what was not committed is rolled back when it goes. Those that come while others
-// wait for the disk are committed together, with one sync; nobody else sees any of it before that.
-// No Query of it may be in use when it commits.
+// A transaction. Rolled back on destruction unless committed. Transactions that start while others
+// wait for the disk are committed together, with one sync; none is visible before that. Release all
+// rows of it before the commit.
 class Transaction {
  public:
   // Throws Error kOutOfSpace or kInternal.
@@ -129,15 +129,15 @@ class Transaction {
   Connection* operator->() const { return &connection_; }
   Connection& connection() const { return connection_; }
 
-  // To be called, if commit() is, when it is known whether this was committed, before anybody
-  // else's transaction begins. May run in another thread. Must not throw.
+  // If commit() is called, runs `call` once its outcome is known and before another transaction
+  // begins. May run in another thread. Must not throw.
   void at_end(std::function<void(bool is_committed)> call);
 
-  // False once commit() has let go of it, whatever came of that.
+  // False once commit() has released the transaction, whatever its outcome.
   bool is_open() const { return open_; }
 
-  // When it returns this is committed. Throws Error kOutOfSpace or kInternal: then it is rolled
-  // back. Others may have committed theirs meanwhile.
+  // On return the transaction is committed. If this throws Error kOutOfSpace or kInternal, it is
+  // rolled back; other transactions may have been committed meanwhile.
   void commit();
 
  private:
@@ -150,8 +150,7 @@ class Transaction {
   std::vector<std::function<void(bool is_committed)>> at_end_;
 };
 
-// Reads what is committed. Holds its connection, so what takes long with what was read is to be
-// done afterwards.
+// A read of committed data. Holds its connection, so process results after its end.
 class Reading {
  public:
   explicit Reading(Connection& connection)
@@ -169,7 +168,7 @@ class Reading {
     std::atomic<int>& readings;
   };
 
-  const Count count_;  // first, so that who waits is counted
+  const Count count_;  // first, so that waiting threads count
   const Lock lock_;
   Connection& connection_;
 };

@@ -62,6 +62,10 @@ TEST_F(Batch, WhatAnotherInputSendsIsNoInput) {
   const auto image = file("b.img");
   EXPECT_THAT(names_of({image, file("c.nii"), pair}), ElementsAre("b", "c"));
   EXPECT_THAT(names_of({pair, pair}), ElementsAre("b"));
+  const auto head = file("d+orig.HEAD");
+  EXPECT_THAT(names_of({head, file("d+orig.BRIK")}), ElementsAre("d+orig"));
+  const auto rec = file("e.REC");
+  EXPECT_THAT(names_of({file("e.PAR"), rec}), ElementsAre("e"));
 }
 
 TEST_F(Batch, TwoOfOneNameAreRefused) {

@@ -47,7 +47,8 @@ TEST_F(OptionsTest, ReadsRawSamples) {
   ASSERT_TRUE(options.upload.raw);
   EXPECT_THAT(options.upload.raw->dims, ElementsAre(512, 512, 300));
   EXPECT_EQ(options.upload.raw->type, SampleType::kInt16);
-  EXPECT_THAT(options.upload.raw->geometry.spacing, ElementsAre(0.7, 0.7, 1));
+  ASSERT_TRUE(options.upload.spacing);
+  EXPECT_THAT(*options.upload.spacing, ElementsAre(0.7, 0.7, 1));
   EXPECT_THAT(options.upload.raw->geometry.origin, ElementsAre(-90, 0, 1.5));
   EXPECT_EQ(options.upload.raw->geometry.direction.back(), -1);
   EXPECT_TRUE(options.upload.raw->big_endian);

@@ -51,7 +51,7 @@ TEST(RawDescription, WhatIsMalformedIsRefusedByName) {
 }
 
 TEST(RawDescription, PartsOfItWithoutDimsAreRefused) {
-  for (const std::string name : {"type", "spacing", "origin", "direction", "byte_order"}) {
+  for (const std::string name : {"type", "origin", "direction", "byte_order"}) {
     const auto error = thrown_by([&] { raw_description_of(with_query({{name, "1"}})); });
     ASSERT_TRUE(error) << name;
     EXPECT_THAT(fields_of(*error), ElementsAre("dims"));
@@ -106,6 +106,13 @@ TEST(ImportOptionsOf, TakesWhatChoosesAndAccepts) {
   EXPECT_FALSE(none.volume || none.nifti_form || none.accepts(NoteCode::kFrameOfReference));
 }
 
+TEST(ImportOptionsOf, TakesTheSpacingOfAFileThatHasNone) {
+  const auto options = import_options_of(with_query({{"spacing", "0.5,1,2"}}));
+  EXPECT_FALSE(options.raw);
+  EXPECT_EQ(options.spacing, (std::array<double, 3>{0.5, 1, 2}));
+  EXPECT_FALSE(import_options_of(with_query({})).spacing);
+}
+
 TEST(ImportOptionsOf, RefusesOtherValues) {
   for (const auto& pair : Pairs{{"member", ""},
                                 {"member", "a\nb"},
@@ -116,6 +123,9 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
                                 {"accept", "missing-slices"},
                                 {"accept", "forms-differ"},
                                 {"accept", "frame-of-reference,"},
+                                {"spacing", "1,1"},
+                                {"spacing", "1,1,0"},
+                                {"spacing", "1,1,nan"},
                                 {"nifti_form", "both"}}) {
     const auto error = thrown_by([&] { import_options_of(with_query({pair})); });
     ASSERT_TRUE(error) << pair.first << '=' << pair.second;

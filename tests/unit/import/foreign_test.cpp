@@ -105,6 +105,20 @@ TEST(ForeignNrrd, VolumesAreChosenAlongTheFirstAndTheLastAxis) {
             kSamples.substr(8, 8));
 }
 
+// Volumes take turns with each row, or with each plane.
+TEST(ForeignNrrd, VolumesAreChosenAlongAMiddleAxis) {
+  Lines lines = with(with(small_nrrd(), "dimension", "4"), "sizes", "2 3 2 2");
+  const auto second_of = [&](const std::string& kinds, const std::string& directions) {
+    const Lines all = with(with(lines, "kinds", kinds), "space directions", directions);
+    const std::string packed = nrrd(with(all, "encoding", "gzip"), gzip(kSamples));
+    const std::string found(import_bytes(packed, {}, {.volume = 1}).sample_bytes());
+    EXPECT_EQ(import_bytes(nrrd(all, kSamples), {}, {.volume = 1}).sample_bytes(), found);
+    return found;
+  };
+  EXPECT_EQ(second_of("space list space space", "(1,0,0) none (0,1,0) (0,0,1)"), "cdijopuv");
+  EXPECT_EQ(second_of("space space list space", "(1,0,0) (0,1,0) none (0,0,1)"), "ghijklstuvwx");
+}
+
 TEST(ForeignNrrd, ANiftiFileServesAsDataWithOrWithoutItsHeaderSkipped) {
   Lines lines = with(small_nrrd(), "encoding", "gzip");
   lines.emplace_back("data file", "h.nii.gz");

@@ -105,9 +105,21 @@ TEST(Nifti, TurnsRasIntoLpsByQform) {
 }
 
 TEST(Nifti, LiesAlongLpsWithoutForms) {
-  const Geometry geometry =
-      import_nifti({.pixdim = {1, 2, 3, 4, 0, 0, 0, 0}, .sform_code = 0}).volume.geometry;
-  EXPECT_EQ(geometry, (Geometry{.spacing = {2, 3, 4}}));
+  const Outcome outcome = import_nifti({.pixdim = {1, 2, 3, 4, 0, 0, 0, 0}, .sform_code = 0});
+  EXPECT_EQ(outcome.volume.geometry, (Geometry{.spacing = {2, 3, 4}}));
+  EXPECT_THAT(codes_of(outcome), testing::ElementsAre("space-assumed"));
+}
+
+TEST(Nifti, ValuesOfSurfacesAndMatricesAreNoVolumes) {
+  const std::string row(2562, 'a');
+  for (const std::vector<std::int64_t>& dim : std::vector<std::vector<std::int64_t>>{
+           {3, 2562, 1, 1, 1, 1, 1, 1}, {3, 427, 1, 6, 1, 1, 1, 1}}) {
+    EXPECT_THAT(import_bytes(nifti({.dim = dim}, row)).error,
+                HasSubstr("2562 values in rows of one sample"));
+  }
+  std::string cifti = nifti({.version = 2}, kSmallSamples);
+  cifti.replace(504, 4, bytes_of(std::vector<std::int32_t>{3001}));
+  EXPECT_THAT(import_bytes(cifti).error, HasSubstr("CIFTI-2"));
 }
 
 TEST(Nifti, TakesTheSformWhateverItsCodeAndTellsHowFarTheQformIs) {

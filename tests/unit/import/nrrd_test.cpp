@@ -104,6 +104,11 @@ TEST(Nrrd, TurnsItsSpaceIntoLps) {
 
 TEST(Nrrd, RefusesSpacesThatItCannotPlace) {
   EXPECT_THAT(import_with("space", "3D-left-handed").error, HasSubstr("left-handed"));
+  EXPECT_EQ(import_with("space", "3D-left-handed").remedy.overridable, "space-assumed");
+  const std::string left = nrrd(with(small_nrrd(), "space", "3D-left-handed"), kSmallSamples);
+  const Outcome accepted = import_bytes(left, {}, {.accept = {"space-assumed"}});
+  EXPECT_EQ(accepted.sample_bytes(), kSmallSamples);
+  EXPECT_THAT(codes_of(accepted), testing::ElementsAre("space-assumed"));
   EXPECT_THAT(import_with("space", "RAST").error, HasSubstr("rast"));
   EXPECT_THAT(import_with("space", "outer").error, HasSubstr("outer"));
 }

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/volume_formats.h"
 #include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/objects.h"
 #include "tests/unit/import/writers.h"
@@ -73,7 +74,6 @@ TEST(Readers, EachHasANameOfItsOwnAndReads) {
   std::set<std::string_view> names;
   for (const Reader& reader : readers()) {
     EXPECT_TRUE(names.insert(reader.name).second) << reader.name;
-    EXPECT_FALSE(reader.title.empty()) << reader.name;
     EXPECT_NE(reader.parse, nullptr) << reader.name;
     EXPECT_EQ(reader.sniff == nullptr, reader.name == "raw") << reader.name;
   }
@@ -87,10 +87,28 @@ TEST(Readers, AreNamedWhereNoneReadsAFile) {
       outcome.error,
       testing::EndsWith(
           ", or a ZIP or TAR of one. If it holds raw samples, give their dims (X,Y,Z) and type."));
-  for (const Reader& reader : readers()) {
-    if (reader.sniff == nullptr) continue;
-    EXPECT_THAT(outcome.error, testing::HasSubstr(std::string(reader.title)));
+  for (const VolumeFormat& format : volume_formats()) {
+    if (format.name == "raw") continue;
+    EXPECT_THAT(outcome.error, testing::HasSubstr(std::string(format.title)));
   }
+}
+
+TEST(Readers, AreThoseOfTheTableOfFormats) {
+  std::set<std::string_view> names;
+  for (const Reader& reader : readers()) names.insert(reader.name);
+  names.erase("archive");
+  for (const VolumeFormat& format : volume_formats()) {
+    EXPECT_EQ(names.erase(format.name), 1) << format.name;
+    EXPECT_FALSE(format.title.empty() || format.suffixes.empty() || format.content.empty())
+        << format.name;
+  }
+  EXPECT_THAT(names, testing::IsEmpty());
+}
+
+TEST(Readers, NameFilesOfOtherPrograms) {
+  EXPECT_THAT(import_bytes("ZISRAWFILE and more").error,
+              testing::StartsWith("This is a CZI file of Zeiss, which cannot be read."));
+  EXPECT_THAT(import_bytes("\xff\xd8\xff and more").error, testing::HasSubstr("a JPEG image"));
 }
 
 }  // namespace

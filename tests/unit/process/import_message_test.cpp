@@ -18,6 +18,7 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
   order.task.options.volume = 3;
   order.task.options.accept = {"frame-of-reference"};
   order.task.options.nifti_form = NiftiForm::kQform;
+  order.task.options.spacing = {0.5, 1, 2};
   order.bounds = {.memory_bytes = 8, .time = seconds(9)};
   order.task.options.raw = RawDescription{.dims = {1, 2, 4294967295},
                                           .type = SampleType::kFloat64,
@@ -41,6 +42,7 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
   EXPECT_EQ(read.task.options.volume, 3U);
   EXPECT_TRUE(read.task.options.accepts(NoteCode::kFrameOfReference));
   EXPECT_EQ(read.task.options.nifti_form, NiftiForm::kQform);
+  EXPECT_EQ(read.task.options.spacing, (std::array<double, 3>{0.5, 1, 2}));
   EXPECT_EQ(read.bounds.memory_bytes, 8U);
   EXPECT_EQ(read.bounds.time, seconds(9));
   ASSERT_TRUE(read.task.options.raw);

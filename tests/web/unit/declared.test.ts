@@ -57,6 +57,12 @@ describe('what is surely no volume', () => {
     expect(await told(['a.mhd', blob(`${metaHeader}ElementDataFile = a.raw\n`)])).toMatch(/Choose both/);
   });
 
+  it('is no file of a format that is known by its name alone', async () => {
+    expect(await told(['a.mgz', junk])).toBe('');
+    expect(await told(['lh.HEAD', junk], ['lh.BRIK', junk])).toBe('');
+    expect(await told(['a.txt', junk])).toMatch(/match no supported format/);
+  });
+
   it('are several files of which none is known', async () => {
     expect(await told(['a.txt', junk], ['b.txt', junk])).toMatch(/all 2 files/);
     expect(await told(['a.raw', junk], ['a.mhd', blob(`${metaHeader}ElementDataFile = a.raw\n`)])).toBe('');

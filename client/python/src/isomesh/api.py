@@ -39,7 +39,7 @@ class Volume(TypedDict):
     #: not part of the id, of any mesh or of any log. Null if nothing gave a name.
     name: Optional[str]
     #: The format of the first upload.
-    format: Literal['raw', 'nifti', 'nrrd', 'metaimage', 'vti', 'dicom']
+    format: VolumeFormat
     #: The number of samples along x, y and z.
     dims: Sequence[int]
     #: The type of one sample.
@@ -98,10 +98,13 @@ class Note(TypedDict):
     detail: str
 
 
-NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'fractional-segments']
+VolumeFormat = Literal['nifti', 'nrrd', 'metaimage', 'vti', 'vtk', 'mgh', 'afni', 'par', 'isq', 'mrc', 'cube', 'numpy', 'hdf5', 'tiff', 'png', 'bmp', 'dicom', 'raw']
 
 
-AcceptableNote = Literal['frame-of-reference']
+NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'unit-angstrom', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'fractional-segments']
+
+
+AcceptableNote = Literal['space-assumed', 'frame-of-reference']
 
 
 class Preset(TypedDict):
@@ -892,7 +895,7 @@ class ProblemErrors(TypedDict):
 
 class ProblemChoices(TypedDict):
     #: The query parameter to add.
-    parameter: Literal['series', 'member', 'volume']
+    parameter: Literal['series', 'member', 'volume', 'spacing']
     value: str
     #: A description of the value, for people.
     title: str

@@ -157,7 +157,8 @@ class Client:
                   with the axes x, y and z; a nibabel image, or any object with `dataobj` and `affine`
         affine    for an array: the 4 x 4 matrix that maps its indices to millimetres
         affine_space  the space of `affine`: "ras" (nibabel, NIfTI) or "lps" (DICOM, ITK)
-        spacing   for an array, instead of `affine`: millimetres between samples along each axis
+        spacing   for an array, instead of `affine`, and for a file that gives none: millimetres between
+                  samples along each axis
         raw       for a path or bytes: describes them as raw samples
         name      the volume's name. Default: the name of the file or of its series
 

@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 _PIECE = 1 << 20
 _MOST_FILES = 20000  # as many as the server unpacks
 _LONGEST_HEADER = 1 << 20
+# A header and its samples; the others are the samples' other names.
+_PAIRS = (
+    (".hdr", ".img", ".img.gz"),
+    (".HEAD", ".BRIK", ".BRIK.gz", ".BRIK.bz2"),
+    (".PAR", ".REC"),
+    (".par", ".rec"),
+)
 
 
 @dataclass
@@ -63,9 +70,10 @@ def _files_of(path: Path) -> List[Tuple[str, Path]]:
         return _header_and_data(path, "=", "elementdatafile")
     if suffix == ".nhdr":
         return _header_and_data(path, ":", "datafile")
-    if suffix in (".hdr", ".img"):
-        pair = [path.with_suffix(each) for each in (".hdr", ".img", ".img.gz")]
-        return [(file.name, file) for file in pair if file.is_file()]
+    for suffixes in _PAIRS:
+        if path.suffix in suffixes[:2]:
+            pair = [path.with_suffix(each) for each in suffixes]
+            return [(file.name, file) for file in pair if file.is_file()]
     return [(path.name, path)]
 
 
@@ -223,10 +231,12 @@ def of_source(
         body = of_array(source, affine, space, spacing)
     if is_array and raw is not None:
         raise ValueError("raw is for files and bytes; an array needs no description")
-    if not is_array and (affine is not None or spacing is not None):
-        raise ValueError("affine and spacing are for arrays; a file has its own geometry")
+    if not is_array and affine is not None:
+        raise ValueError("affine is for arrays; a file has its own geometry")
     if raw is not None:
         body.query = raw.query()
+    if not is_array and spacing is not None:
+        body.query = {**body.query, "spacing": ",".join(repr(float(each)) for each in spacing)}
     return body
 
 

@@ -85,7 +85,7 @@ export function adviceFor(error: ApiError): string {
     case 413:
       return 'Crop or resample the volume, or ask the administrator to raise the limit.';
     case 415:
-      return 'The server reads NIfTI, NRRD, MetaImage, VTK images and DICOM. Raw samples need a description.';
+      return 'Send the volume in a format that the server reads. Raw samples need a description.';
     case 422:
       return 'Export the volume again from its source, or choose another one.';
     case 429:

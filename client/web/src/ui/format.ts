@@ -1,4 +1,5 @@
 // Numbers and times for people.
+import { volumeFormats } from '../../generated/parameters';
 
 const plain = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
@@ -81,13 +82,11 @@ export const formatNames: Record<string, string> = {
   vtp: 'VTP',
   gii: 'GIFTI',
   zip: 'ZIP of labels',
-  nifti: 'NIfTI',
-  nrrd: 'NRRD',
-  metaimage: 'MetaImage',
-  raw: 'Raw samples',
-  vti: 'VTK',
-  dicom: 'DICOM',
 };
+
+export function volumeFormatTitle(name: string): string {
+  return volumeFormats.find((format) => format.name === name)?.title ?? name;
+}
 
 // Three digits that count, so that neighbours in a table are as long.
 export function millimetres(value: number): string {

@@ -1,6 +1,6 @@
 // Names and notes of volumes for users.
 import type { Volume } from '../api/types';
-import { formatDims, formatNames } from '../ui/format';
+import { formatDims, volumeFormatTitle } from '../ui/format';
 
 // A date of DICOM, 20240501, for people.
 function dateOf(text: string | undefined): string {
@@ -27,7 +27,7 @@ export function fileStem(volume: Volume | null, otherwise: string): string {
 }
 
 export function volumeKind(volume: Volume): string {
-  const kind = volume.modality ?? formatNames[volume.format] ?? volume.format;
+  const kind = volume.modality ?? volumeFormatTitle(volume.format);
   return `${kind}, ${formatDims(volume.dims)}`;
 }
 

@@ -1,6 +1,7 @@
 // Checks the first bytes of a file before gigabytes are sent in vain. It only finds files that are certainly
 // not volumes; the daemon decides about all others.
 
+import { volumeFormats } from '../../generated/parameters';
 import { ApiError } from '../api/problem';
 import { formatBytes, formatDims } from '../ui/format';
 import { declaredBy } from './declared';
@@ -74,7 +75,20 @@ function isKnown(head: Uint8Array): boolean {
   return [isNifti, isDicom, isText, isArchive, isPackedOtherwise].some((test) => test(head));
 }
 
-export async function mayBeVolume(file: Blob): Promise<boolean> {
+// Formats whose first bytes are tested above, and raw samples, which need a description.
+const sniffed = ['nifti', 'nrrd', 'metaimage', 'vti', 'dicom', 'raw'];
+const suffixes = volumeFormats
+  .filter(({ name }) => !sniffed.includes(name))
+  .flatMap((format) => format.suffixes.map((suffix) => suffix.toLowerCase()));
+
+// The other formats are only known by the ends of their names.
+function isNamedAsVolume(path: string): boolean {
+  const name = path.toLowerCase().replace(/\.gz$/, '');
+  return suffixes.some((suffix) => name.endsWith(suffix.replace(/\.gz$/, '')));
+}
+
+export async function mayBeVolume(file: Blob, path = ''): Promise<boolean> {
+  if (isNamedAsVolume(path)) return true;
   const head = await bytesOf(file, headBytes);
   return isKnown(startsWith(head, 0x1f, 0x8b) ? await unpacked(file) : head);
 }
@@ -86,7 +100,7 @@ function unsent(status: 415 | 422, detail: string): ApiError {
 
 // The reason why the file is certainly not a volume; null if it may be one.
 async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
-  if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} match no supported format.`);
+  if (!(await mayBeVolume(file, path))) return unsent(415, `The first bytes of ${path} match no supported format.`);
   const head = await bytesOf(file, textBytes);
   const declared = declaredBy(head);
   if (!declared) return null;
@@ -105,6 +119,6 @@ async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
 export async function faultOf(files: readonly NamedFile[]): Promise<ApiError | null> {
   const [only] = files;
   if (only && files.length === 1) return faultOfOne(only);
-  for (const { file } of files) if (await mayBeVolume(file)) return null;
+  for (const { path, file } of files) if (await mayBeVolume(file, path)) return null;
   return unsent(415, `The first bytes of all ${files.length} files match no supported format.`);
 }

@@ -2,7 +2,7 @@
 import { client } from '../../client';
 import type { Volume } from '../../api/types';
 import { button, h } from '../../ui/dom';
-import { formatDims, formatNames, formatSpacing, formatValue } from '../../ui/format';
+import { formatDims, volumeFormatTitle, formatSpacing, formatValue } from '../../ui/format';
 import { askText, tellError } from '../../ui/notices';
 import { skippedText } from '../../volume/skipped';
 import { noteTexts, volumeName } from '../../volume/names';
@@ -50,7 +50,7 @@ function nameHeading(volume: Volume, onRenamed: () => void): HTMLElement {
 
 function factsOf(volume: Volume): string {
   return [
-    formatNames[volume.format] ?? volume.format,
+    volumeFormatTitle(volume.format),
     volume.modality,
     `${formatDims(volume.dims)}, ${volume.type}`,
     formatSpacing(volume.spacing),

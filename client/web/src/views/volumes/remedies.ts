@@ -19,7 +19,7 @@ export function acceptButton(
   return button('Accept it anyway', () => onChoices({ ...before, accept }));
 }
 
-const nouns = { series: 'series', member: 'file', volume: 'volume' } as const;
+const nouns = { series: 'series', member: 'file', volume: 'volume', spacing: 'distance between samples' } as const;
 
 // The question that a rejected upload leaves open. '' if there is none, or if it was answered: then what the server says about
 // the answer is to be seen.
@@ -64,7 +64,19 @@ function choiceList(
       () => undefined,
     );
   }
-  return h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element));
+  const own = parameter === 'spacing' && h('li', {}, spacingForm(onChoice));
+  return h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
+}
+
+// Other distances than those that the server offers.
+function spacingForm(onChoice: (value: string) => void): HTMLElement {
+  const input = h('input', { type: 'text', placeholder: '0.5,0.5,1', 'aria-label': 'Millimetres along x, y and z' });
+  const form = h('form', { class: 'choice' }, input, h('button', { type: 'submit' }, 'Use these millimetres along x, y and z'));
+  form.addEventListener('submit', (event) => {
+    event.preventDefault();
+    if (input.value.trim() !== '') onChoice(input.value.trim());
+  });
+  return form;
 }
 
 // A list for each parameter that the rejection leaves to be chosen.

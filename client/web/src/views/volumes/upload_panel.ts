@@ -1,4 +1,5 @@
 // The panel that takes dropped volumes: one file, a folder of slices, or several files.
+import { volumeFormats } from '../../../generated/parameters';
 import { client } from '../../client';
 import { ApiError, asApiError, mayPass } from '../../api/problem';
 import type { RawDescription, UploadedVolume } from '../../api/types';
@@ -203,7 +204,7 @@ export class UploadPanel {
     this.body.replaceChildren(
       icon(arrow),
       h('h2', {}, 'Drop a volume here'),
-      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, raw samples, or a ZIP or TAR archive of these'),
+      h('p', {}, `${volumeFormats.map(({ title }) => title).join(', ')}: a file, a folder, or a ZIP or TAR archive`),
       h(
         'div',
         { class: 'actions' },

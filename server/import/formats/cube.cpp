@@ -1,0 +1,170 @@
+#include "server/import/formats/cube.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/text.h"
+#include "server/import/formats/placing.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kMostHeaderBytes = kBeginningBytes;
+constexpr double kAngstromPerBohr = 0.529177210903;  // CODATA 2018
+constexpr std::int64_t kMostAtoms = 1'000'000;
+constexpr std::uint64_t kMostValues = 10'000;
+
+// Takes lines from the front of a text.
+class LineReader {
+ public:
+  explicit LineReader(std::string_view text) : text_(text) {}
+
+  // Empty if the text ends before the line does.
+  std::optional<std::string_view> next() {
+    const std::size_t end = text_.find('\n', at_);
+    if (end == std::string_view::npos) return std::nullopt;
+    const std::string_view line = text_.substr(at_, end - at_);
+    at_ = end + 1;
+    return line;
+  }
+
+  std::size_t offset() const { return at_; }
+
+ private:
+  std::string_view text_;
+  std::size_t at_ = 0;
+};
+
+// A count and a vector, and for the atoms maybe the number of values at a point.
+struct CountLine {
+  std::int64_t count = 0;
+  Vector3 vector = {};
+  std::uint64_t values = 1;
+};
+
+std::optional<CountLine> count_line(std::optional<std::string_view> line, bool may_have_values) {
+  if (!line) return std::nullopt;
+  const auto parts = words(*line);
+  if (parts.size() < 4 || parts.size() > (may_have_values ? 5 : 4)) return std::nullopt;
+  CountLine result;
+  const auto count = parse_int64(parts[0]);
+  if (!count) return std::nullopt;
+  result.count = *count;
+  for (std::size_t at = 0; at < 3; ++at) {
+    const auto number = parse_double(parts[at + 1]);
+    if (!number || !std::isfinite(*number)) return std::nullopt;
+    result.vector[at] = *number;
+  }
+  if (parts.size() == 5) {
+    const auto values = parse_uint64(parts[4]);
+    if (!values || *values < 1 || *values > kMostValues) return std::nullopt;
+    result.values = *values;
+  }
+  return result;
+}
+
+struct Header {
+  CountLine atoms;  // the vector is the origin
+  std::array<CountLine, 3> axes;
+};
+
+std::optional<Header> read_header(LineReader& lines) {
+  lines.next();
+  lines.next();
+  const auto atoms = count_line(lines.next(), true);
+  if (!atoms || std::abs(atoms->count) > kMostAtoms) return std::nullopt;
+  Header header{*atoms, {}};
+  for (CountLine& axis : header.axes) {
+    const auto line = count_line(lines.next(), false);
+    if (!line || line->count == 0) return std::nullopt;
+    axis = *line;
+  }
+  return header;
+}
+
+// The numbers of the orbitals, which follow the atoms if their count is negative: how many there
+// are, and then each, on one or more lines.
+std::uint64_t read_orbitals(LineReader& lines) {
+  std::optional<std::uint64_t> count;
+  for (std::uint64_t found = 0; !count || found < *count;) {
+    const auto line = lines.next();
+    if (!line) throw_unusable("The cube file ends within its list of orbitals.");
+    auto parts = words(*line);
+    if (!count) {
+      count = parts.empty() ? std::nullopt : parse_uint64(parts.front());
+      if (!count || *count < 1 || *count > kMostValues) {
+        throw_unusable("The cube file's number of orbitals is not plausible.");
+      }
+      parts.erase(parts.begin());
+    }
+    if (parts.empty() && found < *count) {
+      throw_unusable("The cube file's list of orbitals is damaged.");
+    }
+    found += parts.size();
+  }
+  return *count;
+}
+
+std::uint64_t skip_atoms(LineReader& lines, const CountLine& atoms) {
+  for (std::int64_t atom = 0; atom < std::abs(atoms.count); ++atom) {
+    if (!lines.next()) {
+      throw_unusable("The cube file ends within its list of atoms, or the list is longer than " +
+                     std::to_string(kMostHeaderBytes) + " bytes.");
+    }
+  }
+  return atoms.count < 0 ? read_orbitals(lines) : atoms.values;
+}
+
+// A positive number of samples means that lengths are in bohr.
+Geometry geometry_of_header(const Header& header) {
+  const bool is_bohr = header.axes[0].count > 0;
+  const double unit = is_bohr ? kAngstromPerBohr : 1;
+  const auto scaled = [&](Vector3 vector) {
+    for (double& part : vector) part *= unit;
+    return vector;
+  };
+  return geometry_of(scaled(header.atoms.vector),
+                     {scaled(header.axes[0].vector), scaled(header.axes[1].vector),
+                      scaled(header.axes[2].vector)});
+}
+
+}  // namespace
+
+bool is_cube(std::string_view head) {
+  LineReader lines(head);
+  return read_header(lines).has_value();
+}
+
+SourceVolume parse_cube(const InputFile& file, const Companions& /*companions*/,
+                        const ImportOptions& options) {
+  const std::string text = file.text(0, kMostHeaderBytes);
+  LineReader lines(text);
+  const auto header = read_header(lines);
+  if (!header) throw_unusable("The header of the cube file is damaged.");
+  SourceVolume volume;
+  std::array<std::uint64_t, 3> sizes = {};
+  std::ranges::transform(header->axes, sizes.begin(), [](const CountLine& axis) {
+    return static_cast<std::uint64_t>(std::abs(axis.count));
+  });
+  volume.dims = volume_dims(sizes);
+  volume.stored_axes = {2, 1, 0};
+  volume.layout.type = StoredType::kFloat32;
+  volume.encoding = Encoding::kText;
+  const std::uint64_t values = skip_atoms(lines, header->atoms);
+  choose_volume(values,
+                {.what = "their value at each point",
+                 .title = [](std::uint64_t index) { return "value " + std::to_string(index); }},
+                options, volume);
+  if (values > 1) volume.chosen.run = 1;
+  volume.payload = {lines.offset(), file.size() - lines.offset()};
+  volume.geometry = geometry_of_header(*header);
+  volume.notes.push_back(angstrom_note("the cube file"));
+  return volume;
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,323 @@
+#include "server/import/formats/par.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <tuple>
+
+#include "base/text.h"
+#include "server/import/formats/placing.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kMostHeaderBytes = std::size_t{8} << 20;
+
+using General = std::map<std::string, std::string, std::less<>>;
+using Row = std::vector<double>;
+
+struct Header {
+  General general;
+  std::vector<Row> rows;  // one for each image
+};
+
+// Columns of a row in all versions that are read.
+enum Column : std::size_t {
+  kSlice,
+  kEcho,
+  kInstant,
+  kPhase,
+  kType,
+  kSequence,
+  kPlace,
+  kBits,
+  kWidth = 9,
+  kHeight,
+  kIntercept,
+  kSlope,
+  kThickness = 22,
+  kGap,
+  kOrientation = 25,
+  kSpacing = 28,
+  kColumnsOfV4 = 41,
+  kDiffusion = 41,
+  kGradient = 42,
+  kLabelType = 48,
+};
+
+// The images of a volume share these.
+using Key = std::array<double, 8>;
+constexpr std::array<std::size_t, 8> kKeyColumns = {kEcho,     kInstant,   kPhase,    kType,
+                                                    kSequence, kDiffusion, kGradient, kLabelType};
+constexpr std::array<const char*, 8> kKeyNames = {"echo",     "instant", "phase",    "type",
+                                                  "sequence", "b value", "gradient", "label type"};
+
+Key key_of(const Row& row) {
+  Key key = {};
+  for (std::size_t at = 0; at < key.size(); ++at) {
+    if (kKeyColumns[at] < row.size()) key[at] = row[kKeyColumns[at]];
+  }
+  return key;
+}
+
+Row row_of(std::string_view line) {
+  Row row;
+  for (const std::string_view word : words(line)) {
+    const auto number = parse_double(word);
+    if (!number || !std::isfinite(*number)) {
+      throw_unusable("The PAR header has a row of an image with " + in_quotes(word) +
+                     ", which is not a number.");
+    }
+    row.push_back(*number);
+  }
+  if (row.size() >= kColumnsOfV4) return row;
+  throw_unusable("The PAR header has a row of an image with " + std::to_string(row.size()) +
+                 " numbers. Versions 4, 4.1 and 4.2 are read, which have 41 or more.");
+}
+
+// ".    Max. number of slices/locations      :   9": what stands before and behind the colon.
+void add_general(std::string_view line, General& general) {
+  const std::size_t colon = line.find(':');
+  if (colon == std::string_view::npos) return;
+  general.emplace(lower(trimmed(line.substr(1, colon - 1))), trimmed(line.substr(colon + 1)));
+}
+
+Header read_header(std::string_view text) {
+  Header header;
+  for (const std::string_view line : lines(text)) {
+    if (line.front() == '#') continue;
+    if (line.front() == '.') {
+      add_general(line, header.general);
+    } else {
+      header.rows.push_back(row_of(line));
+    }
+  }
+  if (header.rows.empty()) throw_unusable("The PAR header describes no image.");
+  return header;
+}
+
+// Angles or offsets: back to front, feet to head, right to left.
+Vector3 general_vector(const Header& header, std::string_view beginning) {
+  for (const auto& [name, value] : header.general) {
+    if (!name.starts_with(beginning)) continue;
+    const auto parts = words(value);
+    Vector3 vector = {};
+    for (std::size_t at = 0; at < 3; ++at) {
+      const auto number = parts.size() == 3 ? parse_double(parts[at]) : std::nullopt;
+      if (!number || !std::isfinite(*number)) break;
+      vector[at] = *number;
+      if (at == 2) return vector;
+    }
+  }
+  throw_unusable("The PAR header has no three numbers for " + in_quotes(beginning) + ".");
+}
+
+std::uint64_t whole(double number, const char* what) {
+  constexpr double kMost = 1e9;
+  if (number >= 0 && number <= kMost && number == std::floor(number)) {
+    return static_cast<std::uint64_t>(number);
+  }
+  throw_unusable(std::string("The PAR header's ") + what + " is not plausible.");
+}
+
+// --- Geometry ------------------------------------------------------------------------------------
+
+using Matrix = std::array<Vector3, 3>;  // rows
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix result = {};
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column) {
+      for (std::size_t at = 0; at < 3; ++at) result[row][column] += a[row][at] * b[at][column];
+    }
+  }
+  return result;
+}
+
+// Philips' axes run to the back, to the head and to the left. The order of the three rotations was
+// found by nibabel's authors from converted images.
+Matrix rotation_of(const Vector3& degrees) {
+  std::array<double, 3> sine = {};
+  std::array<double, 3> cosine = {};
+  for (std::size_t at = 0; at < 3; ++at) {
+    sine[at] = std::sin(degrees[at] * std::numbers::pi / 180);
+    cosine[at] = std::cos(degrees[at] * std::numbers::pi / 180);
+  }
+  const Matrix x = {Vector3{1, 0, 0}, {0, cosine[0], -sine[0]}, {0, sine[0], cosine[0]}};
+  const Matrix y = {Vector3{cosine[1], 0, sine[1]}, {0, 1, 0}, {-sine[1], 0, cosine[1]}};
+  const Matrix z = {Vector3{cosine[2], -sine[2], 0}, {sine[2], cosine[2], 0}, {0, 0, 1}};
+  return product(z, product(x, y));
+}
+
+// Columns, rows and slices in Philips' axes, by the orientation of the slices.
+Matrix axes_of(double orientation) {
+  if (orientation == 1) return {Vector3{0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
+  if (orientation == 2) return {Vector3{1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+  if (orientation == 3) return {Vector3{0, 0, 1}, {0, -1, 0}, {1, 0, 0}};
+  throw_unusable("The PAR header's slice orientation " + to_text(orientation) + " is unknown.");
+}
+
+Geometry geometry_of_header(const Header& header, const SourceVolume& volume) {
+  const Row& row = header.rows.front();
+  const Vector3 spacing = {row[kSpacing], row[kSpacing + 1], row[kThickness] + row[kGap]};
+  const Matrix axes = product(rotation_of(general_vector(header, "angulation midslice")),
+                              axes_of(row[kOrientation]));
+  const Vector3 centre = general_vector(header, "off centre midslice");
+  // From Philips' axes to RAS: the left is their third, the back their first.
+  const auto ras = [](const Vector3& v) { return Vector3{-v[2], -v[0], v[1]}; };
+  Vector3 origin = centre;
+  std::array<Vector3, 3> steps = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t part = 0; part < 3; ++part) {
+      steps[axis][part] = axes[part][axis] * spacing[axis];
+      origin[part] -= steps[axis][part] * (volume.dims[axis] - 1.0) / 2;
+    }
+    steps[axis] = ras(steps[axis]);
+  }
+  return geometry_of_ras(ras(origin), steps);
+}
+
+// --- Images --------------------------------------------------------------------------------------
+
+// The columns that all images must share.
+void check_rows(const Header& header) {
+  const Row& first = header.rows.front();
+  for (const std::size_t column :
+       {kBits, kWidth, kHeight, kThickness, kGap, kOrientation, kSpacing}) {
+    const auto differs = [&](const Row& row) { return row[column] != first[column]; };
+    if (std::ranges::any_of(header.rows, differs)) {
+      throw_unusable(
+          "The images of the PAR header differ in size, spacing or orientation, so they are not "
+          "one volume.");
+    }
+  }
+}
+
+using Volumes = std::map<Key, std::vector<const Row*>>;
+
+std::string title_of(const Volumes& volumes, std::uint64_t index) {
+  const auto at = [&](std::uint64_t place) {
+    return std::next(volumes.begin(), static_cast<std::ptrdiff_t>(place))->first;
+  };
+  const Key key = at(index);
+  std::string title;
+  for (std::size_t part = 0; part < key.size(); ++part) {
+    const auto is_same = [&](const auto& volume) { return volume.first[part] == key[part]; };
+    if (std::ranges::all_of(volumes, is_same)) continue;
+    title += (title.empty() ? "" : ", ") + std::string(kKeyNames[part]) + ' ' + to_text(key[part]);
+  }
+  return title;
+}
+
+Volumes volumes_of(const Header& header) {
+  Volumes volumes;
+  for (const Row& row : header.rows) volumes[key_of(row)].push_back(&row);
+  for (auto& [key, rows] : volumes) {
+    std::ranges::sort(rows, {}, [](const Row* row) { return (*row)[kSlice]; });
+  }
+  return volumes;
+}
+
+void check_slices(const std::vector<const Row*>& rows) {
+  for (std::size_t at = 0; at < rows.size(); ++at) {
+    const double found = (*rows[at])[kSlice];
+    const double expected = static_cast<double>(at) + 1;
+    if (found == expected) continue;
+    throw_unusable("Slice " + to_text(std::min(found, expected)) + " of " +
+                   std::to_string(rows.size()) + " in the PAR header is " +
+                   (found > expected ? "missing." : "there twice."));
+  }
+}
+
+struct Described {
+  SourceVolume volume;
+  std::vector<std::uint64_t> places;  // of its slices in the REC, in images
+};
+
+Described describe(const Header& header, const ImportOptions& options) {
+  check_rows(header);
+  const Volumes volumes = volumes_of(header);
+  Described result;
+  SourceVolume& volume = result.volume;
+  choose_volume(volumes.size(),
+                {.what = "echo, instant, phase, type or diffusion",
+                 .title = [&](std::uint64_t index) { return title_of(volumes, index); }},
+                options, volume);
+  const auto& rows =
+      std::next(volumes.begin(), static_cast<std::ptrdiff_t>(volume.chosen.index))->second;
+  volume.chosen = {};
+  check_slices(rows);
+  const Row& first = *rows.front();
+  const std::array<std::uint64_t, 3> sizes = {whole(first[kWidth], "width of an image"),
+                                              whole(first[kHeight], "height of an image"),
+                                              rows.size()};
+  volume.dims = volume_dims(sizes);
+  if (first[kBits] != 8 && first[kBits] != 16) {
+    throw_unusable("The images of the PAR header have " + to_text(first[kBits]) +
+                   " bits. 8 and 16 are supported.");
+  }
+  volume.layout.type = first[kBits] == 8 ? StoredType::kUint8 : StoredType::kUint16;
+  const Rescale rescale = {first[kSlope], first[kIntercept]};
+  for (const Row* row : rows) {
+    if ((*row)[kSlope] != rescale.slope || (*row)[kIntercept] != rescale.intercept) {
+      throw_unusable("The slices of the PAR header have different slopes and intercepts.");
+    }
+    result.places.push_back(whole((*row)[kPlace], "index of an image"));
+  }
+  if (rescale.slope != 1 || rescale.intercept != 0) volume.layout.rescale = rescale;
+  volume.geometry = geometry_of_header(header, volume);
+  return result;
+}
+
+std::string rec_name(const Companions& companions) {
+  const std::string& own = companions.name;
+  const std::string stem = own.substr(0, own.rfind('.'));
+  for (const char* suffix : {".REC", ".rec", ".Rec"}) {
+    if (companions.files.contains(stem + suffix)) return stem + suffix;
+  }
+  throw_unusable(
+      "The samples of the PAR header are in a .REC file, which is missing. Send both files in one "
+      "ZIP or TAR.");
+}
+
+}  // namespace
+
+bool is_par(std::string_view head) {
+  const std::size_t version = head.find("CLINICAL TRYOUT");
+  return head.starts_with('#') && version != std::string_view::npos &&
+         head.find("Research image export tool", version) != std::string_view::npos;
+}
+
+SourceVolume parse_par(const InputFile& file, const Companions& companions,
+                       const ImportOptions& options) {
+  const std::filesystem::path& path = companion(rec_name(companions), companions);
+  auto [volume, places] = describe(read_header(file.text(0, kMostHeaderBytes)), options);
+  const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
+  const std::uint64_t size = InputFile(path).size();
+  for (const std::uint64_t place : places) {
+    if (size < slice || place > (size - slice) / slice) {
+      throw_unusable("The REC file is truncated: image " + std::to_string(place) + " is missing.");
+    }
+    volume.data_files.push_back({path, {place * slice, slice}});
+  }
+  return volume;
+}
+
+std::vector<std::string> par_data_names(const InputFile& /*file*/, const Companions& companions) {
+  return {rec_name(companions)};
+}
+
+MostBytes most_par_bytes(const InputFile& beginning, const ImportTask& task) {
+  const Header header = read_header(beginning.text(0, kMostHeaderBytes));
+  const auto [volume, places] = describe(header, task.options);
+  check_limits(volume, task.limits);
+  const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
+  const std::uint64_t most = *std::ranges::max_element(places) + 1;
+  return {.file = kMostHeaderBytes + kHeadroomBytes, .data = most * slice + kHeadroomBytes};
+}
+
+}  // namespace isomesh::import

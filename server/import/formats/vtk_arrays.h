@@ -1,0 +1,31 @@
+// The arrays in the data section of a legacy VTK file. Internal to the reader.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/files.h"
+#include "server/import/source/stored_samples.h"
+
+namespace isomesh::import {
+
+struct VtkArray {
+  std::string name;
+  std::string type;  // as in the file: "unsigned_char"
+  std::uint64_t components = 1;
+  std::uint64_t tuples = 0;
+  bool is_of_cells = false;
+  bool is_scalars = false;   // by the keyword SCALARS
+  std::uint64_t offset = 0;  // of its data in the file
+};
+
+// Empty for names of no real number.
+std::optional<StoredType> vtk_type(const std::string& name);
+
+// The arrays from `offset` on, in their order, up to the first scalars of points. Throws Error
+// kUnusableVolume if the file is damaged or has more than a thousand of them.
+std::vector<VtkArray> vtk_arrays(const InputFile& file, std::uint64_t offset, bool is_text);
+
+}  // namespace isomesh::import

@@ -1,0 +1,164 @@
+#include "server/import/images/stack.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+#include "base/files.h"
+#include "base/text.h"
+#include "proto/error.h"
+#include "server/import/formats/placing.h"
+#include "server/import/images/bmp.h"
+#include "server/import/images/natural_order.h"
+#include "server/import/images/png.h"
+#include "server/import/images/tiff.h"
+#include "server/import/samples/transfer.h"
+
+namespace isomesh::import {
+namespace {
+
+// The pages of a volume, which must all be of one layout, one behind the other in a file.
+class Pages {
+ public:
+  Pages(std::uint64_t count, const ImportTask& task)
+      : task_(task), count_(count), samples_(task.scratch, ".pages") {}
+
+  PageCheck check() {
+    return [this](const PageLayout& layout) { take(layout); };
+  }
+  PageSink sink() {
+    return [this](std::span<const std::byte> samples) { samples_.write(samples); };
+  }
+
+  // `source` has everything but dims and type.
+  Volume write(SourceVolume source) const {
+    source.dims = described_.dims;
+    source.layout = described_.layout;
+    source.chosen = {};
+    return write_canonical(InputFile(samples_.path()), source, task_);
+  }
+
+ private:
+  void take(const PageLayout& layout) {
+    if (layout_ && *layout_ != layout) {
+      throw_unusable("The pages differ: one has " + text_of(*layout_) + ", another has " +
+                     text_of(layout) + ".");
+    }
+    if (layout_) return;
+    layout_ = layout;
+    const std::array<std::uint64_t, 3> sizes = {layout.width, layout.height, count_};
+    described_.dims = volume_dims(sizes);
+    described_.layout.type = layout.type;
+    check_limits(described_, task_.limits);
+  }
+
+  static std::string text_of(const PageLayout& layout) {
+    return std::to_string(layout.width) + " x " + std::to_string(layout.height) + " samples of " +
+           std::to_string(bytes_per_sample(layout.type)) + " bytes";
+  }
+
+  const ImportTask& task_;
+  std::uint64_t count_;
+  std::optional<PageLayout> layout_;
+  SourceVolume described_;
+  ScratchFile samples_;
+};
+
+Difference difference_of(const TiffMeaning& meaning) {
+  const bool by_channel = meaning.channels > 1;
+  const bool by_time = meaning.times > 1;
+  return {.what = by_channel && by_time ? "channel and time"
+                  : by_channel          ? "channel"
+                                        : "time",
+          .title = [=](std::uint64_t index) {
+            const std::string channel = "channel " + std::to_string(index % meaning.channels);
+            const std::string time = "time " + std::to_string(index / meaning.channels);
+            if (!by_time) return channel;
+            return by_channel ? channel + ", " + time : time;
+          }};
+}
+
+[[noreturn]] void throw_single() {
+  throw_unusable(
+      "The file holds one page, and a volume needs several. Send all pages in one folder, ZIP or "
+      "TAR.");
+}
+
+Volume read_pages(TiffFile& tiff, const ImportTask& task) {
+  const TiffMeaning meaning = tiff.meaning();
+  if (meaning.slices == 1) throw_single();
+  SourceVolume source;
+  choose_volume(meaning.channels * meaning.times, difference_of(meaning), task.options, source);
+  Pages pages(meaning.slices, task);
+  for (std::uint64_t slice = 0; slice < meaning.slices; ++slice) {
+    tiff.read(meaning.page_of(source.chosen.index, slice), pages.check(), pages.sink());
+  }
+  source.has_spacing = meaning.spacing.has_value();
+  if (meaning.spacing) source.geometry.spacing = *meaning.spacing;
+  source.notes.push_back(lps_assumed("A TIFF image"));
+  return pages.write(std::move(source));
+}
+
+void read_page(const InputFile& file, Pages& pages) {
+  const std::string head = file.text(0, kSniffBytes);
+  if (is_png(head)) return read_png(file, pages.check(), pages.sink());
+  if (is_bmp(head)) return read_bmp(file, pages.check(), pages.sink());
+  TiffFile tiff(file);
+  tiff.read(0, pages.check(), pages.sink());
+}
+
+void check_gaps(const std::vector<ImageFile>& files) {
+  std::vector<std::string> names;
+  for (const ImageFile& file : files) names.push_back(file.name);
+  const std::string missing = missing_between(names);
+  if (missing.empty()) return;
+  throw_unusable("An image is missing between the others: " + printable(missing) + ".");
+}
+
+}  // namespace
+
+bool has_pages(const std::filesystem::path& path) {
+  const InputFile file(path);
+  if (!is_tiff(file.text(0, kSniffBytes))) return false;
+  try {
+    return TiffFile(file).pages() > 1;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    return false;  // reading it reports the damage
+  }
+}
+
+Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
+  if (files.size() == 1) {
+    const InputFile file(files.front().path);
+    if (!is_tiff(file.text(0, kSniffBytes))) throw_single();
+    TiffFile tiff(file);
+    return read_pages(tiff, task);
+  }
+  std::ranges::sort(files, comes_before, &ImageFile::name);
+  check_gaps(files);
+  SourceVolume source;
+  choose_volume(1, {}, task.options, source);
+  Pages pages(files.size(), task);
+  for (const ImageFile& file : files) {
+    try {
+      read_page(InputFile(file.path), pages);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kUnusableVolume) throw;
+      throw error.with_detail(in_quotes(file.name) + ": " + error.what());
+    }
+  }
+  source.has_spacing = false;
+  source.notes.push_back(lps_assumed("A stack of images"));
+  return pages.write(std::move(source));
+}
+
+Volume parse_image(const Input& input) { return import_images({{"", input.path}}, input.task); }
+
+MostBytes most_image_bytes(const InputFile& /*beginning*/, const ImportTask& task) {
+  return {.file = task.limits.max_sample_bytes + kHeadroomBytes};
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,42 @@
+// TIFF images of grey samples (https://www.itu.int/itudoc/itu-t/com16/tiff-fx/docs/tiff6.pdf), also
+// BigTIFF.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/files.h"
+#include "server/import/images/page.h"
+#include "server/import/images/tiff_meaning.h"
+
+namespace isomesh::import {
+
+bool is_tiff(std::string_view head);
+
+class TiffFile {
+ public:
+  // Throws Error kUnusableVolume if the file is damaged.
+  explicit TiffFile(const InputFile& file);
+  ~TiffFile();
+  TiffFile(const TiffFile&) = delete;
+  TiffFile& operator=(const TiffFile&) = delete;
+
+  // The number of pages, without reduced copies of others. Throws Error kUnusableVolume if there
+  // are more than a million.
+  std::uint64_t pages();
+
+  // The meaning of these pages.
+  TiffMeaning meaning();
+
+  // Reads a page. Fast for pages in ascending order. Throws Error kUnusableVolume, also for
+  // colours, palettes and lossy compression.
+  void read(std::uint64_t page, const PageCheck& check, const PageSink& sink);
+
+ private:
+  class Library;
+  std::unique_ptr<Library> library_;
+};
+
+}  // namespace isomesh::import

@@ -1,0 +1,39 @@
+// The meaning of a TIFF's pages, as OME-TIFF and ImageJ write it into the description of the first.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/notes.h"
+
+namespace isomesh::import {
+
+struct TiffMeaning {
+  std::string order = "XYZCT";  // of the pages, the fastest first, as in OME
+  std::uint64_t slices = 0;
+  std::uint64_t channels = 1;
+  std::uint64_t times = 1;
+  // Millimetres; empty unless all three are known.
+  std::optional<std::array<double, 3>> spacing = {};
+
+  std::uint64_t pages() const { return slices * channels * times; }
+  // The page of a slice in the volume of that index; channels count before times.
+  std::uint64_t page_of(std::uint64_t volume, std::uint64_t slice) const;
+};
+
+// Pixels in one unit of the description along x and y; 0 if unknown.
+struct TiffResolution {
+  double x = 0;
+  double y = 0;
+};
+
+// Without a description that is understood, all pages are slices. Throws Error kUnusableVolume if
+// the description contradicts the number of pages.
+TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
+                         std::uint64_t pages);
+
+}  // namespace isomesh::import

@@ -1,0 +1,179 @@
+// Stacks of TIFF, PNG and BMP.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/images/natural_order.h"
+#include "server/import/images/tiff_meaning.h"
+#include "tests/support/errors.h"
+#include "tests/unit/import/archives.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/other_writers.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using Vector = std::array<double, 3>;
+using Dims = std::array<std::uint32_t, 3>;
+
+const std::string kSamples(kSmallSamples);
+const std::string kFirst = kSamples.substr(0, 12);
+const std::string kSecond = kSamples.substr(12);
+const ImportOptions kSpaced = {.spacing = Vector{1, 2, 3}};
+
+TEST(NaturalOrder, ComparesNumbersByValue) {
+  EXPECT_TRUE(comes_before("a9.png", "a10.png"));
+  EXPECT_FALSE(comes_before("a10.png", "a9.png"));
+  EXPECT_TRUE(comes_before("a2b10", "a10b2"));
+  EXPECT_TRUE(comes_before("a01", "a1"));
+  EXPECT_FALSE(comes_before("a1", "a1"));
+  EXPECT_TRUE(comes_before("a", "a1"));
+  EXPECT_TRUE(comes_before("99999999999999999999998", "99999999999999999999999"));
+}
+
+TEST(NaturalOrder, NamesTheFirstNumberThatIsMissing) {
+  EXPECT_EQ(missing_between({"s08.tif", "s09.tif", "s11.tif"}), "s10.tif");
+  EXPECT_EQ(missing_between({"s0.tif", "s2.tif", "s4.tif"}), "");
+  EXPECT_EQ(missing_between({"s0.tif", "s2.tif", "s6.tif", "s8.tif"}), "s4.tif");
+  EXPECT_EQ(missing_between({"a.tif", "b.tif", "d.tif"}), "");
+  EXPECT_EQ(missing_between({"a1b2", "a1b3", "a1b5"}), "a1b4");
+  EXPECT_EQ(missing_between({"1", "3"}), "");
+}
+
+TEST(TiffMeaning, PagesAreOrderedAsOmeSays) {
+  const std::string ome =
+      "<OME xmlns='x'><Image><Pixels DimensionOrder=\"XYZCT\" SizeZ=\"3\" SizeC=\"2\" SizeT=\"1\" "
+      "PhysicalSizeX=\"0.5\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\" "
+      "PhysicalSizeZUnit=\"mm\"/></Image></OME>";
+  const TiffMeaning meaning = tiff_meaning(ome, {}, 6);
+  EXPECT_EQ(meaning.page_of(1, 2), 5);
+  EXPECT_EQ(meaning.spacing, (Vector{0.0005, 0.0005, 2}));
+  EXPECT_TRUE(isomesh::test::thrown_by([&] { tiff_meaning(ome, {}, 5); }));
+}
+
+TEST(TiffMeaning, ImageJCountsChannelsFirst) {
+  const TiffMeaning meaning = tiff_meaning(
+      "ImageJ=1.53\nimages=12\nchannels=2\nslices=3\nframes=2\nunit=\\u00B5m\nspacing=4\n", {2, 4},
+      12);
+  EXPECT_EQ(meaning.page_of(3, 2), 6 + 2 * 2 + 1);  // the second channel at the second time
+  EXPECT_EQ(meaning.spacing, (Vector{0.0005, 0.00025, 0.004}));
+  EXPECT_FALSE(tiff_meaning("ImageJ=1\nimages=3\nunit=pixel\nspacing=1\n", {1, 1}, 3).spacing);
+  EXPECT_EQ(tiff_meaning("a scan", {72, 72}, 3).slices, 3);
+}
+
+TEST(Tiff, PagesAreSlices) {
+  const std::string file = tiff({kFirst, kSecond});
+  EXPECT_THAT(import_bytes(file).error, HasSubstr("spacing=X,Y,Z"));
+  const Outcome outcome = import_bytes(file, {}, kSpaced);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.format, "tiff");
+  EXPECT_EQ(outcome.volume.dims, (Dims{4, 3, 2}));
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{1, 2, 3}));
+  EXPECT_EQ(outcome.sample_bytes(), kSamples);
+  EXPECT_THAT(codes_of(outcome), Contains("space-assumed"));
+  EXPECT_THAT(import_bytes(tiff({kFirst})).error, HasSubstr("one page"));
+}
+
+TEST(Tiff, TheDescriptionGivesSpacingAndVolumes) {
+  const Outcome spaced = import_bytes(
+      tiff({kFirst, kSecond},
+           "<OME><Image><Pixels DimensionOrder='XYCZT' SizeZ='2' SizeC='1' SizeT='1' "
+           "PhysicalSizeX='1' PhysicalSizeY='2' PhysicalSizeZ='3' PhysicalSizeXUnit='mm' "
+           "PhysicalSizeYUnit='mm' PhysicalSizeZUnit='mm'></Pixels></Image></OME>"));
+  ASSERT_EQ(spaced.error, "");
+  EXPECT_EQ(spaced.volume.geometry.spacing, (Vector{1, 2, 3}));
+  ImportOptions second = kSpaced;
+  second.volume = 1;
+  const std::string description = "ImageJ=1\nimages=4\nchannels=2\nslices=2\n";
+  const std::string file = tiff({kFirst, kSecond, kFirst, kFirst}, description);
+  EXPECT_EQ(import_bytes(file).remedy.choices.size(), 2);
+  EXPECT_EQ(import_bytes(file, {}, second).sample_bytes(), kSecond + kFirst);
+}
+
+TEST(Tiff, EveryTruncationIsRefused) {
+  const std::string file = tiff({kFirst, kSecond});
+  constexpr std::size_t kLink = 4;  // to no further page
+  for (std::size_t size = 0; size + kLink < file.size(); ++size) {
+    const Outcome outcome = import_bytes(file.substr(0, size), {}, kSpaced);
+    EXPECT_FALSE(outcome.imported()) << size;
+    EXPECT_NE(outcome.code, ErrorCode::kInternal) << outcome.error;
+  }
+}
+
+TEST(Images, AreStackedInTheOrderOfTheirNumbers) {
+  for (const auto& [first, second, format] :
+       {std::tuple{grey_png(4, kFirst), grey_png(4, kSecond), "png"},
+        {grey_bmp(4, kFirst), grey_bmp(4, kSecond), "bmp"},
+        {tiff({kFirst}), tiff({kSecond}), "tiff"}}) {
+    const Outcome outcome = import_bytes(
+        zip({{"scan/s10", second}, {"scan/s9", first}, {"scan/notes.txt", "text"}}), {}, kSpaced);
+    ASSERT_EQ(outcome.error, "") << format;
+    EXPECT_EQ(outcome.volume.format, format);
+    EXPECT_EQ(outcome.volume.dims, (Dims{4, 3, 2}));
+    EXPECT_EQ(outcome.sample_bytes(), kSamples);
+    EXPECT_EQ(outcome.volume.ignored.size(), 1);
+    EXPECT_THAT(import_bytes(first).error, HasSubstr("one page"));
+  }
+}
+
+TEST(Images, MissingAndDifferentOnesAreNamed) {
+  const std::string image = grey_png(4, kFirst);
+  EXPECT_THAT(
+      import_bytes(zip({{"s1.png", image}, {"s2.png", image}, {"s4.png", image}}), {}, kSpaced)
+          .error,
+      HasSubstr("s3.png"));
+  const Outcome differs =
+      import_bytes(zip({{"s1.png", image}, {"s2.png", grey_png(3, kFirst)}}), {}, kSpaced);
+  EXPECT_THAT(differs.error, HasSubstr("\"s2.png\": The pages differ"));
+  std::string coloured = image;
+  coloured[25] = 2;
+  EXPECT_THAT(import_bytes(zip({{"1.png", coloured}, {"2.png", coloured}})).error,
+              HasSubstr("colours"));
+}
+
+TEST(Images, FoldersAreChosenAndPicturesBesideAVolumeIgnored) {
+  const std::string image = grey_png(4, kFirst);
+  const std::string two = zip({{"a/1.png", image},
+                               {"a/2.png", image},
+                               {"b/1.png", image},
+                               {"b/2.png", grey_png(4, kSecond)}});
+  ASSERT_EQ(import_bytes(two).remedy.choices.size(), 2);
+  EXPECT_EQ(import_bytes(two).remedy.choices[1].value, "b/*.png");
+  ImportOptions second = kSpaced;
+  second.member = "b/*.png";
+  EXPECT_EQ(import_bytes(two, {}, second).sample_bytes(), kSamples);
+  const Outcome beside =
+      import_bytes(zip({{"1.png", image}, {"2.png", image}, {"a.nii", nifti({}, kSamples)}}));
+  ASSERT_EQ(beside.error, "");
+  EXPECT_EQ(beside.volume.format, "nifti");
+  EXPECT_EQ(beside.volume.ignored.size(), 2);
+}
+
+TEST(Images, EveryTruncationIsRefused) {
+  const std::string last = grey_png(4, kSecond);
+  constexpr std::size_t kEnd = 12;  // the chunk that ends the file holds nothing
+  for (std::size_t size = 0; size + kEnd < last.size(); ++size) {
+    const Outcome outcome = import_bytes(
+        zip({{"1.png", grey_png(4, kFirst)}, {"2.png", last.substr(0, size) + " "}}), {}, kSpaced);
+    EXPECT_FALSE(outcome.imported()) << size;
+  }
+  const std::string bitmap = grey_bmp(4, kSecond);
+  for (std::size_t size = bitmap.size() - 13; size < bitmap.size(); ++size) {
+    EXPECT_FALSE(
+        import_bytes(zip({{"1", grey_bmp(4, kFirst)}, {"2", bitmap.substr(0, size)}}), {}, kSpaced)
+            .imported());
+  }
+}
+
+TEST(Images, SizesBeyondTheLimitsAreRefusedEarly) {
+  std::string huge = grey_png(4, kFirst);
+  huge.replace(16, 8, std::string("\0\x0f\0\0\0\x0f\0\0", 8));
+  EXPECT_EQ(
+      import_bytes(zip({{"1", huge}, {"2", huge}}), {.max_sample_bytes = 1 << 20}, kSpaced).code,
+      ErrorCode::kTooLarge);
+}
+
+}  // namespace
+}  // namespace isomesh::import::test
