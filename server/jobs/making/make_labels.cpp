@@ -157,7 +157,7 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   smooth_stage(samples, request, progress, walls.mesh, summary);
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);
-  simplify_stage(written, extracted, progress, walls.mesh, &walls, summary);
+  simplify_stage(samples, written, extracted, progress, walls.mesh, &walls, summary);
   set_size(walls.mesh, summary);
   if (is_simplified(parameters)) check_disk(walls.mesh, request);
   summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};

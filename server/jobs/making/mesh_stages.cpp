@@ -4,8 +4,10 @@
 #include <numeric>
 #include <vector>
 
+#include "proto/samples.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
+#include "server/mesh/bound/bound.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/simplify/simplify.h"
@@ -43,6 +45,37 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   if (effect.is_least) return Simplification::Bound::kTopology;
   const bool is_by_triangles = parameters.triangles && effect.reached_triangles;
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
+}
+
+// Whether the job's error is to be proven. Parts that were left out are still in the samples that
+// the proof looks at.
+bool proves_error(const MeshParameters& parameters) {
+  return parameters.max_error_mm && !parameters.labels && !parameters.close &&
+         parameters.scheme == Scheme::kSix && !parameters.fill_cavities &&
+         parameters.components.keeps_all();
+}
+
+// False where nothing can be proven; the mesh is as it was then.
+bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
+                           const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
+  const MeshParameters& parameters = request.parameters;
+  if (!proves_error(parameters)) return false;
+  const double most = *parameters.max_error_mm;
+  const mesh::BoundOptions options = {.max_error_mm = most,
+                                      .rounding_mm = quantisation_mm(parameters, mesh, most),
+                                      .triangles = parameters.triangles.value_or(0),
+                                      .is_smoothed = parameters.passes > 0};
+  const auto bound = with_sample(samples.type, [&](auto sample) {
+    return mesh::simplify_within(lattice_of<decltype(sample)>(samples),
+                                 extract_options(parameters, request.iso), options,
+                                 progress.context(), mesh);
+  });
+  if (!bound) return false;
+  const bool is_by_triangles =
+      parameters.triangles && mesh.triangles.size() <= *parameters.triangles;
+  summary.simplified = {bound->triangles_before, is_by_triangles ? Simplification::Bound::kTriangles
+                                                                 : Simplification::Bound::kError};
+  return true;
 }
 
 void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
@@ -88,12 +121,23 @@ void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progre
   set_extent(effect.after, summary);
 }
 
-void simplify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
-                    Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
-                    MeshSummary& summary) {
+mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
+  return {.iso = iso,
+          .scheme = parameters.scheme,
+          .interpolation = parameters.interpolation,
+          .close = parameters.close,
+          .regularize = parameters.regularize && !proves_error(parameters)};
+}
+
+void simplify_stage(const SampleArray& samples, const MeshRequest& request,
+                    const ExtractedSurface& extracted, Progress& progress, mesh::Mesh& mesh,
+                    mesh::SeparatingSurface* walls, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
   progress.enter(Stage::kSimplify);
+  if (simplify_within_error(samples, request, progress, mesh, summary)) {
+    return set_extent(measure_extent(mesh, progress.quiet()), summary);
+  }
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
     options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);
