@@ -40,7 +40,6 @@ class Clear {
   bool inside(const PlaneNumbers& a, const PlaneNumbers& b, const PlaneNumbers& c, double sign);
   // sign * F where the last of them found that it was not.
   double failed() const { return failed_; }
-  void fail() { failed_ = -1e30; }
 
  private:
   struct Line;

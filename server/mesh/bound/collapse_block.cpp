@@ -312,10 +312,7 @@ class Collapser {
 
   // The star of x in T+ or T-: x and the edges first, which most often tell.
   bool has_clear_edges(Vecf x, Side side) {
-    if (!clear_.contains(x)) {
-      clear_.fail();
-      return false;
-    }
+    if (!clear_.contains(x)) return false;
     const double sign = side == Side::kIn ? 1 : -1;
     clear_.base(x);
     Star& star = stars_[side == Side::kIn ? 0 : 1];
@@ -347,6 +344,7 @@ class Collapser {
   }
 
   Verdict judge(const Vertex& x) {
+    if (!clear_.contains(x.in) || !clear_.contains(x.out)) return {};
     std::array<double, 2> failed = {0, 0};
     bool in = has_clear_edges(x.in, Side::kIn);
     if (!in) failed[0] = clear_.failed();

@@ -151,13 +151,28 @@ class Rays {
   const float last_y_;
 };
 
-// A random point of one triangle of each of the components.
+// Twice the area of a triangle of S, in voxels.
+double area_of(const Field& field, const Surfaces& surfaces, const Triangle& triangle) {
+  const auto place = [&](std::size_t i) {
+    return zero_between(field, surfaces.crossings[triangle[i]]);
+  };
+  const Vecd a = place(0);
+  return length(cross(place(1) - a, place(2) - a));
+}
+
+// A random point of the largest triangle of each of the components: around a sample at the
+// iso-value others are too small to tell a ray from an edge.
 std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
                         std::span<const std::uint32_t> components,
                         std::span<const std::uint32_t> left, std::mt19937& random) {
+  std::vector<double> largest(components.size(), -1);
   std::vector<std::uint32_t> triangle_of(components.size(), kNone);
   for (std::uint32_t t = 0; t < surfaces.extracted.size(); ++t) {
-    triangle_of[components[surfaces.extracted[t][0]]] = t;
+    const std::uint32_t component = components[surfaces.extracted[t][0]];
+    const double area = area_of(field, surfaces, surfaces.extracted[t]);
+    if (!(area > largest[component])) continue;
+    largest[component] = area;
+    triangle_of[component] = t;
   }
   const auto share = [&] { return 0.1 + static_cast<double>(random() >> 8) / (1 << 24); };
   std::vector<Start> starts;
