@@ -53,7 +53,7 @@ void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
   with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
-    check_memory(size_of(count), request);
+    check_memory(size_of(count), lattice.dims.samples(), request);
     extract_walls(lattice, options, count, progress.context(0.4, 1), walls);
   });
 }

@@ -28,7 +28,7 @@ void extract_as(const SampleArray& samples, const MeshRequest& request, const Pr
   const mesh::Lattice<T> lattice = lattice_of<T>(samples);
   const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
   const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
-  check_memory(size_of(count), request);
+  check_memory(size_of(count), lattice.dims.samples(), request);
   extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "proto/samples.h"
@@ -47,30 +48,43 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
 }
 
-// Whether the job's error is to be proven. Parts that were left out are still in the samples that
-// the proof looks at.
-bool proves_error(const MeshParameters& parameters) {
-  return parameters.max_error_mm && !parameters.labels && !parameters.close &&
-         parameters.scheme == Scheme::kSix && !parameters.fill_cavities &&
-         parameters.components.keeps_all();
+// Why the job's error is measured and not proven, if so: the proof follows the surface that the
+// samples define, whole and open, and a vertex on each lattice edge that it crosses.
+const char* why_measured(const MeshParameters& parameters) {
+  if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
+  if (parameters.scheme != Scheme::kSix) return "The proof is for scheme 6.";
+  if (parameters.regularize) return "The proof is for surfaces without regularize.";
+  if (parameters.close) return "The proof is for surfaces without close.";
+  if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
+  if (!parameters.components.keeps_all()) return "The proof is for all components together.";
+  return nullptr;
 }
 
-// False where nothing can be proven; the mesh is as it was then.
+// False where nothing can be proven; the mesh is as it was then. The certificate says which.
 bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
                            const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
-  if (!proves_error(parameters)) return false;
+  MeshCertificate& certificate = summary.certificate.emplace();
+  if (const char* why = why_measured(parameters)) {
+    certificate.why_unproven = why;
+    return false;
+  }
   const double most = *parameters.max_error_mm;
   const mesh::BoundOptions options = {.max_error_mm = most,
                                       .rounding_mm = quantisation_mm(parameters, mesh, most),
                                       .triangles = parameters.triangles.value_or(0),
                                       .is_smoothed = parameters.passes > 0};
+  std::string why_not;
   const auto bound = with_sample(samples.type, [&](auto sample) {
     return mesh::simplify_within(lattice_of<decltype(sample)>(samples),
                                  extract_options(parameters, request.iso), options,
-                                 progress.context(), mesh);
+                                 progress.context(), mesh, why_not);
   });
-  if (!bound) return false;
+  if (!bound) {
+    certificate.why_unproven = why_not;
+    return false;
+  }
+  certificate.bound_mm = bound->bound_mm + quantisation_mm(parameters, mesh);
   const bool is_by_triangles =
       parameters.triangles && mesh.triangles.size() <= *parameters.triangles;
   summary.simplified = {bound->triangles_before, is_by_triangles ? Simplification::Bound::kTriangles
@@ -126,7 +140,7 @@ mesh::ExtractOptions extract_options(const MeshParameters& parameters, double is
           .scheme = parameters.scheme,
           .interpolation = parameters.interpolation,
           .close = parameters.close,
-          .regularize = parameters.regularize && !proves_error(parameters)};
+          .regularize = parameters.regularize};
 }
 
 void simplify_stage(const SampleArray& samples, const MeshRequest& request,
@@ -135,7 +149,7 @@ void simplify_stage(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
   progress.enter(Stage::kSimplify);
-  if (simplify_within_error(samples, request, progress, mesh, summary)) {
+  if (parameters.max_error_mm && simplify_within_error(samples, request, progress, mesh, summary)) {
     return set_extent(measure_extent(mesh, progress.quiet()), summary);
   }
   mesh::SimplifyOptions options;

@@ -31,8 +31,6 @@ mesh::Lattice<T> lattice_of(const SampleArray& samples) {
           mesh::lattice_to_space(samples.geometry)};
 }
 
-// How the surface is extracted. One whose error is proven is not regularised: the proof starts from
-// a vertex on each crossed edge.
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso);
 
 // The surface as it was extracted, for what is measured from it later. Empty where nothing is.

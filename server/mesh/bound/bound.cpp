@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
+#include "proto/error.h"
 #include "proto/samples.h"
 #include "server/mesh/bound/collapses.h"
 #include "server/mesh/bound/cover.h"
@@ -79,6 +81,23 @@ std::vector<std::uint32_t> compact(Tube& tube) {
   return origins;
 }
 
+// The tube without the components of S that it lies around no longer, and with their plain surface
+// instead. Of each of its vertices: which crossing it began as.
+std::vector<std::uint32_t> restore_lost(const Field& field, const Metric& metric, double reach_mm,
+                                        std::span<const Crossing> crossings,
+                                        std::span<const Triangle> extracted, const Context& context,
+                                        Tube& tube) {
+  const std::vector<std::uint32_t> components = components_of(crossings.size(), extracted);
+  std::vector<std::uint32_t> all(crossings.size());
+  std::iota(all.begin(), all.end(), 0U);
+  const auto lost = uncovered(field, {crossings, extracted, tube.vertices, tube.triangles, all},
+                              components, odd_edges(tube.vertices.size(), tube.triangles), context);
+  if (!lost.empty()) {
+    restore(field, metric, reach_mm, crossings, extracted, components, lost, tube);
+  }
+  return compact(tube);
+}
+
 BoundedMesh describe(const Metric& metric, const Tube& tube) {
   BoundedMesh result;
   const auto mm = [&](Vecf copy) {
@@ -106,6 +125,26 @@ void write(const Metric& metric, std::span<const std::uint32_t> origins,
   replace_triangles(triangles, no_sides, mesh);
 }
 
+// Gives the mesh the tube's surface, whose places are rounded to single precision.
+BoundedMesh deliver(const Metric& metric, std::span<const std::uint32_t> origins, const Tube& tube,
+                    double shift_mm, double max_error_mm, Mesh& mesh) {
+  std::vector<Vec3> places;
+  for (const Vertex& vertex : tube.vertices) {
+    const Vecf place = narrow(metric.place(wide(vertex.p)));
+    places.push_back({place.x, place.y, place.z});
+  }
+  BoundedMesh result = describe(metric, tube);
+  result.shift_mm = shift_mm;
+  result.triangles_before = mesh.triangles.size();
+  result.bound_mm = result.bound_at(places);
+  // The reach leaves room for this rounding.
+  if (!(result.bound_mm <= max_error_mm)) {
+    throw Error(ErrorCode::kInternal, "a proven distance is larger than its limit");
+  }
+  write(metric, origins, places, tube, mesh);
+  return result;
+}
+
 }  // namespace
 }  // namespace bound
 
@@ -130,57 +169,46 @@ bool has_bound(const ExtractOptions& options) {
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
                                            const BoundOptions& options, const Context& context,
-                                           Mesh& mesh) {
+                                           Mesh& mesh, std::string& why_not) {
   using namespace bound;
-  if (!has_bound(extract) || mesh.triangles.size() == 0) return {};
+  const auto unproven = [&](const char* why) {
+    why_not = why;
+    return std::optional<BoundedMesh>();
+  };
+  if (!has_bound(extract)) return unproven("There is no proof for such a surface.");
+  if (mesh.triangles.size() == 0) return BoundedMesh();
   const std::optional<Field> field = make_field(lattice, extract, context);
-  if (!field) return {};
+  if (!field) return unproven("Single precision cannot hold the samples' differences.");
   const std::vector<Crossing> crossings = crossings_of(*field, context);
-  if (crossings.size() != mesh.positions.size()) return {};
+  if (crossings.size() != mesh.positions.size()) {
+    return unproven("The surface is not the whole one of the samples.");
+  }
   const Metric metric(lattice.to_space);
   const double shift = shift_of(lattice, extract, *field, crossings);
   const double reach =
       options.max_error_mm - options.rounding_mm - shift - rounding_of(lattice.dims, metric);
-  if (!(reach > kLeastReach * options.max_error_mm)) return {};
+  if (!(reach > kLeastReach * options.max_error_mm)) {
+    return unproven("Rounding of coordinates takes up the limit.");
+  }
 
   std::optional<Tube> tube =
       make_start(*field, crossings, metric, {.reach_mm = reach, .is_moved = options.is_smoothed},
                  mesh, context);
-  if (!tube) return {};
+  if (!tube) return unproven("Samples differ too little from the iso-value.");
   collapse_edges(*field, metric, {.reach_mm = reach, .triangles = options.triangles}, context,
                  *tube);
-  const std::span<const Triangle> extracted = mesh.triangles.span();
-  const auto components = components_of(crossings.size(), extracted);
-  std::vector<std::uint32_t> origins(crossings.size());
-  for (std::uint32_t v = 0; v < origins.size(); ++v) origins[v] = v;
-  const auto surfaces = [&]() -> Surfaces {
-    return {crossings, extracted, tube->vertices, tube->triangles, origins};
-  };
-  const auto lost = uncovered(*field, surfaces(), components,
-                              odd_edges(tube->vertices.size(), tube->triangles), context);
-  if (!lost.empty()) {
-    restore(*field, metric, reach, crossings, extracted, components, lost, *tube);
-  }
-
-  origins = compact(*tube);
-  std::vector<Vec3> places;
-  for (const Vertex& vertex : tube->vertices) {
-    const Vecf place = narrow(metric.place(wide(vertex.p)));
-    places.push_back({place.x, place.y, place.z});
-  }
-  if (!prove(*field, surfaces(), context).holds()) return {};
-  BoundedMesh result = describe(metric, *tube);
-  result.shift_mm = shift;
-  result.triangles_before = mesh.triangles.size();
-  result.bound_mm = result.bound_at(places);
-  if (!(result.bound_mm <= options.max_error_mm)) return {};
-  write(metric, origins, places, *tube, mesh);
-  return result;
+  const std::vector<std::uint32_t> origins =
+      restore_lost(*field, metric, reach, crossings, mesh.triangles.span(), context, *tube);
+  const Surfaces surfaces = {crossings, mesh.triangles.span(), tube->vertices, tube->triangles,
+                             origins};
+  if (!prove(*field, surfaces, context).holds()) return unproven("The final check failed.");
+  return deliver(metric, origins, *tube, shift, options.max_error_mm, mesh);
 }
 
-#define ISOMESH_INSTANTIATE(T, name, kType)                                                     \
-  template std::optional<BoundedMesh> simplify_within(const Lattice<T>&, const ExtractOptions&, \
-                                                      const BoundOptions&, const Context&, Mesh&);
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                       \
+  template std::optional<BoundedMesh> simplify_within(const Lattice<T>&, const ExtractOptions&,   \
+                                                      const BoundOptions&, const Context&, Mesh&, \
+                                                      std::string&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "server/mesh/context.h"
@@ -54,11 +55,12 @@ bool has_bound(const ExtractOptions& options);
 // than the error, and what Mesh says of layers. The same mesh for any number of threads.
 //
 // Nothing where that cannot be proven, because single precision does not tell the samples apart or
-// parts of the surface are missing; then the mesh is as it was. Takes some 250 bytes a triangle and
-// 4 bytes a sample beside the mesh. Throws Error kCancelled.
+// parts of the surface are missing; then the mesh is as it was, and `why_not` says why in a
+// sentence for users. Takes some 250 bytes a triangle and 4 bytes a sample beside the mesh. Throws
+// Error kCancelled.
 template <class T>
 std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
                                            const BoundOptions& options, const Context& context,
-                                           Mesh& mesh);
+                                           Mesh& mesh, std::string& why_not);
 
 }  // namespace isomesh::mesh

@@ -128,7 +128,9 @@ TEST(BoundProofTest, RefusesABorderThatLeftItsFace) {
 TEST(BoundProofTest, TellsThatAVertexWasMoved) {
   const Scene scene = balls_and_tunnel();
   Mesh mesh = test::extracted(scene.volume, {});
-  const auto bound = simplify_within(scene.volume.lattice(), {}, {.max_error_mm = 0.2}, {}, mesh);
+  std::string why_not;
+  const auto bound =
+      simplify_within(scene.volume.lattice(), {}, {.max_error_mm = 0.2}, {}, mesh, why_not);
   ASSERT_TRUE(bound);
   mesh.positions[7][1] += 0.3F;
   EXPECT_GT(bound->bound_at(mesh.positions.span()), 0.2);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -35,7 +36,10 @@ template <class T>
 std::optional<BoundedMesh> simplified(const test::SampleVolume<T>& volume,
                                       const ExtractOptions& extract, const BoundOptions& options,
                                       Mesh& mesh) {
-  return simplify_within(volume.lattice(), extract, options, {}, mesh);
+  std::string why_not;
+  auto bound = simplify_within(volume.lattice(), extract, options, {}, mesh, why_not);
+  EXPECT_EQ(bound.has_value(), why_not.empty());
+  return bound;
 }
 
 // What a stranger finds: exact distances of random points, both ways.
