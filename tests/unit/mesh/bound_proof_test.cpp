@@ -185,6 +185,7 @@ double least_value(const Field& field, const std::array<Vecf, 3>& p, double sign
       const float u = static_cast<float>(i) / kSteps;
       const float v = static_cast<float>(j) / kSteps;
       const Vecf at = p[0] + (p[1] - p[0]) * u + (p[2] - p[0]) * v;
+      if (!clear.contains(at)) continue;  // rounded beyond the border
       clear.base(at);
       least = std::min(least, sign * clear.value(clear.at(at)));
     }
