@@ -131,11 +131,13 @@ struct ErrorBudget {
 
 // The deviation of the files from the surface as extracted, before smoothing.
 struct MeshCertificate {
-  MeshFormat file = MeshFormat::kDrc;         // the file with the largest deviation
-  double max_mm = 0;                          // in both directions
-  DistanceSummary from_mesh;                  // shows what was added
-  DistanceSummary from_extracted;             // shows what was left out
-  std::optional<ErrorBudget> budget_mm = {};  // if max_error_mm is given
+  MeshFormat file = MeshFormat::kDrc;            // the file with the largest deviation
+  double found_mm = 0;                           // the largest at the samples, in both directions
+  std::optional<double> bound_mm = {};           // if proven: no point of any file deviates more
+  std::optional<std::string> why_unproven = {};  // otherwise, as a sentence
+  DistanceSummary from_mesh;                     // shows what was added
+  DistanceSummary from_extracted;                // shows what was left out
+  std::optional<ErrorBudget> budget_mm = {};     // if max_error_mm is given
 
   bool operator==(const MeshCertificate&) const = default;
 };

@@ -104,7 +104,13 @@ void tell_error(const MeshSummary& mesh, Rows& rows) {
   }
   if (!mesh.certificate) return;
   const MeshCertificate& certificate = *mesh.certificate;
-  rows.push_back({"certified", fixed(certificate.max_mm, 4) + " mm from the extracted surface, " +
+  if (certificate.bound_mm) {
+    rows.push_back({"proven", "no point of any file or of the extracted surface is more than " +
+                                  fixed(*certificate.bound_mm, 4) + " mm from the other"});
+  } else if (certificate.why_unproven) {
+    rows.push_back({"not proven", *certificate.why_unproven});
+  }
+  rows.push_back({"certified", fixed(certificate.found_mm, 4) + " mm from the extracted surface, " +
                                    "measured on the " + std::string(to_string(certificate.file)) +
                                    " file"});
   rows.push_back({"  from the file", way_of(certificate.from_mesh)});

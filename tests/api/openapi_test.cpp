@@ -169,7 +169,10 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   job.parameters.distances = true;
   job.parameters.certify = true;
   job.mesh->simplified.emplace();
-  job.mesh->certificate.emplace().budget_mm.emplace();
+  MeshCertificate& certificate = job.mesh->certificate.emplace();
+  certificate.budget_mm.emplace();
+  certificate.bound_mm = 0.1;  // and the opposite, to have every member
+  certificate.why_unproven = "why";
   job.mesh->quality.self_intersections.emplace();
   job.parameters.callback = Callback{"https://receiver.example/"};
   job.error = to_problem(invalid_parameter("iso", "is wrong"), "/v1/jobs/x");

@@ -174,7 +174,8 @@ send = [ { pacs = "main" } ]
             file.write(self.pacs.file(result["sop_instance_uid"]))
         self.assert_judged(path)
         job = daemon.call("GET", "/v1/jobs/" + order["job"])[2]
-        certified = job["mesh"]["certificate"]["max_mm"]
+        certificate = job["mesh"]["certificate"]
+        certified = certificate.get("bound_mm", certificate["found_mm"])
         self.assertLessEqual(certified, 1.0)
         said = self.value(path, "0070,0081")[0]
         found = re.fullmatch(r"\[iso 500, scheme 6, 1 passes, within ([0-9.]+) mm\]", said)

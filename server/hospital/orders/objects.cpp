@@ -109,8 +109,9 @@ std::string description_of(const Job& job) {
   std::string text = what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) +
                      ", " + std::to_string(parameters.passes) + " passes";
   // Distance of the object's vertices and triangles from the extracted surface.
-  if (job.mesh->certificate) {
-    text += ", within " + number_text(rounded_up(job.mesh->certificate->max_mm)) + " mm";
+  if (const auto& certificate = job.mesh->certificate) {
+    const double within = certificate->bound_mm.value_or(certificate->found_mm);
+    text += ", within " + number_text(rounded_up(within)) + " mm";
   }
   return in_short(text);
 }

@@ -1,5 +1,6 @@
 #include "server/jobs/making/certify_stage.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -69,7 +70,10 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   progress.enter(Stage::kCertify);
   const std::vector<MeshFormat> formats = measured_formats(parameters);
   const double part = 1.0 / static_cast<double>(formats.size() + 1);
-  MeshCertificate& certificate = summary.certificate.emplace();
+  if (!summary.certificate) {
+    summary.certificate.emplace().why_unproven = "A proof needs max_error_mm.";
+  }
+  MeshCertificate& certificate = *summary.certificate;
   for (std::size_t i = 0; i < formats.size(); ++i) {
     std::optional<codec::DecodedSurface> file;
     if (codec::rounds(formats[i], parameters)) {
@@ -79,17 +83,18 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
     const mesh::Certificate measured =
         mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
                       progress.context(begin, begin + part));
-    if (i > 0 && measured.max_mm() <= certificate.max_mm) continue;
+    if (i > 0 && measured.max_mm() <= certificate.found_mm) continue;
     certificate.file = formats[i];
-    certificate.max_mm = measured.max_mm();
+    certificate.found_mm = measured.max_mm();
     certificate.from_mesh = measured.from_mesh;
     certificate.from_extracted = measured.from_reference;
   }
   if (parameters.max_error_mm) {
-    if (certificate.max_mm > *parameters.max_error_mm) {
+    const double largest = std::max(certificate.found_mm, certificate.bound_mm.value_or(0));
+    if (largest > *parameters.max_error_mm) {
       throw Error(ErrorCode::kInternal,
                   "the " + std::string(to_string(certificate.file)) + " file is " +
-                      number_text(certificate.max_mm) +
+                      number_text(largest) +
                       " mm from the extracted surface, which is more than max_error_mm");
     }
     certificate.budget_mm = budget_of(parameters, mesh, summary);

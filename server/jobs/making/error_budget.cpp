@@ -64,9 +64,12 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
   return result;
 }
 
-double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh) {
+double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh, double moved_mm) {
   if (!has_rounded_files(parameters) || mesh.positions.size() == 0) return 0;
-  return quantisation_of(codec::grid_of(mesh, parameters.draco.position_bits));
+  codec::Grid grid = codec::grid_of(mesh, parameters.draco.position_bits);
+  for (auto& low : grid.low) low -= static_cast<float>(moved_mm);
+  grid.side += static_cast<float>(2 * moved_mm);
+  return quantisation_of(grid);
 }
 
 std::vector<MeshFormat> measured_formats(const MeshParameters& parameters) {

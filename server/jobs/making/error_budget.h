@@ -20,8 +20,10 @@ double most_displacement(const MeshParameters& parameters);
 MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh& mesh);
 
 // The most that rounding to the files' coordinates moves a point of the mesh, in millimetres: half
-// the diagonal of a cell of Draco's grid, and what single precision cannot tell.
-double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh);
+// the diagonal of a cell of Draco's grid, and what single precision cannot tell. Also after
+// vertices were moved by `moved_mm`, which makes the grid larger.
+double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
+                       double moved_mm = 0);
 
 // The formats whose surface a certificate measures, in the files' order: each that rounds
 // coordinates, and the first of the others, which all hold the mesh itself.

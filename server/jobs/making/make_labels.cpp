@@ -53,7 +53,7 @@ void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
   with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
-    check_memory(size_of(count), request);
+    check_memory(size_of(count), lattice.dims.samples(), request);
     extract_walls(lattice, options, count, progress.context(0.4, 1), walls);
   });
 }
@@ -157,7 +157,7 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   smooth_stage(samples, request, progress, walls.mesh, summary);
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);
-  simplify_stage(written, extracted, progress, walls.mesh, &walls, summary);
+  simplify_stage(samples, written, extracted, progress, walls.mesh, &walls, summary);
   set_size(walls.mesh, summary);
   if (is_simplified(parameters)) check_disk(walls.mesh, request);
   summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};

@@ -22,21 +22,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
-  return {.iso = iso,
-          .scheme = parameters.scheme,
-          .interpolation = parameters.interpolation,
-          .close = parameters.close,
-          .regularize = parameters.regularize};
-}
-
 template <class T>
 void extract_as(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
                 mesh::Mesh& mesh) {
   const mesh::Lattice<T> lattice = lattice_of<T>(samples);
   const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
   const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
-  check_memory(size_of(count), request);
+  check_memory(size_of(count), lattice.dims.samples(), request);
   extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
 }
 
@@ -154,7 +146,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   smooth_stage(samples, request, progress, mesh, summary);
   const MeshParameters as_written = with_bits_for(parameters, mesh);
   const MeshRequest written = request.with(as_written);
-  simplify_stage(written, extracted, progress, mesh, nullptr, summary);
+  simplify_stage(samples, written, extracted, progress, mesh, nullptr, summary);
   set_size(mesh, summary);
   if (is_simplified(parameters)) check_disk(mesh, request);
 

@@ -26,14 +26,18 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
 // What simplifying and certifying take, one after the other, beside what the job has anyway: the
 // surface as it was extracted, grids of triangles, and files that round coordinates, as bytes and
 // as what they decode to.
-std::uint64_t error_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                          bool certify) {
-  // What simplify.h and triangle_grid.h say that they take, and a little more.
+std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
+                          const MeshParameters& parameters, bool certify) {
+  // What simplify.h, bound.h and triangle_grid.h say that they take, and a little more.
   constexpr std::uint64_t kSimplifyBytesPerTriangle = 200;
+  constexpr std::uint64_t kProveBytesPerTriangle = 260;
   constexpr std::uint64_t kGridsPerTriangle = 130;
   std::uint64_t simplifying = 0;
   if (parameters.max_error_mm || parameters.triangles) {
     simplifying = surface.triangles * kSimplifyBytesPerTriangle;
+  }
+  if (parameters.max_error_mm && !parameters.labels) {
+    simplifying = surface.triangles * kProveBytesPerTriangle + samples * sizeof(float);
   }
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
   // While files are encoded.
@@ -85,8 +89,8 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
           .way = way_of(parameters.smoothing)};
 }
 
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                              bool certify) {
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
+                              const MeshParameters& parameters, bool certify) {
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);
@@ -94,11 +98,13 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParame
   const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
   return mesh_bytes(surface) + smoothing +
          (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding) +
-         error_bytes(surface, parameters, certify);
+         error_bytes(surface, samples, parameters, certify);
 }
 
-void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request) {
-  const std::uint64_t needed = estimate_memory(surface, request.parameters, request.certify);
+void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
+                  const MeshRequest& request) {
+  const std::uint64_t needed =
+      estimate_memory(surface, samples, request.parameters, request.certify);
   const std::uint64_t allowed_bytes = request.memory_bytes;
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kMebibyte = 1 << 20;

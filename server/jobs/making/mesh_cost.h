@@ -12,14 +12,15 @@ namespace isomesh::jobs {
 
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 
-// How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
-// mesh, smoothing, encoders. An upper estimate.
+// How much memory a job with a surface of that size, of so many samples, takes at its peak, beside
+// its mapped volume: mesh, smoothing, encoders. An upper estimate.
 // Simplifying and certifying take the most, where the job does so.
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                              bool certify);
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
+                              const MeshParameters& parameters, bool certify);
 
 // Throws Error kTooLarge with the estimate when that is more than is allowed.
-void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request);
+void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
+                  const MeshRequest& request);
 
 // Throws Error kTooLarge when the files of a mesh could never have room. STL's size is known; of
 // the others', which are guesses, half counts. To be asked of the mesh as it is written.

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
 #include <vector>
 
+#include "proto/samples.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
+#include "server/mesh/bound/bound.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/simplify/simplify.h"
@@ -43,6 +46,50 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   if (effect.is_least) return Simplification::Bound::kTopology;
   const bool is_by_triangles = parameters.triangles && effect.reached_triangles;
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
+}
+
+// Why the job's error is measured and not proven, if so: the proof follows the surface that the
+// samples define, whole and open, and a vertex on each lattice edge that it crosses.
+const char* why_measured(const MeshParameters& parameters) {
+  if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
+  if (parameters.scheme != Scheme::kSix) return "The proof is for scheme 6.";
+  if (parameters.regularize) return "The proof is for surfaces without regularize.";
+  if (parameters.close) return "The proof is for surfaces without close.";
+  if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
+  if (!parameters.components.keeps_all()) return "The proof is for all components together.";
+  return nullptr;
+}
+
+// False where nothing can be proven; the mesh is as it was then. The certificate says which.
+bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
+                           const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
+  const MeshParameters& parameters = request.parameters;
+  MeshCertificate& certificate = summary.certificate.emplace();
+  if (const char* why = why_measured(parameters)) {
+    certificate.why_unproven = why;
+    return false;
+  }
+  const double most = *parameters.max_error_mm;
+  const mesh::BoundOptions options = {.max_error_mm = most,
+                                      .rounding_mm = quantisation_mm(parameters, mesh, most),
+                                      .triangles = parameters.triangles.value_or(0),
+                                      .is_smoothed = parameters.passes > 0};
+  std::string why_not;
+  const auto bound = with_sample(samples.type, [&](auto sample) {
+    return mesh::simplify_within(lattice_of<decltype(sample)>(samples),
+                                 extract_options(parameters, request.iso), options,
+                                 progress.context(), mesh, why_not);
+  });
+  if (!bound) {
+    certificate.why_unproven = why_not;
+    return false;
+  }
+  certificate.bound_mm = bound->bound_mm + quantisation_mm(parameters, mesh);
+  const bool is_by_triangles =
+      parameters.triangles && mesh.triangles.size() <= *parameters.triangles;
+  summary.simplified = {bound->triangles_before, is_by_triangles ? Simplification::Bound::kTriangles
+                                                                 : Simplification::Bound::kError};
+  return true;
 }
 
 void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
@@ -88,12 +135,23 @@ void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progre
   set_extent(effect.after, summary);
 }
 
-void simplify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
-                    Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
-                    MeshSummary& summary) {
+mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
+  return {.iso = iso,
+          .scheme = parameters.scheme,
+          .interpolation = parameters.interpolation,
+          .close = parameters.close,
+          .regularize = parameters.regularize};
+}
+
+void simplify_stage(const SampleArray& samples, const MeshRequest& request,
+                    const ExtractedSurface& extracted, Progress& progress, mesh::Mesh& mesh,
+                    mesh::SeparatingSurface* walls, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
   progress.enter(Stage::kSimplify);
+  if (parameters.max_error_mm && simplify_within_error(samples, request, progress, mesh, summary)) {
+    return set_extent(measure_extent(mesh, progress.quiet()), summary);
+  }
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
     options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);

@@ -14,6 +14,7 @@
 #include "server/mesh/context.h"
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/lattice/lattice.h"
+#include "server/mesh/lattice/placement.h"
 #include "server/mesh/measure/surface_view.h"
 #include "server/mesh/measure/triangle_grid.h"
 #include "server/mesh/mesh.h"
@@ -29,6 +30,8 @@ mesh::Lattice<T> lattice_of(const SampleArray& samples) {
           {samples.dims[0], samples.dims[1], samples.dims[2]},
           mesh::lattice_to_space(samples.geometry)};
 }
+
+mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso);
 
 // The surface as it was extracted, for what is measured from it later. Empty where nothing is.
 struct ExtractedSurface {
@@ -52,10 +55,11 @@ void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progre
 
 // Where the parameters ask for it, leaves fewer triangles, and says in the summary how many there
 // were and what has become of the surface. `walls` are whose mesh it is, if any. The parameters'
-// bits are those that the files' coordinates will have.
-void simplify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
-                    Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
-                    MeshSummary& summary);
+// bits are those that the files' coordinates will have. The distance is proven for every point
+// where it can be (bound.h), and measured otherwise.
+void simplify_stage(const SampleArray& samples, const MeshRequest& request,
+                    const ExtractedSurface& extracted, Progress& progress, mesh::Mesh& mesh,
+                    mesh::SeparatingSurface* walls, MeshSummary& summary);
 
 // How good the triangles are after smoothing and simplification; nothing to measure where there was
 // neither.

@@ -121,7 +121,8 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   }
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
-  estimate.memory_bytes = estimate_memory(surface, parameters, parameters.certify);
+  const std::uint64_t samples = std::uint64_t{volume.dims[0]} * volume.dims[1] * volume.dims[2];
+  estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters.certify);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model(viewer);
   const double spacing_mm = std::ranges::min(volume.geometry.spacing);

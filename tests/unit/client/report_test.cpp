@@ -89,7 +89,7 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
   mesh.simplified = {.triangles_before = 5000, .bound_by = Simplification::Bound::kTriangles};
   mesh.certificate.emplace();
   mesh.certificate->file = MeshFormat::kStl;
-  mesh.certificate->max_mm = 0.09876;
+  mesh.certificate->found_mm = 0.09876;
   mesh.certificate->from_mesh = {.max_mm = 0.05, .mean_mm = 0.01, .p99_mm = 0.04};
   mesh.certificate->from_extracted = {.max_mm = 0.09876, .mean_mm = 0.02, .p99_mm = 0.03};
   mesh.certificate->budget_mm = {.smoothing = 0.05, .quantisation = 0.01, .simplification = 0.04};

@@ -64,11 +64,11 @@ TEST(DistanceCost, IsOfTheExtractedSurfaceAndItsGrid) {
   const mesh::SurfaceSize surface = {2'000'000, 1'000'000};
   MeshParameters parameters;
   parameters.formats = {MeshFormat::kGlb};
-  const std::uint64_t without = estimate_memory(surface, parameters, false);
+  const std::uint64_t without = estimate_memory(surface, 0, parameters, false);
   parameters.distances = true;
-  const std::uint64_t with = estimate_memory(surface, parameters, false);
+  const std::uint64_t with = estimate_memory(surface, 0, parameters, false);
   EXPECT_GT(with, without + surface.triangles * 100);
-  EXPECT_LE(with, estimate_memory(surface, parameters, true));
+  EXPECT_LE(with, estimate_memory(surface, 0, parameters, true));
 }
 
 }  // namespace

@@ -88,6 +88,9 @@ TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
     const MeshSummary mesh = run(parameters);
     ASSERT_TRUE(mesh.certificate);
     ASSERT_TRUE(mesh.simplified);
+    ASSERT_TRUE(mesh.certificate->bound_mm) << mesh.certificate->why_unproven.value_or("");
+    EXPECT_LE(*mesh.certificate->bound_mm, error);
+    EXPECT_GE(*mesh.certificate->bound_mm, mesh.certificate->found_mm);
     EXPECT_EQ(mesh.simplified->triangles_before, reference.triangles.size());
     EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kError);
     double farthest = 0;
@@ -100,7 +103,7 @@ TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
     expect_near(decoded(mesh, MeshFormat::kDrc).view());
     expect_near(decoded(mesh, MeshFormat::kGlb).view());
     expect_near(stl(mesh).view());
-    EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, farthest);
+    EXPECT_DOUBLE_EQ(mesh.certificate->found_mm, farthest);
     const auto& budget = mesh.certificate->budget_mm.value();
     EXPECT_NEAR(budget.smoothing + budget.simplification + budget.quantisation, error, 1e-12);
     EXPECT_LE(budget.smoothing, error / 2);
@@ -113,12 +116,33 @@ TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
   }
 }
 
+// What cannot be proven is measured, and the certificate says why.
+TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
+  const auto why = [&](auto change) {
+    JobParameters parameters = parameters_of(volume_, 0);
+    parameters.max_error_mm = 0.1;
+    parameters.certify = true;
+    change(parameters);
+    const MeshCertificate certificate = run(parameters).certificate.value();
+    EXPECT_FALSE(certificate.bound_mm);
+    EXPECT_LE(certificate.found_mm, parameters.max_error_mm.value_or(1));
+    return certificate.why_unproven.value_or("");
+  };
+  EXPECT_EQ(why([](auto& job) { job.scheme = Scheme::kFive; }), "The proof is for scheme 6.");
+  EXPECT_EQ(why([](auto& job) { job.close = true; }), "The proof is for surfaces without close.");
+  EXPECT_EQ(why([](auto& job) { job.regularize = true; }),
+            "The proof is for surfaces without regularize.");
+  EXPECT_EQ(why([](auto& job) { job.components.keep = 1; }),
+            "The proof is for all components together.");
+  EXPECT_EQ(why([](auto& job) { job.max_error_mm.reset(); }), "A proof needs max_error_mm.");
+}
+
 // Draco's default of bits is too few for some micrometres.
 TEST_F(ErrorJobsTest, TakeAsManyBitsAsTheErrorNeeds) {
   JobParameters parameters = parameters_of(volume_, 0);
   parameters.max_error_mm = 0.002;
   parameters.certify = true;
-  EXPECT_LE(run(parameters).certificate->max_mm, 0.002);
+  EXPECT_LE(run(parameters).certificate->found_mm, 0.002);
 }
 
 TEST_F(ErrorJobsTest, SayWhatTheirTrianglesCost) {
@@ -129,14 +153,14 @@ TEST_F(ErrorJobsTest, SayWhatTheirTrianglesCost) {
   const MeshSummary mesh = run(parameters);
   EXPECT_LE(mesh.triangles, 500U);
   EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kTriangles);
-  EXPECT_DOUBLE_EQ(mesh.certificate->max_mm,
+  EXPECT_DOUBLE_EQ(mesh.certificate->found_mm,
                    certify(stl(mesh).view(), extracted().view(), {}).max_mm());
   EXPECT_FALSE(mesh.certificate->budget_mm);
   parameters.max_error_mm = 0.05;  // which 500 triangles cannot keep
   const MeshSummary both = run(parameters);
   EXPECT_GT(both.triangles, 500U);
   EXPECT_EQ(both.simplified->bound_by, Simplification::Bound::kError);
-  EXPECT_LE(both.certificate->max_mm, 0.05);
+  EXPECT_LE(both.certificate->found_mm, 0.05);
 }
 
 TEST_F(ErrorJobsTest, MeasureWithoutChangingAnything) {
@@ -146,7 +170,7 @@ TEST_F(ErrorJobsTest, MeasureWithoutChangingAnything) {
   parameters.certify = true;
   const MeshSummary certified = run(parameters);
   EXPECT_EQ(certified.files.at(MeshFormat::kDrc).sha256, plain.files.at(MeshFormat::kDrc).sha256);
-  EXPECT_GE(certified.certificate->max_mm, 0.9 * plain.displacement_mm.max / 2);
+  EXPECT_GE(certified.certificate->found_mm, 0.9 * plain.displacement_mm.max / 2);
   EXPECT_TRUE(certified.quality.self_intersections);
 }
 
@@ -160,7 +184,7 @@ TEST_F(ErrorJobsTest, MeasureTheMeshOnceForAllFilesThatHoldIt) {
   EXPECT_EQ(mesh.certificate->file, MeshFormat::kOff);
   EXPECT_EQ(mesh.certificate->from_mesh.points, mesh.vertices + mesh.triangles);
   const mesh::Certificate again = certify(stl(mesh).view(), extracted().view(), {});
-  EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, again.max_mm());
+  EXPECT_DOUBLE_EQ(mesh.certificate->found_mm, again.max_mm());
   EXPECT_EQ(mesh.certificate->budget_mm->quantisation, 0);
 }
 
@@ -223,7 +247,7 @@ TEST_F(ErrorJobsTest, MeasureFilesInTheSpaceThatTheyAreIn) {
     parameters.space = space;
     const MeshSummary mesh = run(parameters);
     ASSERT_TRUE(mesh.certificate);
-    EXPECT_LE(mesh.certificate->max_mm, 0.2);
+    EXPECT_LE(mesh.certificate->found_mm, 0.2);
     EXPECT_EQ(mesh.files.size(), parameters.formats.size());
   }
 }
@@ -238,7 +262,7 @@ TEST_F(ErrorJobsTest, SayThatThereIsNoSurface) {
   const MeshSummary mesh = run(parameters);
   EXPECT_TRUE(mesh.empty);
   EXPECT_EQ(mesh.iso, 1000);
-  EXPECT_EQ(mesh.certificate->max_mm, 0);
+  EXPECT_EQ(mesh.certificate->found_mm, 0);
   EXPECT_EQ(mesh.certificate->from_mesh.points, 0U);
 }
 
@@ -258,8 +282,8 @@ TEST_F(ErrorJobsTest, OfLabelsAreWithinTheErrorInEveryFile) {
   parameters.max_error_mm = 0.2;
   parameters.certify = true;
   const MeshSummary mesh = run_pipeline(labels, parameters, {}, blobs_, process_, {}, kSilent).mesh;
-  EXPECT_LE(mesh.certificate->max_mm, 0.2);
-  EXPECT_GT(mesh.certificate->max_mm, 0);
+  EXPECT_LE(mesh.certificate->found_mm, 0.2);
+  EXPECT_GT(mesh.certificate->found_mm, 0);
   EXPECT_LT(mesh.triangles, mesh.simplified->triangles_before / 2);
   ASSERT_EQ(mesh.labels.size(), 3U);
   for (const LabelSummary& label : mesh.labels) {
@@ -289,7 +313,7 @@ TEST_F(ErrorJobsTest, OfLabelsMeasureDracoInTheZip) {
   parameters.formats = {MeshFormat::kStl, MeshFormat::kPly};
   const MeshCertificate exact = certified();
   EXPECT_EQ(exact.file, MeshFormat::kPly);  // the files of all labels come first
-  EXPECT_LT(exact.max_mm, rounded.max_mm);
+  EXPECT_LT(exact.found_mm, rounded.found_mm);
 }
 
 TEST_F(ErrorJobsTest, AreCancelledAndRefusedAsOthersAre) {

@@ -25,6 +25,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/mesh/smooth", {"server/mesh/extract", "server/mesh/measure"}},
     {"server/mesh/labels", {"server/mesh/extract", "server/mesh/measure"}},
     {"server/mesh/simplify", {"server/mesh/labels"}},
+    {"server/mesh/bound", {"server/mesh/simplify"}},
     {"server/volume", {"proto"}},
     {"server/codec", {"server/mesh"}},
     {"server/store", {"proto"}},

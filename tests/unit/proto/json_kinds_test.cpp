@@ -92,7 +92,8 @@ Job certified_job() {
   mesh.quality.self_intersections = {.pairs = 3, .triangles = 5, .places = {{1, 2, 3}}};
   mesh.certificate.emplace();
   mesh.certificate->file = MeshFormat::k3mf;
-  mesh.certificate->max_mm = 0.09;
+  mesh.certificate->found_mm = 0.09;
+  mesh.certificate->bound_mm = 0.1;
   mesh.certificate->from_mesh = {
       .points = 9, .max_mm = 0.08, .mean_mm = 0.01, .rms_mm = 0.02, .p99_mm = 0.07};
   mesh.certificate->from_extracted.histogram.back() = 9;
@@ -102,6 +103,17 @@ Job certified_job() {
 
 TEST(JobJson, OfTheErrorComesBackTheSame) {
   EXPECT_EQ(job_from_json(to_json(certified_job())), certified_job());
+}
+
+TEST(JobJson, HasTheCertificateOfAnOlderVersion) {
+  json job = json::parse(to_json(certified_job()));
+  json& certificate = job["mesh"]["certificate"];
+  EXPECT_TRUE(certificate["proven"]);
+  for (const char* const name : {"proven", "bound_mm", "found_mm"}) certificate.erase(name);
+  certificate["max_mm"] = 0.09;
+  const MeshCertificate read = job_from_json(job.dump()).mesh->certificate.value();
+  EXPECT_EQ(read.found_mm, 0.09);
+  EXPECT_FALSE(read.bound_mm);
 }
 
 TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {

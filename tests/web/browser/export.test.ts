@@ -29,8 +29,8 @@ describe('a surface', () => {
     expect(made.parameters).toMatchObject({ close: true, certify: true });
     const { name, bytes } = await saved(page, /^Certificate$/);
     expect(name).toMatch(/-certificate\.json$/);
-    const told = JSON.parse(bytes.toString()) as { certificate: { max_mm: number }; files: Record<string, { sha256: string }> };
-    expect(told.certificate.max_mm).toBe(made.mesh?.certificate?.max_mm);
+    const told = JSON.parse(bytes.toString()) as { certificate: { found_mm: number }; files: Record<string, { sha256: string }> };
+    expect(told.certificate.found_mm).toBe(made.mesh?.certificate?.found_mm);
     expect(told.files['3mf']?.sha256).toBe(made.mesh?.files['3mf']?.sha256);
   });
 

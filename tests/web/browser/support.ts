@@ -99,7 +99,7 @@ export interface JobAnswer {
     triangles: number;
     components: number;
     bounds: [[number, number, number], [number, number, number]];
-    certificate?: { max_mm: number; from_mesh: { max_mm: number } };
+    certificate?: { found_mm: number; proven: boolean; from_mesh: { max_mm: number } };
     files: Record<string, { bytes: number; sha256: string }>;
     labels?: { label: number; triangles: number; volume_mm3: number; area_mm2: number }[];
   } | null;

@@ -32,10 +32,10 @@ describe('a surface for a printer', () => {
       id: 'j',
       finished: 't',
       parameters: { iso: 3 },
-      mesh: { certificate: { max_mm: 0.1 }, triangles: 5, files: { stl: { bytes: 9, sha256: 'ab', href: '/v1/x' } } },
+      mesh: { certificate: { found_mm: 0.1 }, triangles: 5, files: { stl: { bytes: 9, sha256: 'ab', href: '/v1/x' } } },
     } as unknown as Job;
     const told = JSON.parse(certificateFile(job)) as Record<string, unknown>;
-    expect(told).toMatchObject({ job: 'j', certificate: { max_mm: 0.1 }, files: { stl: { bytes: 9, sha256: 'ab' } } });
+    expect(told).toMatchObject({ job: 'j', certificate: { found_mm: 0.1 }, files: { stl: { bytes: 9, sha256: 'ab' } } });
     expect(certificateFile(job)).not.toContain('/v1/');
   });
 });

@@ -655,8 +655,16 @@ class MeshCertificate(TypedDict):
     #: The file with the largest distance. The distances are those of this file. Of several files
     #: that hold the mesh exactly, the first.
     file: MeshFormat
-    #: The largest distance in both directions.
-    max_mm: float
+    #: Whether bound_mm was proven for every point. If not, why_unproven says why, and other points
+    #: can be farther than found_mm.
+    proven: bool
+    #: No point of any file is farther from the extracted surface, and no point of the extracted
+    #: surface is farther from any file. At most max_error_mm. Only if it was proven.
+    bound_mm: NotRequired[float]
+    #: Why the distance was measured and not proven.
+    why_unproven: NotRequired[str]
+    #: The largest distance that was found, in both directions.
+    found_mm: float
     #: From the file to the extracted surface. Shows what was added.
     from_mesh: DistanceSummary
     #: From the extracted surface to the file. Shows what was removed.

@@ -23,7 +23,7 @@ export function histogramPath({ histogram, max_mm: max }: DistanceSummary, most:
   return `M0 ${height}${parts.join('')}L${(histogram.length * step).toFixed(1)} ${height}Z`;
 }
 
-function chart({ from_mesh: mesh, from_extracted: extracted, max_mm: most }: Certificate): HTMLElement | null {
+function chart({ from_mesh: mesh, from_extracted: extracted, found_mm: most }: Certificate): HTMLElement | null {
   if (most === 0) return null;
   const top = Math.max(1, ...mesh.histogram, ...extracted.histogram);
   return h(
@@ -105,11 +105,14 @@ export function certificateBody(job: Job): HTMLElement | null {
     h(
       'p',
       {},
-      h('b', {}, `${millimetres(certificate.max_mm)} mm`),
-      ` is the largest distance between the ${file} file and the extracted surface.`,
+      h('b', {}, `${millimetres(certificate.found_mm)} mm`),
+      ` is the largest distance that was found between the ${file} file and the extracted surface.`,
       isOne ? '' : ' Every other file is at least as near.',
       typeof allowed === 'number' ? ` Allowed: ${formatValue(allowed)} mm.` : '',
     ),
+    typeof certificate.bound_mm === 'number'
+      ? h('p', {}, 'Proven: no point of any file or of the extracted surface is more than ', h('b', {}, `${millimetres(certificate.bound_mm)} mm`), ' from the other.')
+      : h('p', { class: 'hint' }, `Measured at points, not proven for all. ${certificate.why_unproven ?? ''}`),
     bothWays(certificate),
     chart(certificate),
     spent(certificate, allowed),

@@ -1,0 +1,215 @@
+#include "server/mesh/bound/bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "proto/error.h"
+#include "proto/samples.h"
+#include "server/mesh/bound/collapses.h"
+#include "server/mesh/bound/cover.h"
+#include "server/mesh/bound/field.h"
+#include "server/mesh/bound/proof.h"
+#include "server/mesh/bound/start.h"
+#include "server/mesh/bound/tube.h"
+#include "server/mesh/simplify/simplify_layers.h"
+
+namespace isomesh::mesh {
+namespace bound {
+namespace {
+
+constexpr double kLeastReach = 0.25;  // of the error: with less nothing is gained
+
+// What rounding to the grid of the copies, and to the mesh's single precision, may move a place.
+double rounding_of(const Dims& dims, const Metric& metric) {
+  constexpr double kUnit = std::numeric_limits<float>::epsilon();
+  const double samples = std::max({dims.x, dims.y, dims.z});
+  const double grid = std::max(1.0 / double{kPlaces}, samples * kUnit) * metric.largest_step();
+  double largest = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const Vecd place = metric.place({(corner & 1) != 0 ? dims.x - 1.0 : 0.0,
+                                     (corner & 2) != 0 ? dims.y - 1.0 : 0.0,
+                                     (corner & 4) != 0 ? dims.z - 1.0 : 0.0});
+    largest = std::max(largest, length(place));
+  }
+  return grid + largest * kUnit;
+}
+
+// The triangles of the components of S in `which`, with all vertices on lattice edges, instead of
+// what has become of them. A component of a few voxels may have been folded until T+ and T- lay
+// around it no longer.
+void restore(const Field& field, const Metric& metric, double reach_mm,
+             std::span<const Crossing> crossings, std::span<const Triangle> extracted,
+             std::span<const std::uint32_t> components, std::span<const std::uint32_t> which,
+             Tube& tube) {
+  std::vector<std::uint8_t> back(crossings.size(), 0);
+  for (const std::uint32_t component : which) back[component] = 1;
+  const auto goes_back = [&](const Triangle& triangle) {
+    return back[components[triangle[0]]] != 0;
+  };
+  std::erase_if(tube.triangles, goes_back);
+  for (Triangle triangle : extracted) {
+    if (!goes_back(triangle)) continue;
+    if (!metric.is_left_handed()) std::swap(triangle[1], triangle[2]);
+    tube.triangles.push_back(triangle);
+  }
+  for (std::size_t v = 0; v < crossings.size(); ++v) {
+    if (back[components[v]] == 0) continue;
+    tube.vertices[v] = on_lattice_edge(field, crossings[v], metric, reach_mm);
+  }
+}
+
+// Forgets the vertices that no triangle names. The others, in their order: which they were.
+std::vector<std::uint32_t> compact(Tube& tube) {
+  std::vector<std::uint32_t> number(tube.vertices.size(), 0);
+  for (const Triangle& triangle : tube.triangles) {
+    for (const std::uint32_t v : triangle) number[v] = 1;
+  }
+  std::vector<std::uint32_t> origins;
+  for (std::uint32_t v = 0; v < number.size(); ++v) {
+    if (number[v] == 0) continue;
+    number[v] = static_cast<std::uint32_t>(origins.size());
+    tube.vertices[origins.size()] = tube.vertices[v];
+    origins.push_back(v);
+  }
+  tube.vertices.resize(origins.size());
+  for (Triangle& triangle : tube.triangles) {
+    for (std::uint32_t& v : triangle) v = number[v];
+  }
+  return origins;
+}
+
+// The tube without the components of S that it lies around no longer, and with their plain surface
+// instead. Of each of its vertices: which crossing it began as.
+std::vector<std::uint32_t> restore_lost(const Field& field, const Metric& metric, double reach_mm,
+                                        std::span<const Crossing> crossings,
+                                        std::span<const Triangle> extracted, const Context& context,
+                                        Tube& tube) {
+  const std::vector<std::uint32_t> components = components_of(crossings.size(), extracted);
+  std::vector<std::uint32_t> all(crossings.size());
+  std::iota(all.begin(), all.end(), 0U);
+  const auto lost = uncovered(field, {crossings, extracted, tube.vertices, tube.triangles, all},
+                              components, odd_edges(tube.vertices.size(), tube.triangles), context);
+  if (!lost.empty()) {
+    restore(field, metric, reach_mm, crossings, extracted, components, lost, tube);
+  }
+  return compact(tube);
+}
+
+BoundedMesh describe(const Metric& metric, const Tube& tube) {
+  BoundedMesh result;
+  const auto mm = [&](Vecf copy) {
+    const Vecd place = metric.place(wide(copy));
+    return std::array{place.x, place.y, place.z};
+  };
+  for (const Vertex& vertex : tube.vertices) {
+    result.inside.push_back(mm(vertex.in));
+    result.outside.push_back(mm(vertex.out));
+  }
+  return result;
+}
+
+// Gives the mesh the tube's surface.
+void write(const Metric& metric, std::span<const std::uint32_t> origins,
+           std::span<const Vec3> places, const Tube& tube, Mesh& mesh) {
+  for (std::size_t v = 0; v < origins.size(); ++v) mesh.positions[origins[v]] = places[v];
+  std::vector<Triangle> triangles;
+  triangles.reserve(tube.triangles.size());
+  for (const auto& [a, b, c] : tube.triangles) {
+    triangles.push_back({origins[a], origins[b], origins[c]});
+    if (!metric.is_left_handed()) std::swap(triangles.back()[1], triangles.back()[2]);
+  }
+  std::vector<WallSides> no_sides;
+  replace_triangles(triangles, no_sides, mesh);
+}
+
+// Gives the mesh the tube's surface, whose places are rounded to single precision.
+BoundedMesh deliver(const Metric& metric, std::span<const std::uint32_t> origins, const Tube& tube,
+                    double shift_mm, double max_error_mm, Mesh& mesh) {
+  std::vector<Vec3> places;
+  for (const Vertex& vertex : tube.vertices) {
+    const Vecf place = narrow(metric.place(wide(vertex.p)));
+    places.push_back({place.x, place.y, place.z});
+  }
+  BoundedMesh result = describe(metric, tube);
+  result.shift_mm = shift_mm;
+  result.triangles_before = mesh.triangles.size();
+  result.bound_mm = result.bound_at(places);
+  // The reach leaves room for this rounding.
+  if (!(result.bound_mm <= max_error_mm)) {
+    throw Error(ErrorCode::kInternal, "a proven distance is larger than its limit");
+  }
+  write(metric, origins, places, tube, mesh);
+  return result;
+}
+
+}  // namespace
+}  // namespace bound
+
+double BoundedMesh::bound_at(std::span<const Vec3> places) const {
+  double most = 0;
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    for (const auto* copy : {&inside[v], &outside[v]}) {
+      const double distance =
+          std::hypot((*copy)[0] - double{places[v][0]}, (*copy)[1] - double{places[v][1]},
+                     (*copy)[2] - double{places[v][2]});
+      if (!(distance <= most)) most = distance;
+      if (std::isnan(most)) return most;
+    }
+  }
+  return most + shift_mm;
+}
+
+bool has_bound(const ExtractOptions& options) {
+  return options.scheme == Scheme::kSix && !options.close && !options.regularize;
+}
+
+template <class T>
+std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const ExtractOptions& extract,
+                                           const BoundOptions& options, const Context& context,
+                                           Mesh& mesh, std::string& why_not) {
+  using namespace bound;
+  const auto unproven = [&](const char* why) {
+    why_not = why;
+    return std::optional<BoundedMesh>();
+  };
+  if (!has_bound(extract)) return unproven("There is no proof for such a surface.");
+  if (mesh.triangles.size() == 0) return BoundedMesh();
+  const std::optional<Field> field = make_field(lattice, extract, context);
+  if (!field) return unproven("Single precision cannot hold the samples' differences.");
+  const std::vector<Crossing> crossings = crossings_of(*field, context);
+  if (crossings.size() != mesh.positions.size()) {
+    return unproven("The surface is not the whole one of the samples.");
+  }
+  const Metric metric(lattice.to_space);
+  const double shift = shift_of(lattice, extract, *field, crossings);
+  const double reach =
+      options.max_error_mm - options.rounding_mm - shift - rounding_of(lattice.dims, metric);
+  if (!(reach > kLeastReach * options.max_error_mm)) {
+    return unproven("Rounding of coordinates takes up the limit.");
+  }
+
+  std::optional<Tube> tube =
+      make_start(*field, crossings, metric, {.reach_mm = reach, .is_moved = options.is_smoothed},
+                 mesh, context);
+  if (!tube) return unproven("Samples differ too little from the iso-value.");
+  collapse_edges(*field, metric, {.reach_mm = reach, .triangles = options.triangles}, context,
+                 *tube);
+  const std::vector<std::uint32_t> origins =
+      restore_lost(*field, metric, reach, crossings, mesh.triangles.span(), context, *tube);
+  const Surfaces surfaces = {crossings, mesh.triangles.span(), tube->vertices, tube->triangles,
+                             origins};
+  if (!prove(*field, surfaces, context).holds()) return unproven("The final check failed.");
+  return deliver(metric, origins, *tube, shift, options.max_error_mm, mesh);
+}
+
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                       \
+  template std::optional<BoundedMesh> simplify_within(const Lattice<T>&, const ExtractOptions&,   \
+                                                      const BoundOptions&, const Context&, Mesh&, \
+                                                      std::string&);
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,29 @@
+// The edges of one block of triangles; private to this folder.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "server/mesh/bound/clear.h"
+#include "server/mesh/bound/collapses.h"
+#include "server/mesh/bound/quadric.h"
+
+namespace isomesh::mesh::bound {
+
+// Some triangles of a tube with vertices numbered anew.
+struct Block {
+  std::vector<Vertex> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<std::uint8_t> stays;  // of each vertex: may not change
+  std::vector<std::uint8_t> first;  // of each vertex: to begin with
+};
+
+// Collapses what may go until `least` triangles are left, and leaves only the triangles that
+// remain. Vertices on the block's boundary keep their places and are set in `stays`.
+void collapse_block(const Field& field, const Metric& metric, double reach_mm, std::size_t least,
+                    Block& block);
+
+}  // namespace isomesh::mesh::bound

@@ -1,0 +1,240 @@
+#include "server/mesh/bound/start.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "server/mesh/bound/clear.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::mesh::bound {
+namespace {
+
+constexpr std::size_t kChunk = 1 << 14;
+
+std::size_t chunks_of(std::size_t count) { return (count + kChunk - 1) / kChunk; }
+
+// Calls visit(i) for each of the chunk's numbers below `count`.
+template <class Visit>
+void visit_chunk(std::size_t chunk, std::size_t count, Visit visit) {
+  for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) visit(i);
+}
+
+bool is_in_face(const Dims& dims, const Vecd& a, const Vecd& b) {
+  const auto share_face = [](double s, double t, std::uint32_t samples) {
+    return s == t && (s == 0 || s == samples - 1.0);
+  };
+  return share_face(a.x, b.x, dims.x) || share_face(a.y, b.y, dims.y) ||
+         share_face(a.z, b.z, dims.z);
+}
+
+class Starter {
+ public:
+  Starter(const Field& field, std::span<const Crossing> crossings, const Metric& metric,
+          const StartOptions& options, const Mesh& mesh, const Context& context)
+      : field_(field),
+        crossings_(crossings),
+        metric_(metric),
+        options_(options),
+        mesh_(mesh),
+        context_(context),
+        stepped_(crossings.size(), 0),
+        changed_(crossings.size(), 1),
+        is_unclear_(crossings.size(), 0) {}
+
+  std::optional<Tube> run() {
+    set_up();
+    while (true) {
+      find_changed_triangles();
+      add_normals();
+      place_changed_vertices();
+      find_faults();
+      if (!has_faults()) return std::move(tube_);
+      if (!step_back()) return {};
+    }
+  }
+
+ private:
+  void set_up() {
+    tube_.vertices.resize(crossings_.size());
+    tube_.border.resize(crossings_.size());
+    tube_.triangles.assign(mesh_.triangles.begin(), mesh_.triangles.end());
+    if (!metric_.is_left_handed()) {
+      for (auto& [a, b, c] : tube_.triangles) std::swap(b, c);
+    }
+    normals_.resize(crossings_.size());
+    parallel_for(context_, chunks_of(crossings_.size()), [&](std::size_t chunk) {
+      visit_chunk(chunk, crossings_.size(), [&](std::size_t v) {
+        const auto [inside, outside] = crossings_[v];
+        tube_.border[v] = static_cast<std::uint8_t>(
+            is_in_face(field_.dims, field_.place(inside), field_.place(outside)));
+        stepped_[v] = tube_.border[v];
+        tube_.vertices[v] = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
+        if (!options_.is_moved || stepped_[v] != 0) return;
+        const Vec3& at = mesh_.positions[v];
+        tube_.vertices[v].p = snap(metric_.index({at[0], at[1], at[2]}));
+      });
+    });
+    const std::size_t chunks = chunks_of(tube_.triangles.size());
+    look_.resize(chunks);
+    faults_.resize(chunks);
+  }
+
+  void find_changed_triangles() {
+    parallel_for(context_, look_.size(), [&](std::size_t chunk) {
+      look_[chunk].clear();
+      visit_chunk(chunk, tube_.triangles.size(), [&](std::size_t t) {
+        const auto& [a, b, c] = tube_.triangles[t];
+        if ((changed_[a] | changed_[b] | changed_[c]) != 0) look_[chunk].push_back(t);
+      });
+    });
+  }
+
+  // All triangles around a changed vertex are looked at, so its sum is whole.
+  void add_normals() {
+    std::ranges::fill(normals_, Vecf{});
+    for (const auto& chunk : look_) {
+      for (const std::size_t t : chunk) {
+        const auto& [a, b, c] = tube_.triangles[t];
+        const Vecf p = tube_.vertices[a].p;
+        const Vecf normal =
+            cross(metric_.mm(tube_.vertices[b].p - p), metric_.mm(tube_.vertices[c].p - p)) *
+            metric_.turn();
+        for (const std::uint32_t v : tube_.triangles[t]) normals_[v] = normals_[v] + normal;
+      }
+    }
+  }
+
+  void place_changed_vertices() {
+    parallel_for(context_, chunks_of(crossings_.size()), [&](std::size_t chunk) {
+      Clear clear(field_);
+      visit_chunk(chunk, crossings_.size(), [&](std::size_t v) {
+        if (changed_[v] == 0) return;
+        Vertex& vertex = tube_.vertices[v];
+        if (stepped_[v] != 0) {
+          vertex = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
+        } else {
+          place_along_normal(v, vertex);
+        }
+        is_unclear_[v] = static_cast<std::uint8_t>(!has_clear_ends(clear, vertex));
+      });
+    });
+  }
+
+  void place_along_normal(std::size_t v, Vertex& vertex) const {
+    Vecd normal = wide(normals_[v]);
+    if (!(length(normal) > 0)) {
+      normal = metric_.mm(field_.place(crossings_[v].inside) - field_.place(crossings_[v].outside));
+    }
+    const Vecd way = metric_.steps(normal * (options_.reach_mm / length(normal)));
+    vertex.in = snap(wide(vertex.p) + way);
+    vertex.out = snap(wide(vertex.p) - way);
+  }
+
+  static bool has_clear_ends(Clear& clear, const Vertex& vertex) {
+    if (!clear.contains(vertex.in) || !clear.contains(vertex.out)) return false;
+    clear.base(vertex.in);
+    return clear.point(clear.at(vertex.in), 1) && clear.point(clear.at(vertex.out), -1);
+  }
+
+  void find_faults() {
+    parallel_for(context_, look_.size(), [&](std::size_t chunk) {
+      Clear clear(field_);
+      faults_[chunk].clear();
+      for (const std::size_t t : look_[chunk]) {
+        if (is_at_fault(clear, tube_.triangles[t])) faults_[chunk].push_back(t);
+      }
+    });
+  }
+
+  bool is_at_fault(Clear& clear, const Triangle& triangle) const {
+    const auto& [a, b, c] = triangle;
+    if ((is_unclear_[a] | is_unclear_[b] | is_unclear_[c]) != 0) return true;
+    const Vertex& x = tube_.vertices[a];
+    const Vertex& y = tube_.vertices[b];
+    const Vertex& z = tube_.vertices[c];
+    const bool all_stepped = (stepped_[a] & stepped_[b] & stepped_[c]) != 0;
+    if (!all_stepped && !is_upright(x, y, z)) return true;
+    return !is_clear(clear, triangle, x.in, y.in, z.in, 1) ||
+           !is_clear(clear, triangle, x.out, y.out, z.out, -1);
+  }
+
+  bool is_clear(Clear& clear, const Triangle& triangle, Vecf a, Vecf b, Vecf c, double sign) const {
+    const auto is_mine = [&](std::uint32_t from, std::uint32_t to) {
+      return from < to || (tube_.border[from] & tube_.border[to]) != 0;  // else the neighbour's
+    };
+    clear.base(a);
+    const PlaneNumbers x = clear.at(a);
+    const PlaneNumbers y = clear.at(b);
+    const PlaneNumbers z = clear.at(c);
+    return (!is_mine(triangle[0], triangle[1]) || clear.edge(x, y, sign)) &&
+           (!is_mine(triangle[1], triangle[2]) || clear.edge(y, z, sign)) &&
+           (!is_mine(triangle[2], triangle[0]) || clear.edge(z, x, sign)) &&
+           clear.inside(x, y, z, sign);
+  }
+
+  bool has_faults() const {
+    return std::ranges::any_of(faults_, [](const auto& chunk) { return !chunk.empty(); });
+  }
+
+  // Of each triangle at fault the vertex that is at fault in most of them. False where one has all
+  // its vertices on lattice edges.
+  bool step_back() {
+    std::vector<std::uint32_t> count(crossings_.size(), 0);
+    for (const auto& chunk : faults_) {
+      for (const std::size_t t : chunk) {
+        for (const std::uint32_t v : tube_.triangles[t]) count[v] += stepped_[v] == 0 ? 1 : 0;
+      }
+    }
+    std::ranges::fill(changed_, 0);
+    for (const auto& chunk : faults_) {
+      for (const std::size_t t : chunk) {
+        const auto most = std::ranges::max(tube_.triangles[t], {}, [&](std::uint32_t v) {
+          return std::pair(count[v], crossings_.size() - v);
+        });
+        if (count[most] == 0) return false;
+        changed_[most] = 1;
+      }
+    }
+    for (std::size_t v = 0; v < changed_.size(); ++v) stepped_[v] |= changed_[v];
+    return true;
+  }
+
+  const Field& field_;
+  const std::span<const Crossing> crossings_;
+  const Metric& metric_;
+  const StartOptions& options_;
+  const Mesh& mesh_;
+  const Context& context_;
+  Tube tube_;
+  std::vector<Vecf> normals_;
+  std::vector<std::uint8_t> stepped_, changed_, is_unclear_;  // by vertex
+  std::vector<std::vector<std::size_t>> look_, faults_;       // by chunk of triangles
+};
+
+}  // namespace
+
+Vertex on_lattice_edge(const Field& field, const Crossing& crossing, const Metric& metric,
+                       double reach_mm) {
+  const Vecd inside = field.place(crossing.inside);
+  const Vecd outside = field.place(crossing.outside);
+  const Vecd way = outside - inside;
+  const double long_mm = length(metric.mm(way));
+  const double zero = length(zero_between(field, crossing) - inside) / length(way);
+  // At a sample near the iso-value many crossings lie in one place: T keeps off it.
+  const double least = std::min(0.5, 0.5 * reach_mm / long_mm);
+  const double share = std::clamp(zero, least, 1 - least);
+  const Vecd p = inside + way * share;
+  const double reach = reach_mm / long_mm;
+  return {snap(p), snap(inside + way * std::max(0.0, share - reach)),
+          snap(inside + way * std::min(1.0, share + reach))};
+}
+
+std::optional<Tube> make_start(const Field& field, std::span<const Crossing> crossings,
+                               const Metric& metric, const StartOptions& options, const Mesh& mesh,
+                               const Context& context) {
+  return Starter(field, crossings, metric, options, mesh, context).run();
+}
+
+}  // namespace isomesh::mesh::bound

@@ -1,0 +1,60 @@
+// A surface T that carries two copies of itself, T+ inside S and T- outside; private to this
+// folder. proof.h says why.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "server/mesh/bound/vec.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh::bound {
+
+// Places in numbers of samples.
+struct Vertex {
+  Vecf p;
+  Vecf in;   // in T+, where F > 0
+  Vecf out;  // in T-, where F < 0
+};
+
+// Seen from where T+ is, triangles are counter-clockwise. Vertex i began as the crossing i of S.
+struct Tube {
+  std::vector<Vertex> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<std::uint8_t> border;  // of each vertex: lies in a face of the volume, and stays
+};
+
+// All three places of a vertex lie on a grid of this many points to the voxel, so that differences
+// of near ones are exact in single precision and areas in double.
+inline constexpr float kPlaces = 65536;
+
+inline Vecf snap(Vecd a) {
+  const auto round = [](double x) {
+    // Single precision has the nearest multiple, or of large numbers a coarser one.
+    return static_cast<float>(std::nearbyint(x * double{kPlaces}) / double{kPlaces});
+  };
+  return {round(a.x), round(a.y), round(a.z)};
+}
+
+// The ends of a triangle that is wider than this are not told apart exactly.
+inline constexpr float kWidest = 60;
+
+inline bool is_wide(Vecf a, Vecf b) {
+  return !(std::abs(a.x - b.x) < kWidest && std::abs(a.y - b.y) < kWidest &&
+           std::abs(a.z - b.z) < kWidest);
+}
+
+// Whether the ways from T- to T and on to T+ rise from the triangle's front at each corner. T does
+// not turn back over an edge between such triangles.
+inline bool is_upright(const Vertex& a, const Vertex& b, const Vertex& c) {
+  const Vecd normal = cross(wide(b.p - a.p), wide(c.p - a.p));
+  const auto rises = [&](const Vertex& v) {
+    constexpr double kLeast = 1e-10;
+    return dot(normal, wide(v.in - v.p)) > kLeast && dot(normal, wide(v.p - v.out)) > kLeast;
+  };
+  return rises(a) && rises(b) && rises(c);
+}
+
+}  // namespace isomesh::mesh::bound

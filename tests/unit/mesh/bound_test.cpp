@@ -1,0 +1,168 @@
+#include "server/mesh/bound/bound.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/mesh/smooth/smooth.h"
+#include "server/mesh/topology/topology.h"
+#include "tests/support/exact_distance.h"
+#include "tests/support/kernels.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::mesh {
+namespace {
+
+test::TriangleSoup soup_of(const Mesh& mesh) {
+  test::TriangleSoup soup;
+  for (const Triangle& triangle : mesh.triangles) {
+    std::array<std::array<double, 3>, 3> corners;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vec3& p = mesh.positions[triangle[i]];
+      corners[i] = {p[0], p[1], p[2]};
+    }
+    soup.triangles.push_back(corners);
+  }
+  return soup;
+}
+
+template <class T>
+std::optional<BoundedMesh> simplified(const test::SampleVolume<T>& volume,
+                                      const ExtractOptions& extract, const BoundOptions& options,
+                                      Mesh& mesh) {
+  std::string why_not;
+  auto bound = simplify_within(volume.lattice(), extract, options, {}, mesh, why_not);
+  EXPECT_EQ(bound.has_value(), why_not.empty());
+  return bound;
+}
+
+// What a stranger finds: exact distances of random points, both ways.
+template <class T>
+void expect_within(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
+                   double error_mm) {
+  const Mesh plain = test::extracted(volume, extract);
+  Mesh mesh = test::extracted(volume, extract);
+  const auto bound = simplified(volume, extract, {.max_error_mm = error_mm}, mesh);
+  ASSERT_TRUE(bound);
+  EXPECT_LE(bound->bound_mm, error_mm);
+  EXPECT_EQ(bound->triangles_before, plain.triangles.size());
+  EXPECT_EQ(bound->bound_at(mesh.positions.span()), bound->bound_mm);
+  const test::TriangleSoup before = soup_of(plain);
+  const test::TriangleSoup after = soup_of(mesh);
+  constexpr double kSinglePrecision = 1e-4;  // of the plain surface's own coordinates
+  EXPECT_LE(test::largest_distance(after, before, 1000, 1), bound->bound_mm + kSinglePrecision);
+  EXPECT_LE(test::largest_distance(before, after, 1000, 2), bound->bound_mm + kSinglePrecision);
+  const Topology was = measure_topology(plain, {});
+  const Topology is = measure_topology(mesh, {});
+  EXPECT_EQ(is.manifold, was.manifold);
+  EXPECT_EQ(is.oriented, was.oriented);
+  EXPECT_EQ(is.boundary_edges, was.boundary_edges);
+}
+
+TEST(BoundTest, KeepsAllOfASphereWithinTheError) {
+  const auto volume = test::sample<float>(test::sphere({5.2, 5.1, 4.9}, 3.9), {11, 11, 11});
+  for (const double error : {0.02, 0.1, 0.5, 2.0}) expect_within(volume, {}, error);
+}
+
+TEST(BoundTest, KeepsAllOfASurfaceThatEndsAtTheBorderWithinTheError) {
+  const auto volume = test::sample<float>(test::gyroid(7), {10, 9, 8});
+  for (const double error : {0.05, 0.3}) expect_within(volume, {}, error);
+}
+
+TEST(BoundTest, KeepsAllOfNoiseWithinTheError) {
+  const auto floats = test::noise_between<float>(-1, 1, {6, 5, 7}, 3);
+  const auto equal = test::noise<std::uint8_t>({0, 1, 2, 3}, {7, 6, 5}, 5);
+  for (const double error : {0.05, 0.2, 0.7}) {
+    expect_within(floats, {.iso = 0.01}, error);
+    expect_within(equal, {.iso = 2}, error);  // many samples equal to the iso-value
+    expect_within(equal, {.iso = 1.5, .interpolation = Interpolation::kMidpoint}, error);
+  }
+}
+
+TEST(BoundTest, KeepsAllOfPlateausAndOfTheSmallestVolumeWithinTheError) {
+  auto plateau = test::constant<std::int16_t>(100, {9, 9, 9});  // the iso-value, and a hole in it
+  for (std::uint64_t i = 3; i < 6; ++i) plateau.at(i, 4, 4) = 90;
+  expect_within(plateau, {.iso = 100}, 0.3);
+  for (unsigned inside = 1; inside < 255; inside += 7) {
+    auto cell = test::constant<float>(-1, {2, 2, 2});
+    for (unsigned c = 0; c < 8; ++c) {
+      if ((inside >> c & 1) != 0)
+        cell.samples[c] = static_cast<float>(c) * 0.3F;  // 0: the iso-value
+    }
+    expect_within(cell, {}, 0.2);
+  }
+}
+
+TEST(BoundTest, HoldsInMillimetresForAnyGeometry) {
+  for (const auto& [name, geometry] : test::all_geometries()) {
+    SCOPED_TRACE(name);
+    const auto volume = test::noise<std::int16_t>({-3, 0, 1, 5}, {6, 7, 5}, 11, geometry);
+    const double step = *std::ranges::min_element(geometry.spacing);
+    expect_within(volume, {.iso = 1}, 0.2 * step);
+  }
+}
+
+TEST(BoundTest, LeavesFewTrianglesOfAFlatSurface) {
+  const auto volume = test::sample<float>(test::plane({0.6, 0.0, 0.8}, 17), {40, 40, 40});
+  Mesh mesh = test::extracted(volume, {});
+  const auto bound = simplified(volume, {}, {.max_error_mm = 0.1}, mesh);
+  ASSERT_TRUE(bound);
+  EXPECT_LT(mesh.triangles.size(), bound->triangles_before / 4);  // its boundary stays
+}
+
+TEST(BoundTest, ProvesWhatWasSmoothedBefore) {
+  const auto volume = test::sample<float>(test::gyroid(9), {14, 13, 12});
+  const Mesh plain = test::extracted(volume, {});
+  Mesh mesh = test::extracted(volume, {});
+  smooth({.passes = 5, .max_displacement_mm = 0.1}, {}, mesh);
+  const auto bound = simplified(volume, {}, {.max_error_mm = 0.2, .is_smoothed = true}, mesh);
+  ASSERT_TRUE(bound);
+  EXPECT_LE(test::largest_distance(soup_of(mesh), soup_of(plain), 1000, 1), 0.2);
+  EXPECT_LE(test::largest_distance(soup_of(plain), soup_of(mesh), 1000, 2), 0.2);
+}
+
+TEST(BoundTest, StopsAtEnoughTriangles) {
+  const auto volume = test::sample<float>(test::sphere({16, 16, 16}, 13), {33, 33, 33});
+  Mesh mesh = test::extracted(volume, {});
+  const std::uint64_t half = mesh.triangles.size() / 2;
+  const auto bound = simplified(volume, {}, {.max_error_mm = 0.5, .triangles = half}, mesh);
+  ASSERT_TRUE(bound);
+  EXPECT_LE(mesh.triangles.size(), half + 2 * 27);  // each block stops by itself
+  EXPECT_GE(mesh.triangles.size(), half - 2 * 27);
+}
+
+TEST(BoundTest, GivesTheSameMeshForAnyNumberOfThreads) {
+  const auto volume = test::sample<float>(test::gyroid(17), {48, 44, 46});
+  std::vector<std::vector<Vec3>> positions;
+  std::vector<std::vector<Triangle>> triangles;
+  for (const int threads : {1, 2, 5}) {
+    const test::ThreadCount count(threads);
+    Mesh mesh = test::extracted(volume, {});
+    ASSERT_TRUE(simplified(volume, {}, {.max_error_mm = 0.1}, mesh));
+    positions.emplace_back(mesh.positions.begin(), mesh.positions.end());
+    triangles.emplace_back(mesh.triangles.begin(), mesh.triangles.end());
+  }
+  EXPECT_TRUE(positions[0] == positions[1] && positions[0] == positions[2]);
+  EXPECT_TRUE(triangles[0] == triangles[1] && triangles[0] == triangles[2]);
+}
+
+TEST(BoundTest, ClaimsNothingWhereItProvesNothing) {
+  const auto volume = test::sample<float>(test::sphere({8, 8, 8}, 6.3), {17, 17, 17});
+  EXPECT_FALSE(has_bound({.scheme = Scheme::kFive}));
+  EXPECT_FALSE(has_bound({.close = true}));
+  EXPECT_FALSE(has_bound({.regularize = true}));
+  Mesh mesh = test::extracted(volume, {});
+  const std::size_t vertices = mesh.positions.size();
+  EXPECT_FALSE(simplified(volume, {.iso = 1}, {.max_error_mm = 0.1}, mesh));  // another surface
+  EXPECT_FALSE(simplified(volume, {}, {.max_error_mm = 0.1, .rounding_mm = 0.09}, mesh));
+  EXPECT_EQ(mesh.positions.size(), vertices);
+}
+
+}  // namespace
+}  // namespace isomesh::mesh
