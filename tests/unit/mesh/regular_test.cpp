@@ -71,7 +71,8 @@ SampleVolume<std::int8_t> block(unsigned pattern, unsigned distances, std::mt199
 
 TEST(RegularSurface, OfEveryPatternOfABlockIsTheReferences) {
   std::mt19937 random(1);
-  for (unsigned pattern = 0; pattern < 1U << 12 && !testing::Test::HasFailure(); pattern += test::kStep) {
+  for (unsigned pattern = 0; pattern < 1U << 12 && !testing::Test::HasFailure();
+       pattern += test::kStep) {
     SCOPED_TRACE(pattern);
     auto volume = block(pattern, pattern % 3 == 0 ? 1 : pattern % 3 == 1 ? 3 : 100, random);
     // The other side is inside, for half of them.
