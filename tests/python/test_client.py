@@ -211,16 +211,21 @@ class Jobs(DaemonTest):
     def test_an_interrupt_cancels_the_job(self):
         noise = numpy.random.default_rng(2).random((128, 128, 96), "float32")
         before = {job["id"] for job in self.client.jobs()}
+        taken = threading.Event()
 
         def interrupt():
             # As soon as it is there: its response may still be on the way.
             while not self.made(before):
                 time.sleep(0.05)
-            os.kill(os.getpid(), signal.SIGINT)
+            # Python sees a signal that comes just before it begins to wait for bytes only once they are there.
+            while not taken.is_set():
+                os.kill(os.getpid(), signal.SIGINT)
+                taken.wait(10)
 
         threading.Thread(target=interrupt, daemon=True).start()
         with self.assertRaises(KeyboardInterrupt):
             self.client.mesh(noise, iso=0.5, passes=1000)
+        taken.set()
         self.assert_the_one_job_is_cancelled(before)
 
     def test_an_interrupt_of_its_response_cancels_the_job(self):

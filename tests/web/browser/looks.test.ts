@@ -71,7 +71,8 @@ describe('slices beside a surface', () => {
     await page.mouse.click(slice.x + 0.6 * slice.width, slice.y + 0.7 * slice.height);
     await expect.poll(() => Number(noted(page, 'at').split(',')[1])).toBeGreaterThan(25);
     await still(page);
-    expect(before.equals(await page.locator('.viewport').screenshot())).toBe(false);
+    // Its place is told before it is drawn.
+    await expect.poll(async () => before.equals(await page.locator('.viewport').screenshot())).toBe(false);
     const place = await settled(() => noted(page, 'at'));
 
     await open(page, `?slices=on&at=${place}`);
