@@ -2,7 +2,7 @@
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { titleOf } from '../openapi';
-import { ballNrrd, ballsNrrd, hues, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
+import { ballNrrd, ballsNrrd, hues, madeJob, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
 
 const at = setup();
 let ball: string;
@@ -149,9 +149,8 @@ describe('a surface that is not what was meant', () => {
     const before = page.url();
     await page.getByRole('button', { name: 'Keep only this component' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
-    // The surface of before stays until the new one is there.
-    await expect.poll(async () => (await openedJob(at)).mesh?.components, { timeout: 30_000 }).toBe(1);
-    const kept = await openedJob(at);
+    const kept = await madeJob(at);
+    expect(kept.mesh?.components).toBe(1);
     const [low] = kept.mesh?.bounds ?? [[0, 0, 0]];
     expect(low[0]).toBeGreaterThan(24);
   });
@@ -179,8 +178,9 @@ describe('a surface that is not what was meant', () => {
     const before = page.url();
     await page.getByRole('button', { name: 'Drop this component' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
-    await expect.poll(async () => (await openedJob(at)).mesh?.components, { timeout: 30_000 }).toBe(1);
-    expect((await openedJob(at)).mesh?.bounds[1][0]).toBeLessThan(24);
+    const { mesh } = await madeJob(at);
+    expect(mesh?.components).toBe(1);
+    expect(mesh?.bounds[1][0]).toBeLessThan(24);
   });
 });
 

@@ -1,7 +1,7 @@
 // Slices that are enlarged, and a box that a job is cropped to.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, ballsNrrd, contourPixels, noted, openedJob, settled, setup, silhouette } from './support';
+import { ballNrrd, ballsNrrd, contourPixels, madeJob, noted, settled, setup, silhouette } from './support';
 
 const at = setup();
 const size = 48;
@@ -88,8 +88,7 @@ describe('a crop', () => {
     expect(half).toBeGreaterThan(0.3);
     await page.getByRole('button', { name: 'Make the surface' }).click();
     await page.waitForURL(/#\/jobs\//);
-    await expect.poll(() => page.locator('.job').getAttribute('data-state')).toBe('succeeded');
-    const { mesh } = await openedJob(at);
+    const { mesh } = await madeJob(at);
     expect(mesh?.bounds[1][0]).toBeCloseTo(23, 3);
   });
 });
@@ -103,8 +102,7 @@ describe('a surface in parts', () => {
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await page.getByRole('button', { name: 'Keep the largest' }).click();
     await expect.poll(() => page.url()).not.toContain(id);
-    await expect.poll(() => page.locator('.job').getAttribute('data-state')).toBe('succeeded');
-    const largest = await openedJob(at);
+    const largest = await madeJob(at);
     expect(largest.mesh?.components).toBe(1);
     expect(largest.mesh?.triangles).toBeGreaterThan(0.6 * (mesh?.triangles ?? 0));
   });

@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, openedJob, setup, surfaceLoaded } from './support';
+import { ballNrrd, madeJob, setup, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -25,7 +25,7 @@ describe('a surface', () => {
     await expect.poll(() => page.locator('[data-format="3mf"]').count()).toBe(1);
     await expect.poll(() => page.locator('[data-format=stl]').count()).toBe(1);
     await expect.poll(() => page.getByRole('button', { name: 'For 3D printing' }).count()).toBe(0);
-    const made = await openedJob(at);
+    const made = await madeJob(at);
     expect(made.parameters).toMatchObject({ close: true, certify: true });
     const { name, bytes } = await saved(page, /^Certificate$/);
     expect(name).toMatch(/-certificate\.json$/);
@@ -54,6 +54,6 @@ describe('a surface', () => {
     await page.getByRole('button', { name: 'For a phone' }).click();
     await expect.poll(() => page.url()).not.toContain(job.id);
     await expect.poll(() => page.getByRole('button', { name: /^USDZ/ }).count()).toBe(1);
-    expect((await openedJob(at)).mesh?.triangles).toBeLessThanOrEqual(150_000);
+    expect((await madeJob(at)).mesh?.triangles).toBeLessThanOrEqual(150_000);
   });
 });

@@ -184,6 +184,12 @@ export function openedJob({ page, daemon }: Setup): Promise<JobAnswer> {
   return daemon.json(`/v1/jobs/${id}`);
 }
 
+// That job, once it has succeeded. The page shows the surface of before until then, and its state.
+export async function madeJob(at: Setup): Promise<JobAnswer> {
+  await expect.poll(async () => (await openedJob(at)).state, { timeout: 30_000 }).toBe('succeeded');
+  return openedJob(at);
+}
+
 // How far apart two points of a ball are that are seen left and right of its middle, each at that part of
 // the radius of its disc, by a camera at that distance.
 export function chordOfBall(radius: number, distance: number, part: number): number {
