@@ -35,14 +35,14 @@ struct Parameter {
   std::optional<double> above = {};
   std::optional<double> maximum = {};
   const char* when_empty = nullptr;        // the word for no value, instead of JSON's null
-  std::array<const char*, 4> values = {};  // the meanings of an enumeration's values, in order
+  std::array<const char*, 5> values = {};  // the meanings of an enumeration's values, in order
   // Kinds of smoothing that differ; empty if none does.
   std::array<std::optional<SmoothingCase>, 2> cases = {};
   bool is_required = false;
   const char* unless = nullptr;  // a required parameter may be missing if this one is given
   JobKind jobs = JobKind::kAny;
-  std::optional<double> by_labels = {};  // the default for jobs by labels, if it differs
-  bool may_be_absent = false;            // omitted for jobs that it does not concern
+  const char* by_labels = nullptr;  // the default for jobs by labels, if it differs
+  bool may_be_absent = false;       // omitted for jobs that it does not concern
   bool in_query = true;
   const char* query = nullptr;   // its name in a query, if it is not `name`
   const char* option = nullptr;  // its name on the command line, if it is not the query's

@@ -103,11 +103,13 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
             .title = "Labels",
             .help =
                 "Labels of a segmentation to mesh instead of an iso-value: their values, or `all`.",
-            .more = "Each label gets a surface of its own. Neighbouring labels share the wall "
-                    "between them. Values that are not listed are background. Vertices lie "
-                    "half-way between two samples. Some defaults differ from those of jobs with an "
-                    "iso-value: 10 passes, a lambda of 0.33, and no vertex moves farther than half "
-                    "the smallest spacing.",
+            .more =
+                "Each label gets a surface of its own. Neighbouring labels share the wall "
+                "between them. Values that are not listed are background. Vertices lie "
+                "half-way between two samples. Some defaults differ from those of jobs with an "
+                "iso-value: `regularize` is true, and `smoothing` is `labels`. With another kind "
+                "of smoothing there are 10 passes, a lambda of 0.33, and no vertex moves farther "
+                "than half the smallest spacing.",
             .minimum = kLeast,
             .maximum = kMost,
             .jobs = JobKind::kByLabels,
@@ -186,16 +188,18 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         "keeps its connected components, its boundary and its genus. Vertices at "
                         "the volume's border stay where they are. The same holds for the own "
                         "surface of each label.",
+                .by_labels = "true",
                 .may_be_absent = true},
       self.regularize);
   parameter(Parameter{.name = "passes",
                       .title = "Passes",
                       .help = "Number of smoothing passes.",
                       .more = "Vertices on the surface's boundary stay where they are. For labels "
-                              "the default is 10.",
+                              "the default is 10. `labels` smoothes once, whatever their number; "
+                              "0 leaves the surface as it is extracted.",
                       .minimum = 0,
                       .maximum = 1000,
-                      .by_labels = label_parameters({}).passes},
+                      .by_labels = "10"},
             self.passes);
   parameter(
       Parameter{
@@ -211,10 +215,15 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
               "larger: each pass moves every vertex along the extracted surface. `angle` moves it "
               "towards the bisectors of its neighbours' angles. `optimize` moves it towards the "
               "mean of its neighbours in the first half of the passes, and then to wherever the "
-              "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise.",
+              "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise. "
+              "`labels` is for labels alone: it takes the steps of the voxels away, keeps flat "
+              "faces "
+              "and edges, and gives each label the volume of its voxels.",
           .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
                      "Evens out the angles of triangles, and keeps shape and volume",
-                     "Enlarges the smallest angles of triangles, and keeps shape and volume"}},
+                     "Enlarges the smallest angles of triangles, and keeps shape and volume",
+                     "For labels: no steps of voxels, and each label's own volume"},
+          .by_labels = "labels"},
       self.smoothing);
   // Above 0.66, Taubin smoothing amplifies the highest frequencies in every pass, whatever the
   // pass-band.
@@ -227,7 +236,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
           .maximum = 1,
           .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},
                     SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}},
-          .by_labels = default_lambda(label_parameters({}))},
+          .by_labels = "0.33"},
       self.lambda);
   parameter(
       Parameter{
@@ -245,7 +254,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
           .name = "max_displacement_mm",
           .title = "Largest displacement",
           .help = "Smoothing moves no vertex farther than this from its extracted position.",
-          .more = "In millimetres. Null means no limit, and for labels half the smallest spacing.",
+          .more =
+              "In millimetres. Null means no limit; but labels that are smoothed by `laplacian` or "
+              "`taubin` move half the smallest spacing at most.",
           .unit = "mm",
           .minimum = 0},
       self.max_displacement_mm);

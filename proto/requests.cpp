@@ -194,6 +194,8 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
       refuse_if(is_wrong && json.contains(parameter.name), parameter.name,
                 "is only for jobs with labels");
     });
+    refuse_if(parameters.smoothing == Smoothing::kLabels, "smoothing",
+              "\"labels\" is only for jobs with labels");
     return refuse_if(has(MeshFormat::kZip), "formats",
                      "\"zip\" holds one file per label, so it needs labels");
   }

@@ -41,7 +41,8 @@ template <>
 struct Names<Smoothing> {
   static constexpr std::array kTable = {
       std::pair{Smoothing::kLaplacian, "laplacian"}, std::pair{Smoothing::kTaubin, "taubin"},
-      std::pair{Smoothing::kAngle, "angle"}, std::pair{Smoothing::kOptimize, "optimize"}};
+      std::pair{Smoothing::kAngle, "angle"}, std::pair{Smoothing::kOptimize, "optimize"},
+      std::pair{Smoothing::kLabels, "labels"}};
 };
 
 // Client and server both know this row; the server's own is in server/codec/formats.cpp.
@@ -173,8 +174,9 @@ double default_lambda(const MeshParameters& parameters) {
   // Factor 1 keeps the steps between half-way vertices, and takes 0.5 to 1 % off the volume of
   // labels in ten passes. Factor 1/3 evens out the steps, and takes a third of a percent.
   constexpr double kLabels = 0.33;
-  const bool is_laplacian = parameters.smoothing == Smoothing::kLaplacian;
-  return parameters.labels && is_laplacian ? kLabels : default_lambda(parameters.smoothing);
+  const bool is_taken = parameters.smoothing == Smoothing::kLaplacian ||
+                        parameters.smoothing == Smoothing::kLabels;  // which has no use for it
+  return parameters.labels && is_taken ? kLabels : default_lambda(parameters.smoothing);
 }
 
 JobParameters label_parameters(LabelChoice labels) {
@@ -183,6 +185,8 @@ JobParameters label_parameters(LabelChoice labels) {
   parameters.labels = std::move(labels);
   parameters.interpolation = Interpolation::kMidpoint;
   parameters.passes = kPasses;
+  parameters.smoothing = Smoothing::kLabels;
+  parameters.regularize = true;
   return parameters;
 }
 

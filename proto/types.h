@@ -178,7 +178,7 @@ struct UploadedVolume {
 
 enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
 enum class Interpolation { kLinear, kMidpoint };
-enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize };
+enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize, kLabels };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
 enum class Space { kLps, kRas };           // directions of a file's x, y and z
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order

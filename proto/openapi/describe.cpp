@@ -164,8 +164,8 @@ void write_choice(Yaml& yaml, const Parameter& parameter) {
 void write_jobs(Yaml& yaml, const Parameter& parameter) {
   if (parameter.jobs == JobKind::kAtIso) yaml.line("x-jobs: iso");
   if (parameter.jobs == JobKind::kByLabels) yaml.line("x-jobs: labels");
-  if (parameter.by_labels) {
-    yaml.line("x-default-by-labels: " + number_text(*parameter.by_labels));
+  if (parameter.by_labels != nullptr) {
+    yaml.line(std::string("x-default-by-labels: ") + parameter.by_labels);
   }
 }
 

@@ -50,7 +50,9 @@ JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewe
   // With all labels, a value assigned to one label is no label of its own. With chosen labels, only
   // their own values matter.
   if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
-  if (!parameters.max_displacement_mm) {
+  const bool is_bounded =
+      parameters.smoothing == Smoothing::kLaplacian || parameters.smoothing == Smoothing::kTaubin;
+  if (is_bounded && !parameters.max_displacement_mm) {
     parameters.max_displacement_mm = std::ranges::min(volume.geometry.spacing) / 2;
   }
   return parameters;

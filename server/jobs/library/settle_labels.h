@@ -11,8 +11,8 @@ namespace isomesh::jobs {
 [[noreturn]] void throw_no_labels(SampleType type);
 
 // Completes parameters that have labels: the names, colours and values of the chosen labels from
-// the volume, unless given, and the default displacement limit of smoothing, half the smallest
-// spacing. Equivalent requests therefore get equal parameters, and share one result. Throws Error
+// the volume, unless given, and the default displacement limit of Laplacian and Taubin smoothing,
+// half the smallest spacing. Equivalent requests therefore get equal parameters, and share one result. Throws Error
 // kInvalidParameter, field "labels", if the samples are not integers; kUnusableVolume if an axis
 // has fewer than two samples, if chosen labels are missing (naming them) or if there are none; and
 // as LabelLists::counts does.

@@ -15,6 +15,7 @@
 #include "server/jobs/making/mesh_stages.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"
+#include "server/mesh/stairs/stairs.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -47,15 +48,31 @@ mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& lab
   return options;
 }
 
-void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
-              const MeshRequest& request, const Progress& progress,
-              mesh::SeparatingSurface& walls) {
-  with_label(samples.type, [&](auto sample) {
+mesh::SurfaceCount separate(const SampleArray& samples, const mesh::SeparateOptions& options,
+                            const MeshRequest& request, const Progress& progress,
+                            mesh::SeparatingSurface& walls) {
+  return with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
-    const mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
+    mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
     check_memory(size_of(count), lattice.dims.samples(), request);
     extract_walls(lattice, options, count, progress.context(0.4, 1), walls);
+    return count;
   });
+}
+
+void smooth_walls(const SampleArray& samples, const mesh::SeparateOptions& options,
+                  const mesh::SurfaceCount& count, const MeshRequest& request, Progress& progress,
+                  mesh::SeparatingSurface& walls, MeshSummary& summary) {
+  if (!removes_stairs(request.parameters)) {
+    return smooth_stage(samples, request, progress, walls.mesh, summary);
+  }
+  const auto remove = [&](const mesh::Context& context) {
+    return with_label(samples.type, [&](auto sample) {
+      return remove_stairs(lattice_of<decltype(sample)>(samples), options, count,
+                           most_displacement(request.parameters), context, walls);
+    });
+  };
+  smooth_stage(remove, progress, walls.mesh, summary);
 }
 
 std::optional<std::string> text_of(const LabelTexts& texts, std::int64_t label) {
@@ -149,12 +166,13 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   progress.enter(Stage::kExtract);
   const auto labels =
       mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
-  separate(samples, separate_options(labels, parameters), request, progress, walls);
+  const mesh::SeparateOptions options = separate_options(labels, parameters);
+  const mesh::SurfaceCount count = separate(samples, options, request, progress, walls);
   if (!is_simplified(parameters)) check_disk(walls.mesh, request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
   const ExtractedSurface extracted(request, walls.mesh);
 
-  smooth_stage(samples, request, progress, walls.mesh, summary);
+  smooth_walls(samples, options, count, request, progress, walls, summary);
   const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
   const MeshRequest written = request.with(as_written);
   simplify_stage(samples, written, extracted, progress, walls.mesh, &walls, summary);

@@ -8,6 +8,7 @@
 #include "server/jobs/making/error_budget.h"
 #include "server/mesh/labels/label_parts.h"
 #include "server/mesh/labels/separate.h"
+#include "server/mesh/stairs/stairs.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -74,9 +75,14 @@ mesh::SmoothingWay way_of(Smoothing smoothing) {
       return mesh::SmoothingWay::kOptimize;
     case Smoothing::kLaplacian:
     case Smoothing::kTaubin:
+    case Smoothing::kLabels:  // not by smooth()
       break;
   }
   return mesh::SmoothingWay::kMean;
+}
+
+bool removes_stairs(const MeshParameters& parameters) {
+  return parameters.smoothing == Smoothing::kLabels && parameters.passes > 0;
 }
 
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
@@ -95,7 +101,9 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t sa
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);
   }
-  const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
+  const std::uint64_t smoothing = removes_stairs(parameters)
+                                      ? mesh::stairs_memory(surface)
+                                      : smoothing_memory(smooth_options(parameters), surface);
   return mesh_bytes(surface) + smoothing +
          (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding) +
          error_bytes(surface, samples, parameters, certify);

@@ -121,14 +121,20 @@ std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& param
 
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary) {
+  mesh::SmoothOptions options = smooth_options(request.parameters);
+  options.within = sides_of_caps(samples, request.parameters, options);
+  smooth_stage([&](const mesh::Context& context) { return smooth(options, context, mesh); },
+               progress, mesh, summary);
+}
+
+void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& mesh,
+                  MeshSummary& summary) {
   progress.enter(Stage::kSmooth);
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
   set_final(extracted, summary.quality);
-  mesh::SmoothOptions options = smooth_options(request.parameters);
-  options.within = sides_of_caps(samples, request.parameters, options);
-  const mesh::SmoothingEffect effect = smooth(options, progress.context(), mesh);
+  const mesh::SmoothingEffect effect = smooth(progress.context());
   summary.area_extracted_mm2 = effect.before.area_mm2;
   summary.displacement_mm = {effect.mean_displacement_mm, effect.max_displacement_mm};
   summary.volume_mm3.extracted = effect.before.volume_mm3;

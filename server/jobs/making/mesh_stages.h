@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "server/mesh/measure/surface_view.h"
 #include "server/mesh/measure/triangle_grid.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/smooth/smooth.h"
 
 namespace isomesh::jobs {
 
@@ -52,6 +54,11 @@ std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& param
 // Those after are set too, in case nothing is to be smoothed.
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary);
+
+// The same with another way to smooth the mesh.
+using Smooth = std::function<mesh::SmoothingEffect(const mesh::Context&)>;
+void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& mesh,
+                  MeshSummary& summary);
 
 // Where the parameters ask for it, leaves fewer triangles, and says in the summary how many there
 // were and what has become of the surface. `walls` are whose mesh it is, if any. The parameters'

@@ -20,6 +20,7 @@ constexpr double kExtractPerTriangle = 1.6e-5;
 constexpr double kConnectivityPerTriangle = 1.0e-5;
 constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
 constexpr double kEnlargePerTriangleAndPass = 6.0e-5;  // of angles
+constexpr double kRemoveStairsPerTriangle = 2.5e-3;
 constexpr double kMeasurePerTriangle = 3.0e-5;
 constexpr double kSimplifyPerTriangle = 5.0e-4;
 constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
@@ -37,6 +38,9 @@ double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   if (parameters.passes == 0) return 0;
   const bool enlarges =
       parameters.smoothing == Smoothing::kAngle || parameters.smoothing == Smoothing::kOptimize;
+  if (parameters.smoothing == Smoothing::kLabels) {
+    return as_double(surface.triangles) * kRemoveStairsPerTriangle;
+  }
   const double pass = enlarges ? kEnlargePerTriangleAndPass : kSmoothPerTriangleAndPass;
   return as_double(surface.triangles) * (kConnectivityPerTriangle + pass * parameters.passes);
 }

@@ -215,6 +215,7 @@ class SignField {
   static constexpr std::size_t kPlaces = kEdgePlaces;
   static constexpr bool kHasLines = false;
   static constexpr bool kHasClusters = false;
+  static constexpr bool kPlacesVertices = true;
 
   SignField(const Extraction& extraction, std::uint32_t first)
       : extraction_(extraction),

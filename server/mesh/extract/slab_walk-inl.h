@@ -117,7 +117,9 @@ class SlabWriter {
     for (std::size_t i = 0; i < vertices_found_; ++i) {
       indices[vertices_[i]] = vertex + static_cast<std::uint32_t>(i);
     }
-    if (z < slab_.end) place_vertices(y, z, vertex);
+    if constexpr (Field::kPlacesVertices) {
+      if (z < slab_.end) place_vertices(y, z, vertex);
+    }
     vertex += static_cast<std::uint32_t>(vertices_found_);
   }
 

@@ -307,6 +307,7 @@ class LabelField {
   static constexpr std::size_t kPlaces = kSlotPlaces;
   static constexpr bool kHasLines = true;
   static constexpr bool kHasClusters = false;
+  static constexpr bool kPlacesVertices = true;
 
   LabelField(const Separation& separation, std::uint32_t first)
       : separation_(separation),

@@ -24,6 +24,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/mesh/measure", {"server/mesh/topology"}},
     {"server/mesh/smooth", {"server/mesh/extract", "server/mesh/measure"}},
     {"server/mesh/labels", {"server/mesh/extract", "server/mesh/measure"}},
+    {"server/mesh/stairs", {"server/mesh/labels", "server/mesh/smooth"}},
     {"server/mesh/simplify", {"server/mesh/labels"}},
     {"server/mesh/bound", {"server/mesh/simplify"}},
     {"server/volume", {"proto"}},

@@ -1,4 +1,5 @@
 // Requests of clients as JSON: read by the server.
+#include <map>
 #include <string>
 #include <vector>
 
@@ -6,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/json.h"
+#include "proto/parameters.h"
 #include "tests/support/errors.h"
 
 namespace isomesh {
@@ -48,6 +50,8 @@ TEST(JobBody, MayNameLabelsInPlaceOfAnIso) {
   expected.lambda = default_lambda(expected);
   EXPECT_EQ(of_labels("\"all\""), expected);
   EXPECT_EQ(expected.passes, 10);
+  EXPECT_EQ(expected.smoothing, Smoothing::kLabels);
+  EXPECT_TRUE(expected.regularize);
   EXPECT_EQ(of_labels("[7, 3, 7, -1]").labels->values, (std::vector<std::int64_t>{-1, 3, 7}));
   EXPECT_EQ(of_labels(R"("all", "passes": 2, "smoothing": "taubin")").passes, 2);
   EXPECT_EQ(of_labels(R"("all", "smoothing": "taubin")").lambda,
@@ -55,6 +59,24 @@ TEST(JobBody, MayNameLabelsInPlaceOfAnIso) {
   EXPECT_EQ(of_labels(R"("all", "label_colors": {"3": "#AAbb00"})").label_colors.at(3), "#aabb00");
   EXPECT_EQ(of_labels(R"("all", "label_values": {"3": [9, 4, 9]})").label_values,
             (LabelValues{{3, {4, 9}}}));
+}
+
+TEST(JobBody, HasTheDefaultsByLabelsThatTheTableTells) {
+  JobParameters parameters = parse_job_parameters(R"({"volume": "a", "labels": "all"})");
+  std::map<std::string, std::string> told;
+  visit(parameters, [&](const Parameter& row, const auto& /*member*/) {
+    if (row.by_labels != nullptr) told[row.name] = row.by_labels;
+  });
+  EXPECT_EQ(told, (std::map<std::string, std::string>{
+                      {"regularize", parameters.regularize ? "true" : "false"},
+                      {"passes", std::to_string(parameters.passes)},
+                      {"smoothing", std::string(to_string(parameters.smoothing))},
+                      {"lambda", number_text(*parameters.lambda)}}));
+}
+
+TEST(JobBody, RefusesWhatIsForLabels) {
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 3, "smoothing": "labels"})"),
+              ElementsAre("smoothing"));
 }
 
 TEST(JobBody, RefusesWhatLabelsCannotHave) {

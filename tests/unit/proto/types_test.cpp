@@ -28,7 +28,7 @@ TEST(Names, AreThoseOfTheContract) {
   expect_names<SampleType>(
       {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"});
   expect_names<Interpolation>({"linear", "midpoint"});
-  expect_names<Smoothing>({"laplacian", "taubin", "angle", "optimize"});
+  expect_names<Smoothing>({"laplacian", "taubin", "angle", "optimize", "labels"});
   expect_names<MeshFormat>(
       {"drc", "glb", "stl", "ply", "obj", "3mf", "off", "vtk", "vtp", "gii", "zip"});
   expect_names<GlbCodec>({"draco", "meshopt"});
@@ -41,7 +41,7 @@ TEST(Names, AreThoseOfTheContract) {
 
 TEST(NamesOf, AreForPeople) {
   EXPECT_EQ(names_of<Interpolation>(), R"("linear" or "midpoint")");
-  EXPECT_EQ(names_of<Smoothing>(), R"("laplacian", "taubin", "angle" or "optimize")");
+  EXPECT_EQ(names_of<Smoothing>(), R"("laplacian", "taubin", "angle", "optimize" or "labels")");
   EXPECT_EQ(names_of<Priority>(), R"("stat", "routine" or "bulk")");
   EXPECT_EQ(names_of<MeshFormat>(),
             R"("drc", "glb", "stl", "ply", "obj", "3mf", "off", "vtk", "vtp", "gii" or "zip")");

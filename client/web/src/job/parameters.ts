@@ -173,10 +173,13 @@ export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string 
   return labels.length === 1 ? `label ${only}` : `${labels.length} labels`;
 }
 
-const smoothingInWords = { laplacian: 'Laplacian', taubin: 'Taubin', angle: 'by angles', optimize: 'optimised' };
+const smoothingInWords = { laplacian: 'Laplacian', taubin: 'Taubin', angle: 'by angles', optimize: 'optimised', labels: 'as labels' };
 
 // In a few words, for titles: 6 tetrahedra, linear, 5 passes.
 export function inWords(job: JobParameters): string {
+  if (job.smoothing === 'labels') {
+    return `${job.scheme} tetrahedra, ${job.passes > 0 ? 'without steps' : 'not smoothed'}${job.close ? ', closed' : ''}`;
+  }
   const passes = job.passes === 1 ? '1 pass' : `${job.passes} passes`;
   const smoothing = job.smoothing !== 'laplacian' && job.passes > 0 ? ` (${smoothingInWords[job.smoothing]})` : '';
   const closed = job.close ? ', closed' : '';

@@ -39,7 +39,7 @@ export interface Parameter {
   // The jobs that take it: those at an iso-value, those by labels, or both; and its default by labels,
   // if that differs.
   jobs: 'iso' | 'labels' | 'any';
-  byLabels?: number;
+  byLabels?: string | number | boolean;
   // The parameter is only for jobs in which the other one has a value that is among the cases; what the
   // case says replaces what stands above.
   by?: { parameter: string; cases: Readonly<Record<string, { default?: number; maximum?: number }>> };
@@ -110,6 +110,11 @@ export function isOfKind({ jobs }: Parameter, job: JobParameters): boolean {
   return jobs === 'any' || jobs === (isByLabels(job) ? 'labels' : 'iso');
 }
 
+// The choices that the daemon takes for this job: one kind of smoothing is for labels alone.
+export function choicesOf({ name, values = [] }: Parameter, job: JobParameters): readonly (string | number)[] {
+  return values.filter((value) => name !== 'smoothing' || value !== 'labels' || isByLabels(job));
+}
+
 // True if the parameter applies to this job.
 export function applies(parameter: Parameter, job: JobParameters): boolean {
   if (!isOfKind(parameter, job)) return false;
@@ -144,7 +149,7 @@ export function fits(parameter: Parameter, value: Value, job: JobParameters): bo
     case 'switch':
       return typeof value === 'boolean';
     case 'choice':
-      return values.includes(value as string | number);
+      return choicesOf(parameter, job).includes(value as string | number);
     case 'choices':
       return Array.isArray(value) && value.length > 0 && value.every((one) => values.includes(one as string));
     case 'text':

@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { isSameJob, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
-import { isByLabels, meshFormats } from '../../job/table';
+import { fits, isByLabels, meshFormats, parameterOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNames, formatNumber, formatValue } from '../../ui/format';
@@ -205,15 +205,19 @@ export const comparisons: readonly Comparison[] = [
       { smoothing: 'taubin' },
       { smoothing: 'angle' },
       { smoothing: 'optimize' },
+      { smoothing: 'labels' },
     ],
   },
 ];
 
 export function compareSection(job: Job): HTMLElement {
+  const smoothing = parameterOf('smoothing');
+  const takes = (variant: Partial<JobParameters>): boolean =>
+    variant.smoothing === undefined || fits(smoothing, variant.smoothing, job.parameters);
   const start = async (comparison: Comparison): Promise<void> => {
     try {
       const jobs = await Promise.all(
-        comparison.variants.map((variant) =>
+        comparison.variants.filter(takes).map((variant) =>
           isSame(job, variant) ? Promise.resolve(job) : submitVariant(job, variant),
         ),
       );

@@ -4,6 +4,7 @@ import { fromText, withGlb } from '../../job/parameters';
 import {
   applies,
   asText,
+  choicesOf,
   defaultOf,
   fits,
   isOfKind,
@@ -58,7 +59,8 @@ function capitalised(text: string): string {
 }
 
 function choiceControl(parameter: Parameter, host: FormHost): Control {
-  const { values = [], valueHelp } = parameter;
+  const { valueHelp } = parameter;
+  const values = choicesOf(parameter, host.job());
   const choices = values.map((value) => ({
     value: String(value),
     label: capitalised(String(value)),

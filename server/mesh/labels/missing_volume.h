@@ -1,0 +1,28 @@
+// How much less the walls between labels enclose than the labels' voxels, and where.
+//
+// A tetrahedron of the lattice has a share of the voxels of its corners, and the walls in it leave
+// each label another volume: half-way between one corner and three others they cut an eighth off,
+// not a quarter. What is missing is owed to the wall's vertices in that tetrahedron. Where vertices
+// were joined (label_clusters-inl.h), what the triangles swept meanwhile is taken off too, exactly.
+// The sum over a wall that is closed is the voxels' volume less what the wall encloses.
+#pragma once
+
+#include "server/mesh/buffer.h"
+#include "server/mesh/context.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/labels/wall_fans.h"
+#include "server/mesh/lattice/lattice.h"
+
+namespace isomesh::mesh {
+
+// By fan, in voxels: what the wall's label at the back lacks, or has too much if it is negative.
+// `surface` is what extract_walls made with the same lattice, options and count, and not moved
+// since; `fans` are its own. Of a surface that is closed, the cells between the outermost samples
+// and the caps count as exact, and so do vertices on the border. For the six integer types of
+// SampleType. The result is the same for any number of threads. Throws Error kCancelled.
+template <class T>
+Buffer<float> missing_volume(const Lattice<T>& lattice, const SeparateOptions& options,
+                             const SurfaceCount& count, const WallFans& fans,
+                             const Context& context, SeparatingSurface& surface);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,151 @@
+// The walk's parts that tally missing volume. Compiled once for each instruction set, see
+// slabs.cpp.
+#if defined(ISOMESH_VOLUME_TALLY_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ISOMESH_VOLUME_TALLY_INL_H_
+#undef ISOMESH_VOLUME_TALLY_INL_H_
+#else
+#define ISOMESH_VOLUME_TALLY_INL_H_
+#endif
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include <hwy/highway.h>
+
+#include "server/mesh/labels/regular_labels-inl.h"
+#include "server/mesh/labels/volume_tally.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isomesh::mesh::HWY_NAMESPACE {
+
+// Looks at the cells of one row as if it wrote their triangles.
+class TallyCellWriter {
+ public:
+  TallyCellWriter(const Separation& separation, const LabelRow& row, const EdgeOffsets& offsets,
+                  std::uint32_t y, std::uint32_t z, VolumeTally& tally)
+      : separation_(separation), row_(row), offsets_(offsets), y_(y), z_(z), tally_(tally) {}
+
+  Triangle* write(std::size_t x, unsigned /*bit*/, const LabelCells& /*cells*/,
+                  const std::uint32_t* places, Triangle* out) const {
+    const std::array<PartNumber, 8> labels = row_.labels_at(x);
+    const unsigned parity = row_.parity_at(x);
+    const CellSplit& split = separation_.splits[parity];
+    const TallyCases& cases = tally_.cases[parity];
+    const bool has_phantoms = is_at_border(x, separation_.dims.x) ||
+                              is_at_border(y_, separation_.dims.y) ||
+                              is_at_border(z_, separation_.dims.z);
+    const Double4 corner =
+        Double4{static_cast<double>(x), static_cast<double>(y_), static_cast<double>(z_), 0} -
+        static_cast<double>(separation_.margin);
+    for (std::size_t t = 0; t < split.tetrahedra; ++t) {
+      const unsigned pattern = pattern_in(labels, split.corners[t]);
+      const TetrahedronWalls& walls = separation_.walls[parity].tetrahedra[t][pattern];
+      for (std::size_t i = 0; i < walls.triangles; ++i) {
+        const WallTriangle& wall = walls.walls[i];
+        const double owed = has_phantoms ? 0 : cases.tetrahedra[t][pattern][i];
+        add(wall, {labels[wall.front], labels[wall.back]}, owed, corner, cases, places);
+      }
+    }
+    return out;
+  }
+
+ private:
+  bool is_at_border(std::size_t at, std::uint32_t samples) const {
+    return separation_.margin != 0 && (at == 0 || at + 2 == samples);
+  }
+
+  void add(const WallTriangle& triangle, WallSides sides, double owed, Double4 corner,
+           const TallyCases& cases, const std::uint32_t* places) const {
+    const Mesh& mesh = tally_.surface.mesh;
+    std::array<std::uint32_t, 3> vertices = {};
+    std::array<Double4, 3> before = {};
+    std::array<Double4, 3> moved = {};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const VertexName name = triangle.vertices[i];
+      const std::uint32_t vertex =
+          places[offsets_[edge_name(name / kSlotPlaces, 0)] + name % kSlotPlaces];
+      const std::array<float, 3>& place = cases.places[name];
+      vertices[i] = vertex;
+      before[i] = Double4{double{place[0]}, double{place[1]}, double{place[2]}, 0};
+      if (!mesh.is_on_border(vertex)) {
+        const Vec3& at = mesh.positions[vertex];
+        Double4 index = lanes(tally_.origin);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          index += lanes(tally_.axes[axis]) * double{at[axis]};
+        }
+        moved[i] = index - corner - before[i];
+      }
+    }
+    // Triangles are wound for space, which a left-handed lattice mirrors.
+    const double hand = separation_.to_space.determinant() < 0 ? -1 : 1;
+    const Double4 normal = swept_normal(before, moved) * hand;
+    const bool is_swapped = sides.front > sides.back;
+    if (is_swapped) std::swap(sides.front, sides.back);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t fan = tally_.fans.find(vertices[i], {sides, false});
+      if (fan == WallFans::kNone) continue;
+      const Double4 product = moved[i] * normal;
+      const double missing = owed - (product[0] + product[1] + product[2]) / 3;
+      const double units = (is_swapped ? -missing : missing) / VolumeTally::kUnit;
+      std::atomic_ref(tally_.units[fan])
+          .fetch_add(static_cast<std::int64_t>(units), std::memory_order_relaxed);
+    }
+  }
+
+  static Double4 cross(Double4 a, Double4 b) {
+    return Double4{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
+                   0};
+  }
+
+  // The triangle's area vector in the mean over its way: a corner's way times it, a third, is that
+  // corner's part of the volume swept.
+  static Double4 swept_normal(const std::array<Double4, 3>& at, const std::array<Double4, 3>& way) {
+    const Double4 e1 = at[1] - at[0];
+    const Double4 e2 = at[2] - at[0];
+    const Double4 f1 = way[1] - way[0];
+    const Double4 f2 = way[2] - way[0];
+    return (cross(e1, e2) + (cross(e1, f2) + cross(f1, e2)) * 0.5 + cross(f1, f2) / 3.0) * 0.5;
+  }
+
+  const Separation& separation_;
+  const LabelRow row_;
+  const EdgeOffsets& offsets_;
+  const std::uint32_t y_;
+  const std::uint32_t z_;
+  VolumeTally& tally_;
+};
+
+// Numbers vertices as `Base` does, and places none.
+template <class Base>
+class TallyField : public Base {
+ public:
+  using Output = VolumeTally;
+  static constexpr bool kPlacesVertices = false;
+
+  TallyField(const Separation& separation, std::uint32_t first)
+      : Base(separation, first), separation_(separation) {}
+
+  std::uint32_t number_clusters(std::uint32_t y, std::uint32_t z,
+                                const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
+                                VolumeTally* /*tally*/) {
+    return Base::number_clusters(y, z, rows, vertex, nullptr);
+  }
+
+  TallyCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
+                              VolumeTally& tally) const {
+    return {separation_, LabelField::row(y, z), offsets, y, z, tally};
+  }
+
+  static Mesh& mesh_of(VolumeTally& tally) { return tally.surface.mesh; }
+
+ private:
+  const Separation& separation_;
+};
+
+}  // namespace isomesh::mesh::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

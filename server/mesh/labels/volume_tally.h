@@ -1,0 +1,46 @@
+// What a walk over the cells tallies to find missing volume; private to this folder.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "server/mesh/labels/label_slabs.h"
+#include "server/mesh/labels/missing_volume.h"
+#include "server/mesh/labels/wall_cases.h"
+
+namespace isomesh::mesh {
+
+// What is missing in a tetrahedron at each corner of each of its triangles (wall_cases.h), in
+// voxels: owed to the label of the triangle's corner `back`.
+using OwedVolumes = std::array<float, 12>;
+
+// For cells of one way of splitting.
+struct TallyCases {
+  std::array<std::array<OwedVolumes, kPatterns>, 6> tetrahedra = {};
+  // Where each vertex lies before any are joined, from the cell's corner 0, in steps of the
+  // lattice.
+  std::array<std::array<float, 3>, 8 * kSlotPlaces> places = {};
+};
+
+// By parity.
+std::array<TallyCases, 2> make_tally_cases(Scheme scheme, const std::array<WallCases, 2>& walls);
+
+struct VolumeTally {
+  // Sums of whole numbers do not depend on the order in which threads add to them.
+  static constexpr double kUnit = 0x1p-32;  // voxels
+
+  SeparatingSurface& surface;
+  const WallFans& fans;
+  const std::array<TallyCases, 2>& cases;
+  // Of the map from space back to the lattice: index_of(p) is `origin` + the sum of p[k] * axes[k].
+  std::array<double, 3> origin;
+  std::array<std::array<double, 3>, 3> axes;
+  std::span<std::int64_t> units;  // by fan
+};
+
+void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,
+                VolumeTally& tally);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,199 @@
+#include "server/mesh/stairs/mobility.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace isomesh::mesh {
+namespace {
+
+// How much a wall bends outward and inward at a vertex.
+struct Bends {
+  float out = 0;
+  float in = 0;
+};
+
+constexpr float kBendsPerSample = 10;  // a tenth of a sample is a bend
+constexpr int kBendSteps = 6;          // how far, in edges, a bend is felt
+constexpr float kBendLoss = 0.12F;     // with each
+constexpr int kCurveSteps = 4;
+constexpr float kCurveLoss = 0.2F;
+constexpr int kCalmSteps = 4;    // along curves
+constexpr float kNoisy = 0.15F;  // the share of junctions among the vertices of a calm curve
+
+float clamped(float value) { return std::clamp(value, 0.0F, 1.0F); }
+
+class Finder {
+ public:
+  Finder(const WallShape& shape, const Context& context)
+      : shape_(shape), context_(context), near_curve_(shape.vertices(), 0) {
+    for (auto* values : {&found_.moves, &found_.owes}) values->assign(shape.vertices(), 0);
+    for (auto* values : {&found_.spread, &found_.calm}) values->assign(shape.vertices(), 1);
+  }
+
+  Mobility find() {
+    find_staircases();
+    find_near_curves();
+    find_noise();
+    combine();
+    return std::move(found_);
+  }
+
+ private:
+  template <class Body>
+  void for_vertices(const Body& body) const {
+    for_runs(context_, shape_.vertices(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v < end; ++v) body(v);
+    });
+  }
+
+  template <class Body>
+  void for_curves(const Body& body) const {
+    for_runs(context_, found_.curves.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) body(std::size_t{found_.curves[i]});
+    });
+  }
+
+  void find_staircases() {
+    std::vector<Bends> bends(shape_.vertices());
+    for_vertices([&](std::size_t v) {
+      if (shape_.degree(v) > 0) bends[v] = bends_at(v);
+    });
+    std::vector<Bends> next = bends;
+    for (int step = 0; step < kBendSteps; ++step) {
+      for_vertices([&](std::size_t v) {
+        Bends most = bends[v];
+        shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+          most.out = std::max(most.out, bends[neighbor].out - kBendLoss);
+          most.in = std::max(most.in, bends[neighbor].in - kBendLoss);
+        });
+        next[v] = most;
+      });
+      bends.swap(next);
+    }
+    const auto both = [&](std::size_t v) { return std::min(bends[v].out, bends[v].in); };
+    for_vertices([&](std::size_t v) {
+      float sum = 0;
+      float count = 0;
+      shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+        sum += both(neighbor);
+        ++count;
+      });
+      if (count == 0) return;
+      found_.moves[v] = std::min(1.0F, both(v) + sum / count);
+      found_.owes[v] = std::max(found_.owes[v], found_.moves[v]);
+    });
+  }
+
+  // Also what is owed for the bend alone, and the diffusivity.
+  Bends bends_at(std::size_t v) {
+    Lanes normal = {};
+    shape_.visit_spokes(
+        v, [&](std::size_t, const Spoke& spoke) { normal += shape_.normal(v, spoke); });
+    const Lanes in_samples = normal * shape_.spacing();
+    const float size = length(in_samples);
+    if (size > 0) found_.spread[v] = size / length(normal) / shape_.largest_spacing();
+    const Lanes way =
+        without_fourth((shape_.mean(v, shape_.at) - shape_.at[v]) / divisor(shape_.spacing()));
+    Bends bends;
+    if (shape_.is_curve(v)) {
+      bends.out = bends.in = clamped(kBendsPerSample * length(way));
+    } else if (size > 0) {
+      const float bend = kBendsPerSample * dot(way, in_samples) / size;
+      bends = {clamped(bend), clamped(-bend)};
+    }
+    found_.owes[v] = std::max(bends.out, bends.in);
+    return bends;
+  }
+
+  static Lanes divisor(Lanes spacing) {
+    spacing[3] = 1;
+    return spacing;
+  }
+  static Lanes without_fourth(Lanes lanes) {
+    lanes[3] = 0;
+    return lanes;
+  }
+
+  // 1 on curves and beside them, less with each edge farther away.
+  void find_near_curves() {
+    for (std::size_t v = 0; v < shape_.vertices(); ++v) {
+      if (!shape_.is_curve(v)) continue;
+      found_.curves.push_back(static_cast<std::uint32_t>(v));
+      near_curve_[v] = 1;
+    }
+    std::vector<float> next = near_curve_;
+    for (int step = 0; step <= kCurveSteps; ++step) {
+      const float loss = step == 0 ? 0 : kCurveLoss;
+      for_vertices([&](std::size_t v) {
+        float most = near_curve_[v];
+        if (shape_.is_curve(v)) return;
+        shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+          most = std::max(most, near_curve_[neighbor] - loss);
+        });
+        next[v] = most;
+      });
+      near_curve_.swap(next);
+      next = near_curve_;
+    }
+    for (std::size_t v = 0; v < shape_.vertices(); ++v) {
+      const bool is_beside = near_curve_[v] > 0 && !shape_.is_curve(v);
+      if (is_beside) found_.beside.push_back(static_cast<std::uint32_t>(v));
+    }
+  }
+
+  void find_noise() {
+    std::vector<float> junctions(shape_.vertices(), 0);
+    for_curves([&](std::size_t v) { junctions[v] = shape_.degree(v) > 2 ? 1.0F : 0.0F; });
+    std::vector<float> next = junctions;
+    for (int step = 0; step < kCalmSteps; ++step) {
+      for_curves(
+          [&](std::size_t v) { next[v] = 0.5F * junctions[v] + 0.5F * shape_.mean(v, junctions); });
+      junctions.swap(next);
+    }
+    for_curves(
+        [&](std::size_t v) { found_.calm[v] = 1 - clamped((junctions[v] - kNoisy) / kNoisy); });
+    // What is noise on a curve is noise in the triangles beside it.
+    for (int step = 0; step < 2; ++step) {
+      next = found_.calm;
+      for_vertices([&](std::size_t v) {
+        shape_.visit_spokes(v, [&](std::size_t, const Spoke& spoke) {
+          next[v] = std::min({next[v], found_.calm[spoke.next], found_.calm[spoke.previous]});
+        });
+      });
+      found_.calm.swap(next);
+    }
+  }
+
+  void combine() {
+    constexpr float kOwedInNoise = 0.3F;
+    for_vertices([&](std::size_t v) {
+      const float calm = found_.calm[v];
+      found_.owes[v] *= kOwedInNoise + (1 - kOwedInNoise) * calm;
+      if (shape_.is_curve(v)) {
+        found_.moves[v] = shape_.degree(v) > 1 ? calm : 0;
+      } else if (shape_.is_held(v)) {
+        found_.moves[v] = near_curve_[v] * calm;
+      } else {
+        found_.spread[v] = std::max(found_.spread[v], near_curve_[v]);
+        found_.moves[v] *= calm * found_.spread[v];
+      }
+    });
+    for (std::size_t v = 0; v < shape_.vertices(); ++v) {
+      if (found_.moves[v] > 0) found_.moving.push_back(static_cast<std::uint32_t>(v));
+    }
+  }
+
+  const WallShape& shape_;
+  const Context& context_;
+  std::vector<float> near_curve_;
+  Mobility found_;
+};
+
+}  // namespace
+
+Mobility find_mobility(const WallShape& shape, const Context& context) {
+  return Finder(shape, context).find();
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,121 @@
+#include "server/mesh/stairs/unfold.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+namespace isomesh::mesh {
+namespace {
+
+struct Suspect {
+  std::array<std::uint32_t, 3> corners = {};
+  Lanes wall_normal = {};
+};
+
+// Normals of a wall around its vertices.
+class WallNormals {
+ public:
+  WallNormals(const WallShape& shape, const Context& context)
+      : shape_(shape), normals_(shape.fans().size()) {
+    for_runs(context, normals_.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t fan = begin; fan < end; ++fan) {
+        for (const Spoke& spoke : shape.fans().spokes(fan)) {
+          normals_[fan] += shape.normal(shape.fans().vertex(fan), spoke);
+        }
+      }
+    });
+  }
+
+  // Summed over everything within so many edges, as often as there are ways there.
+  Lanes around(std::uint32_t fan, int edges) const {
+    if (edges == 0) return normals_[fan];
+    Lanes sum = around(fan, edges - 1);
+    for (const std::uint32_t neighbor : shape_.fans().neighbors(fan)) {
+      sum += around(neighbor, edges - 1);
+    }
+    return sum;
+  }
+
+ private:
+  const WallShape& shape_;
+  std::vector<Lanes> normals_;
+};
+
+Lanes normal_of(const WallShape& shape, const std::array<std::uint32_t, 3>& corners) {
+  return cross(shape.at[corners[1]] - shape.at[corners[0]],
+               shape.at[corners[2]] - shape.at[corners[0]]);
+}
+
+// Whether the cosine between two ways is less than that.
+bool is_less(Lanes a, Lanes b, float cosine) { return dot(a, b) < cosine * length(a) * length(b); }
+
+// The triangles that may be folded: those that lie away from their corners' own normals.
+std::vector<Suspect> find_suspects(const WallShape& shape, const Context& context) {
+  constexpr float kSuspect = 0.7F;
+  constexpr int kEdges = 2;
+  const WallNormals normals(shape, context);
+  const WallFans& fans = shape.fans();
+  std::vector<std::vector<Suspect>> found(shape.vertices() / 8192 + 1);
+  for_runs(context, shape.vertices(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      shape.visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
+        // Each triangle once, at its first corner.
+        if (spoke.next < v || spoke.previous < v) return;
+        const std::array corners = {static_cast<std::uint32_t>(v), spoke.next, spoke.previous};
+        const Wall& wall = fans.wall(fan);
+        const std::array own = {static_cast<std::uint32_t>(fan), fans.find(spoke.next, wall),
+                                fans.find(spoke.previous, wall)};
+        Lanes near = {};
+        for (const std::uint32_t each : own) near += normals.around(each, 0);
+        if (!is_less(normal_of(shape, corners), near, kSuspect)) return;
+        Lanes wide = {};
+        for (const std::uint32_t each : own) wide += normals.around(each, kEdges);
+        found[begin / 8192].push_back({corners, wide});
+      });
+    }
+  });
+  std::vector<Suspect> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace
+
+void unfold(const Context& context, WallShape& shape) {
+  constexpr int kRounds = 6;  // to the mean, and then as many back
+  constexpr float kFolded = 0.1F;
+  const std::vector<Suspect> suspects = find_suspects(shape, context);
+  std::vector<std::uint8_t> is_hit(shape.vertices(), 0);
+  for (int round = 0; round < 2 * kRounds; ++round) {
+    std::vector<std::uint32_t> hit;
+    for (const Suspect& suspect : suspects) {
+      if (!is_less(normal_of(shape, suspect.corners), suspect.wall_normal, kFolded)) continue;
+      for (const std::uint32_t v : suspect.corners) {
+        if (is_hit[v] != 0 || shape.degree(v) <= (shape.is_curve(v) ? 1U : 0U)) continue;
+        is_hit[v] = 1;
+        hit.push_back(v);
+      }
+    }
+    if (hit.empty()) return;
+    std::vector<Lanes> moved;
+    for (const std::uint32_t v : hit) {
+      const Lanes goal = round < kRounds ? shape.mean(v, shape.at) : shape.start()[v];
+      moved.push_back(shape.at[v] + shape.kept(v, 0.5F * (goal - shape.at[v])));
+    }
+    for (std::size_t i = 0; i < hit.size(); ++i) {
+      shape.at[hit[i]] = moved[i];
+      is_hit[hit[i]] = 0;
+    }
+    context.throw_if_stopped();
+  }
+}
+
+std::size_t count_folded(const WallShape& shape, const Context& context) {
+  std::size_t count = 0;
+  for (const Suspect& suspect : find_suspects(shape, context)) {
+    if (is_less(normal_of(shape, suspect.corners), suspect.wall_normal, 0)) ++count;
+  }
+  return count;
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,48 @@
+// Puts the volume back that walls lack; private to this folder.
+#pragma once
+
+#include <vector>
+
+#include "server/mesh/stairs/mobility.h"
+#include "server/mesh/stairs/wall_shape.h"
+
+namespace isomesh::mesh {
+
+// What is missing is divided by the area that it may be spread over, and averaged within the wall:
+// an offset along the wall's normal. Averaging is the adjoint of spreading, so the offsets times
+// the areas are what was missing.
+class VolumeKeeper {
+ public:
+  // `missing`: by fan, what the wall's back lacks at the start, in cubic millimetres. `series`: how
+  // far it is spread. All have to outlive this.
+  VolumeKeeper(const WallShape& shape, const Mobility& mobility, const std::vector<float>& missing,
+               const std::vector<float>& series, const Context& context);
+
+  // From now on curves stay.
+  void hold_curves();
+
+  // Moves the walls once. Throws Error kCancelled.
+  void restore(WallShape& shape) const;
+
+ private:
+  enum class Way { kSpread, kAverage };
+
+  void find_areas();
+  bool may_move(std::size_t vertex) const;
+  std::vector<float> diffused(std::vector<float> values, Way way) const;
+  std::vector<float> offsets(const WallShape& shape, std::vector<Lanes>& normals) const;
+  Lanes way_of_curve(const WallShape& shape, std::size_t vertex, const std::vector<float>& offsets,
+                     const std::vector<Lanes>& normals) const;
+
+  const WallShape& shape_;
+  const Mobility& mobility_;
+  const std::vector<float>& missing_;
+  const std::vector<float>& series_;
+  const Context& context_;
+  bool holds_curves_ = false;
+  std::vector<float> shares_;  // by fan: of a neighbour in the mean
+  std::vector<float> areas_;   // by fan, at the start
+  std::vector<float> room_;    // those that may take volume, spread
+};
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,105 @@
+#include "server/mesh/stairs/wall_shape.h"
+
+#include <map>
+
+#include "server/mesh/points.h"
+
+namespace isomesh::mesh {
+
+WallShape::WallShape(const SeparatingSurface& surface, const Dims& dims,
+                     const LatticeToSpace& to_space, bool closed, const Context& context)
+    : closed_(closed) {
+  place(surface, dims, to_space, context);
+  fans_ = WallFans(
+      surface, [&](const Triangle& triangle) { return is_cap(triangle); }, context);
+  find_curves(context);
+}
+
+void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
+                      const LatticeToSpace& to_space, const Context& context) {
+  const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
+  for (int axis = 0; axis < 3; ++axis) {
+    const Point& step = steps[static_cast<std::size_t>(axis)];
+    spacing_[axis] = static_cast<float>(std::sqrt(dot(step, step)));
+  }
+  largest_spacing_ = std::max({spacing_[0], spacing_[1], spacing_[2]});
+  smallest_spacing_ = std::min({spacing_[0], spacing_[1], spacing_[2]});
+  if (to_space.determinant() < 0) spacing_[0] = -spacing_[0];
+
+  const Mesh& mesh = surface.mesh;
+  const std::array<std::uint32_t, 3> samples = {dims.x, dims.y, dims.z};
+  start_.resize(mesh.positions.size());
+  flags_.resize(mesh.positions.size());
+  // Caps lie half a step beyond the outermost samples, the ends of an open wall in them.
+  const double beyond = closed_ ? 0.5 : 0;
+  for_runs(context, mesh.positions.size(), [&](std::size_t begin, std::size_t end) {
+    constexpr double kNear = 1e-3;  // as single precision leaves it, far from the origin
+    for (std::size_t v = begin; v < end; ++v) {
+      const auto index = index_of(to_space, to_point(mesh.positions[v]));
+      std::uint8_t axes = 0;
+      start_[v] = Lanes{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        start_[v][static_cast<int>(axis)] = static_cast<float>(index[axis]);
+        const double last = samples[axis] - 1 + beyond;
+        const bool is_in_face =
+            std::abs(index[axis] + beyond) < kNear || std::abs(index[axis] - last) < kNear;
+        if (is_in_face) axes |= static_cast<std::uint8_t>(1U << axis);
+      }
+      start_[v] *= spacing_;
+      flags_[v] = !closed_ || mesh.is_on_border(v) ? axes : 0;
+    }
+  });
+  at = start_;
+}
+
+bool WallShape::is_cap(const Triangle& triangle) const {
+  const auto& [a, b, c] = triangle;
+  return closed_ && (flags_[a] & flags_[b] & flags_[c] & kAxes) != 0;
+}
+
+// Those with which other than two triangles join a vertex, of walls or of caps.
+std::vector<std::uint32_t> WallShape::neighbors_along_curves(std::size_t v) const {
+  std::map<std::uint32_t, std::array<int, 2>> triangles;
+  visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
+    const std::size_t kind = fans_.wall(fan).is_cap ? 1 : 0;
+    ++triangles[spoke.next][kind];
+    ++triangles[spoke.previous][kind];
+  });
+  std::vector<std::uint32_t> found;
+  for (const auto& [neighbor, counts] : triangles) {
+    const bool is_inner =
+        std::ranges::all_of(counts, [](int count) { return count == 0 || count == 2; });
+    if (!is_inner) found.push_back(neighbor);
+  }
+  return found;
+}
+
+void WallShape::find_curves(const Context& context) {
+  // A fan that is open has one neighbour more than triangles.
+  const auto may_be_on_curve = [&](std::size_t v) {
+    const std::size_t first = fans_.begin(v);
+    const std::size_t count = fans_.begin(v + 1) - first;
+    return count > 1 || (count == 1 && fans_.neighbors(first).size() != fans_.spokes(first).size());
+  };
+  curve_begin_.assign(vertices() + 1, 0);
+  const auto visit = [&](std::size_t begin, std::size_t end, const auto& use) {
+    for (std::size_t v = begin; v < end; ++v) {
+      if (may_be_on_curve(v)) use(v, neighbors_along_curves(v));
+    }
+  };
+  for_runs(context, vertices(), [&](std::size_t begin, std::size_t end) {
+    visit(begin, end, [&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
+      curve_begin_[v + 1] = static_cast<std::uint32_t>(neighbors.size());
+      if (!neighbors.empty()) flags_[v] |= kCurve;
+    });
+  });
+  for (std::size_t v = 0; v < vertices(); ++v) curve_begin_[v + 1] += curve_begin_[v];
+  curve_neighbors_.resize(curve_begin_.back());
+  for_runs(context, vertices(), [&](std::size_t begin, std::size_t end) {
+    visit(begin, end, [&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
+      std::ranges::copy(neighbors, curve_neighbors_.begin() + curve_begin_[v]);
+    });
+  });
+}
+
+}  // namespace isomesh::mesh

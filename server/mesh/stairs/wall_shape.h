@@ -1,0 +1,139 @@
+// The walls between labels while their stairs are removed; private to this folder.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/mesh/labels/wall_fans.h"
+#include "server/mesh/lattice/lattice.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::mesh {
+
+// A point or a way, in the fourth lane zero.
+using Lanes = float __attribute__((vector_size(16)));
+
+inline float dot(Lanes a, Lanes b) {
+  const Lanes product = a * b;
+  return product[0] + product[1] + product[2];
+}
+
+inline Lanes cross(Lanes a, Lanes b) {
+  return Lanes{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0};
+}
+
+inline float length(Lanes a) { return std::sqrt(dot(a, a)); }
+
+// Calls body(begin, end) for runs of [0, count), several at once. Their length is fixed, so what is
+// computed run by run does not depend on the number of threads.
+template <class Body>
+void for_runs(const Context& context, std::size_t count, const Body& body) {
+  constexpr std::size_t kRun = 8192;
+  parallel_for(context, (count + kRun - 1) / kRun,
+               [&](std::size_t task) { body(task * kRun, std::min(count, (task + 1) * kRun)); });
+}
+
+// Places are in millimetres along the lattice's axes, as if those were orthogonal. Threads may read
+// it while none writes.
+class WallShape {
+ public:
+  // `surface` as extracted; `closed` as SeparateOptions says.
+  WallShape(const SeparatingSurface& surface, const Dims& dims, const LatticeToSpace& to_space,
+            bool closed, const Context& context);
+
+  std::size_t vertices() const { return start_.size(); }
+  const WallFans& fans() const { return fans_; }
+
+  // Where the vertices were, and where they are now.
+  const std::vector<Lanes>& start() const { return start_; }
+  std::vector<Lanes> at;
+
+  // Signed: negative along x in a left-handed lattice, which is mirrored.
+  Lanes spacing() const { return spacing_; }
+  float largest_spacing() const { return largest_spacing_; }
+  float smallest_spacing() const { return smallest_spacing_; }
+
+  // Where three walls or more meet, or one ends, or leaves a cap.
+  bool is_curve(std::size_t v) const { return (flags_[v] & kCurve) != 0; }
+  // In a cap, or in the border of the volume.
+  bool is_held(std::size_t v) const { return (flags_[v] & kAxes) != 0; }
+
+  // The way without what would lead out of that.
+  Lanes kept(std::size_t v, Lanes way) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      if ((flags_[v] >> axis & 1) != 0) way[axis] = 0;
+    }
+    return way;
+  }
+
+  // The neighbours of a vertex on a curve are those along it.
+  template <class Visit>
+  void visit_neighbors(std::size_t v, Visit visit) const {
+    if (is_curve(v)) {
+      for (std::size_t i = curve_begin_[v]; i < curve_begin_[v + 1]; ++i) {
+        visit(curve_neighbors_[i]);
+      }
+      return;
+    }
+    // Each neighbour of another is the next corner of one triangle.
+    visit_spokes(v, [&](std::size_t /*fan*/, const Spoke& spoke) { visit(spoke.next); });
+  }
+
+  // Calls visit(fan, spoke) for all triangles at a vertex.
+  template <class Visit>
+  void visit_spokes(std::size_t v, Visit visit) const {
+    for (std::size_t fan = fans_.begin(v); fan < fans_.begin(v + 1); ++fan) {
+      for (const Spoke& spoke : fans_.spokes(fan)) visit(fan, spoke);
+    }
+  }
+
+  std::size_t degree(std::size_t v) const {
+    std::size_t count = 0;
+    visit_neighbors(v, [&](std::uint32_t) { ++count; });
+    return count;
+  }
+
+  // Of the neighbours, of which there are some.
+  template <class Value>
+  Value mean(std::size_t v, const std::vector<Value>& values) const {
+    Value sum = {};
+    float count = 0;
+    visit_neighbors(v, [&](std::uint32_t neighbor) {
+      sum += values[neighbor];
+      ++count;
+    });
+    return sum / count;
+  }
+
+  // Of a triangle, twice as long as its area.
+  Lanes normal(std::size_t v, const Spoke& spoke) const {
+    return cross(at[spoke.next] - at[v], at[spoke.previous] - at[v]);
+  }
+
+ private:
+  static constexpr std::uint8_t kAxes = 7;  // along which a vertex does not move, a bit each
+  static constexpr std::uint8_t kCurve = 8;
+
+  void place(const SeparatingSurface& surface, const Dims& dims, const LatticeToSpace& to_space,
+             const Context& context);
+  void find_curves(const Context& context);
+  bool is_cap(const Triangle& triangle) const;
+  std::vector<std::uint32_t> neighbors_along_curves(std::size_t v) const;
+
+  const bool closed_;
+  Lanes spacing_ = {};
+  float largest_spacing_ = 0;
+  float smallest_spacing_ = 0;
+  std::vector<Lanes> start_;
+  std::vector<std::uint8_t> flags_;
+  WallFans fans_;
+  std::vector<std::uint32_t> curve_begin_;  // of each vertex, and all
+  std::vector<std::uint32_t> curve_neighbors_;
+};
+
+}  // namespace isomesh::mesh

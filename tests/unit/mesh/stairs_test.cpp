@@ -1,0 +1,332 @@
+// Walls without the steps of voxels, and what they lack of the voxels' volume.
+#include "server/mesh/stairs/stairs.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/mesh/labels/missing_volume.h"
+#include "tests/support/points.h"
+#include "tests/unit/mesh/separated.h"
+
+namespace isomesh::mesh {
+namespace {
+
+using test::Point;
+using Labels = test::SampleVolume<std::uint8_t>;
+
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+struct Smoothed {
+  SeparatingSurface surface;
+  SmoothingEffect effect;
+};
+
+Smoothed without_stairs(const Labels& volume, const SeparateOptions& options,
+                        double most = kUnbounded) {
+  Smoothed result;
+  const auto lattice = volume.lattice();
+  const SurfaceCount count = count_walls(lattice, options, {});
+  extract_walls(lattice, options, count, {}, result.surface);
+  result.effect = remove_stairs(lattice, options, count, most, {}, result.surface);
+  return result;
+}
+
+SeparateOptions joined(std::size_t labels, bool close = false) {
+  return {.labels = consecutive<std::int64_t>(1, labels), .close = close, .regularize = true};
+}
+
+// As many samples as cover the ball of that radius around the origin, and two more.
+Labels labels_of(const std::function<int(const Point&)>& label, double radius,
+                 const std::array<double, 3>& spacing) {
+  Geometry geometry;
+  Dims dims;
+  std::uint32_t* const counts[] = {&dims.x, &dims.y, &dims.z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto half = static_cast<std::uint32_t>(std::ceil(radius / spacing[axis])) + 2;
+    *counts[axis] = 2 * half + 1;
+    geometry.spacing[axis] = spacing[axis];
+    geometry.origin[axis] = -static_cast<double>(half) * spacing[axis];
+  }
+  return test::sample<std::uint8_t>([&](const Point& p) { return label(p); }, dims, geometry);
+}
+
+std::map<std::int64_t, double> voxels_mm3(const Labels& volume) {
+  std::map<std::int64_t, double> volumes;
+  for (const LabelVoxels& label : count_labels(volume.lattice(), {})) {
+    volumes[label.label] = label.volume_mm3;
+  }
+  return volumes;
+}
+
+std::vector<LabelMeasure> measured(const SeparatingSurface& surface) {
+  return measure_labels(surface, LabelTriangles(surface), {});
+}
+
+// What fans owe each label, in voxels.
+std::map<std::int64_t, double> owed(const Labels& volume, const SeparateOptions& options,
+                                    SeparatingSurface& surface) {
+  const auto lattice = volume.lattice();
+  const SurfaceCount count = count_walls(lattice, options, {});
+  extract_walls(lattice, options, count, {}, surface);
+  const WallFans fans(surface, [](const Triangle&) { return false; }, {});
+  const Buffer<float> missing = missing_volume(lattice, options, count, fans, {}, surface);
+  std::map<std::int64_t, double> sums;
+  for (std::size_t fan = 0; fan < fans.size(); ++fan) {
+    const WallSides sides = fans.wall(fan).sides;
+    sums[sides.back] += missing[fan];
+    sums[sides.front] -= missing[fan];
+  }
+  return sums;
+}
+
+TEST(MissingVolume, IsThatOfTheVoxelsLessWhatTheWallsEnclose) {
+  for (const Geometry& geometry : {Geometry{}, test::oblique_left_handed_geometry()}) {
+    Labels noise = label_noise(4, {15, 12, 13}, 71, geometry);
+    // Walls that reach the border enclose nothing.
+    for (std::uint32_t k = 0; k < noise.dims.z; ++k) {
+      for (std::uint32_t j = 0; j < noise.dims.y; ++j) {
+        for (std::uint32_t i = 0; i < noise.dims.x; ++i) {
+          const bool is_inner = i > 0 && j > 0 && k > 0 && i + 1 < noise.dims.x &&
+                                j + 1 < noise.dims.y && k + 1 < noise.dims.z;
+          if (!is_inner) noise.at(i, j, k) = 0;
+        }
+      }
+    }
+    const double voxel = std::abs(noise.lattice().to_space.determinant());
+    for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+      for (const bool regularize : {false, true}) {
+        SCOPED_TRACE(testing::Message() << static_cast<int>(scheme) << ' ' << regularize);
+        SeparateOptions options = joined(3);
+        options.scheme = scheme;
+        options.regularize = regularize;
+        SeparatingSurface surface;
+        const auto sums = owed(noise, options, surface);
+        const auto voxels = voxels_mm3(noise);
+        for (const LabelMeasure& label : measured(surface)) {
+          const double missing = voxels.at(label.label) - label.extent.volume_mm3;
+          EXPECT_NEAR(sums.at(label.label) * voxel, missing, 2e-4 * voxels.at(label.label));
+        }
+      }
+    }
+  }
+}
+
+struct Shape {
+  std::string name;
+  std::array<double, 3> spacing;
+  double area_percent;
+  double volume_percent;
+};
+
+class RoundShapes : public testing::TestWithParam<Shape> {
+ protected:
+  static constexpr double kRadius = 10;
+
+  // The mean over some places of the centre, none of them special to the lattice.
+  void expect_near(const std::function<double(const Point&)>& outside, double reach,
+                   double area) const {
+    constexpr std::array<Point, 4> kPlaces = {Point{0.31, -0.22, 0.41}, Point{-0.13, 0.47, -0.29},
+                                              Point{0.05, 0.12, -0.4}, Point{-0.37, -0.08, 0.19}};
+    double area_error = 0;
+    for (const Point& place : kPlaces) {
+      const auto label = [&](const Point& p) {
+        Point from;
+        for (std::size_t i = 0; i < 3; ++i) from[i] = p[i] - place[i] * GetParam().spacing[i];
+        return outside(from) <= 0 ? 1 : 0;
+      };
+      const Labels volume = labels_of(label, reach, GetParam().spacing);
+      const Smoothed smoothed = without_stairs(volume, joined(1));
+      const Extent extent = measure_extent(smoothed.surface.mesh, {});
+      const double voxels = voxels_mm3(volume).at(1);
+      EXPECT_NEAR(extent.volume_mm3 / voxels, 1, GetParam().volume_percent / 100);
+      area_error += (extent.area_mm2 / area - 1) / kPlaces.size();
+    }
+    EXPECT_LT(std::abs(area_error), GetParam().area_percent / 100);
+  }
+};
+
+TEST_P(RoundShapes, HaveTheirAreaAndTheirVoxelsVolume) {
+  const auto ball = [](const Point& p) { return test::length(p) - kRadius; };
+  expect_near(ball, kRadius, 4 * std::numbers::pi * kRadius * kRadius);
+  // A ring around an axis that is oblique to the lattice.
+  constexpr double kRing = 2.5 * kRadius;
+  const Point axis = {0.48, 0.36, 0.8};
+  const auto tube = [&](const Point& p) {
+    const double along = test::dot(p, axis);
+    Point across;
+    for (std::size_t i = 0; i < 3; ++i) across[i] = p[i] - along * axis[i];
+    return std::hypot(along, test::length(across) - kRing) - kRadius;
+  };
+  expect_near(tube, kRing + kRadius, 4 * std::numbers::pi * std::numbers::pi * kRing * kRadius);
+}
+
+INSTANTIATE_TEST_SUITE_P(Spacings, RoundShapes,
+                         testing::Values(Shape{"even", {1, 1, 1}, 0.4, 0.1},
+                                         Shape{"double", {1, 1, 2}, 0.6, 0.1},
+                                         Shape{"triple", {1, 1, 3}, 0.7, 0.15}),
+                         [](const auto& test) { return test.param.name; });
+
+TEST(Stairs, OfABoxAreNone) {
+  const auto label = [](const Point& p) {
+    return std::abs(p[0]) < 10.5 && std::abs(p[1]) < 8.5 && std::abs(p[2]) < 7.5 ? 1 : 0;
+  };
+  const Smoothed smoothed = without_stairs(labels_of(label, 11, {1, 1, 1}), joined(1));
+  constexpr double kFromEdges = 3;
+  std::size_t seen = 0;
+  for (const Vec3& at : smoothed.surface.mesh.positions) {
+    const Point beyond = {std::abs(at[0]) - 10.5, std::abs(at[1]) - 8.5, std::abs(at[2]) - 7.5};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (beyond[(axis + 1) % 3] > -kFromEdges || beyond[(axis + 2) % 3] > -kFromEdges) continue;
+      EXPECT_NEAR(beyond[axis], 0, 0.05);
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 500U);
+}
+
+TEST(Stairs, LeaveWhatIsThinItsVolume) {
+  const Point axis = {0.48, 0.36, 0.8};
+  const auto is_voxel = [](const Point& p) { return test::length(p) < 0.5 ? 1 : 0; };
+  const auto sheet = [&](const Point& p) {
+    return std::abs(test::dot(p, axis)) < 0.75 && test::length(p) < 10 ? 1 : 0;
+  };
+  const auto thread = [&](const Point& p) {
+    const double along = test::dot(p, axis);
+    return std::abs(along) < 10 && test::dot(p, p) - along * along < 0.81 ? 1 : 0;
+  };
+  for (const std::function<int(const Point&)>& label :
+       std::vector<std::function<int(const Point&)>>{is_voxel, sheet, thread}) {
+    const Labels volume = labels_of(label, 10, {1, 1, 1});
+    const Smoothed smoothed = without_stairs(volume, joined(1));
+    const double part = smoothed.effect.after.volume_mm3 / voxels_mm3(volume).at(1);
+    EXPECT_GT(part, 0.7);
+    EXPECT_LT(part, 1.3);
+  }
+}
+
+TEST(Stairs, OfManyLabelsLeaveEachItsVolume) {
+  const Labels volume = label_cells(9, {44, 40, 42}, 15, 31);
+  const auto voxels = voxels_mm3(volume);
+  for (const bool close : {false, true}) {
+    const Smoothed smoothed = without_stairs(volume, joined(9, close));
+    for (const LabelMeasure& label : measured(smoothed.surface)) {
+      EXPECT_TRUE(label.topology.manifold && label.topology.oriented);
+      EXPECT_EQ(label.is_closed() || !close, true);
+      if (!label.is_closed() || voxels.at(label.label) < 1000) continue;
+      // Caps bevel the edges of the volume's box.
+      EXPECT_NEAR(label.extent.volume_mm3 / voxels.at(label.label), 1, close ? 0.02 : 0.005);
+    }
+  }
+}
+
+TEST(Stairs, LeaveCapsFlatAndEndsInTheBorder) {
+  const Labels volume = label_cells(7, {20, 17, 23}, 15, 5);
+  for (const bool close : {false, true}) {
+    const double beyond = close ? 0.5 : 0;
+    SeparatingSurface before;
+    separate_into(before, volume, joined(7, close));
+    const Smoothed smoothed = without_stairs(volume, joined(7, close));
+    const std::array<double, 3> last = {19 + beyond, 16 + beyond, 22 + beyond};
+    std::size_t seen = 0;
+    for (std::size_t v = 0; v < before.mesh.positions.size(); ++v) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float was = before.mesh.positions[v][axis];
+        const float is = smoothed.surface.mesh.positions[v][axis];
+        if (was == -beyond || was == last[axis]) {
+          EXPECT_EQ(is, was);
+          ++seen;
+        }
+        EXPECT_TRUE(std::isfinite(is));
+      }
+    }
+    EXPECT_GT(seen, 100U);
+  }
+}
+
+TEST(Stairs, AreTheSameToTheByteOnAnyNumberOfThreads) {
+  const Labels volume = label_cells(12, {40, 43, 70}, 14, 9);
+  const Smoothed first = without_stairs(volume, joined(12, true));
+  for (const int threads : {1, 2, 5}) {
+    const test::ThreadCount count(threads);
+    const Smoothed again = without_stairs(volume, joined(12, true));
+    EXPECT_TRUE(same_bytes(first.surface, again.surface)) << threads;
+    EXPECT_EQ(first.effect.mean_displacement_mm, again.effect.mean_displacement_mm);
+  }
+}
+
+TEST(Stairs, MoveNothingFartherThanIsAllowed) {
+  const Labels volume = label_noise(3, {14, 13, 12}, 3, test::oblique_left_handed_geometry());
+  SeparatingSurface before;
+  separate_into(before, volume, joined(2));
+  constexpr double kMost = 0.1;
+  const Smoothed smoothed = without_stairs(volume, joined(2), kMost);
+  double largest = 0;
+  for (std::size_t v = 0; v < before.mesh.positions.size(); ++v) {
+    Point way;
+    for (std::size_t i = 0; i < 3; ++i) {
+      way[i] = double{smoothed.surface.mesh.positions[v][i]} - before.mesh.positions[v][i];
+    }
+    largest = std::max(largest, test::length(way));
+  }
+  EXPECT_LE(smoothed.effect.max_displacement_mm, kMost);
+  EXPECT_GT(largest, kMost / 2);
+  EXPECT_LT(largest, kMost + 1e-5);  // what single precision leaves
+}
+
+// Blocks of a volume will be worked on by themselves.
+TEST(Stairs, DependOnlyOnWhatIsNear) {
+  constexpr std::uint32_t kChanged = 75;
+  constexpr double kReach = 60;  // layers
+  Labels volume = label_cells(40, {24, 24, 150}, 14, 77);
+  const Smoothed first = without_stairs(volume, joined(40));
+  const Labels other = label_noise(5, volume.dims, 78);
+  for (std::uint32_t k = kChanged; k < volume.dims.z; ++k) {
+    for (std::uint32_t j = 0; j < volume.dims.y; ++j) {
+      for (std::uint32_t i = 0; i < volume.dims.x; ++i)
+        volume.at(i, j, k) = other.samples[i + 7 * j + 24 * k];
+    }
+  }
+  const Smoothed second = without_stairs(volume, joined(40));
+  std::map<Vec3, Vec3> moved;
+  SeparatingSurface start;
+  separate_into(start, volume, joined(40));
+  for (std::size_t v = 0; v < start.mesh.positions.size(); ++v) {
+    moved[start.mesh.positions[v]] = second.surface.mesh.positions[v];
+  }
+  Labels unchanged = label_cells(40, {24, 24, 150}, 14, 77);
+  separate_into(start, unchanged, joined(40));
+  double farthest = 0;
+  std::size_t same = 0;
+  for (std::size_t v = 0; v < start.mesh.positions.size(); ++v) {
+    const Vec3& from = start.mesh.positions[v];
+    if (from[2] > kChanged) break;
+    const auto found = moved.find(from);
+    if (found != moved.end() && found->second == first.surface.mesh.positions[v]) {
+      ++same;
+    } else {
+      farthest = std::max(farthest, kChanged - double{from[2]});
+    }
+  }
+  RecordProperty("farthest", std::to_string(farthest));
+  EXPECT_LT(farthest, kReach);
+  EXPECT_GT(same, 1000U);
+}
+
+TEST(Stairs, OfNothingAreNothing) {
+  const Labels empty = test::constant<std::uint8_t>(0, {5, 5, 5});
+  const Smoothed smoothed = without_stairs(empty, joined(1));
+  EXPECT_EQ(smoothed.surface.mesh.positions.size(), 0U);
+  EXPECT_EQ(smoothed.effect.max_displacement_mm, 0);
+}
+
+}  // namespace
+}  // namespace isomesh::mesh
