@@ -302,14 +302,15 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   if (is_told(self, self.max_error_mm.has_value())) {
     parameter(Parameter{.name = "max_error_mm",
                         .title = "Largest error",
-                        .help = "The measured distance between each file and the extracted surface "
-                                "is at most this.",
-                        .more = "In millimetres, in both directions. The samples are all vertices "
-                                "and the centres of all triangles; other points may be farther "
-                                "away. Smoothing may use half of it. Simplification then "
+                        .help = "The distance between each file and the extracted surface is at "
+                                "most this.",
+                        .more = "In millimetres, in both directions. It is proven for every point "
+                                "where that can be done, and measured otherwise: at all vertices "
+                                "and the centres of all triangles, so other points may be farther "
+                                "away. `mesh.certificate` says which, see `certify`, which is "
+                                "switched on. Smoothing may use half of it. Simplification then "
                                 "removes as many triangles as the rest allows, and Draco's "
-                                "coordinates get as many bits as that takes. The error is measured "
-                                "on what the files hold: see `certify`, which is switched on.",
+                                "coordinates get as many bits as that takes.",
                         .unit = "mm",
                         .minimum = 0.001,
                         .maximum = 1000,

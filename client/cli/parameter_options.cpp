@@ -68,7 +68,9 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   if (help.ends_with('.')) help.pop_back();
   const std::string unit = parameter.unit;
   std::string defaults = default_of(parameter, standard);
-  if (parameter.by_labels) defaults += ", " + number_text(*parameter.by_labels) + " with --labels";
+  if (parameter.by_labels != nullptr) {
+    defaults += std::string(", ") + parameter.by_labels + " with --labels";
+  }
   std::string more = words_of<T>() + limits_of(parameter);  // a number has limits, others words
   if (!defaults.empty()) more += (more.empty() ? "default: " : "; default: ") + defaults;
   return help + (unit.empty() ? "" : ", in " + unit) + (more.empty() ? "" : " (" + more + ')');
@@ -96,10 +98,10 @@ class ParameterOptions {
         must_be(parameter, std::is_integral_v<Number>));
   }
 
-  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+  CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
                         const std::string& help, bool& value) {
     CLI::Option* on = app_.add_flag(name, value, help + (value ? " (default)" : ""));
-    if (value) {
+    if (value || parameter.by_labels != nullptr) {
       const std::string off = "--no-" + name.substr(2);
       app_.add_flag_callback(
               off, [&value] { value = false; }, "Switch off " + name)
@@ -371,12 +373,18 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
   for (const Parameter& parameter : added) relate(parameter, options);
   CLI::Option* const labels = options.at("labels");
   options.at("interpolation")->excludes(labels);  // vertices of labels lie half-way
-  app.parse_complete_callback(
-      [&parameters, kept, labels, iso = options.at("iso"), passes = options.at("passes")] {
-        if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
-        const bool is_by_labels = labels->count() > 0;
-        if (is_by_labels && passes->count() == 0) parameters.passes = label_parameters({}).passes;
-      });
+  app.parse_complete_callback([&parameters, &app, kept, labels, iso = options.at("iso")] {
+    if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
+    if (labels->count() == 0) return;
+    const auto is_left_out = [&](const std::string& name) {
+      const CLI::Option* const off = app.get_option_no_throw("--no-" + name);
+      return app.get_option("--" + name)->count() == 0 && (off == nullptr || off->count() == 0);
+    };
+    const JobParameters standard = label_parameters({});
+    if (is_left_out("passes")) parameters.passes = standard.passes;
+    if (is_left_out("smoothing")) parameters.smoothing = standard.smoothing;
+    if (is_left_out("regularize")) parameters.regularize = standard.regularize;
+  });
 }
 
 std::string in_options(const Error& error) {

@@ -239,6 +239,11 @@ TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {
   EXPECT_EQ(parameters.labels, (LabelChoice{{1, 5}}));
   EXPECT_EQ(parameters.background, 9);
   EXPECT_EQ(parameters.passes, label_parameters({}).passes);
+  EXPECT_EQ(parameters.smoothing, Smoothing::kLabels);
+  EXPECT_TRUE(parameters.regularize);
+  EXPECT_FALSE(
+      parse({"mesh", file_.c_str(), "--labels", "all", "--no-regularize", "-o", glb.c_str()})
+          .parameters.regularize);
   EXPECT_EQ(parameters.label_names, (LabelTexts{{1, "Left lung"}, {5, "Heart"}}));
   EXPECT_EQ(parameters.label_colors, (LabelTexts{{5, "#ff0000"}}));
   EXPECT_EQ(parameters.label_values, (LabelValues{{5, {5, 6}}}));

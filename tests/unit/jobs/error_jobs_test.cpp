@@ -301,6 +301,7 @@ TEST_F(ErrorJobsTest, OfLabelsMeasureDracoInTheZip) {
   parameters.volume = labels.id;
   parameters.close = true;
   parameters.formats = {MeshFormat::kDrc};
+  parameters.passes = 0;
   parameters.draco.position_bits = 8;  // so that it is far
   parameters.certify = true;
   const auto certified = [&] {

@@ -70,6 +70,7 @@ describe('a job by labels', () => {
     expect(text).not.toContain('--iso');
     expect(text).toContain('-o mesh.glb -o mesh.zip');
     expect(curlSnippet('http://h:1', named, false)).toContain('JOB/mesh.zip');
+    expect(commandSnippet('http://h:1', { ...all, regularize: false }, false)).toContain('--no-regularize');
   });
 
   it('has one file for all labels, or a ZIP', () => {
@@ -84,9 +85,10 @@ describe('a job by labels', () => {
       '2 labels',
       'label 7',
     ]);
-    expect(inWords(all)).toBe('6 tetrahedra, 10 passes');
+    expect(inWords(all)).toBe('6 tetrahedra, without steps');
+    expect(inWords({ ...all, smoothing: 'taubin' })).toBe('6 tetrahedra, 10 passes (Taubin)');
     const jobs = [defaults, all].map((parameters) => ({ parameters }) as Parameters<typeof titlesOf>[0][0]);
-    expect(titlesOf(jobs)).toEqual(['iso 60, 5 passes', 'all labels, 10 passes']);
+    expect(titlesOf(jobs)).toEqual(['iso 60, not regularized, 5 passes, laplacian', 'all labels, regularized, 10 passes, labels']);
   });
 });
 

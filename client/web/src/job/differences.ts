@@ -10,6 +10,7 @@ const words: Record<string, (job: JobParameters) => string> = {
   interpolation: ({ interpolation }) => interpolation ?? 'midpoint',
   passes: ({ passes }) => (passes === 1 ? '1 pass' : `${passes} passes`),
   smoothing: ({ smoothing }) => smoothing,
+  regularize: ({ regularize }) => (regularize === true ? 'regularized' : 'not regularized'),
   close: ({ close }) => (close ? 'closed' : 'open'),
 };
 // A title begins with the first three; the others do not change the surface.

@@ -28,6 +28,7 @@ function optionFor(parameter: Parameter, job: JobParameters): string {
   if (parameter.kind === 'places' && parameter.name !== 'crop') {
     return (value as Places).map((place) => `--${parameter.option} ${place.join(',')}`).join(' ');
   }
+  if (value === false) return `--no-${parameter.option}`;
   return value === true ? `--${parameter.option}` : `--${parameter.option} ${quoted(asText(value))}`;
 }
 
