@@ -40,6 +40,9 @@ void throw_wrong_kind() { throw Error(ErrorCode::kInternal, "has a member of the
 
 bool is_null(const Json& json) { return json.is_null(); }
 bool is_string(const Json& json) { return json.is_string(); }
+bool is_number(const Json& json) { return json.is_number(); }
+bool is_array(const Json& json) { return json.is_array(); }
+bool is_object(const Json& json) { return json.is_object(); }
 
 bool boolean(const Json& json) {
   if (!json.is_boolean()) throw_wrong_kind();

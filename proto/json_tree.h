@@ -54,6 +54,9 @@ Json& append(Json& array);
 
 bool is_null(const Json& json);
 bool is_string(const Json& json);
+bool is_number(const Json& json);
+bool is_array(const Json& json);
+bool is_object(const Json& json);
 bool boolean(const Json& json);
 // Reads a whole number. Throws if it is out of range.
 std::int64_t whole(const Json& json, std::int64_t least, std::int64_t most);

@@ -23,13 +23,13 @@ struct Table {
   std::vector<LabelEntry> labels;
 };
 
-std::string base_of(const std::string& name) {
+std::string lower_name(const std::string& name) {
   return lower(std::filesystem::path(name).filename().string());
 }
 
 // "head" of "head.nii.gz".
 std::string stem_of(const std::string& name) {
-  std::filesystem::path base = base_of(name);
+  std::filesystem::path base = lower_name(name);
   if (base.extension() == ".gz") base = base.stem();
   return base.stem().string();
 }
@@ -39,7 +39,7 @@ bool begins_with(const std::string& name, const std::string& stem) {
   const auto is_word = [](char letter) {
     return (letter >= 'a' && letter <= 'z') || (letter >= '0' && letter <= '9');
   };
-  const std::string base = base_of(name);
+  const std::string base = lower_name(name);
   return !stem.empty() && base.starts_with(stem) &&
          (base.size() == stem.size() || !is_word(base[stem.size()]));
 }

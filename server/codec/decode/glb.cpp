@@ -13,7 +13,8 @@
 namespace isomesh::codec::decoding {
 namespace {
 
-using Json = nlohmann::json;
+// As what writes the document, so that the compiler makes it once.
+using Json = nlohmann::ordered_json;
 
 // Reads a little-endian number; the caller has checked the bounds.
 std::uint32_t word_at(Bytes bytes, std::size_t offset) {

@@ -28,7 +28,7 @@ constexpr std::size_t kTarBlock = 512;
 constexpr std::uint64_t kMostUnpackedPerByte = 200;
 constexpr std::uint64_t kNeverABomb = std::uint64_t{1} << 30;
 
-[[noreturn]] void throw_damaged(archive* source) {
+[[noreturn]] void throw_archive_error(archive* source) {
   const char* reason = ::archive_error_string(source);
   throw_unusable("The archive is damaged or truncated: " +
                  in_quotes(reason == nullptr ? "no reason known" : reason) + ".");
@@ -70,16 +70,17 @@ std::string plain_name(std::string_view name) {
   return plain;
 }
 
-class Reader {
+class OpenArchive {
  public:
-  explicit Reader(const InputFile& file) : file_(file), archive_(::archive_read_new()) {
+  explicit OpenArchive(const InputFile& file) : file_(file), archive_(::archive_read_new()) {
     if (!archive_) throw Error(ErrorCode::kInternal, "archive_read_new failed.");
     // Read a ZIP by its central directory, which shows whether members are missing.
     ::archive_read_support_format_zip_seekable(archive_.get());
     ::archive_read_support_format_tar(archive_.get());
-    constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
-    if (::archive_read_open_fd(archive_.get(), file.descriptor(), kPieceBytes) != ARCHIVE_OK) {
-      throw_damaged(archive_.get());
+    constexpr std::size_t kArchivePieceBytes = std::size_t{1} << 17;
+    if (::archive_read_open_fd(archive_.get(), file.descriptor(), kArchivePieceBytes) !=
+        ARCHIVE_OK) {
+      throw_archive_error(archive_.get());
     }
   }
 
@@ -87,7 +88,7 @@ class Reader {
   archive_entry* next() {
     // If the rest of the last member is missing, the archive was truncated.
     if (in_member_ && ::archive_read_data_skip(archive_.get()) != ARCHIVE_OK) {
-      throw_damaged(archive_.get());
+      throw_archive_error(archive_.get());
     }
     before_next_ = static_cast<std::uint64_t>(::archive_filter_bytes(archive_.get(), 0));
     archive_entry* entry = nullptr;
@@ -95,7 +96,7 @@ class Reader {
     in_member_ = false;
     if (status == ARCHIVE_EOF) return nullptr;
     // The library warns of names that the locale cannot represent, which is harmless.
-    if (status != ARCHIVE_OK && status != ARCHIVE_WARN) throw_damaged(archive_.get());
+    if (status != ARCHIVE_OK && status != ARCHIVE_WARN) throw_archive_error(archive_.get());
     in_member_ = true;
     return entry;
   }
@@ -103,7 +104,7 @@ class Reader {
   std::size_t read(std::span<std::byte> target) {
     const la_ssize_t count = ::archive_read_data(archive_.get(), target.data(), target.size());
     // Warnings are errors here: the library warns of wrong checksums.
-    if (count < 0) throw_damaged(archive_.get());
+    if (count < 0) throw_archive_error(archive_.get());
     return static_cast<std::size_t>(count);
   }
 
@@ -265,7 +266,7 @@ class Unpacker {
   }
 
   InputFile file_;
-  Reader reader_;
+  OpenArchive reader_;
   ArchiveLimits limits_;
   std::size_t entries_ = 0;
   std::uint64_t total_ = 0;

@@ -13,9 +13,7 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kMostHeaderBytes = kBeginningBytes;
-
-using Attributes = std::map<std::string, std::string, std::less<>>;  // the text of each value
+using HeadAttributes = std::map<std::string, std::string, std::less<>>;  // the text of each value
 
 // "name = value" of one line; empty if it is none.
 std::optional<std::string_view> value_in(std::string_view line, std::string_view name) {
@@ -33,8 +31,8 @@ bool is_type(std::string_view line) {
 }
 
 // Each attribute has three lines, then its value up to the next attribute.
-Attributes read_attributes(std::string_view text) {
-  Attributes attributes;
+HeadAttributes read_attributes(std::string_view text) {
+  HeadAttributes attributes;
   std::string* value = nullptr;
   for (const std::string_view line : lines(text)) {
     if (is_type(line)) {
@@ -48,20 +46,20 @@ Attributes read_attributes(std::string_view text) {
   return attributes;
 }
 
-std::string_view text_of(const Attributes& attributes, std::string_view name) {
+std::string_view text_of(const HeadAttributes& attributes, std::string_view name) {
   const auto found = attributes.find(name);
   return found == attributes.end() ? std::string_view{} : std::string_view(found->second);
 }
 
 // The value of a string attribute, which is written as 'text~.
-std::string_view string_of(const Attributes& attributes, std::string_view name) {
+std::string_view string_of(const HeadAttributes& attributes, std::string_view name) {
   std::string_view text = text_of(attributes, name);
   if (text.starts_with('\'')) text.remove_prefix(1);
   while (text.ends_with('~')) text.remove_suffix(1);
   return text;
 }
 
-std::vector<double> numbers_of(const Attributes& attributes, std::string_view name,
+std::vector<double> numbers_of(const HeadAttributes& attributes, std::string_view name,
                                std::size_t least) {
   std::vector<double> numbers;
   for (const std::string_view word : words(text_of(attributes, name))) {
@@ -77,7 +75,7 @@ std::vector<double> numbers_of(const Attributes& attributes, std::string_view na
                  ".");
 }
 
-std::uint64_t whole(double number, std::string_view name) {
+std::uint64_t whole_value(double number, std::string_view name) {
   constexpr double kMost = 1e9;
   if (number >= 0 && number <= kMost && number == std::floor(number)) {
     return static_cast<std::uint64_t>(number);
@@ -85,7 +83,7 @@ std::uint64_t whole(double number, std::string_view name) {
   throw_unusable("The AFNI attribute " + in_quotes(name) + " is not plausible.");
 }
 
-StoredType type_of(const Attributes& attributes, std::uint64_t volumes) {
+StoredType type_of(const HeadAttributes& attributes, std::uint64_t volumes) {
   const auto codes = numbers_of(attributes, "BRICK_TYPES", volumes);
   if (std::ranges::count(codes, codes.front()) != static_cast<std::ptrdiff_t>(codes.size())) {
     throw_unusable("The sub-bricks of the AFNI dataset have different types.");
@@ -99,7 +97,7 @@ StoredType type_of(const Attributes& attributes, std::uint64_t volumes) {
                  " is not supported. A sample must be one real number.");
 }
 
-std::optional<Rescale> rescale_of(const Attributes& attributes, std::uint64_t volume) {
+std::optional<Rescale> rescale_of(const HeadAttributes& attributes, std::uint64_t volume) {
   if (text_of(attributes, "BRICK_FLOAT_FACS").empty()) return std::nullopt;
   const double factor = numbers_of(attributes, "BRICK_FLOAT_FACS", volume + 1)[volume];
   if (factor == 0 || factor == 1) return std::nullopt;  // 0 means none
@@ -107,14 +105,14 @@ std::optional<Rescale> rescale_of(const Attributes& attributes, std::uint64_t vo
 }
 
 // By axis codes: right to left, left to right, back to front, front to back, up, down.
-Geometry geometry_of_axes(const Attributes& attributes) {
+Geometry geometry_of_axes(const HeadAttributes& attributes) {
   const auto codes = numbers_of(attributes, "ORIENT_SPECIFIC", 3);
   const auto origin = numbers_of(attributes, "ORIGIN", 3);
   const auto delta = numbers_of(attributes, "DELTA", 3);
   std::array<Vector3, 3> steps = {};
   Vector3 first = {};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::uint64_t row = whole(codes[axis], "ORIENT_SPECIFIC") / 2;
+    const std::uint64_t row = whole_value(codes[axis], "ORIENT_SPECIFIC") / 2;
     if (row > 2) throw_unusable("The AFNI attribute \"ORIENT_SPECIFIC\" is not plausible.");
     steps[axis][row] = delta[axis];
     first[row] = origin[axis];
@@ -122,7 +120,7 @@ Geometry geometry_of_axes(const Attributes& attributes) {
   return geometry_of(first, steps);
 }
 
-Geometry geometry_of_header(const Attributes& attributes) {
+Geometry geometry_of_header(const HeadAttributes& attributes) {
   if (text_of(attributes, "IJK_TO_DICOM_REAL").empty()) return geometry_of_axes(attributes);
   const auto matrix = numbers_of(attributes, "IJK_TO_DICOM_REAL", 12);
   std::array<Vector3, 3> steps = {};
@@ -135,13 +133,13 @@ Geometry geometry_of_header(const Attributes& attributes) {
 }
 
 // Everything except the data file.
-SourceVolume describe(const Attributes& attributes, const ImportOptions& options) {
+SourceVolume describe(const HeadAttributes& attributes, const ImportOptions& options) {
   const auto dims = numbers_of(attributes, "DATASET_DIMENSIONS", 3);
   const auto rank = numbers_of(attributes, "DATASET_RANK", 2);
   std::array<std::uint64_t, 4> sizes = {};
   for (std::size_t axis = 0; axis < 3; ++axis)
-    sizes[axis] = whole(dims[axis], "DATASET_DIMENSIONS");
-  sizes[3] = whole(rank[1], "DATASET_RANK");
+    sizes[axis] = whole_value(dims[axis], "DATASET_DIMENSIONS");
+  sizes[3] = whole_value(rank[1], "DATASET_RANK");
   SourceVolume volume;
   volume.dims = volume_dims(std::span(sizes).first(3));
   const std::uint64_t count = volumes_beyond(sizes);
@@ -184,7 +182,7 @@ bool is_afni(std::string_view head) {
 SourceVolume parse_afni(const InputFile& file, const Companions& companions,
                         const ImportOptions& options) {
   const std::string name = brick_name(companions);
-  const Attributes attributes = read_attributes(file.text(0, kMostHeaderBytes));
+  const HeadAttributes attributes = read_attributes(file.text(0, kBeginningBytes));
   SourceVolume volume = describe(attributes, options);
   if (name.ends_with(".gz")) volume.encoding = Encoding::kDeflate;
   if (name.ends_with(".bz2")) volume.encoding = Encoding::kBzip2;
@@ -198,9 +196,9 @@ std::vector<std::string> afni_data_names(const InputFile& /*file*/, const Compan
 
 MostBytes most_afni_bytes(const InputFile& beginning, const ImportTask& task) {
   const SourceVolume volume =
-      describe(read_attributes(beginning.text(0, kMostHeaderBytes)), task.options);
+      describe(read_attributes(beginning.text(0, kBeginningBytes)), task.options);
   check_limits(volume, task.limits);
-  return {.file = kMostHeaderBytes + kHeadroomBytes,
+  return {.file = kBeginningBytes + kHeadroomBytes,
           .data = volume.most_encoded_bytes() + kHeadroomBytes};
 }
 

@@ -14,7 +14,6 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kMostHeaderBytes = kBeginningBytes;
 constexpr double kAngstromPerBohr = 0.529177210903;  // CODATA 2018
 constexpr std::int64_t kMostAtoms = 1'000'000;
 constexpr std::uint64_t kMostValues = 10'000;
@@ -68,17 +67,17 @@ std::optional<CountLine> count_line(std::optional<std::string_view> line, bool m
   return result;
 }
 
-struct Header {
+struct CubeHeader {
   CountLine atoms;  // the vector is the origin
   std::array<CountLine, 3> axes;
 };
 
-std::optional<Header> read_header(LineReader& lines) {
+std::optional<CubeHeader> read_cube_header(LineReader& lines) {
   lines.next();
   lines.next();
   const auto atoms = count_line(lines.next(), true);
   if (!atoms || std::abs(atoms->count) > kMostAtoms) return std::nullopt;
-  Header header{*atoms, {}};
+  CubeHeader header{*atoms, {}};
   for (CountLine& axis : header.axes) {
     const auto line = count_line(lines.next(), false);
     if (!line || line->count == 0) return std::nullopt;
@@ -114,14 +113,14 @@ std::uint64_t skip_atoms(LineReader& lines, const CountLine& atoms) {
   for (std::int64_t atom = 0; atom < std::abs(atoms.count); ++atom) {
     if (!lines.next()) {
       throw_unusable("The cube file ends within its list of atoms, or the list is longer than " +
-                     std::to_string(kMostHeaderBytes) + " bytes.");
+                     std::to_string(kBeginningBytes) + " bytes.");
     }
   }
   return atoms.count < 0 ? read_orbitals(lines) : atoms.values;
 }
 
 // A positive number of samples means that lengths are in bohr.
-Geometry geometry_of_header(const Header& header) {
+Geometry geometry_of_header(const CubeHeader& header) {
   const bool is_bohr = header.axes[0].count > 0;
   const double unit = is_bohr ? kAngstromPerBohr : 1;
   const auto scaled = [&](Vector3 vector) {
@@ -137,14 +136,14 @@ Geometry geometry_of_header(const Header& header) {
 
 bool is_cube(std::string_view head) {
   LineReader lines(head);
-  return read_header(lines).has_value();
+  return read_cube_header(lines).has_value();
 }
 
 SourceVolume parse_cube(const InputFile& file, const Companions& /*companions*/,
                         const ImportOptions& options) {
-  const std::string text = file.text(0, kMostHeaderBytes);
+  const std::string text = file.text(0, kBeginningBytes);
   LineReader lines(text);
-  const auto header = read_header(lines);
+  const auto header = read_cube_header(lines);
   if (!header) throw_unusable("The header of the cube file is damaged.");
   SourceVolume volume;
   std::array<std::uint64_t, 3> sizes = {};

@@ -106,7 +106,7 @@ std::vector<std::string> minc_axes(const Hdf5File& file) {
 }
 
 // The row of a spatial axis: x runs to the right, y to the front and z up.
-std::optional<std::size_t> row_of(std::string_view axis) {
+std::optional<std::size_t> axis_row(std::string_view axis) {
   if (axis == "xspace") return 0;
   if (axis == "yspace") return 1;
   if (axis == "zspace") return 2;
@@ -128,7 +128,7 @@ Geometry minc_geometry(const Hdf5File& file, std::span<const std::string> axes) 
       throw_unusable("The MINC file's slices are not equally spaced.");
     }
     Vector3 cosines = {0, 0, 0};
-    cosines[row_of(axes[at]).value()] = 1;
+    cosines[axis_row(axes[at]).value()] = 1;
     const auto told = file.numbers(path, "direction_cosines");
     if (told.size() == 3) std::ranges::copy(told, cosines.begin());
     const double start = number_of(file, path, "start", 0);

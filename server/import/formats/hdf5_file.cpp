@@ -10,10 +10,10 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kMostAxes = 8;
+constexpr std::size_t kMostRank = 8;
 constexpr std::uint64_t kMostChunkBytes = std::uint64_t{256} << 20;
-constexpr std::uint64_t kPieceBytes = std::uint64_t{16} << 20;
-constexpr std::uint64_t kMostNumbers = 1'000'000;
+constexpr std::uint64_t kReadBytes = std::uint64_t{16} << 20;
+constexpr std::uint64_t kMostNumbersRead = 1'000'000;
 
 std::mutex& library() {
   static std::mutex mutex;
@@ -87,8 +87,8 @@ hid_t memory_type(StoredType type) {
 std::vector<std::uint64_t> sizes_of(hid_t dataset) {
   const Hdf5Handle space(H5Dget_space(dataset), H5Sclose);
   const int axes = H5Sget_simple_extent_ndims(space.id());
-  check(axes >= 0 && static_cast<std::size_t>(axes) <= kMostAxes);
-  std::array<hsize_t, kMostAxes> sizes = {};
+  check(axes >= 0 && static_cast<std::size_t>(axes) <= kMostRank);
+  std::array<hsize_t, kMostRank> sizes = {};
   check(H5Sget_simple_extent_dims(space.id(), sizes.data(), nullptr) == axes);
   return {sizes.begin(), sizes.begin() + axes};
 }
@@ -101,9 +101,9 @@ void check_storage(hid_t dataset, std::size_t bytes_each) {
     throw_unusable("The HDF5 file's samples are in another file.");
   }
   if (layout != H5D_CHUNKED) return;
-  std::array<hsize_t, kMostAxes> chunk = {};
-  const int axes = H5Pget_chunk(created.id(), kMostAxes, chunk.data());
-  check(axes >= 0 && static_cast<std::size_t>(axes) <= kMostAxes);
+  std::array<hsize_t, kMostRank> chunk = {};
+  const int axes = H5Pget_chunk(created.id(), kMostRank, chunk.data());
+  check(axes >= 0 && static_cast<std::size_t>(axes) <= kMostRank);
   std::uint64_t bytes = bytes_each;
   for (int axis = 0; axis < axes; ++axis) {
     const std::uint64_t size = chunk[static_cast<std::size_t>(axis)];
@@ -147,8 +147,8 @@ Hdf5Array::Hdf5Array(Hdf5Handle dataset)
 
 void Hdf5Array::read_box(std::span<const std::uint64_t> first, std::span<const std::uint64_t> size,
                          std::span<std::byte> target) const {
-  std::array<hsize_t, kMostAxes> start = {};
-  std::array<hsize_t, kMostAxes> count = {};
+  std::array<hsize_t, kMostRank> start = {};
+  std::array<hsize_t, kMostRank> count = {};
   std::ranges::copy(first, start.begin());
   std::ranges::copy(size, count.begin());
   const Hdf5Handle from(H5Dget_space(dataset_.id()), H5Sclose);
@@ -167,11 +167,11 @@ void Hdf5Array::read(std::uint64_t first, std::uint64_t count,
   // The slowest axes are walked; the faster ones are read whole, as far as a piece goes.
   std::size_t whole = sizes_.size();
   std::uint64_t inner = bytes;
-  while (whole > 1 && inner <= kPieceBytes / std::max<std::uint64_t>(sizes_[whole - 1], 1)) {
+  while (whole > 1 && inner <= kReadBytes / std::max<std::uint64_t>(sizes_[whole - 1], 1)) {
     inner *= sizes_[--whole];
   }
   const std::size_t walked = whole - 1;  // the axis of which several indices may be read at a time
-  const std::uint64_t at_once = std::max<std::uint64_t>(kPieceBytes / inner, 1);
+  const std::uint64_t at_once = std::max<std::uint64_t>(kReadBytes / inner, 1);
   std::vector<std::uint64_t> place(sizes_.size(), 0);
   std::vector<std::uint64_t> box = sizes_;
   place[0] = first;
@@ -195,7 +195,7 @@ void Hdf5Array::read(std::uint64_t first, std::uint64_t count,
 std::vector<double> Hdf5Array::numbers() const {
   std::uint64_t count = 1;
   for (const std::uint64_t size : sizes_) {
-    if (size == 0 || count > kMostNumbers / size) throw_damaged_file();
+    if (size == 0 || count > kMostNumbersRead / size) throw_damaged_file();
     count *= size;
   }
   std::vector<double> numbers(count);

@@ -11,8 +11,8 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::string_view kMagic = "CTDATA-HEADER_V1";
-constexpr std::size_t kBlockBytes = 512;  // the header is the first block
+constexpr std::string_view kIsqMagic = "CTDATA-HEADER_V1";
+constexpr std::size_t kIsqBlockBytes = 512;  // the header is the first block
 constexpr std::int32_t kShorts = 3;
 
 // Sizes in samples, and the same in micrometres.
@@ -37,12 +37,12 @@ void set_lattice(const HeaderBytes& header, SourceVolume& volume) {
 }  // namespace
 
 bool is_isq(std::string_view head) {
-  return head.size() >= kBlockBytes && head.starts_with(kMagic);
+  return head.size() >= kIsqBlockBytes && head.starts_with(kIsqMagic);
 }
 
 SourceVolume parse_isq(const InputFile& file, const Companions& /*companions*/,
                        const ImportOptions& options) {
-  const std::string head = file.text(0, kBlockBytes);
+  const std::string head = file.text(0, kIsqBlockBytes);
   if (!is_isq(head)) throw_unusable("The ISQ header is damaged.");
   const HeaderBytes header(head, false);
   const auto type = header.at<std::int32_t>(16);
@@ -56,7 +56,7 @@ SourceVolume parse_isq(const InputFile& file, const Companions& /*companions*/,
   volume.layout.type = StoredType::kInt16;
   set_lattice(header, volume);
   choose_volume(1, {}, options, volume);
-  const std::uint64_t offset = (static_cast<std::uint64_t>(blocks) + 1) * kBlockBytes;
+  const std::uint64_t offset = (static_cast<std::uint64_t>(blocks) + 1) * kIsqBlockBytes;
   volume.payload = {offset, file.size() - std::min(file.size(), offset)};
   volume.notes.push_back(lps_assumed("An ISQ file"));
   return volume;

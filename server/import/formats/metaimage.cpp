@@ -17,12 +17,11 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
 constexpr std::string_view kLastKey = "ElementDataFile";
 
 using Fields = std::map<std::string, std::string, std::less<>>;
 
-struct Header {
+struct MetaHeader {
   Fields fields;
   std::uint64_t bytes = 0;  // including its last line
 };
@@ -53,8 +52,8 @@ void add_field(Fields& fields, std::string_view line) {
   }
 }
 
-Header read_header(const std::string& text) {
-  Header header;
+MetaHeader read_meta_header(const std::string& text) {
+  MetaHeader header;
   std::size_t next = 0;
   while (next < text.size()) {
     const std::size_t end = std::min(text.find('\n', next), text.size());
@@ -92,11 +91,11 @@ bool flag(const Fields& fields, std::string_view name, bool otherwise) {
 bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)) != "local"; }
 
 // The names of the data files. After "LIST" they follow the header, one per line.
-std::vector<std::string> data_names(const InputFile& file, const Header& header) {
+std::vector<std::string> data_names(const InputFile& file, const MetaHeader& header) {
   const std::string_view said = optional(header.fields, kLastKey);
   if (is_file_pattern(said)) return expand_file_pattern(said);
   if (!said.starts_with("LIST")) return {std::string(said)};
-  const std::string text = file.text(header.bytes, kMostHeaderBytes);
+  const std::string text = file.text(header.bytes, kMostTextHeaderBytes);
   const auto names = lines(text);
   return {names.begin(), names.end()};
 }
@@ -190,7 +189,7 @@ Encoding encoding_of(const Fields& fields) {
   return Encoding::kText;
 }
 
-CompressedRange payload_of(const InputFile& file, const Header& header,
+CompressedRange payload_of(const InputFile& file, const MetaHeader& header,
                            const SourceVolume& volume) {
   CompressedRange payload{header.bytes, file.size() - header.bytes};
   const std::string_view skip = optional(header.fields, "HeaderSize");
@@ -249,7 +248,7 @@ std::vector<double> numbers_of(std::string_view value) {
 }
 
 // MetaImage's space is LPS, as in all programs that write it. Axes beyond the third are omitted.
-Geometry geometry_of(const Fields& fields, std::size_t axes) {
+Geometry geometry_of_fields(const Fields& fields, std::size_t axes) {
   const auto matrix =
       numbers_of(one_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes));
   const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, axes));
@@ -340,13 +339,13 @@ bool is_metaimage(std::string_view head) {
 
 std::vector<std::string> metaimage_data_names(const InputFile& file,
                                               const Companions& /*companions*/) {
-  const Header header = read_header(file.text(0, kMostHeaderBytes));
+  const MetaHeader header = read_meta_header(file.text(0, kMostTextHeaderBytes));
   return is_detached(header.fields) ? data_names(file, header) : std::vector<std::string>();
 }
 
 SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
                              const ImportOptions& options) {
-  const Header header = read_header(file.text(0, kMostHeaderBytes));
+  const MetaHeader header = read_meta_header(file.text(0, kMostTextHeaderBytes));
   const Fields& fields = header.fields;
   const std::string_view object = optional(fields, "ObjectType");
   if (!object.empty() && object != "Image") {
@@ -361,21 +360,21 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   } else {
     volume.payload = payload_of(file, header, volume);
   }
-  volume.geometry = geometry_of(fields, sizes.size());
+  volume.geometry = geometry_of_fields(fields, sizes.size());
   scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"), volume.notes);
   return volume;
 }
 
 MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::uint64_t kMostSkipped = std::uint64_t{64} << 20;
-  const Header header = read_header(beginning.text(0, kMostHeaderBytes));
+  const MetaHeader header = read_meta_header(beginning.text(0, kMostTextHeaderBytes));
   const Fields& fields = header.fields;
   const SourceVolume volume = samples_of(fields, sizes_of(fields), task.options);
   check_limits(volume, task.limits);
   const std::uint64_t samples = volume.most_encoded_bytes() + kHeadroomBytes;
   if (!is_detached(fields)) return {.file = header.bytes + samples};
   const std::uint64_t skipped = std::min(data_skip(fields).value_or(kMostSkipped), kMostSkipped);
-  return {.file = kMostHeaderBytes + kHeadroomBytes, .data = skipped + samples};
+  return {.file = kMostTextHeaderBytes + kHeadroomBytes, .data = skipped + samples};
 }
 
 }  // namespace isomesh::import

@@ -13,7 +13,7 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 284;  // all of it big-endian
+constexpr std::size_t kMghHeaderBytes = 284;  // all of it big-endian
 constexpr std::int32_t kVersion = 1;
 
 std::optional<StoredType> type_of(std::int32_t code) {
@@ -75,7 +75,7 @@ Geometry geometry_of_header(const HeaderBytes& header, SourceVolume& volume) {
 }  // namespace
 
 bool is_mgh(std::string_view head) {
-  if (head.size() < kHeaderBytes) return false;
+  if (head.size() < kMghHeaderBytes) return false;
   const HeaderBytes header(head, true);
   const auto is_size = [](std::int64_t size) { return size > 0; };
   const auto good = header.at<std::int16_t>(28);
@@ -85,7 +85,7 @@ bool is_mgh(std::string_view head) {
 
 SourceVolume parse_mgh(const InputFile& file, const Companions& /*companions*/,
                        const ImportOptions& options) {
-  const std::string text = file.text(0, kHeaderBytes);
+  const std::string text = file.text(0, kMghHeaderBytes);
   if (!is_mgh(text)) throw_unusable("The MGH header is damaged.");
   const HeaderBytes header(text, true);
   std::array<std::uint64_t, 4> sizes = {};
@@ -99,7 +99,7 @@ SourceVolume parse_mgh(const InputFile& file, const Companions& /*companions*/,
                 {.what = "their frame",
                  .title = [](std::uint64_t index) { return "frame " + std::to_string(index); }},
                 options, volume);
-  volume.payload.offset = kHeaderBytes;
+  volume.payload.offset = kMghHeaderBytes;
   volume.has_footer = true;
   volume.geometry = geometry_of_header(header, volume);
   return volume;

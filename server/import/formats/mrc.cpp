@@ -15,10 +15,10 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 1024;
+constexpr std::size_t kMrcHeaderBytes = 1024;
 constexpr int kStackOfVolumes = 401;
 
-struct Header {
+struct MrcHeader {
   bool big_endian = false;
   std::array<std::int64_t, 3> size = {};      // of columns, rows and sections
   std::array<std::int64_t, 3> start = {};     // of columns, rows and sections
@@ -38,10 +38,10 @@ bool is_permutation(std::array<std::int64_t, 3> axes) {
   return axes == std::array<std::int64_t, 3>{1, 2, 3};
 }
 
-Header read_as(std::string_view head, bool big_endian) {
+MrcHeader read_as(std::string_view head, bool big_endian) {
   constexpr std::int32_t kImod = 1146047817;
   const HeaderBytes bytes(head, big_endian);
-  Header header;
+  MrcHeader header;
   header.big_endian = big_endian;
   bytes.read<std::int32_t>(0, header.size);
   header.mode = bytes.at<std::int32_t>(12);
@@ -59,10 +59,10 @@ Header read_as(std::string_view head, bool big_endian) {
 
 // Empty if the header makes sense in neither byte order. Axes of 0, which some programs write, are
 // those of x, y and z.
-std::optional<Header> find_header(std::string_view head) {
-  if (head.size() < kHeaderBytes || head.substr(208, 3) != "MAP") return std::nullopt;
+std::optional<MrcHeader> find_header(std::string_view head) {
+  if (head.size() < kMrcHeaderBytes || head.substr(208, 3) != "MAP") return std::nullopt;
   for (const bool big_endian : {false, true}) {
-    Header header = read_as(head, big_endian);
+    MrcHeader header = read_as(head, big_endian);
     if (header.axes == std::array<std::int64_t, 3>{}) header.axes = {1, 2, 3};
     const bool is_sized = std::ranges::all_of(header.size, [](auto size) { return size > 0; });
     if (is_sized && is_permutation(header.axes) && header.mode >= 0 && header.mode < 128) {
@@ -72,7 +72,7 @@ std::optional<Header> find_header(std::string_view head) {
   return std::nullopt;
 }
 
-void set_type(const Header& header, SourceVolume& volume) {
+void set_type(const MrcHeader& header, SourceVolume& volume) {
   const auto set = [&](StoredType type) { volume.layout = {type, header.big_endian, {}}; };
   switch (header.mode) {
     case 0:
@@ -97,7 +97,7 @@ void set_type(const Header& header, SourceVolume& volume) {
 }
 
 // The unit vectors of the cell: a along x, b in the plane of x and y. Angles of 0 are right angles.
-std::array<Vector3, 3> cell_axes(const Header& header) {
+std::array<Vector3, 3> cell_axes(const MrcHeader& header) {
   const bool is_right =
       std::ranges::all_of(header.angles, [](double angle) { return angle == 0 || angle == 90; });
   if (is_right) return {Vector3{1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, 0, 1}};
@@ -114,7 +114,7 @@ std::array<Vector3, 3> cell_axes(const Header& header) {
 }
 
 // Along x, y and z.
-std::array<double, 3> first_index(const Header& header) {
+std::array<double, 3> first_index(const MrcHeader& header) {
   std::array<double, 3> first = {};
   for (std::size_t at = 0; at < 3; ++at) {
     first[static_cast<std::size_t>(header.axes[at]) - 1] = static_cast<double>(header.start[at]);
@@ -122,7 +122,7 @@ std::array<double, 3> first_index(const Header& header) {
   return first;
 }
 
-void place(const Header& header, SourceVolume& volume) {
+void place(const MrcHeader& header, SourceVolume& volume) {
   std::array<Vector3, 3> steps = cell_axes(header);
   Vector3 origin = header.origin;
   const bool has_origin = std::ranges::any_of(origin, [](double part) { return part != 0; });
@@ -142,7 +142,7 @@ void place(const Header& header, SourceVolume& volume) {
 }
 
 // The number of volumes in a stack, whose sections are one behind the other.
-std::uint64_t volumes_of(const Header& header) {
+std::uint64_t volumes_of(const MrcHeader& header) {
   const std::int64_t sections = header.size[2];
   const std::int64_t each = header.sampling[2];
   if (header.space_group == 0 && each == 1 && sections > 1) {
@@ -163,7 +163,7 @@ bool is_mrc(std::string_view head) { return find_header(head).has_value(); }
 
 SourceVolume parse_mrc(const InputFile& file, const Companions& /*companions*/,
                        const ImportOptions& options) {
-  const auto header = find_header(file.text(0, kHeaderBytes));
+  const auto header = find_header(file.text(0, kMrcHeaderBytes));
   if (!header) throw_unusable("The MRC header is damaged.");
   if (header->extended_bytes < 0) throw_unusable("The MRC header's extended size is negative.");
   const std::uint64_t volumes = volumes_of(*header);
@@ -180,7 +180,7 @@ SourceVolume parse_mrc(const InputFile& file, const Companions& /*companions*/,
                 {.what = "their place in the stack",
                  .title = [](std::uint64_t index) { return "volume " + std::to_string(index); }},
                 options, volume);
-  const std::uint64_t offset = kHeaderBytes + static_cast<std::uint64_t>(header->extended_bytes);
+  const std::uint64_t offset = kMrcHeaderBytes + static_cast<std::uint64_t>(header->extended_bytes);
   volume.payload = {offset, file.size() - std::min(file.size(), offset)};
   place(*header, volume);
   volume.notes.push_back(angstrom_note("the MRC file"));

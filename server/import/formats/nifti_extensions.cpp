@@ -12,7 +12,7 @@ namespace isomesh::import {
 namespace {
 
 // Room for 65 535 labels with long names; the rest is ignored.
-constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
+constexpr std::uint64_t kMostExtensionBytes = std::uint64_t{16} << 20;
 constexpr std::size_t kFlagBytes = 4;  // the first tells whether there are extensions
 constexpr std::size_t kHeadBytes = 8;  // size and code
 
@@ -37,7 +37,7 @@ std::vector<LabelEntry> nifti_labels(const InputFile& file, const NiftiHeader& h
                                      std::uint64_t end, std::uint64_t volume) {
   const auto begin = static_cast<std::uint64_t>(header.bytes);
   if (header.is_analyze || end < begin + kFlagBytes + kHeadBytes) return {};
-  const std::string bytes = file.text(begin, std::min(end - begin, kMostBytes));
+  const std::string bytes = file.text(begin, std::min(end - begin, kMostExtensionBytes));
   if (bytes.size() < kFlagBytes || bytes[0] == '\0') return {};
   std::string_view rest = std::string_view(bytes).substr(kFlagBytes);
   std::vector<LabelEntry> entries;

@@ -12,8 +12,6 @@ namespace {
 constexpr std::size_t kNifti1Bytes = 348;
 constexpr std::size_t kNifti2Bytes = 540;
 
-using Fields = HeaderBytes;
-
 enum class Version { kOne, kTwo };
 
 struct Kind {
@@ -25,7 +23,7 @@ struct Kind {
 
 // Analyze has no magic number, so its header is checked more strictly: "extents" and "regular" as
 // in its manual, a known datatype with its bits, and sizes of one to seven axes.
-bool is_analyze(const Fields& fields) {
+bool is_analyze(const HeaderBytes& fields) {
   struct Row {
     int datatype;
     int bits;
@@ -43,13 +41,14 @@ std::optional<Kind> kind_of(std::string_view head) {
   using std::string_view_literals::operator""sv;
   if (head.size() < kNifti1Bytes) return std::nullopt;
   for (const bool big_endian : {false, true}) {
-    const auto size = Fields(head, big_endian).at<std::int32_t>(0);
+    const auto size = HeaderBytes(head, big_endian).at<std::int32_t>(0);
     if (size == kNifti1Bytes) {
       const std::string_view magic = head.substr(344, 4);
       if (magic == "n+1\0"sv || magic == "ni1\0"sv) {
         return Kind{Version::kOne, big_endian, magic == "ni1\0"sv};
       }
-      if (is_analyze(Fields(head, big_endian))) return Kind{Version::kOne, big_endian, true, true};
+      if (is_analyze(HeaderBytes(head, big_endian)))
+        return Kind{Version::kOne, big_endian, true, true};
     }
     if (size == kNifti2Bytes) {
       const std::string_view magic = head.substr(4, 4);
@@ -61,7 +60,7 @@ std::optional<Kind> kind_of(std::string_view head) {
   return std::nullopt;
 }
 
-NiftiHeader read_nifti1(const Fields& fields) {
+NiftiHeader read_nifti1(const HeaderBytes& fields) {
   NiftiHeader header;
   fields.read<std::int16_t>(40, header.dim);
   header.intent = fields.at<std::int16_t>(68);
@@ -80,7 +79,7 @@ NiftiHeader read_nifti1(const Fields& fields) {
   return header;
 }
 
-NiftiHeader read_nifti2(const Fields& fields) {
+NiftiHeader read_nifti2(const HeaderBytes& fields) {
   NiftiHeader header;
   header.datatype = fields.at<std::int16_t>(12);
   header.bits = fields.at<std::int16_t>(14);
@@ -122,7 +121,7 @@ NiftiHeader read_nifti_header(std::string_view head) {
   if (kind->version == Version::kTwo && head.size() < kNifti2Bytes) {
     throw_unusable("The file ends within its NIfTI-2 header.");
   }
-  const Fields fields(head, kind->big_endian);
+  const HeaderBytes fields(head, kind->big_endian);
   NiftiHeader header = kind->version == Version::kOne ? read_nifti1(fields) : read_nifti2(fields);
   header.big_endian = kind->big_endian;
   header.bytes = kind->version == Version::kOne ? kNifti1Bytes : kNifti2Bytes;

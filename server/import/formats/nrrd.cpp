@@ -19,13 +19,10 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
 constexpr std::string_view kDataFile = "datafile";
 
-using Fields = NrrdFields;
-
-struct Header {
-  Fields fields;
+struct NrrdHeader {
+  NrrdFields fields;
   std::uint64_t bytes = 0;  // including the final empty line
 };
 
@@ -36,7 +33,7 @@ std::string field_name(std::string_view text) {
   return name;
 }
 
-void add_field(Fields& fields, std::string_view line) {
+void add_line(NrrdFields& fields, std::string_view line) {
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) {
     throw_unusable("The NRRD header has a line that is not a field: " + in_quotes(line) + ".");
@@ -56,13 +53,13 @@ void add_field(Fields& fields, std::string_view line) {
   }
 }
 
-bool names_list(const Fields& fields) {
+bool names_list(const NrrdFields& fields) {
   const auto found = fields.find(kDataFile);
   return found != fields.end() && found->second.starts_with("LIST");
 }
 
-Header read_header(const std::string& text) {
-  Header header;
+NrrdHeader read_nrrd_header(const std::string& text) {
+  NrrdHeader header;
   std::size_t next = 0;
   for (bool first = true;; first = false) {
     const std::size_t end = text.find('\n', next);
@@ -79,12 +76,12 @@ Header read_header(const std::string& text) {
       header.bytes = next;
       return header;
     }
-    if (!first && !line.starts_with('#')) add_field(header.fields, line);
+    if (!first && !line.starts_with('#')) add_line(header.fields, line);
   }
   throw_unusable("The NRRD header has no end: the empty line after it is missing.");
 }
 
-const std::string& required(const Fields& fields, std::string_view name) {
+const std::string& required_field(const NrrdFields& fields, std::string_view name) {
   const auto found = fields.find(name);
   if (found == fields.end()) {
     throw_unusable("The NRRD header has no field " + in_quotes(name) + ".");
@@ -92,7 +89,7 @@ const std::string& required(const Fields& fields, std::string_view name) {
   return found->second;
 }
 
-StoredType type_of(const Fields& fields) {
+StoredType stored_type(const NrrdFields& fields) {
   using Names = std::vector<std::string_view>;
   static const std::vector<std::pair<StoredType, Names>> types = {
       {StoredType::kInt8, {"signed char", "int8", "int8_t"}},
@@ -110,7 +107,7 @@ StoredType type_of(const Fields& fields) {
        {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
       {StoredType::kFloat32, {"float"}},
       {StoredType::kFloat64, {"double"}}};
-  const std::string name = lower(required(fields, "type"));
+  const std::string name = lower(required_field(fields, "type"));
   for (const auto& [type, names] : types) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return type;
   }
@@ -118,24 +115,25 @@ StoredType type_of(const Fields& fields) {
                  " is not supported. A sample must be one real number.");
 }
 
-std::vector<std::uint64_t> sizes_of(const Fields& fields) {
+std::vector<std::uint64_t> axis_sizes(const NrrdFields& fields) {
   constexpr std::uint64_t kMostAxes = 16;
-  const auto count = parse_uint64(required(fields, "dimension"));
+  const auto count = parse_uint64(required_field(fields, "dimension"));
   std::vector<std::uint64_t> sizes;
-  for (const std::string_view word : words(required(fields, "sizes"))) {
+  for (const std::string_view word : words(required_field(fields, "sizes"))) {
     const auto size = parse_uint64(word);
     if (!size) throw_unusable("The NRRD header's size " + in_quotes(word) + " is not a number.");
     sizes.push_back(*size);
   }
   if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
-    throw_unusable("The NRRD header's dimension is " + in_quotes(required(fields, "dimension")) +
-                   ", but it has " + std::to_string(sizes.size()) + " sizes.");
+    throw_unusable("The NRRD header's dimension is " +
+                   in_quotes(required_field(fields, "dimension")) + ", but it has " +
+                   std::to_string(sizes.size()) + " sizes.");
   }
   return sizes;
 }
 
-Encoding encoding_of(const Fields& fields) {
-  const std::string name = lower(required(fields, "encoding"));
+Encoding payload_encoding(const NrrdFields& fields) {
+  const std::string name = lower(required_field(fields, "encoding"));
   if (name == "raw") return Encoding::kRaw;
   if (name == "gzip" || name == "gz") return Encoding::kDeflate;
   if (name == "text" || name == "txt" || name == "ascii") return Encoding::kText;
@@ -145,7 +143,7 @@ Encoding encoding_of(const Fields& fields) {
                  " is not supported. raw, gzip, bzip2, ascii and hex are.");
 }
 
-bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
+bool is_big_endian(const NrrdFields& fields, StoredType type, Encoding encoding) {
   const std::string name = lower(value_of(fields, "endian"));
   if (name == "little") return false;
   if (name == "big") return true;
@@ -157,9 +155,9 @@ bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
 }
 
 std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t lines) {
-  constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
+  constexpr std::size_t kHeaderPieceBytes = std::size_t{1} << 16;
   while (lines > 0) {
-    const std::string piece = file.text(offset, kPieceBytes);
+    const std::string piece = file.text(offset, kHeaderPieceBytes);
     if (piece.empty()) throw_unusable("The file ends within the lines that its header skips.");
     std::size_t begin = 0;
     for (std::size_t end = 0; lines > 0 && end != std::string::npos;) {
@@ -173,7 +171,7 @@ std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint6
   return offset;
 }
 
-std::int64_t skip_field(const Fields& fields, std::string_view name) {
+std::int64_t skip_field(const NrrdFields& fields, std::string_view name) {
   const std::string_view text = value_of(fields, name);
   if (text.empty()) return 0;
   const auto count = parse_int64(text);
@@ -189,7 +187,7 @@ bool is_stream(const SourceVolume& volume) {
 }
 
 // The number of bytes to skip; empty if the samples are at the end of their file.
-Skip byte_skip(const Fields& fields, const SourceVolume& volume) {
+Skip byte_skip(const NrrdFields& fields, const SourceVolume& volume) {
   const std::int64_t bytes = skip_field(fields, "byteskip");
   const bool can_end = is_stream(volume) || volume.encoding == Encoding::kRaw;
   if (bytes < 0 && !can_end) {
@@ -199,7 +197,8 @@ Skip byte_skip(const Fields& fields, const SourceVolume& volume) {
   return bytes < 0 ? Skip() : Skip(static_cast<std::uint64_t>(bytes));
 }
 
-std::uint64_t payload_offset(const InputFile& file, const Header& header, SourceVolume& volume) {
+std::uint64_t payload_offset(const InputFile& file, const NrrdHeader& header,
+                             SourceVolume& volume) {
   const std::int64_t lines = skip_field(header.fields, "lineskip");
   if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
   const Skip skip = byte_skip(header.fields, volume);
@@ -217,13 +216,13 @@ std::uint64_t payload_offset(const InputFile& file, const Header& header, Source
 }
 
 // The names of the data files. After "LIST" they follow the header, one per line.
-std::vector<std::string> data_names(const InputFile& file, const Header& header) {
+std::vector<std::string> data_names(const InputFile& file, const NrrdHeader& header) {
   const std::string_view said = value_of(header.fields, kDataFile);
   if (!names_list(header.fields)) {
     if (is_file_pattern(said)) return expand_file_pattern(said);
     return {std::string(said)};
   }
-  const std::string text = file.text(header.bytes, kMostHeaderBytes);
+  const std::string text = file.text(header.bytes, kMostTextHeaderBytes);
   const auto names = lines(text);
   return {names.begin(), names.end()};
 }
@@ -235,7 +234,7 @@ bool has_own_header(const std::string& name, const Companions& companions) {
   return is_nifti(is_gzip(bytes) ? inflate_head(bytes, kSniffBytes) : head);
 }
 
-std::vector<DataFile> data_files(const InputFile& file, const Header& header,
+std::vector<DataFile> data_files(const InputFile& file, const NrrdHeader& header,
                                  const Companions& companions, SourceVolume& volume) {
   if (skip_field(header.fields, "lineskip") != 0) {
     throw_unusable("The NRRD header skips lines in a data file, which is not supported.");
@@ -252,13 +251,13 @@ std::vector<DataFile> data_files(const InputFile& file, const Header& header,
 }
 
 // Sets dims, type and encoding, and selects one of several volumes.
-SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
+SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
                         const ImportOptions& options) {
   SourceVolume volume;
   volume.dims =
       volume_dims(std::span(sizes.lattice).first(std::min<std::size_t>(sizes.lattice.size(), 3)));
-  volume.encoding = encoding_of(fields);
-  volume.layout.type = type_of(fields);
+  volume.encoding = payload_encoding(fields);
+  volume.layout.type = stored_type(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
   // Layers are consecutive or take turns with each sample.
   const bool is_interleaved = sizes.run == 1;
@@ -290,15 +289,15 @@ bool is_nrrd(std::string_view head) {
 }
 
 std::vector<std::string> nrrd_data_names(const InputFile& file, const Companions& /*companions*/) {
-  const Header header = read_header(file.text(0, kMostHeaderBytes));
+  const NrrdHeader header = read_nrrd_header(file.text(0, kMostTextHeaderBytes));
   return header.fields.contains(kDataFile) ? data_names(file, header) : std::vector<std::string>();
 }
 
 SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
                         const ImportOptions& options) {
-  const Header header = read_header(file.text(0, kMostHeaderBytes));
-  const Fields& fields = header.fields;
-  const NrrdSizes sizes = nrrd_sizes(fields, sizes_of(fields));
+  const NrrdHeader header = read_nrrd_header(file.text(0, kMostTextHeaderBytes));
+  const NrrdFields& fields = header.fields;
+  const NrrdSizes sizes = nrrd_sizes(fields, axis_sizes(fields));
   SourceVolume volume = samples_of(fields, sizes, options);
   if (fields.contains(kDataFile)) {
     volume.data_files = data_files(file, header, companions, volume);
@@ -312,16 +311,16 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
 
 MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::int64_t kMostSkipped = std::int64_t{64} << 20;
-  const Header header = read_header(beginning.text(0, kMostHeaderBytes));
-  const Fields& fields = header.fields;
+  const NrrdHeader header = read_nrrd_header(beginning.text(0, kMostTextHeaderBytes));
+  const NrrdFields& fields = header.fields;
   const SourceVolume volume =
-      samples_of(fields, nrrd_sizes(fields, sizes_of(fields)), task.options);
+      samples_of(fields, nrrd_sizes(fields, axis_sizes(fields)), task.options);
   check_limits(volume, task.limits);
   const std::int64_t skipped =
       std::clamp<std::int64_t>(skip_field(fields, "byteskip"), 0, kMostSkipped);
   const std::uint64_t samples =
       static_cast<std::uint64_t>(skipped) + volume.most_encoded_bytes() + kHeadroomBytes;
-  const std::uint64_t list = kMostHeaderBytes + kHeadroomBytes;  // of names
+  const std::uint64_t list = kMostTextHeaderBytes + kHeadroomBytes;  // of names
   if (fields.contains(kDataFile)) return {.file = list, .data = samples};
   return {.file = header.bytes + samples};
 }

@@ -14,10 +14,10 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::string_view kMagic = "\x93NUMPY";
-constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
+constexpr std::string_view kNpyMagic = "\x93NUMPY";
+constexpr std::size_t kMostDictionaryBytes = std::size_t{1} << 16;
 
-struct Header {
+struct NpyHeader {
   std::string type;  // as in NumPy: "<f4"
   bool is_fortran = false;
   std::vector<std::uint64_t> shape;
@@ -27,7 +27,7 @@ struct Header {
 [[noreturn]] void throw_damaged_header() { throw_unusable("The NumPy header is damaged."); }
 
 // The text behind a key of the header, a dictionary in Python's notation.
-std::string_view value_of(std::string_view text, std::string_view key) {
+std::string_view dictionary_value(std::string_view text, std::string_view key) {
   for (const char quote : {'\'', '"'}) {
     const std::size_t at = text.find(quote + std::string(key) + quote);
     if (at == std::string_view::npos) continue;
@@ -51,34 +51,34 @@ std::vector<std::uint64_t> shape_of(std::string_view text) {
   return shape;
 }
 
-Header read_header(std::string_view head) {
+NpyHeader read_npy_header(std::string_view head) {
   if (!is_numpy(head) || head.size() < 12) throw_damaged_header();
   const HeaderBytes numbers(head, false);
   const bool is_long = head[6] > 1;
   const std::size_t begin = is_long ? 12 : 10;
   const std::size_t size = is_long ? numbers.at<std::uint32_t>(8) : numbers.at<std::uint16_t>(8);
-  if (size > kMostHeaderBytes || head.size() < begin + size) throw_damaged_header();
+  if (size > kMostDictionaryBytes || head.size() < begin + size) throw_damaged_header();
   const std::string_view text = head.substr(begin, size);
-  Header header;
+  NpyHeader header;
   header.bytes = begin + size;
-  const std::string_view type = value_of(text, "descr");
+  const std::string_view type = dictionary_value(text, "descr");
   const std::size_t end = type.find_first_of("'\"", 1);
   if (type.starts_with('\'') || type.starts_with('"')) {
     header.type = type.substr(1, std::min(end, type.size()) - 1);
   }
-  header.is_fortran = value_of(text, "fortran_order").starts_with("True");
-  header.shape = shape_of(value_of(text, "shape"));
+  header.is_fortran = dictionary_value(text, "fortran_order").starts_with("True");
+  header.shape = shape_of(dictionary_value(text, "shape"));
   return header;
 }
 
-struct Row {
+struct TypeRow {
   std::string_view name;  // without the byte order
   StoredType type;
   Encoding encoding = Encoding::kRaw;
 };
 
-const Row* type_row(const Header& header) {
-  static constexpr Row kTypes[] = {
+const TypeRow* type_row(const NpyHeader& header) {
+  static constexpr TypeRow kTypes[] = {
       {"b1", StoredType::kUint8},   {"i1", StoredType::kInt8},
       {"u1", StoredType::kUint8},   {"i2", StoredType::kInt16},
       {"u2", StoredType::kUint16},  {"i4", StoredType::kInt32},
@@ -89,14 +89,14 @@ const Row* type_row(const Header& header) {
     return nullptr;
   }
   const auto* found =
-      std::ranges::find(kTypes, std::string_view(header.type).substr(1), &Row::name);
+      std::ranges::find(kTypes, std::string_view(header.type).substr(1), &TypeRow::name);
   return found == std::end(kTypes) ? nullptr : found;
 }
 
 // A first of four axes holds the volumes.
-bool has_volumes(const Header& header) { return header.shape.size() == 4; }
+bool has_volumes(const NpyHeader& header) { return header.shape.size() == 4; }
 
-bool is_shape_of_volume(const Header& header) {
+bool is_shape_of_volume(const NpyHeader& header) {
   return header.shape.size() == 3 || has_volumes(header);
 }
 
@@ -109,12 +109,12 @@ std::string text_of(const std::vector<std::uint64_t>& shape) {
 }  // namespace
 
 bool is_numpy(std::string_view head) {
-  return head.size() >= 8 && head.starts_with(kMagic) && head[6] >= 1 && head[6] <= 3;
+  return head.size() >= 8 && head.starts_with(kNpyMagic) && head[6] >= 1 && head[6] <= 3;
 }
 
 bool may_hold_numpy_volume(std::string_view head) {
   try {
-    const Header header = read_header(head);
+    const NpyHeader header = read_npy_header(head);
     return is_shape_of_volume(header) && type_row(header) != nullptr;
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
@@ -124,8 +124,8 @@ bool may_hold_numpy_volume(std::string_view head) {
 
 SourceVolume parse_numpy(const InputFile& file, const Companions& /*companions*/,
                          const ImportOptions& options) {
-  const Header header = read_header(file.text(0, kMostHeaderBytes + 12));
-  const Row* row = type_row(header);
+  const NpyHeader header = read_npy_header(file.text(0, kMostDictionaryBytes + 12));
+  const TypeRow* row = type_row(header);
   if (row == nullptr) {
     throw_unusable("The NumPy array's type " + in_quotes(header.type) +
                    " is not supported. A sample must be one real number.");

@@ -15,14 +15,14 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kMostHeaderBytes = std::size_t{8} << 20;
+constexpr std::size_t kMostParBytes = std::size_t{8} << 20;
 
 using General = std::map<std::string, std::string, std::less<>>;
-using Row = std::vector<double>;
+using ImageRow = std::vector<double>;
 
-struct Header {
+struct ParHeader {
   General general;
-  std::vector<Row> rows;  // one for each image
+  std::vector<ImageRow> rows;  // one for each image
 };
 
 // Columns of a row in all versions that are read.
@@ -56,7 +56,7 @@ constexpr std::array<std::size_t, 8> kKeyColumns = {kEcho,     kInstant,   kPhas
 constexpr std::array<const char*, 8> kKeyNames = {"echo",     "instant", "phase",    "type",
                                                   "sequence", "b value", "gradient", "label type"};
 
-Key key_of(const Row& row) {
+Key key_of(const ImageRow& row) {
   Key key = {};
   for (std::size_t at = 0; at < key.size(); ++at) {
     if (kKeyColumns[at] < row.size()) key[at] = row[kKeyColumns[at]];
@@ -64,8 +64,8 @@ Key key_of(const Row& row) {
   return key;
 }
 
-Row row_of(std::string_view line) {
-  Row row;
+ImageRow image_row(std::string_view line) {
+  ImageRow row;
   for (const std::string_view word : words(line)) {
     const auto number = parse_double(word);
     if (!number || !std::isfinite(*number)) {
@@ -86,14 +86,14 @@ void add_general(std::string_view line, General& general) {
   general.emplace(lower(trimmed(line.substr(1, colon - 1))), trimmed(line.substr(colon + 1)));
 }
 
-Header read_header(std::string_view text) {
-  Header header;
+ParHeader read_par_header(std::string_view text) {
+  ParHeader header;
   for (const std::string_view line : lines(text)) {
     if (line.front() == '#') continue;
     if (line.front() == '.') {
       add_general(line, header.general);
     } else {
-      header.rows.push_back(row_of(line));
+      header.rows.push_back(image_row(line));
     }
   }
   if (header.rows.empty()) throw_unusable("The PAR header describes no image.");
@@ -101,7 +101,7 @@ Header read_header(std::string_view text) {
 }
 
 // Angles or offsets: back to front, feet to head, right to left.
-Vector3 general_vector(const Header& header, std::string_view beginning) {
+Vector3 general_vector(const ParHeader& header, std::string_view beginning) {
   for (const auto& [name, value] : header.general) {
     if (!name.starts_with(beginning)) continue;
     const auto parts = words(value);
@@ -161,8 +161,8 @@ Matrix axes_of(double orientation) {
   throw_unusable("The PAR header's slice orientation " + to_text(orientation) + " is unknown.");
 }
 
-Geometry geometry_of_header(const Header& header, const SourceVolume& volume) {
-  const Row& row = header.rows.front();
+Geometry geometry_of_header(const ParHeader& header, const SourceVolume& volume) {
+  const ImageRow& row = header.rows.front();
   const Vector3 spacing = {row[kSpacing], row[kSpacing + 1], row[kThickness] + row[kGap]};
   const Matrix axes = product(rotation_of(general_vector(header, "angulation midslice")),
                               axes_of(row[kOrientation]));
@@ -184,11 +184,11 @@ Geometry geometry_of_header(const Header& header, const SourceVolume& volume) {
 // --- Images --------------------------------------------------------------------------------------
 
 // The columns that all images must share.
-void check_rows(const Header& header) {
-  const Row& first = header.rows.front();
+void check_rows(const ParHeader& header) {
+  const ImageRow& first = header.rows.front();
   for (const std::size_t column :
        {kBits, kWidth, kHeight, kThickness, kGap, kOrientation, kSpacing}) {
-    const auto differs = [&](const Row& row) { return row[column] != first[column]; };
+    const auto differs = [&](const ImageRow& row) { return row[column] != first[column]; };
     if (std::ranges::any_of(header.rows, differs)) {
       throw_unusable(
           "The images of the PAR header differ in size, spacing or orientation, so they are not "
@@ -197,7 +197,7 @@ void check_rows(const Header& header) {
   }
 }
 
-using Volumes = std::map<Key, std::vector<const Row*>>;
+using Volumes = std::map<Key, std::vector<const ImageRow*>>;
 
 std::string title_of(const Volumes& volumes, std::uint64_t index) {
   const auto at = [&](std::uint64_t place) {
@@ -213,16 +213,16 @@ std::string title_of(const Volumes& volumes, std::uint64_t index) {
   return title;
 }
 
-Volumes volumes_of(const Header& header) {
+Volumes volumes_of(const ParHeader& header) {
   Volumes volumes;
-  for (const Row& row : header.rows) volumes[key_of(row)].push_back(&row);
+  for (const ImageRow& row : header.rows) volumes[key_of(row)].push_back(&row);
   for (auto& [key, rows] : volumes) {
-    std::ranges::sort(rows, {}, [](const Row* row) { return (*row)[kSlice]; });
+    std::ranges::sort(rows, {}, [](const ImageRow* row) { return (*row)[kSlice]; });
   }
   return volumes;
 }
 
-void check_slices(const std::vector<const Row*>& rows) {
+void check_slices(const std::vector<const ImageRow*>& rows) {
   for (std::size_t at = 0; at < rows.size(); ++at) {
     const double found = (*rows[at])[kSlice];
     const double expected = static_cast<double>(at) + 1;
@@ -238,7 +238,7 @@ struct Described {
   std::vector<std::uint64_t> places;  // of its slices in the REC, in images
 };
 
-Described describe(const Header& header, const ImportOptions& options) {
+Described describe(const ParHeader& header, const ImportOptions& options) {
   check_rows(header);
   const Volumes volumes = volumes_of(header);
   Described result;
@@ -251,7 +251,7 @@ Described describe(const Header& header, const ImportOptions& options) {
       std::next(volumes.begin(), static_cast<std::ptrdiff_t>(volume.chosen.index))->second;
   volume.chosen = {};
   check_slices(rows);
-  const Row& first = *rows.front();
+  const ImageRow& first = *rows.front();
   const std::array<std::uint64_t, 3> sizes = {whole(first[kWidth], "width of an image"),
                                               whole(first[kHeight], "height of an image"),
                                               rows.size()};
@@ -262,7 +262,7 @@ Described describe(const Header& header, const ImportOptions& options) {
   }
   volume.layout.type = first[kBits] == 8 ? StoredType::kUint8 : StoredType::kUint16;
   const Rescale rescale = {first[kSlope], first[kIntercept]};
-  for (const Row* row : rows) {
+  for (const ImageRow* row : rows) {
     if ((*row)[kSlope] != rescale.slope || (*row)[kIntercept] != rescale.intercept) {
       throw_unusable("The slices of the PAR header have different slopes and intercepts.");
     }
@@ -295,7 +295,7 @@ bool is_par(std::string_view head) {
 SourceVolume parse_par(const InputFile& file, const Companions& companions,
                        const ImportOptions& options) {
   const std::filesystem::path& path = companion(rec_name(companions), companions);
-  auto [volume, places] = describe(read_header(file.text(0, kMostHeaderBytes)), options);
+  auto [volume, places] = describe(read_par_header(file.text(0, kMostParBytes)), options);
   const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
   const std::uint64_t size = InputFile(path).size();
   for (const std::uint64_t place : places) {
@@ -312,12 +312,12 @@ std::vector<std::string> par_data_names(const InputFile& /*file*/, const Compani
 }
 
 MostBytes most_par_bytes(const InputFile& beginning, const ImportTask& task) {
-  const Header header = read_header(beginning.text(0, kMostHeaderBytes));
+  const ParHeader header = read_par_header(beginning.text(0, kMostParBytes));
   const auto [volume, places] = describe(header, task.options);
   check_limits(volume, task.limits);
   const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
   const std::uint64_t most = *std::ranges::max_element(places) + 1;
-  return {.file = kMostHeaderBytes + kHeadroomBytes, .data = most * slice + kHeadroomBytes};
+  return {.file = kMostParBytes + kHeadroomBytes, .data = most * slice + kHeadroomBytes};
 }
 
 }  // namespace isomesh::import

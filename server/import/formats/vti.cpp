@@ -60,7 +60,7 @@ Extent extent_of(const VtiAttributes& attributes, std::string_view name) {
   return extent;
 }
 
-Geometry geometry_of(const VtiAttributes& image, const Extent& extent) {
+Geometry geometry_of_image(const VtiAttributes& image, const Extent& extent) {
   Geometry geometry;
   geometry.spacing = numbers_of<3>(image, "Spacing", {1, 1, 1});
   geometry.direction = numbers_of<9>(image, "Direction", geometry.direction);
@@ -170,7 +170,6 @@ VtkCompression compression_of(const VtiDocument& document) {
 // Throws if an entity or a comment is among the samples, because the decoder would read it as
 // samples.
 void check_text(const InputFile& file, const CompressedRange& text) {
-  constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
   for (std::uint64_t done = 0; done < text.bytes;) {
     const std::string piece =
         file.text(text.offset + done, std::min<std::uint64_t>(kPieceBytes, text.bytes - done));
@@ -271,7 +270,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   check_components(array);
   SourceVolume volume;
   volume.dims = extent.dims;
-  volume.geometry = geometry_of(document.image, extent);
+  volume.geometry = geometry_of_image(document.image, extent);
   if (is_of_cells) move_to_cells(volume);
   choose_volume(1, {}, options, volume);
   volume.layout.type = type_of(array);

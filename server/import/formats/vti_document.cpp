@@ -11,16 +11,16 @@ namespace isomesh::import {
 namespace {
 
 // Parses a document incrementally up to its appended data, which is not XML.
-class Parser : public XmlHandler {
+class VtiParser : public XmlHandler {
  public:
   enum class Until { kImage, kSamples };
 
-  Parser(const InputFile& file, Until until) : file_(file), until_(until) {}
+  VtiParser(const InputFile& file, Until until) : file_(file), until_(until) {}
 
   VtiDocument parse() {
-    constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
+    constexpr std::size_t kXmlPieceBytes = std::size_t{1} << 16;
     for (std::uint64_t next = 0; !reader_.is_stopped();) {
-      const std::string piece = file_.text(next, kPieceBytes);
+      const std::string piece = file_.text(next, kXmlPieceBytes);
       next += piece.size();
       const bool last = next >= file_.size();
       try {
@@ -130,11 +130,11 @@ std::string_view attribute_of(const VtiAttributes& attributes, std::string_view 
 }
 
 VtiDocument read_vti_document(const InputFile& file) {
-  return Parser(file, Parser::Until::kSamples).parse();
+  return VtiParser(file, VtiParser::Until::kSamples).parse();
 }
 
 VtiAttributes read_vti_image(const InputFile& beginning) {
-  VtiAttributes image = Parser(beginning, Parser::Until::kImage).parse().image;
+  VtiAttributes image = VtiParser(beginning, VtiParser::Until::kImage).parse().image;
   if (image.empty()) throw_unusable("The VTK file does not begin with the extent of an image.");
   return image;
 }

@@ -7,19 +7,15 @@
 
 #include "base/text.h"
 #include "server/import/source/names.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {
 
 constexpr std::size_t kLongestLine = 4096;
-constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
 
 [[noreturn]] void throw_damaged_array() {
   throw_unusable("The VTK file's list of arrays is damaged or truncated.");
-}
-
-bool is_space(char letter) {
-  return letter == ' ' || letter == '\t' || letter == '\r' || letter == '\n';
 }
 
 class Scanner {

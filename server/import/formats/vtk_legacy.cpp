@@ -15,10 +15,10 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::string_view kMagic = "# vtk DataFile Version ";
-constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
+constexpr std::string_view kFirstLine = "# vtk DataFile Version ";
+constexpr std::size_t kMostLegacyHeaderBytes = std::size_t{1} << 16;
 
-struct Header {
+struct LegacyHeader {
   bool is_text = false;
   std::array<std::uint64_t, 3> points = {0, 0, 0};
   Vector3 spacing = {1, 1, 1};
@@ -49,7 +49,8 @@ std::array<std::uint64_t, 3> sizes_of(const std::vector<std::string_view>& parts
 }
 
 // The second of the five parts of the format is a title; the third and the fourth are keywords.
-void read_kind(std::string_view text, const std::vector<std::string_view>& parts, Header& header) {
+void read_kind(std::string_view text, const std::vector<std::string_view>& parts,
+               LegacyHeader& header) {
   if (text == "ASCII" || text == "BINARY") {
     header.is_text = text == "ASCII";
   } else if (parts[0] == "DATASET" && parts.size() > 1 && parts[1] != "STRUCTURED_POINTS") {
@@ -58,8 +59,8 @@ void read_kind(std::string_view text, const std::vector<std::string_view>& parts
   }
 }
 
-Header read_header(std::string_view text) {
-  Header header;
+LegacyHeader read_legacy_header(std::string_view text) {
+  LegacyHeader header;
   std::size_t line = 0;
   for (std::size_t next = 0;; ++line) {
     const std::size_t end = text.find('\n', next);
@@ -95,7 +96,7 @@ const VtkArray* scalars_of(const std::vector<VtkArray>& arrays, bool is_of_cells
   return found;
 }
 
-void take(const VtkArray& array, const Header& header, SourceVolume& volume) {
+void take(const VtkArray& array, const LegacyHeader& header, SourceVolume& volume) {
   if (array.components != 1) {
     throw_unusable("Each sample of the VTK file has " + std::to_string(array.components) +
                    " components. A sample must be one real number.");
@@ -125,7 +126,6 @@ void take(const VtkArray& array, const Header& header, SourceVolume& volume) {
 
 // In text the samples end where the next section begins.
 std::uint64_t text_bytes(const InputFile& file, std::uint64_t offset) {
-  constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
   for (std::uint64_t next = offset; next < file.size();) {
     const std::string piece = file.text(next, kPieceBytes);
     const std::size_t letter = piece.find_first_of("ABCDFGHIJKLMOPQRSTUVWXYZ_");
@@ -140,7 +140,7 @@ std::uint64_t text_bytes(const InputFile& file, std::uint64_t offset) {
 
 }  // namespace
 
-bool is_vtk_legacy(std::string_view head) { return head.starts_with(kMagic); }
+bool is_vtk_legacy(std::string_view head) { return head.starts_with(kFirstLine); }
 
 bool may_hold_structured_points(std::string_view head) {
   const std::size_t kind = head.find("DATASET");
@@ -150,7 +150,7 @@ bool may_hold_structured_points(std::string_view head) {
 
 SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*companions*/,
                               const ImportOptions& options) {
-  const Header header = read_header(file.text(0, kMostHeaderBytes));
+  const LegacyHeader header = read_legacy_header(file.text(0, kMostLegacyHeaderBytes));
   const auto arrays = vtk_arrays(file, header.bytes, header.is_text);
   const VtkArray* array = scalars_of(arrays, false);
   if (array == nullptr) array = scalars_of(arrays, true);
@@ -170,7 +170,8 @@ SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*compani
 MostBytes most_vtk_legacy_bytes(const InputFile& beginning, const ImportTask& task) {
   // Per sample, in all arrays together: 32 numbers as text.
   constexpr std::uint64_t kMostPerSample = 1024;
-  const auto dims = volume_dims(read_header(beginning.text(0, kMostHeaderBytes)).points);
+  const auto dims =
+      volume_dims(read_legacy_header(beginning.text(0, kMostLegacyHeaderBytes)).points);
   const std::uint64_t samples = std::uint64_t{dims[0]} * dims[1] * dims[2];
   const std::uint64_t most = task.limits.max_sample_bytes;
   return {.file = std::min(most, std::min(most, samples) * kMostPerSample) + kHeadroomBytes};

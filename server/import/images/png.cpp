@@ -19,13 +19,13 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-constexpr std::string_view kMagic = "\x89PNG\r\n\x1a\n"sv;
+constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n"sv;
 constexpr std::uint32_t kMostPixels = 1U << 20;  // along each side
 
 [[noreturn]] void throw_damaged_png() { throw_unusable("The PNG image is damaged or truncated."); }
 
 // The file as the library reads it, and what went wrong there.
-struct Source {
+struct PngSource {
   const InputFile& file;
   std::uint64_t at = 0;
   std::exception_ptr failure;
@@ -33,7 +33,7 @@ struct Source {
 
 // Exceptions must not pass through the library.
 void read_bytes(png_struct* png, png_byte* target, std::size_t size) {
-  Source& source = *static_cast<Source*>(png_get_io_ptr(png));
+  PngSource& source = *static_cast<PngSource*>(png_get_io_ptr(png));
   std::size_t count = 0;
   try {
     count = source.file.read(source.at, std::as_writable_bytes(std::span(target, size)));
@@ -50,8 +50,8 @@ void be_silent(png_struct* /*png*/, const char* /*message*/) {}
 
 // The library's state. libpng reports errors by longjmp. So each function below calls setjmp
 // itself, and has no local objects with destructors, which a jump would skip.
-struct Reader {
-  explicit Reader(Source& source) {
+struct PngDecoder {
+  explicit PngDecoder(PngSource& source) {
     png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, jump, be_silent);
     info = png == nullptr ? nullptr : png_create_info_struct(png);
     if (info == nullptr) {
@@ -61,9 +61,9 @@ struct Reader {
     png_set_read_fn(png, &source, read_bytes);
     png_set_user_limits(png, kMostPixels, kMostPixels);
   }
-  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+  ~PngDecoder() { png_destroy_read_struct(&png, &info, nullptr); }
+  PngDecoder(const PngDecoder&) = delete;
+  PngDecoder& operator=(const PngDecoder&) = delete;
 
   bool begin() {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
@@ -113,7 +113,7 @@ PageLayout layout_of(std::string_view head) {
 }  // namespace
 
 bool is_png(std::string_view head) {
-  return head.size() >= 33 && head.starts_with(kMagic) && head.substr(12, 4) == "IHDR";
+  return head.size() >= 33 && head.starts_with(kSignature) && head.substr(12, 4) == "IHDR";
 }
 
 void read_png(const InputFile& file, const PageCheck& check, const PageSink& sink) {
@@ -121,8 +121,8 @@ void read_png(const InputFile& file, const PageCheck& check, const PageSink& sin
   if (!is_png(head)) throw_damaged_png();
   const PageLayout layout = layout_of(head);
   check(layout);
-  Source source = {.file = file, .at = 0, .failure = {}};
-  Reader reader(source);
+  PngSource source = {.file = file, .at = 0, .failure = {}};
+  PngDecoder reader(source);
   const auto expect = [&](bool is_read) {
     if (source.failure) std::rethrow_exception(source.failure);
     if (!is_read) throw_damaged_png();

@@ -9,6 +9,12 @@
 #include "server/import/source/names.h"
 
 namespace isomesh::import {
+
+struct TiffPosition {
+  const InputFile& file;
+  std::uint64_t at = 0;
+};
+
 namespace {
 
 using std::string_view_literals::operator""sv;
@@ -23,15 +29,10 @@ constexpr std::uint64_t kMostBlockBytes = std::uint64_t{256} << 20;
 
 // --- Access to the file --------------------------------------------------------------------------
 
-struct Position {
-  const InputFile& file;
-  std::uint64_t at = 0;
-};
-
-Position& position_of(thandle_t handle) { return *static_cast<Position*>(handle); }
+TiffPosition& position_of(thandle_t handle) { return *static_cast<TiffPosition*>(handle); }
 
 tmsize_t read_bytes(thandle_t handle, void* target, tmsize_t size) {
-  Position& position = position_of(handle);
+  TiffPosition& position = position_of(handle);
   const std::span<std::byte> bytes(static_cast<std::byte*>(target), static_cast<std::size_t>(size));
   const std::size_t count = position.file.read(position.at, bytes);
   position.at += count;
@@ -41,7 +42,7 @@ tmsize_t read_bytes(thandle_t handle, void* target, tmsize_t size) {
 tmsize_t write_bytes(thandle_t, void*, tmsize_t) { return 0; }
 
 toff_t seek(thandle_t handle, toff_t offset, int whence) {
-  Position& position = position_of(handle);
+  TiffPosition& position = position_of(handle);
   if (whence == SEEK_SET) position.at = offset;
   if (whence == SEEK_CUR) position.at += offset;
   if (whence == SEEK_END) position.at = position.file.size() + offset;
@@ -55,7 +56,7 @@ toff_t size_of(thandle_t handle) { return position_of(handle).file.size(); }
 // Its messages would go to standard error.
 int ignore(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
-TIFF* open(Position& position) {
+TIFF* open(TiffPosition& position) {
   TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
   if (options == nullptr) throw std::bad_alloc();
   TIFFOpenOptionsSetMaxSingleMemAlloc(options, kMostBlockBytes);
@@ -212,7 +213,7 @@ class TiffFile::Library {
     page_ = 0;
   }
 
-  Position position_;
+  TiffPosition position_;
   TIFF* tiff_;
   std::uint64_t page_ = 0;
 };

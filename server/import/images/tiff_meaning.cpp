@@ -84,7 +84,7 @@ TiffMeaning ome_meaning(std::string_view description, std::size_t at) {
 
 // --- ImageJ --------------------------------------------------------------------------------------
 
-std::string_view value_of(std::string_view description, std::string_view name) {
+std::string_view described_value(std::string_view description, std::string_view name) {
   for (const std::string_view line : lines(description)) {
     if (line.starts_with(name) && line.substr(name.size()).starts_with('=')) {
       return trimmed(line.substr(name.size() + 1));
@@ -97,13 +97,13 @@ TiffMeaning imagej_meaning(std::string_view description, const TiffResolution& r
                            std::uint64_t pages) {
   TiffMeaning meaning;
   meaning.order = "XYCZT";
-  meaning.channels = count_of(value_of(description, "channels"), 1);
-  meaning.times = count_of(value_of(description, "frames"), 1);
+  meaning.channels = count_of(described_value(description, "channels"), 1);
+  meaning.times = count_of(described_value(description, "frames"), 1);
   const std::uint64_t others = meaning.channels * meaning.times;
-  meaning.slices = count_of(value_of(description, "slices"), pages / others);
-  const std::string_view unit = value_of(description, "unit");
+  meaning.slices = count_of(described_value(description, "slices"), pages / others);
+  const std::string_view unit = described_value(description, "unit");
   const auto length = unit.empty() ? std::nullopt : length_of(unit);
-  const auto between = positive(value_of(description, "spacing"));
+  const auto between = positive(described_value(description, "spacing"));
   if (length && between && resolution.x > 0 && resolution.y > 0) {
     meaning.spacing = {*length / resolution.x, *length / resolution.y, *length * *between};
   }

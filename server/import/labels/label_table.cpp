@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <nlohmann/json.hpp>
-
 #include "base/hex.h"
 #include "base/text.h"
+#include "proto/json_tree.h"
 #include "server/import/source/names.h"
 #include "server/volume/names.h"
 
@@ -14,12 +13,12 @@ namespace isomesh::import {
 namespace {
 
 // Names, and about ten bytes per value: bounded by the size of an import's response.
-constexpr std::size_t kMostBytes = std::size_t{4} << 20;
+constexpr std::size_t kMostTableBytes = std::size_t{4} << 20;
 
 std::string valid_utf8(std::string_view text) {
-  using Json = nlohmann::json;
-  const std::string quoted = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
-  return Json::parse(quoted).get<std::string>();
+  JsonTree tree;
+  json_values::assign(tree.root(), text);
+  return json_values::text(JsonTree(dump(tree.root())).root());
 }
 
 void check_size(const std::vector<LabelEntry>& entries) {
@@ -32,9 +31,9 @@ void check_size(const std::vector<LabelEntry>& entries) {
   for (const LabelEntry& entry : entries) {
     bytes += entry.name.size() + entry.values.size() * kBytesOfValue;
   }
-  if (bytes <= kMostBytes) return;
+  if (bytes <= kMostTableBytes) return;
   throw_unusable("The names and overlaps of the file's labels take more than the " +
-                 std::to_string(kMostBytes) + " bytes that can be stored.");
+                 std::to_string(kMostTableBytes) + " bytes that can be stored.");
 }
 
 }  // namespace

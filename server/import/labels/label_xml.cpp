@@ -15,7 +15,7 @@ namespace {
 
 using Attributes = std::map<std::string, std::string, std::less<>>;
 
-std::string_view value_of(const Attributes& attributes, std::string_view name) {
+std::string_view attribute(const Attributes& attributes, std::string_view name) {
   const auto found = attributes.find(name);
   return found == attributes.end() ? std::string_view{} : std::string_view(found->second);
 }
@@ -24,7 +24,7 @@ std::optional<std::string> color_of(const Attributes& attributes) {
   std::array<double, 3> parts = {};
   std::size_t at = 0;
   for (const char* const name : {"Red", "Green", "Blue"}) {
-    const auto part = parse_double(value_of(attributes, name));
+    const auto part = parse_double(attribute(attributes, name));
     if (!part) return std::nullopt;
     parts[at++] = *part;
   }
@@ -51,9 +51,9 @@ std::vector<LabelEntry> afni_labels(std::string_view text) {
   return entries;
 }
 
-class Parser : public XmlHandler {
+class LabelXmlParser : public XmlHandler {
  public:
-  explicit Parser(std::uint64_t volume) : volume_(volume) {}
+  explicit LabelXmlParser(std::uint64_t volume) : volume_(volume) {}
 
   std::vector<LabelEntry> parse(std::string_view text) {
     try {
@@ -69,10 +69,11 @@ class Parser : public XmlHandler {
     attributes_.clear();
     pairs.for_each([&](const char* key, const char* value) { attributes_.emplace(key, value); });
     if (name == "VolumeInformation") {
-      is_of_volume_ = parse_uint64(value_of(attributes_, "Index")).value_or(0) == volume_;
+      is_of_volume_ = parse_uint64(attribute(attributes_, "Index")).value_or(0) == volume_;
     }
-    is_in_text_ = (name == "Label" && is_of_volume_) ||
-                  (name == "AFNI_atr" && value_of(attributes_, "atr_name") == "VALUE_LABEL_DTABLE");
+    is_in_text_ =
+        (name == "Label" && is_of_volume_) ||
+        (name == "AFNI_atr" && attribute(attributes_, "atr_name") == "VALUE_LABEL_DTABLE");
     text_.clear();
   }
 
@@ -82,7 +83,7 @@ class Parser : public XmlHandler {
 
   void end_element(std::string_view name) override {
     if (is_in_text_ && name == "Label") {
-      if (const auto label = parse_int64(value_of(attributes_, "Key"))) {
+      if (const auto label = parse_int64(attribute(attributes_, "Key"))) {
         entries_.push_back(
             {.label = *label, .name = label_name(text_), .color = color_of(attributes_)});
       }
@@ -105,7 +106,7 @@ class Parser : public XmlHandler {
 }  // namespace
 
 std::vector<LabelEntry> labels_of_xml(std::string_view text, std::uint64_t volume) {
-  return Parser(volume).parse(text);
+  return LabelXmlParser(volume).parse(text);
 }
 
 }  // namespace isomesh::import

@@ -4,17 +4,16 @@
 #include <limits>
 #include <string>
 
-#include <nlohmann/json.hpp>
-
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "proto/json_tree.h"
 #include "proto/orders.h"
 
 namespace isomesh::import {
 namespace {
 
-using Json = nlohmann::json;
+namespace json = json_values;
 using process::PeersAnswer;
 using process::PeersObject;
 
@@ -34,37 +33,45 @@ constexpr const char* kNumberOfSeriesRelatedInstances = "00201209";
   throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS is not DICOM JSON");
 }
 
-// The first value of an attribute; null if missing.
-const Json* value_of(const Json& object, const char* tag) {
-  const auto attribute = object.find(tag);
-  if (attribute == object.end() || !attribute->is_object()) return nullptr;
-  const auto values = attribute->find("Value");
-  if (values == attribute->end() || !values->is_array() || values->empty()) return nullptr;
-  return &values->front();
+JsonTree parsed(std::string_view text) {
+  try {
+    return JsonTree(text);
+  } catch (const Error&) {
+    throw_unreadable();
+  }
 }
 
-std::string text_of(const Json& object, const char* tag) {
+// The first value of an attribute; null if missing.
+const Json* tag_value(const Json& object, const char* tag) {
+  const Json* const attribute = json::find(object, tag);
+  const Json* const values = attribute == nullptr ? nullptr : json::find(*attribute, "Value");
+  if (values == nullptr || !json::is_array(*values) || json::array_size(*values) == 0) {
+    return nullptr;
+  }
+  return &json::element(*values, 0);
+}
+
+std::string tag_text(const Json& object, const char* tag) {
   constexpr std::size_t kLongest = 1024;
-  const Json* value = value_of(object, tag);
-  if (value == nullptr || !value->is_string()) return "";
-  return printable(value->get<std::string>().substr(0, kLongest));
+  const Json* value = tag_value(object, tag);
+  if (value == nullptr || !json::is_string(*value)) return "";
+  return printable(json::text(*value).substr(0, kLongest));
 }
 
 std::string uid_of(const Json& object, const char* tag) {
-  std::string uid(trimmed(text_of(object, tag)));
+  std::string uid(trimmed(tag_text(object, tag)));
   if (!uid.empty() && !is_uid(uid)) throw_unreadable();
   return uid;
 }
 
 // Servers write integers as numbers or, for IS, also as strings.
 template <class Number>
-std::optional<Number> number_of(const Json& object, const char* tag) {
-  const Json* value = value_of(object, tag);
+std::optional<Number> tag_number(const Json& object, const char* tag) {
+  const Json* value = tag_value(object, tag);
   if (value == nullptr) return std::nullopt;
-  const std::optional<double> number = value->is_number() ? value->get<double>()
-                                       : value->is_string()
-                                           ? parse_double(value->get<std::string>())
-                                           : std::nullopt;
+  const std::optional<double> number = json::is_number(*value)   ? json::number(*value)
+                                       : json::is_string(*value) ? parse_double(json::text(*value))
+                                                                 : std::nullopt;
   if (!number || !(*number >= 0) || *number > std::numeric_limits<Number>::max() ||
       std::floor(*number) != *number) {
     return std::nullopt;
@@ -73,23 +80,25 @@ std::optional<Number> number_of(const Json& object, const char* tag) {
 }
 
 PeersObject found_object(const Json& object) {
-  if (!object.is_object()) throw_unreadable();
+  if (!json::is_object(object)) throw_unreadable();
   return {.study = uid_of(object, kStudyInstanceUid),
           .series = uid_of(object, kSeriesInstanceUid),
           .instance = uid_of(object, kSopInstanceUid),
-          .patient_id = text_of(object, kPatientId),
-          .modality = text_of(object, kModality),
-          .series_description = text_of(object, kSeriesDescription),
-          .instances = number_of<std::uint32_t>(object, kNumberOfSeriesRelatedInstances)};
+          .patient_id = tag_text(object, kPatientId),
+          .modality = tag_text(object, kModality),
+          .series_description = tag_text(object, kSeriesDescription),
+          .instances = tag_number<std::uint32_t>(object, kNumberOfSeriesRelatedInstances)};
 }
 
 std::vector<PeersObject> referenced(const Json& answer, const char* sequence) {
   std::vector<PeersObject> objects;
-  if (value_of(answer, sequence) == nullptr) return objects;
-  for (const Json& item : answer.at(sequence).at("Value")) {
-    if (!item.is_object()) throw_unreadable();
+  if (tag_value(answer, sequence) == nullptr) return objects;
+  const Json& items = *json::find(*json::find(answer, sequence), "Value");
+  for (std::size_t at = 0; at < json::array_size(items); ++at) {
+    const Json& item = json::element(items, at);
+    if (!json::is_object(item)) throw_unreadable();
     objects.push_back({.instance = uid_of(item, kReferencedSopInstanceUid),
-                       .failure = number_of<std::uint16_t>(item, kFailureReason)});
+                       .failure = tag_number<std::uint16_t>(item, kFailureReason)});
   }
   return objects;
 }
@@ -100,12 +109,15 @@ PeersAnswer read_answer(const std::filesystem::path& file) {
   const std::string text = read_whole(file);
   PeersAnswer answer;
   if (trimmed(text).empty()) return answer;
-  const Json json = Json::parse(text, nullptr, false);
-  if (json.is_array()) {
-    for (const Json& object : json) answer.objects.push_back(found_object(object));
-  } else if (json.is_object()) {
-    answer.stored = referenced(json, kReferencedSopSequence);
-    answer.failed = referenced(json, kFailedSopSequence);
+  const JsonTree tree = parsed(text);
+  const Json& root = tree.root();
+  if (json::is_array(root)) {
+    for (std::size_t at = 0; at < json::array_size(root); ++at) {
+      answer.objects.push_back(found_object(json::element(root, at)));
+    }
+  } else if (json::is_object(root)) {
+    answer.stored = referenced(root, kReferencedSopSequence);
+    answer.failed = referenced(root, kFailedSopSequence);
   } else {
     throw_unreadable();
   }

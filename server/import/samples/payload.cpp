@@ -17,8 +17,6 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
-
 [[noreturn]] void throw_short(std::uint64_t expected, std::uint64_t found) {
   throw_unusable("The file is truncated: its header declares " + std::to_string(expected) +
                  " bytes of samples, but the file has " + std::to_string(found) + ".");

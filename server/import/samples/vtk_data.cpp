@@ -12,8 +12,6 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
-
 [[noreturn]] void throw_short() {
   throw_unusable("The file is truncated: the VTK array of the samples ends too early.");
 }
@@ -30,10 +28,6 @@ std::optional<unsigned> base64_digit(char letter) {
   if (letter == '+') return 62;
   if (letter == '/') return 63;
   return std::nullopt;
-}
-
-bool is_space(char letter) {
-  return letter == ' ' || letter == '\t' || letter == '\r' || letter == '\n';
 }
 
 // Decodes a file's base64 text in order.

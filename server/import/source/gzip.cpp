@@ -13,8 +13,6 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
-
 int window_bits(Wrapping wrapping) {
   return wrapping == Wrapping::kNone ? -MAX_WBITS : MAX_WBITS + 32;
 }

@@ -11,6 +11,9 @@
 
 namespace isomesh::import {
 
+// Files are read, inflated and converted in pieces of this size.
+inline constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+
 bool is_gzip(std::span<const std::byte> head);
 
 // Inflates up to `count` bytes of a gzip file's head. Empty if it is not gzip. Never throws because

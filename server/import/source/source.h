@@ -27,6 +27,11 @@ struct MostBytes {
   std::uint64_t data = 0;  // for each data file of its header
 };
 
+// White space between the numbers or words of a text.
+inline bool is_space(char letter) {
+  return letter == ' ' || letter == '\t' || letter == '\r' || letter == '\n';
+}
+
 enum class Encoding {
   kRaw,
   kDeflate,  // a gzip or zlib stream

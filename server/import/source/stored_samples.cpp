@@ -66,7 +66,7 @@ bool is_converted(const SampleLayout& layout) {
   return layout.rescale || layout.type == StoredType::kUint64 || layout.type == StoredType::kInt64;
 }
 
-void read_whole(const InputFile& file, std::uint64_t offset, std::span<std::byte> target) {
+void read_exactly(const InputFile& file, std::uint64_t offset, std::span<std::byte> target) {
   if (file.read(offset, target) != target.size()) {
     throw_unusable("The file ends before its last sample.");
   }
@@ -116,7 +116,7 @@ void read_samples(const InputFile& file, std::uint64_t offset, const SampleLayou
     const std::size_t count = std::min(kPieceSamples, target.size() / canonical_size);
     const std::span piece = target.first(count * canonical_size);
     const std::span stored = converted ? std::span(buffer).first(count * stored_size) : piece;
-    read_whole(file, offset, stored);
+    read_exactly(file, offset, stored);
     if (layout.big_endian) swap_bytes(stored, stored_size);
     if (converted) convert_piece(stored, layout, piece);
     offset += stored.size();

@@ -9,6 +9,7 @@
 #include "server/import/dicom/elements/beginning.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
+#include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/kinds/describe.h"
 #include "server/import/dicom/kinds/object_kinds.h"
 #include "server/import/source/reader.h"
@@ -115,10 +116,6 @@ class HeaderReader {
   std::size_t doubles_ = 0;
 };
 
-std::string count_of(std::int64_t count) {
-  return std::to_string(count) + (count == 1 ? " slice" : " slices");
-}
-
 // One entry per series: "head, 93 slices".
 std::vector<Choice> list_series(std::span<const Source> sources) {
   struct Series {
@@ -140,7 +137,7 @@ std::vector<Choice> list_series(std::span<const Source> sources) {
     for (const std::string& part : {series.description, series.modality}) {
       if (!part.empty()) title += part + ", ";
     }
-    return title + count_of(series.slices);
+    return title + count_of(static_cast<std::size_t>(series.slices), "slice");
   };
   std::map<std::string, std::size_t> uses;
   for (const auto& entry : all) ++uses[title_of(entry.second)];

@@ -26,7 +26,7 @@ namespace {
 
 constexpr double kMostPlanes = 65535;
 
-std::vector<Segment> segments_of(const DataSet& data) {
+std::vector<Segment> described_segments(const DataSet& data) {
   std::vector<Segment> segments;
   const Element* sequence = data.find(kSegmentSequence);
   if (sequence == nullptr) return segments;
@@ -226,7 +226,7 @@ bool is_segmentation(const DataSet& data) { return !data.text(kSegmentationType)
 
 Segmentation describe_segmentation(const DataSet& data) {
   const SegmentKind kind = kind_of(data);
-  return {.segments = segments_of(data),
+  return {.segments = described_segments(data),
           .kind = kind,
           .maximum = kind == SegmentKind::kFractional ? maximum_of(data) : 1,
           .slice_distance = slice_distance(data)};
