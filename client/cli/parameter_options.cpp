@@ -69,7 +69,7 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   const std::string unit = parameter.unit;
   std::string defaults = default_of(parameter, standard);
   if (parameter.by_labels != nullptr) {
-    defaults += std::string(", ") + parameter.by_labels + " with --labels";
+    defaults += std::string(defaults.empty() ? "" : ", ") + parameter.by_labels + " with --labels";
   }
   std::string more = words_of<T>() + limits_of(parameter);  // a number has limits, others words
   if (!defaults.empty()) more += (more.empty() ? "default: " : "; default: ") + defaults;

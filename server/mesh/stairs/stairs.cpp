@@ -18,14 +18,15 @@ namespace {
 
 // In three goes, so that what is small never shrinks by much before it gets its volume back.
 constexpr int kRounds = 3;
-constexpr int kLastRounds = 2;
 // Of each, for an even spacing; times grow with its ratio, and degrees with the root of that.
-constexpr double kSmoothTime = 2.5;
-constexpr double kSmoothDegree = 3;
+constexpr double kSmoothTime = 3;
+constexpr double kSmoothDegree = 4;
 constexpr double kSpreadTime = 12;
 constexpr double kSpreadDegree = 7;
 constexpr double kCurveTime = 30;
 constexpr int kCurveDegree = 10;
+// No coordinate moves farther from the start, in samples: what is owed may have no other place.
+constexpr float kMostSamples = 1.5F;
 // More uneven than this a lattice leaves nothing to be evened out.
 constexpr double kMostRatio = 5;
 
@@ -43,11 +44,11 @@ class Remover {
     const std::vector<float> light = series(kSmoothDegree, kSmoothTime);
     for (int round = 0; round < kRounds; ++round) {
       filter(mobility_.moving, mobility_.moves, light, context_, shape_);
-      keeper_.restore(shape_);
+      restore();
     }
     if (!mobility_.curves.empty()) smooth_curves();
-    for (int round = 0; round < kLastRounds; ++round) {
-      keeper_.restore(shape_);
+    for (int round = 0; round < kRounds; ++round) {
+      restore();
       unfold(context_, shape_);
     }
   }
@@ -58,6 +59,22 @@ class Remover {
     return diffusion_series(whole, time * ratio_);
   }
 
+  // Moves the vertex back until each coordinate is within so many samples of the start.
+  void hold(std::size_t v, float samples) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const float from = shape_.start()[v][axis];
+      const float most = samples * std::abs(shape_.spacing()[axis]);
+      shape_.at[v][axis] = std::clamp(shape_.at[v][axis], from - most, from + most);
+    }
+  }
+
+  void restore() {
+    keeper_.restore(shape_);
+    for_runs(context_, shape_.vertices(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v < end; ++v) hold(v, kMostSamples);
+    });
+  }
+
   // Along themselves, no coordinate by more than a step from the start; then the walls beside them
   // by two half steps.
   void smooth_curves() {
@@ -65,13 +82,7 @@ class Remover {
     std::ranges::copy_if(mobility_.curves, std::back_inserter(moving),
                          [&](std::uint32_t v) { return mobility_.moves[v] > 0; });
     filter(moving, mobility_.moves, flat_series(kCurveDegree, kCurveTime), context_, shape_);
-    for (const std::uint32_t v : moving) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const float from = shape_.start()[v][axis];
-        const float most = std::abs(shape_.spacing()[axis]);
-        shape_.at[v][axis] = std::clamp(shape_.at[v][axis], from - most, from + most);
-      }
-    }
+    for (const std::uint32_t v : moving) hold(v, 1);
     constexpr std::array<float, 3> kHalfSteps = {0.25F, 0.5F, 0.25F};  // of the mean, squared
     filter(mobility_.beside, mobility_.moves, kHalfSteps, context_, shape_);
     keeper_.hold_curves();

@@ -76,6 +76,7 @@ std::vector<std::string> some_value(const Parameter& parameter, const Member& st
                                                      {"scheme", "5"},
                                                      {"keep-nearest-to", "1,2,3"},
                                                      {"label-values", "1=2-4"},
+                                                     {"smoothing", "taubin"},
                                                      {"max-displacement", "0.5"},
                                                      {"callback", "https://ris.example/done"}};
   if (const auto found = values.find(option.substr(2)); found != values.end()) {

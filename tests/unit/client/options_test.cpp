@@ -218,11 +218,14 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   std::string words;  // without line breaks
   std::istringstream stream(help);
   for (std::string word; stream >> word;) words += (words.empty() ? "" : " ") + word;
-  for (const std::string text : {"Number of tetrahedra per cell (5 or 6; default: 6)",
-                                 "(laplacian, taubin, angle or optimize; default: laplacian)",
-                                 "(from 0 to 1000; default: 5, 10 with --labels)",
-                                 "default: 1 for laplacian, 0.33 for taubin, ", "default: 0.1)",
-                                 "position, in mm", "(default: drc)"}) {
+  for (const std::string text :
+       {"Number of tetrahedra per cell (5 or 6; default: 6)",
+        "(laplacian, taubin, angle, optimize or labels; default: laplacian, "
+        "labels with --labels)",
+        "keeps the topology (default: true with --labels)",
+        "(from 0 to 1000; default: 5, 10 with --labels)",
+        "default: 1 for laplacian, 0.33 for taubin, ", "default: 0.1)", "position, in mm",
+        "(default: drc)"}) {
     EXPECT_THAT(words, HasSubstr(text));
   }
   EXPECT_THAT(ending_of({"mesh", "--help"}).second,

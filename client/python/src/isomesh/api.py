@@ -323,7 +323,7 @@ Regularize = bool
 Passes = int
 
 
-Smoothing = Literal['laplacian', 'taubin', 'angle', 'optimize']
+Smoothing = Literal['laplacian', 'taubin', 'angle', 'optimize', 'labels']
 
 
 Lambda = Union['Optional[float]']
@@ -978,8 +978,9 @@ class JobOptions(TypedDict, total=False):
         Labels of a segmentation to mesh instead of an iso-value: their values, or all. Each
         label gets a surface of its own. Neighbouring labels share the wall between them. Values
         that are not listed are background. Vertices lie half-way between two samples. Some
-        defaults differ from those of jobs with an iso-value: 10 passes, a lambda of 0.33, and
-        no vertex moves farther than half the smallest spacing.
+        defaults differ from those of jobs with an iso-value: regularize is true, and smoothing
+        is labels. With another kind of smoothing there are 10 passes, a lambda of 0.33, and no
+        vertex moves farther than half the smallest spacing.
 
     background
         The value of samples without a label.
@@ -1014,7 +1015,8 @@ class JobOptions(TypedDict, total=False):
 
     passes
         Number of smoothing passes. Vertices on the surface's boundary stay where they are. For
-        labels the default is 10.
+        labels the default is 10. labels smoothes once, whatever their number; 0 leaves the
+        surface as it is extracted.
 
     smoothing
         The smoothing method. laplacian: each pass moves every vertex towards the mean of its
@@ -1025,7 +1027,9 @@ class JobOptions(TypedDict, total=False):
         moves every vertex along the extracted surface. angle moves it towards the bisectors of
         its neighbours' angles. optimize moves it towards the mean of its neighbours in the
         first half of the passes, and then to wherever the smallest angle becomes larger.
-        Neither uses lambda, and neither removes noise.
+        Neither uses lambda, and neither removes noise. labels is for labels alone: it takes the
+        steps of the voxels away, keeps flat faces and edges, and gives each label the volume of
+        its voxels.
 
     lambda_
         Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours. Null: 1
@@ -1037,7 +1041,8 @@ class JobOptions(TypedDict, total=False):
 
     max_displacement_mm
         Smoothing moves no vertex farther than this from its extracted position. In millimetres.
-        Null means no limit, and for labels half the smallest spacing.
+        Null means no limit; but labels that are smoothed by laplacian or taubin move half the
+        smallest spacing at most.
 
     close
         Cap the surface where it meets the volume's border. Samples beyond the border then count
@@ -1061,12 +1066,12 @@ class JobOptions(TypedDict, total=False):
         surface: close is true.
 
     max_error_mm
-        The measured distance between each file and the extracted surface is at most this. In
-        millimetres, in both directions. The samples are all vertices and the centres of all
-        triangles; other points may be farther away. Smoothing may use half of it.
-        Simplification then removes as many triangles as the rest allows, and Draco's
-        coordinates get as many bits as that takes. The error is measured on what the files
-        hold: see certify, which is switched on.
+        The distance between each file and the extracted surface is at most this. In
+        millimetres, in both directions. It is proven for every point where that can be done,
+        and measured otherwise: at all vertices and the centres of all triangles, so other
+        points may be farther away. mesh.certificate says which, see certify, which is switched
+        on. Smoothing may use half of it. Simplification then removes as many triangles as the
+        rest allows, and Draco's coordinates get as many bits as that takes.
 
     triangles
         Simplify the surface to at most this many triangles. If max_error_mm is given too, the
