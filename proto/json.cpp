@@ -111,4 +111,10 @@ std::vector<Job> jobs_from_json(std::string_view text) {
   return from_text<std::vector<Job>>(text, "jobs");
 }
 
+std::string next_from_json(std::string_view page) {
+  const JsonTree tree(page);
+  const Json* const next = json_values::find(tree.root(), "next");
+  return next != nullptr && json_values::is_string(*next) ? json_values::text(*next) : "";
+}
+
 }  // namespace isomesh

@@ -53,6 +53,8 @@ JobEvent job_event_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 std::vector<LabelSummary> labels_from_json(std::string_view text);
+// The cursor of the page after one of volumes, jobs or orders; empty if that is the last.
+std::string next_from_json(std::string_view page);
 
 // A volume as stores and imports write it: to_json() with its labels.
 std::string to_record(const Volume& volume);

@@ -3,15 +3,17 @@
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "base/clock.h"
+#include "base/error.h"
 #include "client/cli/commands.h"
 #include "client/cli/ids.h"
 #include "client/cli/option_values.h"
+#include "proto/json_tree.h"
 #include "proto/orders.h"
 
 namespace isomesh::cli {
@@ -82,6 +84,14 @@ void print(const Order& order, bool json) {
   }
 }
 
+bool is_json_object(std::string_view text) {
+  try {
+    return json_values::is_object(JsonTree(text).root());
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 void add_order_options(CLI::App& app, Options& options) {
@@ -95,9 +105,7 @@ void add_order_options(CLI::App& app, Options& options) {
                  "Parameters of the mesh as a JSON object, as in POST /v1/jobs: '{\"iso\": 250}'")
       ->type_name("JSON")
       ->check([](const std::string& text) {
-        return nlohmann::json::parse(text, nullptr, false).is_object()
-                   ? std::string()
-                   : std::string("must be a JSON object");
+        return is_json_object(text) ? std::string() : std::string("must be a JSON object");
       });
   app.add_option("--send", order.send,
                  "PACS that receive the mesh, instead of those of the rule. May be repeated")

@@ -4,10 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include <nlohmann/json.hpp>
-
 #include "client/cli/text.h"
 #include "proto/json.h"
+#include "proto/json_tree.h"
 #include "proto/stages.h"
 
 namespace isomesh::cli {
@@ -348,13 +347,16 @@ std::string label_list(const VolumeLabels& labels) {
 
 std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
                      const ClientTiming& client) {
-  auto json = nlohmann::ordered_json::parse(to_json(job));
-  auto& paths = json["outputs"] = nlohmann::ordered_json::array();
-  for (const auto& path : outputs) paths.push_back(path.string());
-  auto& times = json["client"] = nlohmann::ordered_json::object();
-  if (client.upload) times["upload"] = *client.upload;
-  if (client.download) times["download"] = *client.download;
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  using namespace json_values;
+  JsonTree tree(to_json(job));
+  Json& paths = member(tree.root(), "outputs");
+  make_array(paths);
+  for (const auto& path : outputs) assign(append(paths), path.string());
+  Json& times = member(tree.root(), "client");
+  make_object(times);
+  if (client.upload) assign(member(times, "upload"), *client.upload);
+  if (client.download) assign(member(times, "download"), *client.download);
+  return dump(tree.root());
 }
 
 }  // namespace isomesh::cli

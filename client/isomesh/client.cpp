@@ -4,8 +4,6 @@
 #include <iterator>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "base/base64.h"
 #include "base/hex.h"
 #include "base/ids.h"
@@ -86,13 +84,6 @@ std::string digest_of(const UploadBody& file) {
 std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_segment(id); }
 std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(id); }
 
-// The cursor of a page that jobs_from_json has accepted.
-std::string next_of(const std::string& page) {
-  const auto json = nlohmann::json::parse(page, nullptr, false);
-  const auto next = json.find("next");
-  return next != json.end() && next->is_string() ? next->get<std::string>() : std::string();
-}
-
 }  // namespace
 
 Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
@@ -153,7 +144,7 @@ std::vector<Volume> Client::volumes() {
     if (!cursor.empty()) query.emplace_back("cursor", cursor);
     const std::string body = impl_->repeat({.target = "/v1/volumes" + query_string(query)});
     std::vector<Volume> page = volumes_from_json(body);
-    cursor = page.empty() ? "" : next_of(body);
+    cursor = page.empty() ? "" : next_from_json(body);
     std::ranges::move(page, std::back_inserter(all));
   } while (!cursor.empty());
   return all;
@@ -231,7 +222,7 @@ JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
   if (state) query.emplace_back("state", to_string(*state));
   if (!cursor.empty()) query.emplace_back("cursor", cursor);
   const std::string body = impl_->repeat({.target = "/v1/jobs" + query_string(query)});
-  return {.jobs = jobs_from_json(body), .next = next_of(body)};
+  return {.jobs = jobs_from_json(body), .next = next_from_json(body)};
 }
 
 void Client::cancel(const std::string& id) {
@@ -274,7 +265,7 @@ std::vector<LabelSummary> Client::job_labels(const std::string& id) {
         impl_->repeat({.target = job_path(id) + "/labels" + query_string(query)});
     const std::vector<LabelSummary> page = labels_from_json(body);
     labels.insert(labels.end(), page.begin(), page.end());
-    cursor = page.empty() ? "" : next_of(body);
+    cursor = page.empty() ? "" : next_from_json(body);
   } while (!cursor.empty());
   return labels;
 }

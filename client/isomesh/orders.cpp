@@ -4,8 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "base/ids.h"
 #include "client/isomesh/impl.h"
 #include "client/isomesh/url.h"
@@ -63,10 +61,7 @@ OrderPage Client::orders(std::optional<OrderState> state, const std::string& rul
   if (!rule.empty()) query.emplace_back("rule", rule);
   if (!cursor.empty()) query.emplace_back("cursor", cursor);
   const std::string body = impl_->repeat({.target = kOrders + query_string(query)});
-  const auto json = nlohmann::json::parse(body, nullptr, false);
-  const auto next = json.is_object() ? json.value("next", nlohmann::json()) : nlohmann::json();
-  return {.orders = orders_from_json(body),
-          .next = next.is_string() ? next.get<std::string>() : ""};
+  return {.orders = orders_from_json(body), .next = next_from_json(body)};
 }
 
 Order Client::cancel_order(const std::string& id) {

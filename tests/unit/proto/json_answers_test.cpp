@@ -48,6 +48,14 @@ TEST(AnswerJson, VolumesComeBackTheSame) {
   EXPECT_EQ(volumes_from_json(to_json(several)), several);
 }
 
+TEST(AnswerJson, PagesHaveTheCursorOfTheNext) {
+  EXPECT_EQ(next_from_json(R"({"jobs": [], "next": "abc"})"), "abc");
+  EXPECT_EQ(next_from_json(R"({"jobs": [], "next": null})"), "");
+  EXPECT_EQ(next_from_json(R"({"jobs": []})"), "");
+  EXPECT_EQ(next_from_json(R"({"next": 5})"), "");
+  EXPECT_EQ(next_from_json("[]"), "");
+}
+
 TEST(AnswerJson, LabelsAreInRecordsAndInNoAnswer) {
   Volume volume = some_volume();
   volume.labels = {{.label = -1, .name = "rest"},
