@@ -66,6 +66,10 @@ std::array<double, 3> color_of(const LabelSummary& label) {
   return color;
 }
 
+double linear_of(double srgb) {
+  return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
+}
+
 void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink) {
   context.throw_if_stopped();

@@ -31,6 +31,9 @@ std::string title_of(const LabelSummary& label);
 // determines it from the label's value.
 std::array<double, 3> color_of(const LabelSummary& label);
 
+// A channel in linear light, as glTF and USD want it (IEC 61966-2-1).
+double linear_of(double srgb);
+
 // Binary glTF 2.0 as in encode_glb (encode.h), with a node, a mesh and a material per label, below
 // the node that transforms LPS millimetres to glTF's metres. A node has the label's title, and
 // label, voxels, volume_mm3 and area_mm2 as extras. All labels share one quantisation grid: shared

@@ -9,7 +9,9 @@
 #include "proto/error.h"
 #include "server/codec/decode/decoders.h"
 #include "server/codec/space.h"
+#include "server/codec/usda.h"
 #include "server/codec/zip/threemf.h"
+#include "server/codec/zip/usdz.h"
 
 namespace isomesh::codec {
 namespace {
@@ -78,6 +80,18 @@ void encode_labels_with_provenance(const LabelledSurface& surface, const Provena
                                    Space /*space*/, const mesh::Context& context,
                                    const Sink& sink) {
   encode(surface, provenance, context, sink);
+}
+
+double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
+  return 1500 + (parameters.normals ? 65 : 30) * as_double(surface.vertices) +
+         24 * as_double(surface.triangles);
+}
+
+std::uint64_t usd_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
+  // One label's surface can be almost everything.
+  constexpr std::uint64_t kLabelPerTriangle = 30;
+  return (parameters.normals ? surface.vertices * sizeof(mesh::Vec3) : 0) +
+         (parameters.labels ? surface.triangles * kLabelPerTriangle : 0);
 }
 
 constexpr std::array kFormats = {
@@ -207,6 +221,30 @@ constexpr std::array kFormats = {
                  return encode_3mf(surface.mesh, surface.provenance, context, sink);
                },
            .encode_labels = encode_labels_with_provenance<encode_labels_3mf>},
+    Format{.format = MeshFormat::kUsda,
+           .media_type = "model/vnd.usda",
+           .milliseconds_per_triangle = 3.0e-4,
+           .bytes = usd_bytes,
+           .memory_bytes = usd_memory,
+           .shows_topology = never,
+           .encode =
+               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
+                 encode_usda(surface.mesh, surface.provenance, MeshFormat::kUsda, context, sink);
+                 return std::optional<mesh::Topology>();
+               },
+           .encode_labels =
+               [](const LabelledSurface& surface, const Provenance& provenance, Space /*space*/,
+                  const mesh::Context& context, const Sink& sink) {
+                 encode_labels_usda(surface, provenance, MeshFormat::kUsda, context, sink);
+               }},
+    Format{.format = MeshFormat::kUsdz,
+           .media_type = "model/vnd.usdz+zip",
+           .milliseconds_per_triangle = 6.0e-4,  // formatted twice
+           .bytes = usd_bytes,
+           .memory_bytes = usd_memory,
+           .shows_topology = never,
+           .encode = encode_with_provenance<encode_usdz>,
+           .encode_labels = encode_labels_with_provenance<encode_labels_usdz>},
     Format{.format = MeshFormat::kOff,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 2.0e-4,
