@@ -50,14 +50,14 @@ bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.
 std::optional<mesh::Topology> encode_turned_drc(const Format::Surface& surface,
                                                 const mesh::Context& context, const Sink& sink) {
   const DracoParameters& draco = surface.provenance.parameters.draco;
-  if (surface.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
-  return encode_drc(copy_in_space(surface.mesh, surface.space), draco, context, sink);
+  if (surface.frame.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
+  return encode_drc(copy_in_space(surface.mesh, surface.frame.space), draco, context, sink);
 }
 
 template <auto encode>
-std::optional<mesh::Topology> encode_in_space(const Format::Surface& surface,
+std::optional<mesh::Topology> encode_in_frame(const Format::Surface& surface,
                                               const mesh::Context& context, const Sink& sink) {
-  encode(surface.mesh, surface.space, context, sink);
+  encode(surface.mesh, surface.frame, context, sink);
   return std::nullopt;
 }
 
@@ -70,14 +70,14 @@ std::optional<mesh::Topology> encode_with_provenance(const Format::Surface& surf
 }
 
 template <auto encode>
-void encode_labels_in_space(const LabelledSurface& surface, const Provenance& /*provenance*/,
-                            Space space, const mesh::Context& context, const Sink& sink) {
-  encode(surface, space, context, sink);
+void encode_labels_in_frame(const LabelledSurface& surface, const Provenance& /*provenance*/,
+                            const Frame& frame, const mesh::Context& context, const Sink& sink) {
+  encode(surface, frame, context, sink);
 }
 
 template <auto encode>
 void encode_labels_with_provenance(const LabelledSurface& surface, const Provenance& provenance,
-                                   Space /*space*/, const mesh::Context& context,
+                                   const Frame& /*frame*/, const mesh::Context& context,
                                    const Sink& sink) {
   encode(surface, provenance, context, sink);
 }
@@ -179,7 +179,7 @@ constexpr std::array kFormats = {
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_stl>},
+           .encode = encode_in_frame<encode_stl>},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -189,8 +189,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_ply>,
-           .encode_labels = encode_labels_in_space<encode_labels_ply>},
+           .encode = encode_in_frame<encode_ply>,
+           .encode_labels = encode_labels_in_frame<encode_labels_ply>},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
            .milliseconds_per_triangle = 2.0e-4,
@@ -200,8 +200,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_obj>,
-           .encode_labels = encode_labels_in_space<encode_labels_obj>},
+           .encode = encode_in_frame<encode_obj>,
+           .encode_labels = encode_labels_in_frame<encode_labels_obj>},
     Format{.format = MeshFormat::k3mf,
            .media_type = "model/3mf",
            .milliseconds_per_triangle = 6.5e-4,
@@ -233,8 +233,8 @@ constexpr std::array kFormats = {
                  return std::optional<mesh::Topology>();
                },
            .encode_labels =
-               [](const LabelledSurface& surface, const Provenance& provenance, Space /*space*/,
-                  const mesh::Context& context, const Sink& sink) {
+               [](const LabelledSurface& surface, const Provenance& provenance,
+                  const Frame& /*frame*/, const mesh::Context& context, const Sink& sink) {
                  encode_labels_usda(surface, provenance, MeshFormat::kUsda, context, sink);
                }},
     Format{.format = MeshFormat::kUsdz,
@@ -254,7 +254,7 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_off>},
+           .encode = encode_in_frame<encode_off>},
     Format{.format = MeshFormat::kVtk,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -265,8 +265,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_vtk>,
-           .encode_labels = encode_labels_in_space<encode_labels_vtk>},
+           .encode = encode_in_frame<encode_vtk>,
+           .encode_labels = encode_labels_in_frame<encode_labels_vtk>},
     Format{.format = MeshFormat::kVtp,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -315,6 +315,10 @@ constexpr std::array kFormats = {
            .encode = nullptr},
 };
 
+Frame frame_of(MeshFormat format, const Provenance& provenance) {
+  return {space_of(format, provenance.parameters), length_unit(provenance.notes)};
+}
+
 }  // namespace
 
 const Format& describe(MeshFormat format) {
@@ -336,8 +340,7 @@ std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
   if (row.encode == nullptr) {
     throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
   }
-  const Space space = space_of(format, provenance.parameters);
-  return row.encode({mesh, provenance, space, extracted}, context, sink);
+  return row.encode({mesh, provenance, frame_of(format, provenance), extracted}, context, sink);
 }
 
 void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
@@ -346,7 +349,7 @@ void encode_labels(const LabelledSurface& surface, MeshFormat format, const Prov
   if (row.encode_labels == nullptr) {
     throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
   }
-  row.encode_labels(surface, provenance, space_of(format, provenance.parameters), context, sink);
+  row.encode_labels(surface, provenance, frame_of(format, provenance), context, sink);
 }
 
 DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,

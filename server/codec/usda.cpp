@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "proto/parameters.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/faces.h"
 #include "server/codec/number_text.h"
@@ -82,7 +83,9 @@ class Stage {
       : format_(format), has_normals_(provenance.parameters.normals), sink_(sink) {
     write("#usda 1.0\n(\n    customLayerData = {\n        string \"isomesh:provenance\" = " +
           usd_string(provenance_text(provenance)) +
-          "\n    }\n    defaultPrim = \"isomesh\"\n    metersPerUnit = 0.001\n"
+          "\n    }\n    defaultPrim = \"isomesh\"\n    metersPerUnit = " +
+          number_text(length_unit(provenance.notes).metres) +
+          "\n"
           "    upAxis = \"Y\"\n)\n\ndef Xform \"isomesh\" (\n    kind = \"component\"\n)\n{\n");
   }
 
