@@ -296,8 +296,8 @@ TEST_F(ErrorJobsTest, OfLabelsAreWithinTheErrorInEveryFile) {
 // Each label's Draco stream lies in the ZIP, of which all together are one file to be measured.
 TEST_F(ErrorJobsTest, OfLabelsMeasureDracoInTheZip) {
   const Volume labels =
-      add(test::sample<std::uint8_t>([](const test::Point& p) { return p[0] < 9 ? 1.0 : 2.0; },
-                                     {20, 20, 20}),
+      add(test::sample<std::uint8_t>([](const test::Point& p) { return p[0] < 6 ? 1.0 : 2.0; },
+                                     {12, 12, 12}),
           SampleType::kUint8);
   JobParameters parameters = label_parameters({});
   parameters.volume = labels.id;

@@ -16,6 +16,7 @@
 #include "server/jobs/queue/estimate.h"
 #include "server/jobs/queue/pipeline.h"
 #include "tests/support/errors.h"
+#include "tests/support/step.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -205,9 +206,11 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
 }
 
 TEST_F(LabelJobsTest, MayBeThousands) {
-  auto samples = test::constant<std::uint16_t>(0, {14, 14, 14});
+  constexpr std::size_t kValues = 2500 / test::kStep;
+  constexpr std::size_t kSide = test::kStep == 1 ? 14 : 8;
+  auto samples = test::constant<std::uint16_t>(0, {kSide, kSide, kSide});
   for (std::size_t n = 0; n < samples.samples.size(); ++n) {
-    samples.samples[n] = static_cast<std::uint16_t>(n % 2500);
+    samples.samples[n] = static_cast<std::uint16_t>(n % kValues);
   }
   const Volume volume = add(samples, SampleType::kUint16);
   JobParameters parameters = label_parameters({});
@@ -215,14 +218,14 @@ TEST_F(LabelJobsTest, MayBeThousands) {
   Job job;
   job.id = "many";
   job.mesh = run(volume, settled(volume, parameters)).mesh;
-  EXPECT_EQ(job.mesh->labels_count, 2499U);
+  EXPECT_EQ(job.mesh->labels_count, kValues - 1);
   EXPECT_TRUE(job.mesh->labels.empty());
   EXPECT_LT(to_record(job).size(), std::size_t{64} << 10);
   const JobLabels labels(job, blobs_);
-  EXPECT_EQ(labels.after(2498).size(), 1U);
-  const auto label = labels.find(2000);
+  EXPECT_EQ(labels.after(kValues - 2).size(), 1U);
+  const auto label = labels.find(kValues - 1);
   ASSERT_TRUE(label);
-  EXPECT_EQ(label->voxels, 1U);  // of 2744 samples
+  EXPECT_EQ(label->voxels, 1U);  // of fewer samples than twice the values
   EXPECT_EQ(label->files.size(), 2U);
   const LabelFile& file = label->files.at(MeshFormat::kStl);
   const std::string zip = blob(job.mesh->files.at(MeshFormat::kZip).sha256);

@@ -9,6 +9,7 @@
 
 #include "proto/json.h"
 #include "tests/support/errors.h"
+#include "tests/support/step.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -90,9 +91,9 @@ TEST_F(LabelPagesTest, AreFoundByTheirValue) {
   const std::vector<LabelSummary> written = some_labels(600);
   const Job job = job_with(file_of(written), 600);
   const JobLabels labels(job, blobs_);
-  for (const LabelSummary& label : written) {
-    EXPECT_EQ(labels.find(label.label)->voxels, label.voxels);
-    EXPECT_FALSE(labels.find(label.label + 1));
+  for (std::size_t n = 0; n < written.size(); n += test::kStep) {
+    EXPECT_EQ(labels.find(written[n].label)->voxels, written[n].voxels);
+    EXPECT_FALSE(labels.find(written[n].label + 1));
   }
   EXPECT_FALSE(labels.find(-301));
   EXPECT_FALSE(labels.find(std::numeric_limits<std::int64_t>::min()));

@@ -149,7 +149,7 @@ TEST_F(PipelineTest, TakesEverySampleType) {
 
 TEST_F(PipelineTest, EveryWayGivesTheSameBytesOnAnyNumberOfThreads) {
   const Volume volume =
-      add(test::noise<std::uint8_t>({0, 1, 2}, {31, 29, 40}, 9), SampleType::kUint8);
+      add(test::noise<std::uint8_t>({0, 1, 2}, {19, 17, 40}, 9), SampleType::kUint8);
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
     for (const Interpolation interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
       JobParameters parameters = parameters_of(volume, 1);
