@@ -11,9 +11,24 @@
 
 namespace isomesh {
 
-// kVtk: VTK's legacy file. kVtp: VTK's XML file. kGii: GIFTI. kZip: one file per label in each
-// other requested format except glb and 3mf; STL if there is none.
-enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, k3mf, kOff, kVtk, kVtp, kGii, kZip };
+// kUsda: USD's text. kUsdz: that in a package. kVtk: VTK's legacy file. kVtp: VTK's XML file. kGii:
+// GIFTI. kZip: one file per label in each other requested format except glb, 3mf, usda and usdz;
+// STL if there is none.
+enum class MeshFormat {
+  kDrc,
+  kGlb,
+  kStl,
+  kPly,
+  kObj,
+  k3mf,
+  kUsda,
+  kUsdz,
+  kOff,
+  kVtk,
+  kVtp,
+  kGii,
+  kZip
+};
 
 struct MeshFile {
   std::uint64_t bytes = 0;

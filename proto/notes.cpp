@@ -134,4 +134,12 @@ std::vector<Note> notes_in_mesh(const std::vector<Note>& notes) {
   return chosen;
 }
 
+LengthUnit length_unit(const std::vector<Note>& notes) {
+  constexpr LengthUnit kMillimetre = {"mm", "millimetres", 1e-3};
+  constexpr LengthUnit kAngstrom = {"angstrom", "angstrom", 1e-10};
+  const bool is_angstrom =
+      std::ranges::find(notes, describe(NoteCode::kUnitAngstrom).name, &Note::code) != notes.end();
+  return is_angstrom ? kAngstrom : kMillimetre;
+}
+
 }  // namespace isomesh

@@ -62,4 +62,16 @@ Note note_of(NoteCode code, std::string detail);
 
 std::vector<Note> notes_in_mesh(const std::vector<Note>& notes);
 
+// The unit of a volume's coordinates, and so of the lengths of its meshes.
+struct LengthUnit {
+  std::string_view symbol;  // "mm" or "angstrom"
+  std::string_view name;    // "millimetres" or "angstrom"
+  double metres;
+
+  bool operator==(const LengthUnit&) const = default;
+};
+
+// `notes`: the volume's, or those in its mesh.
+LengthUnit length_unit(const std::vector<Note>& notes);
+
 }  // namespace isomesh

@@ -69,7 +69,12 @@ int submit(const Options& options, const std::stop_token& stop) {
 }
 
 void show(Client& client, const Job& job, bool json) {
-  std::cout << (json ? to_json(job) + '\n' : job_report(with_labels(client, job)));
+  if (json) {
+    std::cout << to_json(job) << '\n';
+    return;
+  }
+  const LengthUnit unit = job.mesh ? unit_of(client, job) : length_unit({});
+  std::cout << job_report(with_labels(client, job), unit);
 }
 
 // Returns 0 for every state of the job.

@@ -140,6 +140,15 @@ Job with_labels(Client& client, Job job) {
   return job;
 }
 
+LengthUnit unit_of(Client& client, const Job& job) {
+  try {
+    return length_unit(client.volume(job.parameters.volume).notes);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+    return length_unit({});
+  }
+}
+
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
            std::optional<std::int64_t> label) {
   if (output.is_stdout()) return fetch_to_stdout(client, id, output, bar, label);

@@ -47,6 +47,9 @@ Job wait(Client& client, const std::string& id, ProgressBar& bar);
 // The job with all of its labels, which are omitted in a job with many.
 Job with_labels(Client& client, Job job);
 
+// The unit of the job's volume; the millimetre if the volume was deleted.
+LengthUnit unit_of(Client& client, const Job& job);
+
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
            std::optional<std::int64_t> label = std::nullopt);
 

@@ -220,7 +220,7 @@ class Run {
     if (!is_one_of_many_) {
       if (job.reused) text += "\nthe mesh was reused from an identical earlier job\n";
       text += '\n' + timing_report(job.timing, seen_) + '\n' +
-              mesh_report(*with_labels(client_, job).mesh);
+              mesh_report(*with_labels(client_, job).mesh, unit_of(client_, job));
     }
     print(text);
   }

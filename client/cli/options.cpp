@@ -302,9 +302,10 @@ class Parser {
       }
       const bool holds_one = !holds_all_labels(output.format) && output.format != MeshFormat::kZip;
       if (labels && holds_one && labels->values.size() != 1) {
-        wrong_usage("-o: " + file +
-                    " can hold only one label. Use .glb, .3mf, .ply, .obj, .vtk or .vtp for all "
-                    "labels in one file, or .zip for one file per label");
+        wrong_usage(
+            "-o: " + file +
+            " can hold only one label. Use .glb, .3mf, .usdz, .ply, .obj, .vtk or .vtp for all "
+            "labels in one file, or .zip for one file per label");
       }
     }
   }

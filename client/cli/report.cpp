@@ -44,8 +44,22 @@ std::string subject_of(const JobParameters& parameters) {
   return labels->is_all() ? "all labels" : std::to_string(labels->values.size()) + " labels";
 }
 
-std::string extent(const MeshSummary& mesh, std::size_t axis) {
-  return fixed(mesh.bounds[0][axis], 2) + " to " + fixed(mesh.bounds[1][axis], 2) + " mm";
+// Lengths, areas and volumes with their unit.
+class Units {
+ public:
+  explicit Units(const LengthUnit& unit) : unit_(unit.symbol) {}
+
+  std::string length(double value, int digits) const { return fixed(value, digits) + ' ' + unit_; }
+  std::string area(double value) const { return fixed(value, 1) + ' ' + unit_ + "²"; }
+  std::string volume(double value) const { return fixed(value, 1) + ' ' + cubic(); }
+  std::string cubic() const { return unit_ + "³"; }
+
+ private:
+  std::string unit_;
+};
+
+std::string extent(const MeshSummary& mesh, std::size_t axis, const Units& in) {
+  return fixed(mesh.bounds[0][axis], 2) + " to " + in.length(mesh.bounds[1][axis], 2);
 }
 
 std::string topology_of(const MeshQuality& quality) {
@@ -66,20 +80,20 @@ void tell_iso(const MeshSummary& mesh, Rows& rows) {
 }
 
 // An open surface encloses nothing, so the sum over its triangles is not a volume.
-void tell_volume(const MeshSummary& mesh, Rows& rows) {
+void tell_volume(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (mesh.empty) return;
   if (!mesh.quality.encloses_volume) {
     rows.push_back({"volume", "none: the surface is open; --close caps it at the volume's border"});
     return;
   }
-  const std::string after = mesh.simplified ? " mm³ simplified" : " mm³ smoothed";
-  rows.push_back({"volume", fixed(mesh.volume_mm3.extracted, 1) + " mm³ extracted"});
-  rows.push_back({"", fixed(mesh.volume_mm3.smoothed, 1) + after});
+  const std::string after = mesh.simplified ? " simplified" : " smoothed";
+  rows.push_back({"volume", in.volume(mesh.volume_mm3.extracted) + " extracted"});
+  rows.push_back({"", in.volume(mesh.volume_mm3.smoothed) + after});
 }
 
-std::string way_of(const DistanceSummary& distances) {
-  return fixed(distances.max_mm, 4) + " mm at most, " + fixed(distances.p99_mm, 4) +
-         " mm for 99 %, " + fixed(distances.mean_mm, 4) + " mm on average";
+std::string way_of(const DistanceSummary& distances, const Units& in) {
+  return in.length(distances.max_mm, 4) + " at most, " + in.length(distances.p99_mm, 4) +
+         " for 99 %, " + in.length(distances.mean_mm, 4) + " on average";
 }
 
 std::string bound_of(const Simplification& simplified) {
@@ -94,7 +108,7 @@ std::string bound_of(const Simplification& simplified) {
   return "topology: fewer triangles would open or fold the surface, or change its boundary";
 }
 
-void tell_error(const MeshSummary& mesh, Rows& rows) {
+void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (mesh.simplified) {
     rows.push_back(
         {"simplified", "from " +
@@ -105,25 +119,25 @@ void tell_error(const MeshSummary& mesh, Rows& rows) {
   const MeshCertificate& certificate = *mesh.certificate;
   if (certificate.bound_mm) {
     rows.push_back({"proven", "no point of any file or of the extracted surface is more than " +
-                                  fixed(*certificate.bound_mm, 4) + " mm from the other"});
+                                  in.length(*certificate.bound_mm, 4) + " from the other"});
   } else if (certificate.why_unproven) {
     rows.push_back({"not proven", *certificate.why_unproven});
   }
-  rows.push_back({"certified", fixed(certificate.found_mm, 4) + " mm from the extracted surface, " +
-                                   "measured on the " + std::string(to_string(certificate.file)) +
-                                   " file"});
-  rows.push_back({"  from the file", way_of(certificate.from_mesh)});
-  rows.push_back({"  to the file", way_of(certificate.from_extracted)});
+  rows.push_back({"certified", in.length(certificate.found_mm, 4) +
+                                   " from the extracted surface, " + "measured on the " +
+                                   std::string(to_string(certificate.file)) + " file"});
+  rows.push_back({"  from the file", way_of(certificate.from_mesh, in)});
+  rows.push_back({"  to the file", way_of(certificate.from_extracted, in)});
   if (certificate.budget_mm) {
     const ErrorBudget& budget = *certificate.budget_mm;
-    rows.push_back({"  budget", fixed(budget.smoothing, 4) + " mm smoothing, " +
-                                    fixed(budget.simplification, 4) + " mm simplification, " +
-                                    fixed(budget.quantisation, 4) + " mm rounding"});
+    rows.push_back({"  budget", in.length(budget.smoothing, 4) + " smoothing, " +
+                                    in.length(budget.simplification, 4) + " simplification, " +
+                                    in.length(budget.quantisation, 4) + " rounding"});
   }
 }
 
-std::string labels_report(const std::vector<LabelSummary>& labels) {
-  Rows rows = {{"label", "name", "triangles", "mm³", "mm³ of voxels", "topology"}};
+std::string labels_report(const std::vector<LabelSummary>& labels, const Units& in) {
+  Rows rows = {{"label", "name", "triangles", in.cubic(), in.cubic() + " of voxels", "topology"}};
   for (const LabelSummary& label : labels) {
     std::string topology = label.closed ? "closed" : "open";
     if (!label.manifold) topology += ", not manifold";
@@ -154,7 +168,8 @@ std::string timing_report(const Timing& timing, const ClientTiming& client) {
   return in_columns({Align::kLeft, Align::kRight, Align::kRight}, rows);
 }
 
-std::string mesh_report(const MeshSummary& mesh) {
+std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
+  const Units in(unit);
   const auto count = [](auto value) { return grouped(static_cast<std::int64_t>(value)); };
   Rows rows;
   tell_iso(mesh, rows);
@@ -164,17 +179,17 @@ std::string mesh_report(const MeshSummary& mesh) {
       {"boundary edges", count(mesh.boundary_edges)},
       {"components", count(mesh.components)},
       {"Euler number", count(mesh.euler)},
-      {"area", fixed(mesh.area_extracted_mm2, 1) + " mm² extracted"},
-      {"", fixed(mesh.area_mm2, 1) + (mesh.simplified ? " mm² simplified" : " mm² smoothed")}};
+      {"area", in.area(mesh.area_extracted_mm2) + " extracted"},
+      {"", in.area(mesh.area_mm2) + (mesh.simplified ? " simplified" : " smoothed")}};
   rows.insert(rows.end(), sizes.begin(), sizes.end());
-  tell_volume(mesh, rows);
-  const Rows places = {{"displacement", fixed(mesh.displacement_mm.mean, 3) + " mm on average, " +
-                                            fixed(mesh.displacement_mm.max, 3) + " mm at most"},
-                       {"x (LPS)", extent(mesh, 0)},
-                       {"y", extent(mesh, 1)},
-                       {"z", extent(mesh, 2)}};
+  tell_volume(mesh, in, rows);
+  const Rows places = {{"displacement", in.length(mesh.displacement_mm.mean, 3) + " on average, " +
+                                            in.length(mesh.displacement_mm.max, 3) + " at most"},
+                       {"x (LPS)", extent(mesh, 0, in)},
+                       {"y", extent(mesh, 1, in)},
+                       {"z", extent(mesh, 2, in)}};
   rows.insert(rows.end(), places.begin(), places.end());
-  tell_error(mesh, rows);
+  tell_error(mesh, in, rows);
   if (mesh.dropped.components > 0) {
     rows.push_back({"dropped", count(mesh.dropped.components) + " components of " +
                                    count(mesh.dropped.triangles) + " triangles"});
@@ -195,17 +210,18 @@ std::string mesh_report(const MeshSummary& mesh) {
     rows.push_back({"mesh." + std::string(to_string(format)), size_of(file)});
   }
   std::string text = in_columns({Align::kLeft, Align::kLeft}, rows);
-  return mesh.labels.empty() ? text : text + '\n' + labels_report(mesh.labels);
+  return mesh.labels.empty() ? text : text + '\n' + labels_report(mesh.labels, in);
 }
 
 std::string volume_report(const Volume& volume) {
+  const std::string unit(length_unit(volume.notes).symbol);
   Rows rows = {{"volume", volume.id},
                {"name", volume.name.value_or("none")},
                {"format", volume.format},
                {"samples", dims_of(volume) + " " + std::string(to_string(volume.type)) + ", " +
                                human_bytes(volume.bytes)},
-               {"spacing", listed(volume.geometry.spacing) + " mm"},
-               {"origin", listed(volume.geometry.origin) + " mm (LPS)"},
+               {"spacing", listed(volume.geometry.spacing) + ' ' + unit},
+               {"origin", listed(volume.geometry.origin) + ' ' + unit + " (LPS)"},
                {"direction", listed(volume.geometry.direction)},
                {"range", human_number(volume.range[0]) + " to " + human_number(volume.range[1])},
                {"suggested iso", human_number(volume.suggested_iso)}};
@@ -274,7 +290,7 @@ std::string estimate_report(const Estimate& estimate) {
   return in_columns({Align::kLeft, Align::kLeft}, rows);
 }
 
-std::string job_report(const Job& job) {
+std::string job_report(const Job& job, const LengthUnit& unit) {
   const JobParameters& asked = job.parameters;
   Rows rows = {{"job", job.id}, {"state", std::string(to_string(job.state))}};
   if (!is_final(job.state)) {
@@ -297,7 +313,7 @@ std::string job_report(const Job& job) {
   }
   std::string text = in_columns({Align::kLeft, Align::kLeft}, rows);
   if (is_final(job.state)) text += '\n' + timing_report(job.timing, {});
-  if (job.mesh) text += '\n' + mesh_report(*job.mesh);
+  if (job.mesh) text += '\n' + mesh_report(*job.mesh, unit);
   return text;
 }
 

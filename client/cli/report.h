@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/notes.h"
 #include "proto/types.h"
 
 namespace isomesh::cli {
@@ -20,12 +21,13 @@ struct ClientTiming {
 // The stages with their times and their percentages of the total, with the transfers around them.
 std::string timing_report(const Timing& timing, const ClientTiming& client);
 
-std::string mesh_report(const MeshSummary& mesh);
+// `unit`: of the job's volume.
+std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit = length_unit({}));
 std::string volume_report(const Volume& volume);
 // A line of bars over the range. Heights are logarithms, because air outnumbers everything else.
 std::string histogram_report(const Histogram& histogram);
 std::string estimate_report(const Estimate& estimate);
-std::string job_report(const Job& job);
+std::string job_report(const Job& job, const LengthUnit& unit = length_unit({}));
 
 // The options that would resolve an error, one per line; empty if there are none.
 std::string remedy_report(const Remedy& remedy);

@@ -366,9 +366,9 @@ std::string formats() {
     yaml.text(
         "description",
         "The format and suffix of a mesh file. STL, PLY and VTK are binary. `vtk` is VTK's legacy "
-        "format, `vtp` its XML format, `gii` GIFTI. `zip` is for labels. It "
-        "holds one file per label in each other requested format except `glb` "
-        "and `3mf`. If there is none, the files are STL.");
+        "format, `vtp` its XML format, `gii` GIFTI, `usda` USD's text, and `usdz` that text in a "
+        "package. `zip` is for labels. It holds one file per label in each other requested format "
+        "except `glb`, `3mf`, `usda` and `usdz`. If there is none, the files are STL.");
     yaml.line("type: string");
     yaml.line("enum: " + in_brackets(value_names<MeshFormat>()));
     std::vector<std::string> whole;

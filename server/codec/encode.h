@@ -21,6 +21,12 @@ namespace isomesh::codec {
 
 struct Grid;
 
+// The space and the unit of a file's coordinates. Headers tell both.
+struct Frame {
+  Space space = Space::kLps;
+  LengthUnit unit = length_unit({});
+};
+
 // Takes the encoded bytes, in order. It may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
 
@@ -41,27 +47,27 @@ std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoPara
 
 // Binary STL, normals from the winding. This and all other formats except Draco, GLB and ZIP are
 // streamed in a few megabytes of memory and formatted in parallel; the bytes do not depend on the
-// number of threads. Positions are millimetres. Throws Error kTooLarge beyond 2^32 - 1 triangles,
-// and kCancelled.
-void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+// number of threads. Positions are in the frame's unit. Throws Error kTooLarge beyond 2^32 - 1
+// triangles, and kCancelled.
+void encode_stl(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink);
 
 // Binary little-endian PLY: vertices as floats, faces as lists of unsigned 32-bit indices. Throws
 // Error kCancelled.
-void encode_ply(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_ply(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink);
 
 // OBJ: numbers as the shortest text that reads as the same float. Throws Error kCancelled.
-void encode_obj(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_obj(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink);
 
 // Geomview's OFF, as text: numbers as in OBJ. Throws Error kCancelled.
-void encode_off(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_off(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink);
 
 // VTK's legacy file of polygonal data, binary (big-endian). Throws Error kTooLarge beyond 2^31 - 1
 // vertices or corners of triangles, and kCancelled.
-void encode_vtk(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_vtk(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink);
 
 // The origin of a mesh: all parameters, beside the samples, that determine its bytes. No owner, no

@@ -66,19 +66,23 @@ std::array<double, 3> color_of(const LabelSummary& label) {
   return color;
 }
 
-void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::Context& context,
-                       const Sink& sink) {
+double linear_of(double srgb) {
+  return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
+}
+
+void encode_labels_ply(const LabelledSurface& surface, const Frame& frame,
+                       const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
   const mesh::Mesh& mesh = surface.walls.mesh;
   const std::vector<FaceRun> runs = faces_of(surface);
   const std::size_t faces = count_of(runs);
   const std::string header =
-      ply_header(space, mesh.positions.size(), faces,
+      ply_header(frame, mesh.positions.size(), faces,
                  has_wide_labels(surface) ? "property uint label\n" : "property int label\n");
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + faces);
   writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_ply_vertex(in_space(mesh.positions[v], space), out);
+    return write_ply_vertex(in_space(mesh.positions[v], frame.space), out);
   });
   for (const FaceRun& run : runs) {
     writer.write(run.count, kFaceBytes, [&](std::size_t t, std::byte* out) {
@@ -89,16 +93,16 @@ void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::
   }
 }
 
-void encode_labels_obj(const LabelledSurface& surface, Space space, const mesh::Context& context,
-                       const Sink& sink) {
+void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
+                       const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
   const mesh::Mesh& mesh = surface.walls.mesh;
-  const std::string header = obj_header(space);
+  const std::string header = obj_header(frame);
   sink(std::as_bytes(std::span(header)));
   const std::vector<FaceRun> runs = faces_of(surface);
   BlockWriter writer(context, sink, mesh.positions.size() + count_of(runs));
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(in_space(mesh.positions[v], space), out);
+    return write_obj_vertex(in_space(mesh.positions[v], frame.space), out);
   });
   std::set<std::string> groups;
   for (std::size_t n = 0; n < runs.size(); ++n) {

@@ -31,6 +31,9 @@ std::string title_of(const LabelSummary& label);
 // determines it from the label's value.
 std::array<double, 3> color_of(const LabelSummary& label);
 
+// A channel in linear light, as glTF and USD want it (IEC 61966-2-1).
+double linear_of(double srgb);
+
 // Binary glTF 2.0 as in encode_glb (encode.h), with a node, a mesh and a material per label, below
 // the node that transforms LPS millimetres to glTF's metres. A node has the label's title, and
 // label, voxels, volume_mm3 and area_mm2 as extras. All labels share one quantisation grid: shared
@@ -42,19 +45,19 @@ void encode_labels_glb(const LabelledSurface& surface, const Provenance& provena
 // Binary PLY as encode_ply writes it, with an int property `label` of faces. Every label's surface
 // is complete and oriented outward: a face between two labels occurs once for each. Throws Error
 // kCancelled.
-void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::Context& context,
-                       const Sink& sink);
+void encode_labels_ply(const LabelledSurface& surface, const Frame& frame,
+                       const mesh::Context& context, const Sink& sink);
 
 // OBJ as encode_obj writes it, with a group of faces per label, named by its title with blanks
 // replaced; equal titles get the label's value appended. Surfaces are complete, as in PLY. Throws
 // Error kCancelled.
-void encode_labels_obj(const LabelledSurface& surface, Space space, const mesh::Context& context,
-                       const Sink& sink);
+void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
+                       const mesh::Context& context, const Sink& sink);
 
 // VTK's legacy and XML files as encode_vtk and encode_vtp write them, with each triangle's label as
 // the cell data `label`. Surfaces are complete, as in PLY. They throw as those do.
-void encode_labels_vtk(const LabelledSurface& surface, Space space, const mesh::Context& context,
-                       const Sink& sink);
+void encode_labels_vtk(const LabelledSurface& surface, const Frame& frame,
+                       const mesh::Context& context, const Sink& sink);
 void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
                        const mesh::Context& context, const Sink& sink);
 

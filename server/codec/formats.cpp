@@ -9,7 +9,9 @@
 #include "proto/error.h"
 #include "server/codec/decode/decoders.h"
 #include "server/codec/space.h"
+#include "server/codec/usda.h"
 #include "server/codec/zip/threemf.h"
+#include "server/codec/zip/usdz.h"
 
 namespace isomesh::codec {
 namespace {
@@ -48,14 +50,14 @@ bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.
 std::optional<mesh::Topology> encode_turned_drc(const Format::Surface& surface,
                                                 const mesh::Context& context, const Sink& sink) {
   const DracoParameters& draco = surface.provenance.parameters.draco;
-  if (surface.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
-  return encode_drc(copy_in_space(surface.mesh, surface.space), draco, context, sink);
+  if (surface.frame.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
+  return encode_drc(copy_in_space(surface.mesh, surface.frame.space), draco, context, sink);
 }
 
 template <auto encode>
-std::optional<mesh::Topology> encode_in_space(const Format::Surface& surface,
+std::optional<mesh::Topology> encode_in_frame(const Format::Surface& surface,
                                               const mesh::Context& context, const Sink& sink) {
-  encode(surface.mesh, surface.space, context, sink);
+  encode(surface.mesh, surface.frame, context, sink);
   return std::nullopt;
 }
 
@@ -68,16 +70,28 @@ std::optional<mesh::Topology> encode_with_provenance(const Format::Surface& surf
 }
 
 template <auto encode>
-void encode_labels_in_space(const LabelledSurface& surface, const Provenance& /*provenance*/,
-                            Space space, const mesh::Context& context, const Sink& sink) {
-  encode(surface, space, context, sink);
+void encode_labels_in_frame(const LabelledSurface& surface, const Provenance& /*provenance*/,
+                            const Frame& frame, const mesh::Context& context, const Sink& sink) {
+  encode(surface, frame, context, sink);
 }
 
 template <auto encode>
 void encode_labels_with_provenance(const LabelledSurface& surface, const Provenance& provenance,
-                                   Space /*space*/, const mesh::Context& context,
+                                   const Frame& /*frame*/, const mesh::Context& context,
                                    const Sink& sink) {
   encode(surface, provenance, context, sink);
+}
+
+double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
+  return 1500 + (parameters.normals ? 65 : 30) * as_double(surface.vertices) +
+         24 * as_double(surface.triangles);
+}
+
+std::uint64_t usd_memory(const SurfaceSize& surface, const MeshParameters& parameters) {
+  // One label's surface can be almost everything.
+  constexpr std::uint64_t kLabelPerTriangle = 30;
+  return (parameters.normals ? surface.vertices * sizeof(mesh::Vec3) : 0) +
+         (parameters.labels ? surface.triangles * kLabelPerTriangle : 0);
 }
 
 constexpr std::array kFormats = {
@@ -165,7 +179,7 @@ constexpr std::array kFormats = {
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_stl>},
+           .encode = encode_in_frame<encode_stl>},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -175,8 +189,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_ply>,
-           .encode_labels = encode_labels_in_space<encode_labels_ply>},
+           .encode = encode_in_frame<encode_ply>,
+           .encode_labels = encode_labels_in_frame<encode_labels_ply>},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
            .milliseconds_per_triangle = 2.0e-4,
@@ -186,8 +200,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_obj>,
-           .encode_labels = encode_labels_in_space<encode_labels_obj>},
+           .encode = encode_in_frame<encode_obj>,
+           .encode_labels = encode_labels_in_frame<encode_labels_obj>},
     Format{.format = MeshFormat::k3mf,
            .media_type = "model/3mf",
            .milliseconds_per_triangle = 6.5e-4,
@@ -207,6 +221,30 @@ constexpr std::array kFormats = {
                  return encode_3mf(surface.mesh, surface.provenance, context, sink);
                },
            .encode_labels = encode_labels_with_provenance<encode_labels_3mf>},
+    Format{.format = MeshFormat::kUsda,
+           .media_type = "model/vnd.usda",
+           .milliseconds_per_triangle = 3.0e-4,
+           .bytes = usd_bytes,
+           .memory_bytes = usd_memory,
+           .shows_topology = never,
+           .encode =
+               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
+                 encode_usda(surface.mesh, surface.provenance, MeshFormat::kUsda, context, sink);
+                 return std::optional<mesh::Topology>();
+               },
+           .encode_labels =
+               [](const LabelledSurface& surface, const Provenance& provenance,
+                  const Frame& /*frame*/, const mesh::Context& context, const Sink& sink) {
+                 encode_labels_usda(surface, provenance, MeshFormat::kUsda, context, sink);
+               }},
+    Format{.format = MeshFormat::kUsdz,
+           .media_type = "model/vnd.usdz+zip",
+           .milliseconds_per_triangle = 6.0e-4,  // formatted twice
+           .bytes = usd_bytes,
+           .memory_bytes = usd_memory,
+           .shows_topology = never,
+           .encode = encode_with_provenance<encode_usdz>,
+           .encode_labels = encode_labels_with_provenance<encode_labels_usdz>},
     Format{.format = MeshFormat::kOff,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 2.0e-4,
@@ -216,7 +254,7 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_off>},
+           .encode = encode_in_frame<encode_off>},
     Format{.format = MeshFormat::kVtk,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -227,8 +265,8 @@ constexpr std::array kFormats = {
                },
            .memory_bytes = no_memory,
            .shows_topology = never,
-           .encode = encode_in_space<encode_vtk>,
-           .encode_labels = encode_labels_in_space<encode_labels_vtk>},
+           .encode = encode_in_frame<encode_vtk>,
+           .encode_labels = encode_labels_in_frame<encode_labels_vtk>},
     Format{.format = MeshFormat::kVtp,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -277,6 +315,10 @@ constexpr std::array kFormats = {
            .encode = nullptr},
 };
 
+Frame frame_of(MeshFormat format, const Provenance& provenance) {
+  return {space_of(format, provenance.parameters), length_unit(provenance.notes)};
+}
+
 }  // namespace
 
 const Format& describe(MeshFormat format) {
@@ -298,8 +340,7 @@ std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
   if (row.encode == nullptr) {
     throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
   }
-  const Space space = space_of(format, provenance.parameters);
-  return row.encode({mesh, provenance, space, extracted}, context, sink);
+  return row.encode({mesh, provenance, frame_of(format, provenance), extracted}, context, sink);
 }
 
 void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
@@ -308,7 +349,7 @@ void encode_labels(const LabelledSurface& surface, MeshFormat format, const Prov
   if (row.encode_labels == nullptr) {
     throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
   }
-  row.encode_labels(surface, provenance, space_of(format, provenance.parameters), context, sink);
+  row.encode_labels(surface, provenance, frame_of(format, provenance), context, sink);
 }
 
 DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,

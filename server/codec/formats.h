@@ -25,7 +25,7 @@ struct Format {
   struct Surface {
     const mesh::Mesh& mesh;
     const Provenance& provenance;
-    Space space;                          // of the file
+    Frame frame;                          // of the file
     const mesh::TriangleGrid* extracted;  // for distances
   };
 
@@ -42,8 +42,9 @@ struct Format {
   std::optional<mesh::Topology> (*encode)(const Surface& surface, const mesh::Context& context,
                                           const Sink& sink);
   // Null for a format that does not hold all labels in one file.
-  void (*encode_labels)(const LabelledSurface& surface, const Provenance& provenance, Space space,
-                        const mesh::Context& context, const Sink& sink) = nullptr;
+  void (*encode_labels)(const LabelledSurface& surface, const Provenance& provenance,
+                        const Frame& frame, const mesh::Context& context,
+                        const Sink& sink) = nullptr;
   // Null for a format that holds the mesh's triangles and floats exactly, in the file's space; by
   // labels, the triangles of each label's own surface. Other formats round coordinates.
   DecodedSurface (*decode)(std::span<const std::byte> file, const mesh::Context& context) = nullptr;

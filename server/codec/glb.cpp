@@ -118,11 +118,6 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
   }
 }
 
-// glTF's colours are linear; screen colours are not (IEC 61966-2-1).
-double linear_of(double srgb) {
-  return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
-}
-
 GlbPart part_of(const LabelSummary& label) {
   GlbPart part = {.name = title_of(label), .material = title_of(label)};
   part.color = color_of(label);

@@ -4,8 +4,9 @@
 
 namespace isomesh::codec {
 
-std::string obj_header(Space space) {
-  return "# isomesh, millimetres, " + std::string(letters_of(space)) + '\n';
+std::string obj_header(const Frame& frame) {
+  return "# isomesh, " + std::string(frame.unit.name) + ", " +
+         std::string(letters_of(frame.space)) + '\n';
 }
 
 std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* begin) {
@@ -30,14 +31,14 @@ std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
   return reinterpret_cast<std::byte*>(out);
 }
 
-void encode_obj(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_obj(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
   context.throw_if_stopped();
-  const std::string header = obj_header(space);
+  const std::string header = obj_header(frame);
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(in_space(mesh.positions[v], space), out);
+    return write_obj_vertex(in_space(mesh.positions[v], frame.space), out);
   });
   writer.write(mesh.triangles.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
     return write_obj_face(mesh.triangles[t], out);

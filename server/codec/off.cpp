@@ -24,16 +24,17 @@ char* write_numbers(Number a, Number b, Number c, char* out) {
 
 }  // namespace
 
-void encode_off(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_off(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
   context.throw_if_stopped();
-  const std::string header = "OFF\n# isomesh, millimetres, " + std::string(letters_of(space)) +
-                             '\n' + std::to_string(mesh.positions.size()) + ' ' +
+  const std::string header = "OFF\n# isomesh, " + std::string(frame.unit.name) + ", " +
+                             std::string(letters_of(frame.space)) + '\n' +
+                             std::to_string(mesh.positions.size()) + ' ' +
                              std::to_string(mesh.triangles.size()) + " 0\n";
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostVertexBytes, [&](std::size_t v, std::byte* out) {
-    const auto& [x, y, z] = in_space(mesh.positions[v], space);
+    const auto& [x, y, z] = in_space(mesh.positions[v], frame.space);
     return reinterpret_cast<std::byte*>(write_numbers(x, y, z, reinterpret_cast<char*>(out)));
   });
   writer.write(mesh.triangles.size(), kMostFaceBytes, [&](std::size_t t, std::byte* out) {

@@ -17,7 +17,7 @@ Json provenance_json(const Provenance& provenance) {
                {"spacing", provenance.geometry.spacing},
                {"origin", provenance.geometry.origin},
                {"direction", provenance.geometry.direction},
-               {"units", "mm"},
+               {"units", length_unit(provenance.notes).symbol},
                {"space", "LPS"}});
   // Only if there are notes: the meshes of other volumes keep their bytes.
   for (const Note& note : provenance.notes) {

@@ -46,7 +46,7 @@ void write_facet(const mesh::Mesh& mesh, Space space, const mesh::Triangle& tria
 
 }  // namespace
 
-void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_stl(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
   const std::size_t triangles = mesh.triangles.size();
   if (triangles > std::numeric_limits<std::uint32_t>::max()) {
@@ -55,8 +55,8 @@ void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& contex
                 "simplify it.");
   }
   // The header must not start with "solid": readers would assume a text file.
-  const std::string title =
-      "isomesh binary STL, millimetres, SPACE=" + std::string(letters_of(space));
+  const std::string title = "isomesh binary STL, " + std::string(frame.unit.name) +
+                            ", SPACE=" + std::string(letters_of(frame.space));
   std::array<std::byte, kHeaderBytes + 4> header = {};
   std::memcpy(header.data(), title.data(), title.size());
   const auto count = static_cast<std::uint32_t>(triangles);
@@ -65,7 +65,7 @@ void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& contex
 
   BlockWriter(context, sink, triangles)
       .write(triangles, kFacetBytes, [&](std::size_t t, std::byte* out) {
-        write_facet(mesh, space, mesh.triangles[t], out);
+        write_facet(mesh, frame.space, mesh.triangles[t], out);
         return out + kFacetBytes;
       });
 }

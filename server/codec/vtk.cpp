@@ -25,18 +25,19 @@ std::byte* write_turned(std::uint32_t word, std::byte* out) {
 }
 
 void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const char* label_type,
-                Space space, const mesh::Context& context, const Sink& sink) {
+                const Frame& frame, const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
   const std::size_t vertices = mesh.positions.size();
   const std::size_t faces = count_of(runs);
   check_signed_indices(vertices, faces, MeshFormat::kVtk);
   const auto text = [&](const std::string& line) { sink(std::as_bytes(std::span(line))); };
   // 3D Slicer reads the space from the title in the second line.
-  text("# vtk DataFile Version 3.0\nisomesh, millimetres, SPACE=" + std::string(letters_of(space)) +
-       "\nBINARY\nDATASET POLYDATA\nPOINTS " + std::to_string(vertices) + " float\n");
+  text("# vtk DataFile Version 3.0\nisomesh, " + std::string(frame.unit.name) +
+       ", SPACE=" + std::string(letters_of(frame.space)) + "\nBINARY\nDATASET POLYDATA\nPOINTS " +
+       std::to_string(vertices) + " float\n");
   BlockWriter writer(context, sink, vertices + faces * (label_type == nullptr ? 1 : 2));
   writer.write(vertices, kVertexBytes, [&](std::size_t v, std::byte* out) {
-    for (const float coordinate : in_space(mesh.positions[v], space)) {
+    for (const float coordinate : in_space(mesh.positions[v], frame.space)) {
       out = write_turned(std::bit_cast<std::uint32_t>(coordinate), out);
     }
     return out;
@@ -62,15 +63,15 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
 
 }  // namespace
 
-void encode_vtk(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+void encode_vtk(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
-  write_file(mesh, faces_of(mesh), nullptr, space, context, sink);
+  write_file(mesh, faces_of(mesh), nullptr, frame, context, sink);
 }
 
-void encode_labels_vtk(const LabelledSurface& surface, Space space, const mesh::Context& context,
-                       const Sink& sink) {
+void encode_labels_vtk(const LabelledSurface& surface, const Frame& frame,
+                       const mesh::Context& context, const Sink& sink) {
   write_file(surface.walls.mesh, faces_of(surface),
-             has_wide_labels(surface) ? "unsigned_int" : "int", space, context, sink);
+             has_wide_labels(surface) ? "unsigned_int" : "int", frame, context, sink);
 }
 
 }  // namespace isomesh::codec

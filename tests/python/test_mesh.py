@@ -140,6 +140,14 @@ class OtherPackages(LimitedTest):
             self.assertEqual({name: each.tolist() for name, each in given["face_attributes"].items()},
                              {} if labels is None else {"label": [1, 1, 2, 2]})
 
+    def test_to_trimesh_tells_the_unit_of_the_volume(self):
+        module = type(sys)("trimesh")
+        exec(TRIMESH, module.__dict__)
+        mesh = tetrahedron()
+        mesh.notes = [{"code": "unit-angstrom", "detail": "in angstrom"}]
+        with mock.patch.dict(sys.modules, {"trimesh": module}):
+            self.assertEqual(mesh.to_trimesh().given["metadata"]["units"], "angstrom")
+
     def test_to_vtk(self):
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkFiltersCore import vtkMassProperties

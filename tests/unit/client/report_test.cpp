@@ -83,6 +83,27 @@ TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
   EXPECT_THAT(report, Not(HasSubstr("1,234.5")));
 }
 
+TEST(MeshReport, IsInTheUnitOfTheVolume) {
+  MeshSummary mesh;
+  mesh.area_extracted_mm2 = 12;
+  mesh.volume_mm3 = {.extracted = 5, .smoothed = 4};
+  mesh.quality.encloses_volume = true;
+  mesh.certificate.emplace().found_mm = 0.5;
+  mesh.labels = {{.label = 1}};
+  const std::vector<Note> notes = {note_of(NoteCode::kUnitAngstrom, "")};
+  const std::string report = mesh_report(mesh, length_unit(notes));
+  EXPECT_THAT(report, HasSubstr("12.0 angstrom² extracted\n"));
+  EXPECT_THAT(report, HasSubstr("4.0 angstrom³ smoothed\n"));
+  EXPECT_THAT(report, HasSubstr("0.5000 angstrom from the extracted surface"));
+  EXPECT_THAT(report, HasSubstr("0.00 to 0.00 angstrom\n"));
+  EXPECT_THAT(report, HasSubstr("angstrom³ of voxels"));
+  EXPECT_THAT(report, Not(HasSubstr("mm")));
+  Volume volume;
+  volume.notes = notes;
+  EXPECT_THAT(volume_report(volume), HasSubstr(" angstrom (LPS)"));
+  EXPECT_THAT(volume_report(volume), Not(HasSubstr(" mm")));
+}
+
 TEST(MeshReport, TellsTheIsoValueAndTheError) {
   MeshSummary mesh;
   mesh.iso = 61.5;

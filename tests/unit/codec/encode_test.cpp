@@ -78,7 +78,8 @@ TEST_P(EncodeInBlocks, PassesOnWhatItsSinkThrows) {
 INSTANTIATE_TEST_SUITE_P(Formats, EncodeInBlocks,
                          testing::Values(MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj,
                                          MeshFormat::k3mf, MeshFormat::kOff, MeshFormat::kVtk,
-                                         MeshFormat::kVtp, MeshFormat::kGii),
+                                         MeshFormat::kVtp, MeshFormat::kGii, MeshFormat::kUsda,
+                                         MeshFormat::kUsdz),
                          [](const auto& test) { return std::string(to_string(test.param)); });
 
 TEST(Formats, EveryOneHasItsRow) {
@@ -124,6 +125,8 @@ TEST(Formats, HaveTheMediaTypesThatAreRegistered) {
   EXPECT_EQ(media_type(MeshFormat::kDrc), "application/octet-stream");
   EXPECT_EQ(media_type(MeshFormat::kPly), "application/octet-stream");
   EXPECT_EQ(media_type(MeshFormat::k3mf), "model/3mf");
+  EXPECT_EQ(media_type(MeshFormat::kUsda), "model/vnd.usda");
+  EXPECT_EQ(media_type(MeshFormat::kUsdz), "model/vnd.usdz+zip");
   EXPECT_EQ(media_type(MeshFormat::kZip), "application/zip");
 }
 

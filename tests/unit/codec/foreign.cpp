@@ -3,6 +3,8 @@
 #include <cstring>
 #include <span>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include <assimp/cimport.h>
 #include <assimp/scene.h>
@@ -11,6 +13,7 @@
 #include "tests/support/process.h"
 #include "tests/unit/codec/foreign_3mf.h"
 #include "tests/unit/codec/foreign_cgal.h"
+#include "tests/unit/codec/usd_reader.h"
 
 namespace isomesh::test {
 namespace {
@@ -136,6 +139,15 @@ std::vector<std::array<mesh::Vec3, 3>> read_exactly(const std::string& bytes, Me
         add(object.points, object.triangles);
       }
       break;
+    case MeshFormat::kUsda:
+    case MeshFormat::kUsdz: {
+      const bool is_text = format == MeshFormat::kUsda;
+      for (UsdMesh& mesh : read_usda(is_text ? bytes : first_file_of_usdz(bytes)).meshes) {
+        for (auto& [x, y, z] : mesh.points) std::tie(y, z) = std::pair(-z, y);  // to LPS
+        add(mesh.points, mesh.triangles);
+      }
+      break;
+    }
     case MeshFormat::kVtk:
     case MeshFormat::kVtp:
     case MeshFormat::kGii: {

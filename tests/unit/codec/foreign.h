@@ -45,8 +45,8 @@ ForeignSurface read_with_python(const std::string& bytes, MeshFormat format);
 
 // The triangles of a file that rounds nothing, in its order, each as its corners' places, as a
 // reader that is not ours finds them, to the bit: assimp those of stl and ply, CGAL of obj and off,
-// lib3mf of all objects of a 3mf, and the above of the others. Throws std::runtime_error with their
-// words, and for a format that has no such reader.
+// lib3mf of all objects of a 3mf, usd_reader.h of usda and usdz, in LPS, and the above of the
+// others. Throws std::runtime_error with their words, and for a format that has no such reader.
 std::vector<std::array<mesh::Vec3, 3>> read_exactly(const std::string& bytes, MeshFormat format);
 
 }  // namespace isomesh::test

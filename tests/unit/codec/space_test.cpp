@@ -53,12 +53,13 @@ INSTANTIATE_TEST_SUITE_P(Formats, SpaceOfFiles, testing::Values(MeshFormat::kDrc
 
 TEST(SpaceOf, IsThatOfTheParameterUnlessTheFormatHasItsOwn) {
   for (const MeshFormat format : test::formats_of_a_surface()) {
-    const bool has_own = format == MeshFormat::kGlb || format == MeshFormat::kGii;
+    const bool has_own = format == MeshFormat::kGlb || format == MeshFormat::kGii ||
+                         format == MeshFormat::kUsda || format == MeshFormat::kUsdz;
     EXPECT_EQ(space_of(format, in(Space::kRas).parameters) ==
                   space_of(format, in(Space::kLps).parameters),
               has_own)
         << to_string(format);
-    // GLB and GIFTI say in their provenance alone which space was asked for.
+    // GLB, GIFTI and USD say in their provenance alone which space was asked for.
     EXPECT_NE(encoded(oblique(), format, in(Space::kLps)),
               encoded(oblique(), format, in(Space::kRas)))
         << to_string(format);

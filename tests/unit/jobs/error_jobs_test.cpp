@@ -238,8 +238,9 @@ TEST_F(ErrorJobsTest, CropToABoxWithCapsInIt) {
 // surface where they lie.
 TEST_F(ErrorJobsTest, MeasureFilesInTheSpaceThatTheyAreIn) {
   JobParameters parameters = parameters_of(volume_, 0);
-  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kOff, MeshFormat::kVtk,
-                        MeshFormat::kVtp, MeshFormat::kGii, MeshFormat::kGlb, MeshFormat::k3mf};
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kOff,
+                        MeshFormat::kVtk, MeshFormat::kVtp, MeshFormat::kGii,
+                        MeshFormat::kGlb, MeshFormat::k3mf, MeshFormat::kUsdz};
   parameters.glb_codec = GlbCodec::kMeshopt;
   parameters.max_error_mm = 0.2;
   parameters.certify = true;
@@ -254,8 +255,9 @@ TEST_F(ErrorJobsTest, MeasureFilesInTheSpaceThatTheyAreIn) {
 
 TEST_F(ErrorJobsTest, SayThatThereIsNoSurface) {
   JobParameters parameters = parameters_of(volume_, 1000);
-  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kGlb, MeshFormat::k3mf,
-                        MeshFormat::kOff, MeshFormat::kVtk, MeshFormat::kVtp, MeshFormat::kGii};
+  parameters.formats = {MeshFormat::kDrc,  MeshFormat::kStl, MeshFormat::kGlb, MeshFormat::k3mf,
+                        MeshFormat::kOff,  MeshFormat::kVtk, MeshFormat::kVtp, MeshFormat::kGii,
+                        MeshFormat::kUsda, MeshFormat::kUsdz};
   EXPECT_TRUE(run(parameters).empty);
   parameters.max_error_mm = 0.1;
   parameters.certify = true;

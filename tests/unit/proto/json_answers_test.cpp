@@ -171,7 +171,7 @@ TEST(AnswerJson, UnknownMembersAreIgnored) {
   job["parameters"]["later"] = true;
   job["timing"]["later"] = 3;
   job["mesh"]["genus"] = 1;
-  job["mesh"]["files"]["usdz"] = {{"bytes", 1}};
+  job["mesh"]["files"]["usdc"] = {{"bytes", 1}};
   job["mesh"]["files"]["drc"]["later"] = 1;
   EXPECT_EQ(job_from_json(job.dump()), succeeded_job());
 }

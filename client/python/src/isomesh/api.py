@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SampleType = Literal['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'float32', 'float64']
 
 
-MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', 'off', 'vtk', 'vtp', 'gii', 'zip']
+MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', 'usda', 'usdz', 'off', 'vtk', 'vtp', 'gii', 'zip']
 
 
 MeshBytes = str

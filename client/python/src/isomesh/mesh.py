@@ -142,11 +142,12 @@ class Mesh:
         trimesh = _package("trimesh", "mesh.to_trimesh()", "trimesh")
         numpy = _package("numpy", "mesh.to_trimesh()", "numpy")
         labels = {} if self.labels is None else {"label": numpy.array(self.labels)}
+        is_angstrom = any(note["code"] == "unit-angstrom" for note in self.notes)
         return trimesh.Trimesh(
             vertices=numpy.array(self.vertices, "float64"),
             faces=numpy.array(self.faces, "int64"),
             face_attributes=labels,
-            metadata={"units": "mm", "space": self.space},
+            metadata={"units": "angstrom" if is_angstrom else "mm", "space": self.space},
             process=False,  # which would merge and reorder vertices
         )
 

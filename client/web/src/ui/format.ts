@@ -77,6 +77,8 @@ export const formatNames: Record<string, string> = {
   ply: 'PLY',
   obj: 'OBJ',
   '3mf': '3MF',
+  usda: 'USD (text)',
+  usdz: 'USDZ',
   off: 'OFF',
   vtk: 'VTK',
   vtp: 'VTP',
