@@ -44,10 +44,10 @@ class Record {
 
 // The fields that the local header and the directory have in common.
 void describe(const File& file, std::size_t extra_bytes, Record& record) {
-  constexpr std::uint32_t kVersion = 10;
+  constexpr std::uint32_t kVersionNeeded = 10;
   constexpr std::uint32_t kFirstDay = 0x21;  // of 1980: equal surfaces give equal bytes
   const auto bytes = static_cast<std::uint32_t>(file.bytes);
-  record.two(kVersion).two(0).two(0).two(0).two(kFirstDay);
+  record.two(kVersionNeeded).two(0).two(0).two(0).two(kFirstDay);
   record.four(file.checksum).four(bytes).four(bytes);
   record.two(static_cast<std::uint32_t>(kName.size()));
   record.two(static_cast<std::uint32_t>(extra_bytes));

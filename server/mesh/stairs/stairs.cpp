@@ -105,10 +105,9 @@ struct Displacements {
 Displacements take_over(const WallShape& shape, const LatticeToSpace& to_space, double most,
                         const Context& context, Mesh& mesh) {
   const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
-  constexpr std::size_t kRun = 8192;
-  std::vector<Displacements> runs(mesh.positions.size() / kRun + 1);
+  std::vector<Displacements> runs(runs_of(mesh.positions.size()));
   for_runs(context, mesh.positions.size(), [&](std::size_t begin, std::size_t end) {
-    Displacements& here = runs[begin / kRun];
+    Displacements& here = runs[begin / kRunLength];
     for (std::size_t v = begin; v < end; ++v) {
       const Lanes moved = shape.at[v] - shape.start()[v];
       Point way = {0, 0, 0};

@@ -55,7 +55,7 @@ std::vector<Suspect> find_suspects(const WallShape& shape, const Context& contex
   constexpr int kEdges = 2;
   const WallNormals normals(shape, context);
   const WallFans& fans = shape.fans();
-  std::vector<std::vector<Suspect>> found(shape.vertices() / 8192 + 1);
+  std::vector<std::vector<Suspect>> found(runs_of(shape.vertices()));
   for_runs(context, shape.vertices(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       shape.visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
@@ -70,7 +70,7 @@ std::vector<Suspect> find_suspects(const WallShape& shape, const Context& contex
         if (!is_less(normal_of(shape, corners), near, kSuspect)) return;
         Lanes wide = {};
         for (const std::uint32_t each : own) wide += normals.around(each, kEdges);
-        found[begin / 8192].push_back({corners, wide});
+        found[begin / kRunLength].push_back({corners, wide});
       });
     }
   });

@@ -15,6 +15,7 @@
 
 #include "server/mesh/labels/missing_volume.h"
 #include "tests/support/points.h"
+#include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh {
@@ -137,7 +138,8 @@ class RoundShapes : public testing::TestWithParam<Shape> {
     constexpr std::array<Point, 4> kPlaces = {Point{0.31, -0.22, 0.41}, Point{-0.13, 0.47, -0.29},
                                               Point{0.05, 0.12, -0.4}, Point{-0.37, -0.08, 0.19}};
     double area_error = 0;
-    for (const Point& place : kPlaces) {
+    for (std::size_t n = 0; n < kPlaces.size(); n += test::kStep) {
+      const Point& place = kPlaces[n];
       const auto label = [&](const Point& p) {
         Point from;
         for (std::size_t i = 0; i < 3; ++i) from[i] = p[i] - place[i] * GetParam().spacing[i];
@@ -150,7 +152,9 @@ class RoundShapes : public testing::TestWithParam<Shape> {
       EXPECT_NEAR(extent.volume_mm3 / voxels, 1, GetParam().volume_percent / 100);
       area_error += (extent.area_mm2 / area - 1) / kPlaces.size();
     }
-    EXPECT_LT(std::abs(area_error), GetParam().area_percent / 100);
+    if (test::kStep == 1) {
+      EXPECT_LT(std::abs(area_error), GetParam().area_percent / 100);
+    }
   }
 };
 
@@ -253,7 +257,7 @@ TEST(Stairs, LeaveCapsFlatAndEndsInTheBorder) {
 }
 
 TEST(Stairs, AreTheSameToTheByteOnAnyNumberOfThreads) {
-  const Labels volume = label_cells(12, {40, 43, 70}, 14, 9);
+  const Labels volume = label_cells(12, {30, 33, 50}, 14, 9);
   const Smoothed first = without_stairs(volume, joined(12, true));
   for (const int threads : {1, 2, 5}) {
     const test::ThreadCount count(threads);
@@ -286,13 +290,14 @@ TEST(Stairs, MoveNothingFartherThanIsAllowed) {
 TEST(Stairs, DependOnlyOnWhatIsNear) {
   constexpr std::uint32_t kChanged = 75;
   constexpr double kReach = 60;  // layers
-  Labels volume = label_cells(40, {24, 24, 150}, 14, 77);
+  constexpr Dims dims = {16, 17, 140};
+  Labels volume = label_cells(40, dims, 14, 77);
   const Smoothed first = without_stairs(volume, joined(40));
-  const Labels other = label_noise(5, volume.dims, 78);
-  for (std::uint32_t k = kChanged; k < volume.dims.z; ++k) {
-    for (std::uint32_t j = 0; j < volume.dims.y; ++j) {
-      for (std::uint32_t i = 0; i < volume.dims.x; ++i)
-        volume.at(i, j, k) = other.samples[i + 7 * j + 24 * k];
+  const Labels other = label_noise(5, dims, 78);
+  for (std::uint32_t k = kChanged; k < dims.z; ++k) {
+    for (std::uint32_t j = 0; j < dims.y; ++j) {
+      for (std::uint32_t i = 0; i < dims.x; ++i)
+        volume.at(i, j, k) = other.samples[i + dims.x * (j + dims.y * k)];
     }
   }
   const Smoothed second = without_stairs(volume, joined(40));
@@ -302,7 +307,7 @@ TEST(Stairs, DependOnlyOnWhatIsNear) {
   for (std::size_t v = 0; v < start.mesh.positions.size(); ++v) {
     moved[start.mesh.positions[v]] = second.surface.mesh.positions[v];
   }
-  Labels unchanged = label_cells(40, {24, 24, 150}, 14, 77);
+  const Labels unchanged = label_cells(40, dims, 14, 77);
   separate_into(start, unchanged, joined(40));
   double farthest = 0;
   std::size_t same = 0;
