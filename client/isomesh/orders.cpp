@@ -7,6 +7,7 @@
 #include "base/ids.h"
 #include "client/isomesh/impl.h"
 #include "client/isomesh/url.h"
+#include "proto/json.h"
 
 namespace isomesh {
 namespace {

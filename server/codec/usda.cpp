@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kMostSeparatorBytes = 2;
 constexpr std::size_t kMostVectorBytes = 6 + kMostSeparatorBytes + 3 * kMostFloatBytes;
 constexpr std::size_t kMostCountBytes = 1 + kMostSeparatorBytes;
-constexpr std::size_t kMostFaceBytes = 3 * (kMostIndexBytes + kMostSeparatorBytes);
+constexpr std::size_t kMostTripleBytes = 3 * (kMostIndexBytes + kMostSeparatorBytes);
 
 // LPS to Y up: the head points along y, the front of the patient along z.
 mesh::Vec3 with_y_up(const mesh::Vec3& lps) {
@@ -165,7 +165,7 @@ class Stage {
       return reinterpret_cast<std::byte*>(text);
     });
     write("]\n        int[] faceVertexIndices = [");
-    writer.write(faces, kMostFaceBytes, [&](std::size_t t, std::byte* out) {
+    writer.write(faces, kMostTripleBytes, [&](std::size_t t, std::byte* out) {
       char* text = separate(t, reinterpret_cast<char*>(out));
       const auto& [a, b, c] = mesh.triangles[t];
       text = write_text(",", write_number(std::uint64_t{a}, text));

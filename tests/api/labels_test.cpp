@@ -65,8 +65,9 @@ TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {
   const Job job = made(R"("labels": "all", "close": true, "formats": ["glb", "stl"],
                           "label_names": {"3": "Left"}, "label_colors": {"7": "#FF8000"})");
   EXPECT_EQ(job.parameters.passes, 10);
-  EXPECT_EQ(job.parameters.lambda, 0.33);
-  EXPECT_EQ(job.parameters.max_displacement_mm, 0.5);
+  EXPECT_EQ(job.parameters.smoothing, Smoothing::kLabels);
+  EXPECT_TRUE(job.parameters.regularize);
+  EXPECT_FALSE(job.parameters.max_displacement_mm);
   const json parameters = json::parse(to_json(job.parameters));
   EXPECT_FALSE(parameters.contains("iso"));
   EXPECT_FALSE(parameters.contains("interpolation"));

@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/labels/missing_volume.h"
+#include "server/mesh/stairs/unfold.h"
 #include "tests/support/points.h"
 #include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
@@ -126,6 +127,7 @@ struct Shape {
   std::array<double, 3> spacing;
   double area_percent;
   double volume_percent;
+  std::size_t folded;
 };
 
 class RoundShapes : public testing::TestWithParam<Shape> {
@@ -147,6 +149,9 @@ class RoundShapes : public testing::TestWithParam<Shape> {
       };
       const Labels volume = labels_of(label, reach, GetParam().spacing);
       const Smoothed smoothed = without_stairs(volume, joined(1));
+      const auto lattice = volume.lattice();
+      const WallShape shape(smoothed.surface, lattice.dims, lattice.to_space, false, {});
+      EXPECT_LE(count_folded(shape, {}), GetParam().folded);
       const Extent extent = measure_extent(smoothed.surface.mesh, {});
       const double voxels = voxels_mm3(volume).at(1);
       EXPECT_NEAR(extent.volume_mm3 / voxels, 1, GetParam().volume_percent / 100);
@@ -174,9 +179,9 @@ TEST_P(RoundShapes, HaveTheirAreaAndTheirVoxelsVolume) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Spacings, RoundShapes,
-                         testing::Values(Shape{"even", {1, 1, 1}, 0.4, 0.1},
-                                         Shape{"double", {1, 1, 2}, 0.6, 0.1},
-                                         Shape{"triple", {1, 1, 3}, 0.7, 0.15}),
+                         testing::Values(Shape{"even", {1, 1, 1}, 0.4, 0.1, 0},
+                                         Shape{"double", {1, 1, 2}, 0.6, 0.1, 0},
+                                         Shape{"triple", {1, 1, 3}, 0.7, 0.15, 1}),
                          [](const auto& test) { return test.param.name; });
 
 TEST(Stairs, OfABoxAreNone) {

@@ -40,7 +40,7 @@ describe('a surface', () => {
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await surfaceLoaded(page);
-    const { name, bytes } = await saved(page, /^USDZ/);
+    const { name, bytes } = await saved(page, /^USDZ for/);
     expect(name).toMatch(/iso-100\.usdz$/);
     // A ZIP whose files are stored as they are.
     expect(bytes.subarray(0, 4).toString('latin1')).toBe('PK\u0003\u0004');
@@ -53,7 +53,7 @@ describe('a surface', () => {
     await page.goto(`${daemon.url}/#/jobs/${job.id}`);
     await page.getByRole('button', { name: 'For a phone' }).click();
     await expect.poll(() => page.url()).not.toContain(job.id);
-    await expect.poll(() => page.getByRole('button', { name: /^USDZ/ }).count()).toBe(1);
+    await expect.poll(() => page.getByRole('button', { name: /^USDZ for/ }).count()).toBe(1);
     expect((await madeJob(at)).mesh?.triangles).toBeLessThanOrEqual(150_000);
   });
 });

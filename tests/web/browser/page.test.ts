@@ -182,34 +182,6 @@ describe('a surface', () => {
     expect(millimetres).toBeLessThan(expected * 1.03);
   });
 
-  it('turns with fewer pixels where frames take long, and rests with all', async () => {
-    const { daemon, page } = at;
-    const volume = await daemon.upload(readFileSync(brain));
-    const large = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 120);
-    await page.goto(`${daemon.url}/#/jobs/${large.id}`);
-    await surfaceLoaded(page);
-    const viewport = page.locator('.viewport');
-    const canvas = await viewport.locator('canvas').boundingBox();
-    if (!canvas) throw new Error('there is no canvas');
-    const [x, y] = [canvas.x + canvas.width / 2, canvas.y + canvas.height / 2];
-    const sizes = (): Promise<number[]> => viewport.locator('canvas').evaluate(({ width, height }: HTMLCanvasElement) => [width, height]);
-    const before = await sizes();
-    await page.mouse.move(x, y);
-    await page.mouse.down();
-    let turns = 0;
-    const turned = async (): Promise<number> => {
-      turns += 1;
-      await page.mouse.move(x + 60 * Math.sin(turns / 5), y);
-      return Number(await viewport.getAttribute('data-sharpness'));
-    };
-    await expect.poll(turned, { interval: 20 }).toBeLessThan(1);
-    await page.mouse.up();
-    await still(page);
-    expect((await silhouette(page, viewport)).part).toBeGreaterThan(0.05);
-    expect(await viewport.getAttribute('data-sharpness')).toBe('1.00');
-    expect(await sizes()).toEqual(before);
-  });
-
   it('made as Draco alone is shown as well', async () => {
     const { daemon, page } = at;
     const draco = await daemon.submit({ volume: ball, iso: 100, formats: ['drc'] }, 30);

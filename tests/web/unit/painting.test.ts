@@ -61,21 +61,4 @@ describe('the budget of frames', () => {
     expect(budget.isSlow).toBe(true);
     expect(budget.steps).toBeGreaterThanOrEqual(40);
   });
-
-  it('draws coarse frames that take long with fewer pixels, and with more again when they are quick', () => {
-    const budget = new FrameBudget();
-    const frames = (count: number, took: number, how = { isMoving: true, isCoarse: true }): number => {
-      for (let n = 0; n < count; n += 1) budget.drawn(performance.now() - took, how);
-      return budget.sharpness;
-    };
-    expect(frames(9, 3000, { isMoving: true, isCoarse: false })).toBe(1);
-    expect(frames(1, 3000)).toBe(0.75);
-    expect(frames(1, 60)).toBeLessThan(0.6);
-    const least = frames(50, 200);
-    expect(least).toBeGreaterThan(0.3);
-    expect(least).toBeLessThan(0.4);
-    expect(frames(50, 26)).toBe(least);
-    expect(frames(5, 2)).toBeGreaterThan(least);
-    expect(frames(50, 2)).toBe(1);
-  });
 });

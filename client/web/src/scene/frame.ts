@@ -1,15 +1,8 @@
-// One picture of a surface: drawn at once, or in steps of some blocks each, of which a change ends the rest; with all pixels of
-// the canvas or with fewer.
+// One picture of a surface: drawn at once, or in steps of some blocks each, of which a change ends the rest.
 import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { overLayer } from './cross';
 import { Painting } from './painting';
 import type { Parts } from './parts';
-
-export interface Effort {
-  steps: number;
-  // The part of the canvas's pixels along each side, up to 1.
-  sharpness: number;
-}
 
 export class Frame {
   readonly painting: Painting;
@@ -27,11 +20,8 @@ export class Frame {
   }
 
   // `then` is told whether the picture is there: `isOver` may have ended it between two steps. `after` draws over it.
-  paint({ steps, sharpness }: Effort, isOver: () => boolean, after: () => void, then: (isWhole: boolean) => void): void {
-    const canvas = this.renderer.domElement;
-    const { clientWidth, clientHeight } = canvas;
-    const width = Math.max(1, Math.round(sharpness * canvas.width));
-    const height = Math.max(1, Math.round(sharpness * canvas.height));
+  paint(steps: number, isOver: () => boolean, after: () => void, then: (isWhole: boolean) => void): void {
+    const { width, height, clientWidth, clientHeight } = this.renderer.domElement;
     // By a picture that is not whole yet.
     this.showAll();
     const before = (): void => {

@@ -349,10 +349,7 @@ export class Surface {
     };
     this.isBusy = true;
     const isOver = (): boolean => this.isDisposed || this.isWaiting;
-    // What is coarse no more is drawn anew, with all pixels.
-    const sharpness = isCoarse ? this.budget.sharpness : 1;
-    this.host.dataset.sharpness = sharpness.toFixed(2);
-    this.frame.paint({ steps, sharpness }, isOver, after, (isWhole) => this.release(() => isWhole && this.drawn(began, isCoarse)));
+    this.frame.paint(steps, isOver, after, (isWhole) => this.release(() => isWhole && this.drawn(began, isCoarse)));
   }
 
   private drawn(began: number, isCoarse: boolean): void {
