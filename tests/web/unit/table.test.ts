@@ -63,7 +63,8 @@ describe('the table of parameters', () => {
     expect(estimateQuery(job).get(parameter.query)).toBe(asText(value));
     const address = new URLSearchParams(queryOfParameters(job, defaults));
     expect(parametersOfQuery(address, defaults)).toEqual(job);
-    const option = value === true ? `--${parameter.option}` : `--${parameter.option} ${asText(value)}`;
+    const isSwitch = typeof value === 'boolean';
+    const option = isSwitch ? `--${value ? '' : 'no-'}${parameter.option}` : `--${parameter.option} ${asText(value)}`;
     expect(commandSnippet('http://h:1', job, false)).toContain(option);
   });
 
