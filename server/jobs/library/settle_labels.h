@@ -12,10 +12,10 @@ namespace isomesh::jobs {
 
 // Completes parameters that have labels: the names, colours and values of the chosen labels from
 // the volume, unless given, and the default displacement limit of Laplacian and Taubin smoothing,
-// half the smallest spacing. Equivalent requests therefore get equal parameters, and share one result. Throws Error
-// kInvalidParameter, field "labels", if the samples are not integers; kUnusableVolume if an axis
-// has fewer than two samples, if chosen labels are missing (naming them) or if there are none; and
-// as LabelLists::counts does.
+// half the smallest spacing. Equivalent requests therefore get equal parameters, and share one
+// result. Throws Error kInvalidParameter, field "labels", if the samples are not integers;
+// kUnusableVolume if an axis has fewer than two samples, if chosen labels are missing (naming them)
+// or if there are none; and as LabelLists::counts does.
 JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewer,
                             const Volume& volume, LabelLists& lists);
 
