@@ -65,8 +65,8 @@ class TallyCellWriter {
     std::array<Double4, 3> moved = {};
     for (std::size_t i = 0; i < 3; ++i) {
       const VertexName name = triangle.vertices[i];
-      const std::uint32_t vertex =
-          places[offsets_[edge_name(name / kSlotPlaces, 0)] + name % kSlotPlaces];
+      const std::uint32_t vertex = places[offsets_[edge_name(name / kSlotPlaces, 0)] +
+                                          static_cast<std::ptrdiff_t>(name % kSlotPlaces)];
       const std::array<float, 3>& place = cases.places[name];
       vertices[i] = vertex;
       before[i] = Double4{double{place[0]}, double{place[1]}, double{place[2]}, 0};
