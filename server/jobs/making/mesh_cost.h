@@ -13,7 +13,7 @@ namespace isomesh::jobs {
 // True if labels are smoothed by remove_stairs (server/mesh/stairs).
 bool removes_stairs(const MeshParameters& parameters);
 
-// Of every other kind of smoothing.
+// For every other kind of smoothing.
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 
 // How much memory a job with a surface of that size, of so many samples, takes at its peak, beside

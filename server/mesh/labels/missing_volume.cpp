@@ -62,19 +62,6 @@ std::array<double, 4> shares_of(const Corners& corners, Scheme scheme) {
   return shares;
 }
 
-// The first corner of a tetrahedron with the same label as each.
-std::array<std::size_t, 4> classes_of(unsigned pattern) {
-  constexpr std::array<std::array<unsigned, 4>, 4> kPairs = {
-      {{0, 0, 1, 2}, {0, 0, 3, 4}, {1, 3, 0, 5}, {2, 4, 5, 0}}};
-  std::array<std::size_t, 4> classes = {0, 1, 2, 3};
-  for (std::size_t j = 0; j < 4; ++j) {
-    for (std::size_t i = j; i-- > 0;) {
-      if ((pattern >> kPairs[i][j] & 1) == 0) classes[j] = i;
-    }
-  }
-  return classes;
-}
-
 class Tetrahedron {
  public:
   Tetrahedron(const Corners& corners, unsigned pattern, const TetrahedronWalls& walls,
@@ -120,8 +107,9 @@ class Tetrahedron {
     return count;
   }
 
-  // What the walls leave each label: by class. A label with one corner is the cone from there to
-  // its walls; two and two have half each, since one is the other's image; the last has the rest.
+  // The volume that the walls leave each label, by class. A label with one corner is the cone from
+  // there to its walls; two and two have half each, since one is the other's image; the last has
+  // the rest.
   std::array<double, 4> volumes() const {
     std::array<double, 4> volumes = {};
     double rest = volume_of(corners_);
@@ -153,7 +141,7 @@ class Tetrahedron {
   }
 
   const Corners& corners_;
-  const std::array<std::size_t, 4> classes_;
+  const std::array<unsigned, 4> classes_;
   const TetrahedronWalls& walls_;
   const Places& places_;
 };

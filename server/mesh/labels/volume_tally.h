@@ -1,4 +1,4 @@
-// What a walk over the cells tallies to find missing volume; private to this folder.
+// Sums over the cells that tell where volume is missing; private to this folder.
 #pragma once
 
 #include <array>

@@ -72,15 +72,9 @@ class TetrahedronBuilder {
 
   TetrahedronWalls build(unsigned pattern) {
     walls_ = {};
-    // Each corner's class is the first corner of its label.
-    std::array<unsigned, 4> classes = {0, 1, 2, 3};
+    const std::array<unsigned, 4> classes = classes_of(pattern);
     std::array<unsigned, 4> sizes = {};
-    for (unsigned j = 0; j < 4; ++j) {
-      for (unsigned i = j; i-- > 0;) {
-        if ((pattern >> kPairs[i][j] & 1) == 0) classes[j] = i;
-      }
-      ++sizes[classes[j]];
-    }
+    for (const unsigned label : classes) ++sizes[label];
     if (pattern_of(classes) != pattern) return {};  // "the same" does not carry over: no such case
     unsigned labels = 0;
     for (const unsigned size : sizes) labels += size > 0 ? 1 : 0;
@@ -91,9 +85,6 @@ class TetrahedronBuilder {
   }
 
  private:
-  static constexpr std::array<std::array<unsigned, 4>, 4> kPairs = {
-      {{0, 0, 1, 2}, {0, 0, 3, 4}, {1, 3, 0, 5}, {2, 4, 5, 0}}};
-
   // A vertex on what some of the tetrahedron's corners span.
   struct Spot {
     VertexName name;
@@ -215,6 +206,18 @@ class TetrahedronBuilder {
 };
 
 }  // namespace
+
+std::array<unsigned, 4> classes_of(unsigned pattern) {
+  constexpr std::array<std::array<unsigned, 4>, 4> kPairs = {
+      {{0, 0, 1, 2}, {0, 0, 3, 4}, {1, 3, 0, 5}, {2, 4, 5, 0}}};
+  std::array<unsigned, 4> classes = {0, 1, 2, 3};
+  for (unsigned j = 0; j < 4; ++j) {
+    for (unsigned i = j; i-- > 0;) {
+      if ((pattern >> kPairs[i][j] & 1) == 0) classes[j] = i;
+    }
+  }
+  return classes;
+}
 
 WallCases make_wall_cases(Scheme scheme, bool odd, bool left_handed) {
   const std::array<Slots, 2> slots = {slots_of(cell_split(scheme, false)),
