@@ -217,8 +217,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
               "mean of its neighbours in the first half of the passes, and then to wherever the "
               "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise. "
               "`labels` is for labels alone: it takes the steps of the voxels away, keeps flat "
-              "faces "
-              "and edges, and gives each label the volume of its voxels.",
+              "faces, and gives each label the volume of its voxels, to a few tenths of a percent.",
           .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
                      "Evens out the angles of triangles, and keeps shape and volume",
                      "Enlarges the smallest angles of triangles, and keeps shape and volume",

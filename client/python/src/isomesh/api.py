@@ -1028,8 +1028,8 @@ class JobOptions(TypedDict, total=False):
         its neighbours' angles. optimize moves it towards the mean of its neighbours in the
         first half of the passes, and then to wherever the smallest angle becomes larger.
         Neither uses lambda, and neither removes noise. labels is for labels alone: it takes the
-        steps of the voxels away, keeps flat faces and edges, and gives each label the volume of
-        its voxels.
+        steps of the voxels away, keeps flat faces, and gives each label the volume of its
+        voxels, to a few tenths of a percent.
 
     lambda_
         Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours. Null: 1
