@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <span>
 
@@ -18,11 +17,9 @@ namespace isomesh::mesh {
 // A position and one idle lane.
 using Float4 = float __attribute__((vector_size(16)));
 
-// Reads four bytes past the position: the next one's, or what Buffer keeps behind the last.
+// Reads nothing of the next position, which another thread may be writing.
 inline Float4 load(const Vec3& position) {
-  Float4 lanes;
-  std::memcpy(&lanes, &position, sizeof lanes);
-  return lanes;
+  return Float4{position[0], position[1], position[2], 0};
 }
 
 // One coordinate of two points.

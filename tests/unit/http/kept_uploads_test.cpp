@@ -140,15 +140,27 @@ TEST_F(KeptParts, GoWhenNothingMoreComes) {
 }
 
 TEST_F(KeptParts, OfWhoHasMostTheLongestIdleGivesWay) {
-  KeptUploads kept({.parts = 3, .part_bytes = 1000}, folder_.path());
+  KeptUploads kept({.parts = 3}, folder_.path());
+  const std::string greedy = begun(kept, "a")->name();
+  const std::string second = begun(kept, "a")->name();
+  const std::string modest = begun(kept, "b")->name();
+  begun(kept, "c");
+  EXPECT_THROW(kept.find_partial("a", greedy), Error);
+  EXPECT_NO_THROW(kept.find_partial("a", second));
+  EXPECT_NO_THROW(kept.find_partial("b", modest));
+}
+
+// Whether the thread or the next upload makes room first.
+TEST_F(KeptParts, OfWhoHasMostBytesTheLongestIdleGivesWay) {
+  KeptUploads kept({.part_bytes = 1000}, folder_.path());
   const std::string greedy = begun(kept, "a", 400)->name();
   const std::string second = begun(kept, "a", 100)->name();
   const std::string modest = begun(kept, "b", 300)->name();
   const KeptUploads::Partial sent = begun(kept, "c", 900);
-  EXPECT_THROW(kept.find_partial("a", greedy), Error);
   begun(kept, "c");
-  EXPECT_THROW(kept.find_partial("a", second), Error);
+  EXPECT_THROW(kept.find_partial("a", greedy), Error);
   EXPECT_THROW(kept.find_partial("b", modest), Error);
+  EXPECT_NO_THROW(kept.find_partial("a", second));
   EXPECT_NO_THROW(kept.find_partial("c", sent->name()));
 }
 
