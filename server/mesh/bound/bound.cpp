@@ -8,6 +8,7 @@
 
 #include "proto/error.h"
 #include "proto/samples.h"
+#include "server/mesh/bound/clusters.h"
 #include "server/mesh/bound/collapses.h"
 #include "server/mesh/bound/cover.h"
 #include "server/mesh/bound/field.h"
@@ -192,8 +193,8 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
   }
 
   std::optional<Tube> tube =
-      make_start(*field, crossings, metric, {.reach_mm = reach, .is_moved = options.is_smoothed},
-                 mesh, context);
+      make_start(*field, crossings, find_clusters(lattice, extract, crossings, context), metric,
+                 {.reach_mm = reach, .is_moved = options.is_smoothed}, mesh, context);
   if (!tube) return unproven("Samples differ too little from the iso-value.");
   collapse_edges(*field, metric, {.reach_mm = reach, .triangles = options.triangles}, context,
                  *tube);

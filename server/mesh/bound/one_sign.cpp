@@ -31,13 +31,18 @@ double number_in(std::size_t family, Vecd p) {
 // Convex, in order. Each of the six families cuts off two sides at most.
 class Polygon {
  public:
-  void add(Vecd p) { points_[size_++] = p; }
+  void add(Vecd p) {
+    x_[size_] = p.x;
+    y_[size_] = p.y;
+    z_[size_++] = p.z;
+  }
   std::size_t size() const { return size_; }
-  Vecd operator[](std::size_t i) const { return points_[i]; }
+  Vecd operator[](std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
 
  private:
-  std::array<Vecd, 24> points_;
+  static constexpr std::size_t kMost = 24;
   std::size_t size_ = 0;
+  std::array<double, kMost> x_, y_, z_;  // set up to size_: most of the time would go into zeros
 };
 
 // F by its own words: in Kuhn's tetrahedra the way from a cell's first corner to its last goes
@@ -82,15 +87,13 @@ class Cutter {
       low = std::min(low, number_in(family, polygon[i]));
       high = std::max(high, number_in(family, polygon[i]));
     }
-    Polygon rest = polygon;
-    for (double plane = std::floor(low + kSame) + 1; plane < high - kSame; ++plane) {
-      Polygon below;
-      Polygon above;
-      if (!cut(rest, family, plane, below, above)) return false;
-      if (!are_pieces_positive(below, family + 1)) return false;
-      rest = above;
-    }
-    return are_pieces_positive(rest, family + 1);
+    // The last plane first: what is below it is cut further by those before.
+    const double plane = std::ceil(high - kSame) - 1;
+    if (!(plane > low + kSame)) return are_pieces_positive(polygon, family + 1);
+    Polygon below;
+    Polygon above;
+    return cut(polygon, family, plane, below, above) && are_pieces_positive(below, family) &&
+           are_pieces_positive(above, family + 1);
   }
 
  private:

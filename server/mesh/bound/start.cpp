@@ -31,14 +31,18 @@ bool is_in_face(const Dims& dims, const Vecd& a, const Vecd& b) {
 
 class Starter {
  public:
-  Starter(const Field& field, std::span<const Crossing> crossings, const Metric& metric,
-          const StartOptions& options, const Mesh& mesh, const Context& context)
+  Starter(const Field& field, std::span<const Crossing> crossings, const Clusters& clusters,
+          const Metric& metric, const StartOptions& options, const Mesh& mesh,
+          const Context& context)
       : field_(field),
         crossings_(crossings),
+        clusters_(clusters),
         metric_(metric),
         options_(options),
         mesh_(mesh),
         context_(context),
+        vertex_(crossings.size()),
+        is_joined_(crossings.size(), 0),
         stepped_(crossings.size(), 0),
         changed_(crossings.size(), 1),
         is_unclear_(crossings.size(), 0) {}
@@ -50,9 +54,11 @@ class Starter {
       add_normals();
       place_changed_vertices();
       find_faults();
-      if (!has_faults()) return std::move(tube_);
+      if (!has_faults()) break;
       if (!step_back()) return {};
     }
+    name_vertices();
+    return std::move(tube_);
   }
 
  private:
@@ -70,15 +76,50 @@ class Starter {
         tube_.border[v] = static_cast<std::uint8_t>(
             is_in_face(field_.dims, field_.place(inside), field_.place(outside)));
         stepped_[v] = tube_.border[v];
-        tube_.vertices[v] = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
-        if (!options_.is_moved || stepped_[v] != 0) return;
-        const Vec3& at = mesh_.positions[v];
-        tube_.vertices[v].p = snap(metric_.index({at[0], at[1], at[2]}));
+        vertex_[v] = static_cast<std::uint32_t>(v);
+        place_alone(v);
       });
+    });
+    parallel_for(context_, chunks_of(clusters_.size()), [&](std::size_t chunk) {
+      visit_chunk(chunk, clusters_.size(), [&](std::size_t k) { join(clusters_.members(k)); });
     });
     const std::size_t chunks = chunks_of(tube_.triangles.size());
     look_.resize(chunks);
     faults_.resize(chunks);
+  }
+
+  // Where a vertex is that no other is joined with.
+  void place_alone(std::size_t v) {
+    tube_.vertices[v] = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
+    if (!options_.is_moved || stepped_[v] != 0) return;
+    tube_.vertices[v].p = snap(moved(v));
+  }
+
+  Vecd moved(std::size_t v) const {
+    const Vec3& at = mesh_.positions[v];
+    return metric_.index({at[0], at[1], at[2]});
+  }
+
+  // Makes one vertex of crossings, at their mean.
+  void join(std::span<const std::uint32_t> crossings) {
+    Vecd sum = {};
+    for (const std::uint32_t v : crossings) {
+      vertex_[v] = crossings.front();
+      sum = sum + (options_.is_moved ? moved(v) : zero_between(field_, crossings_[v]));
+    }
+    is_joined_[crossings.front()] = 1;
+    tube_.vertices[crossings.front()].p = snap(sum * (1.0 / static_cast<double>(crossings.size())));
+  }
+
+  // The vertices of a triangle of S. Some of them are one where crossings are joined.
+  Triangle corners(std::size_t t) const {
+    const auto& [a, b, c] = tube_.triangles[t];
+    return {vertex_[a], vertex_[b], vertex_[c]};
+  }
+
+  static bool is_empty(const Triangle& corners) {
+    const auto& [a, b, c] = corners;
+    return a == b || b == c || c == a;
   }
 
   void find_changed_triangles() {
@@ -86,7 +127,8 @@ class Starter {
       look_[chunk].clear();
       visit_chunk(chunk, tube_.triangles.size(), [&](std::size_t t) {
         const auto& [a, b, c] = tube_.triangles[t];
-        if ((changed_[a] | changed_[b] | changed_[c]) != 0) look_[chunk].push_back(t);
+        const bool is_changed = (changed_[a] | changed_[b] | changed_[c]) != 0;
+        if (is_changed && !is_empty(corners(t))) look_[chunk].push_back(t);
       });
     });
   }
@@ -96,12 +138,12 @@ class Starter {
     std::ranges::fill(normals_, Vecf{});
     for (const auto& chunk : look_) {
       for (const std::size_t t : chunk) {
-        const auto& [a, b, c] = tube_.triangles[t];
+        const auto& [a, b, c] = corners(t);
         const Vecf p = tube_.vertices[a].p;
         const Vecf normal =
             cross(metric_.mm(tube_.vertices[b].p - p), metric_.mm(tube_.vertices[c].p - p)) *
             metric_.turn();
-        for (const std::uint32_t v : tube_.triangles[t]) normals_[v] = normals_[v] + normal;
+        for (const std::uint32_t v : {a, b, c}) normals_[v] = normals_[v] + normal;
       }
     }
   }
@@ -110,26 +152,44 @@ class Starter {
     parallel_for(context_, chunks_of(crossings_.size()), [&](std::size_t chunk) {
       Clear clear(field_);
       visit_chunk(chunk, crossings_.size(), [&](std::size_t v) {
-        if (changed_[v] == 0) return;
+        if (changed_[v] == 0 || vertex_[v] != v) return;
         Vertex& vertex = tube_.vertices[v];
         if (stepped_[v] != 0) {
           vertex = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
         } else {
-          place_along_normal(v, vertex);
+          place_along_normal(clear, v);
         }
         is_unclear_[v] = static_cast<std::uint8_t>(!has_clear_ends(clear, vertex));
       });
     });
   }
 
-  void place_along_normal(std::size_t v, Vertex& vertex) const {
+  void place_along_normal(Clear& clear, std::size_t v) {
+    Vertex& vertex = tube_.vertices[v];
     Vecd normal = wide(normals_[v]);
     if (!(length(normal) > 0)) {
       normal = metric_.mm(field_.place(crossings_[v].inside) - field_.place(crossings_[v].outside));
     }
     const Vecd way = metric_.steps(normal * (options_.reach_mm / length(normal)));
+    if (is_joined_[v] != 0 && !options_.is_moved)
+      vertex.p = nearer_to_surface(clear, vertex.p, way);
     vertex.in = snap(wide(vertex.p) + way);
     vertex.out = snap(wide(vertex.p) - way);
+  }
+
+  // The mean of crossings is off S. Most of a Newton step along `way`, which leads inside; the
+  // whole of it leaves more triangles that are not upright.
+  Vecf nearer_to_surface(Clear& clear, Vecf p, const Vecd& way) const {
+    constexpr double kShare = 0.7;
+    constexpr double kFarthest = 2;
+    const Vecf inner = snap(wide(p) + way);
+    const Vecf outer = snap(wide(p) - way);
+    if (!clear.contains(inner) || !clear.contains(outer)) return p;
+    clear.base(p);
+    const double rise = clear.value(clear.at(inner)) - clear.value(clear.at(outer));
+    if (!(rise > 0)) return p;
+    const double step = -2 * clear.value(clear.at(p)) / rise;
+    return snap(wide(p) + way * (kShare * std::clamp(step, -kFarthest, kFarthest)));
   }
 
   static bool has_clear_ends(Clear& clear, const Vertex& vertex) {
@@ -143,7 +203,7 @@ class Starter {
       Clear clear(field_);
       faults_[chunk].clear();
       for (const std::size_t t : look_[chunk]) {
-        if (is_at_fault(clear, tube_.triangles[t])) faults_[chunk].push_back(t);
+        if (is_at_fault(clear, corners(t))) faults_[chunk].push_back(t);
       }
     });
   }
@@ -184,31 +244,60 @@ class Starter {
     std::vector<std::uint32_t> count(crossings_.size(), 0);
     for (const auto& chunk : faults_) {
       for (const std::size_t t : chunk) {
-        for (const std::uint32_t v : tube_.triangles[t]) count[v] += stepped_[v] == 0 ? 1 : 0;
+        for (const std::uint32_t v : corners(t)) count[v] += stepped_[v] == 0 ? 1 : 0;
       }
     }
     std::ranges::fill(changed_, 0);
     for (const auto& chunk : faults_) {
       for (const std::size_t t : chunk) {
-        const auto most = std::ranges::max(tube_.triangles[t], {}, [&](std::uint32_t v) {
+        const auto most = std::ranges::max(corners(t), {}, [&](std::uint32_t v) {
           return std::pair(count[v], crossings_.size() - v);
         });
         if (count[most] == 0) return false;
         changed_[most] = 1;
       }
     }
-    for (std::size_t v = 0; v < changed_.size(); ++v) stepped_[v] |= changed_[v];
+    for (std::size_t v = 0; v < changed_.size(); ++v) {
+      if (is_joined_[v] == 0) stepped_[v] |= changed_[v];
+    }
+    for (std::size_t k = 0; k < clusters_.size(); ++k) {
+      const std::uint32_t first = clusters_.members(k).front();
+      if ((changed_[first] & is_joined_[first]) != 0) separate(clusters_.members(k));
+    }
     return true;
+  }
+
+  void separate(std::span<const std::uint32_t> crossings) {
+    is_joined_[crossings.front()] = 0;
+    for (const std::uint32_t v : crossings) {
+      vertex_[v] = v;
+      changed_[v] = 1;
+      place_alone(v);
+    }
+  }
+
+  // Gives the tube its own triangles instead of those of S.
+  void name_vertices() {
+    std::size_t count = 0;
+    for (std::size_t t = 0; t < tube_.triangles.size(); ++t) {
+      const Triangle triangle = corners(t);
+      if (!is_empty(triangle)) tube_.triangles[count++] = triangle;
+    }
+    tube_.triangles.resize(count);
   }
 
   const Field& field_;
   const std::span<const Crossing> crossings_;
+  const Clusters& clusters_;
   const Metric& metric_;
   const StartOptions& options_;
   const Mesh& mesh_;
   const Context& context_;
-  Tube tube_;
+  Tube tube_;  // while it is repaired, with the triangles of S
   std::vector<Vecf> normals_;
+  std::vector<std::uint32_t> vertex_;  // of each crossing: the first crossing of its cluster
+  std::vector<std::uint8_t>
+      is_joined_;  // of the first crossings: whether the cluster is one vertex
   std::vector<std::uint8_t> stepped_, changed_, is_unclear_;  // by vertex
   std::vector<std::vector<std::size_t>> look_, faults_;       // by chunk of triangles
 };
@@ -232,9 +321,10 @@ Vertex on_lattice_edge(const Field& field, const Crossing& crossing, const Metri
 }
 
 std::optional<Tube> make_start(const Field& field, std::span<const Crossing> crossings,
-                               const Metric& metric, const StartOptions& options, const Mesh& mesh,
+                               const Clusters& clusters, const Metric& metric,
+                               const StartOptions& options, const Mesh& mesh,
                                const Context& context) {
-  return Starter(field, crossings, metric, options, mesh, context).run();
+  return Starter(field, crossings, clusters, metric, options, mesh, context).run();
 }
 
 }  // namespace isomesh::mesh::bound

@@ -1,15 +1,17 @@
 // The tube that simplification starts from; private to this folder.
 //
-// Each vertex of the surface gets its places in T+ and T-, up and down along its normal. Where the
-// tube is not clear of S or a triangle not upright, the vertex that is most often at fault steps
-// back: to its lattice edge, with T+ and T- on the ways to the edge's two samples. A tube whose
-// vertices are all there is clear.
+// Crossings around a sample are joined into one vertex, as a surface that is regularised has them.
+// Each vertex gets its places in T+ and T-, up and down along its normal. Where the tube is not
+// clear of S or a triangle not upright, the vertex that is most often at fault steps back: a joined
+// one becomes its crossings, and one of a single crossing goes to its lattice edge, with T+ and T-
+// on the ways to the edge's two samples. A tube whose vertices are all there is clear.
 #pragma once
 
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "server/mesh/bound/clusters.h"
 #include "server/mesh/bound/field.h"
 #include "server/mesh/bound/tube.h"
 #include "server/mesh/context.h"
@@ -25,7 +27,8 @@ struct StartOptions {
 // `mesh`: the surface that is not regularised, a vertex for each of `crossings`. Nothing where
 // single precision cannot tell the tube from S. The same for any number of threads.
 std::optional<Tube> make_start(const Field& field, std::span<const Crossing> crossings,
-                               const Metric& metric, const StartOptions& options, const Mesh& mesh,
+                               const Clusters& clusters, const Metric& metric,
+                               const StartOptions& options, const Mesh& mesh,
                                const Context& context);
 
 // A vertex that stepped back.

@@ -38,7 +38,9 @@ struct Scene {
         metric(volume.lattice().to_space),
         field(make_field(volume.lattice(), {}, {})),
         crossings(crossings_of(*field, {})),
-        tube(make_start(*field, crossings, metric, {.reach_mm = kReach}, mesh, {}).value()),
+        tube(make_start(*field, crossings, find_clusters(volume.lattice(), {}, crossings, {}),
+                        metric, {.reach_mm = kReach}, mesh, {})
+                 .value()),
         origins(crossings.size()) {
     collapse_edges(*field, metric, {.reach_mm = kReach}, {}, tube);
     std::iota(origins.begin(), origins.end(), 0U);
