@@ -189,6 +189,8 @@ void read_members(const Json& json, T& value) {
       read_field(*found, member);
     } else if (!kMayBeMissing && !may_be_absent(name)) {
       throw Error(ErrorCode::kInternal, std::string("lacks ") + key);
+    } else if constexpr (std::is_same_v<Member, bool>) {
+      member = false;  // what an older version had no switch for, it did not do
     }
   });
 }

@@ -107,9 +107,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                 "Each label gets a surface of its own. Neighbouring labels share the wall "
                 "between them. Values that are not listed are background. Vertices lie "
                 "half-way between two samples. Some defaults differ from those of jobs with an "
-                "iso-value: `regularize` is true, and `smoothing` is `labels`. With another kind "
-                "of smoothing there are 10 passes, a lambda of 0.33, and no vertex moves farther "
-                "than half the smallest spacing.",
+                "iso-value: `smoothing` is `labels`. With another kind of smoothing there are 10 "
+                "passes, a lambda of 0.33, and no vertex moves farther than half the smallest "
+                "spacing.",
             .minimum = kLeast,
             .maximum = kMost,
             .jobs = JobKind::kByLabels,
@@ -187,8 +187,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                 .more = "The surface has about a third as many triangles, with larger angles. It "
                         "keeps its connected components, its boundary and its genus. Vertices at "
                         "the volume's border stay where they are. The same holds for the own "
-                        "surface of each label.",
-                .by_labels = "true",
+                        "surface of each label. False gives a vertex to each edge between two "
+                        "samples that the surface crosses. At an iso-value, `max_error_mm` does "
+                        "the same: its limit is measured from that surface.",
                 .may_be_absent = true},
       self.regularize);
   parameter(Parameter{.name = "passes",

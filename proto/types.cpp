@@ -196,7 +196,6 @@ JobParameters label_parameters(LabelChoice labels) {
   parameters.interpolation = Interpolation::kMidpoint;
   parameters.passes = kPasses;
   parameters.smoothing = Smoothing::kLabels;
-  parameters.regularize = true;
   return parameters;
 }
 

@@ -220,7 +220,7 @@ struct MeshParameters {
   std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
-  bool regularize = false;
+  bool regularize = true;
   int passes = 5;
   Smoothing smoothing = Smoothing::kLaplacian;
   std::optional<double> lambda;               // empty: default_lambda(smoothing)

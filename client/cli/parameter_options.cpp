@@ -98,10 +98,10 @@ class ParameterOptions {
         must_be(parameter, std::is_integral_v<Number>));
   }
 
-  CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, bool& value) {
     CLI::Option* on = app_.add_flag(name, value, help + (value ? " (default)" : ""));
-    if (value || parameter.by_labels != nullptr) {
+    if (value) {
       const std::string off = "--no-" + name.substr(2);
       app_.add_flag_callback(
               off, [&value] { value = false; }, "Switch off " + name)
@@ -377,13 +377,11 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
     if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
     if (labels->count() == 0) return;
     const auto is_left_out = [&](const std::string& name) {
-      const CLI::Option* const off = app.get_option_no_throw("--no-" + name);
-      return app.get_option("--" + name)->count() == 0 && (off == nullptr || off->count() == 0);
+      return app.get_option("--" + name)->count() == 0;
     };
     const JobParameters standard = label_parameters({});
     if (is_left_out("passes")) parameters.passes = standard.passes;
     if (is_left_out("smoothing")) parameters.smoothing = standard.smoothing;
-    if (is_left_out("regularize")) parameters.regularize = standard.regularize;
   });
 }
 

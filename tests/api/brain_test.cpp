@@ -16,6 +16,7 @@ using namespace test;
 
 struct Golden {
   const char* scheme;
+  const char* regularize;
   std::uint64_t triangles;
   std::uint64_t vertices;
   double volume_mm3;
@@ -29,8 +30,8 @@ TEST_P(Brain, HasTheKnownCountsInTheFileToo) {
   const Daemon daemon;
   const TemporaryFolder folder;
   const Finished result =
-      daemon.command({"mesh", kBrainFile, "--iso", "60", "--scheme", golden.scheme, "--passes", "0",
-                      "--json", "-o", folder / "brain.drc"});
+      daemon.command({"mesh", kBrainFile, "--iso", "60", "--scheme", golden.scheme,
+                      golden.regularize, "--passes", "0", "--json", "-o", folder / "brain.drc"});
   ASSERT_EQ(result.status, 0) << result.errors;
   const MeshSummary mesh = job_from_json(result.output).mesh.value();
   EXPECT_EQ(mesh.triangles, golden.triangles);
@@ -43,12 +44,16 @@ TEST_P(Brain, HasTheKnownCountsInTheFileToo) {
   EXPECT_EQ(decoded.points.size(), golden.vertices);
 }
 
-INSTANTIATE_TEST_SUITE_P(Schemes, Brain,
-                         testing::Values(Golden{"5", 4062210, 2033703, 2794653.2, 581722.6},
-                                         Golden{"6", 5091320, 2544488, 2795793.9, 593150.7}),
-                         [](const auto& golden) {
-                           return std::string("Scheme") + golden.param.scheme;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Schemes, Brain,
+    testing::Values(Golden{"5", "--no-regularize", 4062210, 2033703, 2794653.2, 581722.6},
+                    Golden{"6", "--no-regularize", 5091320, 2544488, 2795793.9, 593150.7},
+                    Golden{"5", "--regularize", 1548420, 776808, 2795157.2, 573194.5},
+                    Golden{"6", "--regularize", 1761096, 879376, 2796561.8, 580961.2}),
+    [](const auto& golden) {
+      const bool is_plain = golden.param.regularize[2] == 'n';
+      return std::string("Scheme") + golden.param.scheme + (is_plain ? "" : "Regularised");
+    });
 
 }  // namespace
 }  // namespace isomesh

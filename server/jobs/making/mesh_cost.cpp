@@ -81,6 +81,10 @@ mesh::SmoothingWay way_of(Smoothing smoothing) {
   return mesh::SmoothingWay::kMean;
 }
 
+bool is_regularized(const MeshParameters& parameters) {
+  return parameters.regularize && (parameters.labels || !parameters.max_error_mm);
+}
+
 bool removes_stairs(const MeshParameters& parameters) {
   return parameters.smoothing == Smoothing::kLabels && parameters.passes > 0;
 }

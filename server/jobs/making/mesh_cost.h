@@ -10,6 +10,10 @@
 
 namespace isomesh::jobs {
 
+// True if crossings are joined while the surface is extracted. A largest error is measured from the
+// surface at an iso-value as it is without.
+bool is_regularized(const MeshParameters& parameters);
+
 // True if labels are smoothed by remove_stairs (server/mesh/stairs).
 bool removes_stairs(const MeshParameters& parameters);
 

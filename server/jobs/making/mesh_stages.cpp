@@ -49,11 +49,10 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
 }
 
 // Why the job's error is measured and not proven, if so: the proof follows the surface that the
-// samples define, whole and open, and a vertex on each lattice edge that it crosses.
+// samples define, whole and open.
 const char* why_measured(const MeshParameters& parameters) {
   if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
   if (parameters.scheme != Scheme::kSix) return "The proof is for scheme 6.";
-  if (parameters.regularize) return "The proof is for surfaces without regularize.";
   if (parameters.close) return "The proof is for surfaces without close.";
   if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
   if (!parameters.components.keeps_all()) return "The proof is for all components together.";
@@ -146,7 +145,7 @@ mesh::ExtractOptions extract_options(const MeshParameters& parameters, double is
           .scheme = parameters.scheme,
           .interpolation = parameters.interpolation,
           .close = parameters.close,
-          .regularize = parameters.regularize};
+          .regularize = is_regularized(parameters)};
 }
 
 void simplify_stage(const SampleArray& samples, const MeshRequest& request,

@@ -36,9 +36,9 @@ SurfaceSize surface_in_files(const MeshSummary& mesh) {
 // A key of what determines the surface of a volume besides iso-value, scheme and whether it is
 // closed.
 std::string key_of_part(const MeshParameters& parameters) {
-  if (!parameters.labels && !parameters.crop && !parameters.regularize) return {};
   MeshParameters part;
-  part.regularize = parameters.regularize;
+  part.regularize = is_regularized(parameters);
+  if (!parameters.labels && !parameters.crop && !part.regularize) return {};
   // The positions of crossings decide which of them are joined.
   if (part.regularize) part.interpolation = parameters.interpolation;
   part.crop = parameters.crop;

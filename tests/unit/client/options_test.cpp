@@ -222,7 +222,7 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
        {"Number of tetrahedra per cell (5 or 6; default: 6)",
         "(laplacian, taubin, angle, optimize or labels; default: laplacian, "
         "labels with --labels)",
-        "keeps the topology (default: true with --labels)",
+        "keeps the topology (default) --no-regularize Switch off --regularize",
         "(from 0 to 1000; default: 5, 10 with --labels)",
         "default: 1 for laplacian, 0.33 for taubin, ", "default: 0.1)", "position, in mm",
         "(default: drc)"}) {

@@ -67,8 +67,10 @@ class ErrorJobsTest : public test::JobsFixture {
   }
 
   // The surface as it is extracted.
-  Soup extracted() {
+  // What a largest error is measured from; joined: without one.
+  Soup extracted(bool joined = false) {
     JobParameters parameters = parameters_of(volume_, 0);
+    parameters.regularize = joined;
     parameters.passes = 0;
     parameters.formats = {MeshFormat::kStl};
     return stl(run(parameters));
@@ -130,11 +132,21 @@ TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
   };
   EXPECT_EQ(why([](auto& job) { job.scheme = Scheme::kFive; }), "The proof is for scheme 6.");
   EXPECT_EQ(why([](auto& job) { job.close = true; }), "The proof is for surfaces without close.");
-  EXPECT_EQ(why([](auto& job) { job.regularize = true; }),
-            "The proof is for surfaces without regularize.");
   EXPECT_EQ(why([](auto& job) { job.components.keep = 1; }),
             "The proof is for all components together.");
   EXPECT_EQ(why([](auto& job) { job.max_error_mm.reset(); }), "A proof needs max_error_mm.");
+}
+
+// Their limit is measured from the surface whose vertices are not joined.
+TEST_F(ErrorJobsTest, AreTheSameWithAndWithoutRegularize) {
+  const auto triangles_with = [&](bool regularize) {
+    JobParameters parameters = parameters_of(volume_, 0);
+    parameters.max_error_mm = 0.1;
+    parameters.regularize = regularize;
+    const MeshSummary mesh = run(parameters);
+    return std::pair(mesh.triangles, mesh.simplified->triangles_before);
+  };
+  EXPECT_EQ(triangles_with(true), triangles_with(false));
 }
 
 // Draco's default of bits is too few for some micrometres.
@@ -154,7 +166,7 @@ TEST_F(ErrorJobsTest, SayWhatTheirTrianglesCost) {
   EXPECT_LE(mesh.triangles, 500U);
   EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kTriangles);
   EXPECT_DOUBLE_EQ(mesh.certificate->found_mm,
-                   certify(stl(mesh).view(), extracted().view(), {}).max_mm());
+                   certify(stl(mesh).view(), extracted(true).view(), {}).max_mm());
   EXPECT_FALSE(mesh.certificate->budget_mm);
   parameters.max_error_mm = 0.05;  // which 500 triangles cannot keep
   const MeshSummary both = run(parameters);

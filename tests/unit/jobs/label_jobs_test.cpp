@@ -110,6 +110,7 @@ TEST_F(LabelJobsTest, OfOneLabelAreThoseOfItsIsoValueAtMidpoints) {
   const PipelineResult by_label = run(two, settled(two, labels));
   JobParameters iso = parameters_of(two, 0.5);
   iso.interpolation = Interpolation::kMidpoint;
+  iso.regularize = false;
   iso.formats = {MeshFormat::kStl};
   iso.passes = 3;
   iso.max_displacement_mm = 100;

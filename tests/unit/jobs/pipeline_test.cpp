@@ -62,6 +62,7 @@ TEST_F(PipelineTest, JoinsVerticesAndKeepsTheTopology) {
   for (const bool close : {false, true}) {
     JobParameters parameters = parameters_of(volume, 0.75);
     parameters.close = close;
+    parameters.regularize = false;
     const MeshSummary plain = run(volume, parameters).mesh;
     parameters.regularize = true;
     const PipelineResult joined = run(volume, parameters);

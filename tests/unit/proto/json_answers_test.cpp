@@ -48,6 +48,14 @@ TEST(AnswerJson, VolumesComeBackTheSame) {
   EXPECT_EQ(volumes_from_json(to_json(several)), several);
 }
 
+TEST(AnswerJson, JobsOfBeforeASwitchDidNotHaveItOn) {
+  json job = json::parse(to_json(succeeded_job()));
+  job["parameters"]["regularize"] = true;
+  EXPECT_TRUE(job_from_json(job.dump()).parameters.regularize);
+  job["parameters"].erase("regularize");
+  EXPECT_FALSE(job_from_json(job.dump()).parameters.regularize);
+}
+
 TEST(AnswerJson, PagesHaveTheCursorOfTheNext) {
   EXPECT_EQ(next_from_json(R"({"jobs": [], "next": "abc"})"), "abc");
   EXPECT_EQ(next_from_json(R"({"jobs": [], "next": null})"), "");

@@ -68,7 +68,6 @@ TEST(JobBody, HasTheDefaultsByLabelsThatTheTableTells) {
     if (row.by_labels != nullptr) told[row.name] = row.by_labels;
   });
   EXPECT_EQ(told, (std::map<std::string, std::string>{
-                      {"regularize", parameters.regularize ? "true" : "false"},
                       {"passes", std::to_string(parameters.passes)},
                       {"smoothing", std::string(to_string(parameters.smoothing))},
                       {"lambda", number_text(*parameters.lambda)}}));

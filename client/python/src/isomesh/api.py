@@ -978,9 +978,9 @@ class JobOptions(TypedDict, total=False):
         Labels of a segmentation to mesh instead of an iso-value: their values, or all. Each
         label gets a surface of its own. Neighbouring labels share the wall between them. Values
         that are not listed are background. Vertices lie half-way between two samples. Some
-        defaults differ from those of jobs with an iso-value: regularize is true, and smoothing
-        is labels. With another kind of smoothing there are 10 passes, a lambda of 0.33, and no
-        vertex moves farther than half the smallest spacing.
+        defaults differ from those of jobs with an iso-value: smoothing is labels. With another
+        kind of smoothing there are 10 passes, a lambda of 0.33, and no vertex moves farther
+        than half the smallest spacing.
 
     background
         The value of samples without a label.
@@ -1011,7 +1011,9 @@ class JobOptions(TypedDict, total=False):
         Join the vertices around a sample where that keeps the topology. The surface has about a
         third as many triangles, with larger angles. It keeps its connected components, its
         boundary and its genus. Vertices at the volume's border stay where they are. The same
-        holds for the own surface of each label.
+        holds for the own surface of each label. False gives a vertex to each edge between two
+        samples that the surface crosses. At an iso-value, max_error_mm does the same: its limit
+        is measured from that surface.
 
     passes
         Number of smoothing passes. Vertices on the surface's boundary stay where they are. For
