@@ -49,11 +49,10 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
 }
 
 // Why the job's error is measured and not proven, if so: the proof follows the surface that the
-// samples define, whole and open.
+// samples define, whole.
 const char* why_measured(const MeshParameters& parameters) {
   if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
   if (parameters.scheme != Scheme::kSix) return "The proof is for scheme 6.";
-  if (parameters.close) return "The proof is for surfaces without close.";
   if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
   if (!parameters.components.keeps_all()) return "The proof is for all components together.";
   return nullptr;

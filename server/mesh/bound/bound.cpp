@@ -23,6 +23,13 @@ namespace {
 
 constexpr double kLeastReach = 0.25;  // of the error: with less nothing is gained
 
+// The layers of phantoms around a surface that is closed: room for T-, which is outside of its
+// caps.
+std::uint32_t margin_for(const Metric& metric, double error_mm) {
+  constexpr double kMost = 8;
+  return 1 + static_cast<std::uint32_t>(std::min(kMost, std::ceil(error_mm / metric.least_step())));
+}
+
 // What rounding to the grid of the copies, and to the mesh's single precision, may move a place.
 double rounding_of(const Dims& dims, const Metric& metric) {
   constexpr double kUnit = std::numeric_limits<float>::epsilon();
@@ -41,24 +48,22 @@ double rounding_of(const Dims& dims, const Metric& metric) {
 // The triangles of the components of S in `which`, with all vertices on lattice edges, instead of
 // what has become of them. A component of a few voxels may have been folded until T+ and T- lay
 // around it no longer.
-void restore(const Field& field, const Metric& metric, double reach_mm,
-             std::span<const Crossing> crossings, std::span<const Triangle> extracted,
-             std::span<const std::uint32_t> components, std::span<const std::uint32_t> which,
-             Tube& tube) {
-  std::vector<std::uint8_t> back(crossings.size(), 0);
+void restore(const StartSurface& surface, std::span<const std::uint32_t> components,
+             std::span<const std::uint32_t> which, Tube& tube) {
+  const std::size_t crossings = surface.crossings.size();
+  std::vector<std::uint8_t> back(crossings, 0);
   for (const std::uint32_t component : which) back[component] = 1;
   const auto goes_back = [&](const Triangle& triangle) {
     return back[components[triangle[0]]] != 0;
   };
   std::erase_if(tube.triangles, goes_back);
-  for (Triangle triangle : extracted) {
+  for (Triangle triangle : surface.mesh.triangles) {
     if (!goes_back(triangle)) continue;
-    if (!metric.is_left_handed()) std::swap(triangle[1], triangle[2]);
+    if (!surface.metric.is_left_handed()) std::swap(triangle[1], triangle[2]);
     tube.triangles.push_back(triangle);
   }
-  for (std::size_t v = 0; v < crossings.size(); ++v) {
-    if (back[components[v]] == 0) continue;
-    tube.vertices[v] = on_lattice_edge(field, crossings[v], metric, reach_mm);
+  for (std::size_t v = 0; v < crossings; ++v) {
+    if (back[components[v]] != 0) tube.vertices[v] = on_lattice_edge(surface, v);
   }
 }
 
@@ -84,18 +89,17 @@ std::vector<std::uint32_t> compact(Tube& tube) {
 
 // The tube without the components of S that it lies around no longer, and with their plain surface
 // instead. Of each of its vertices: which crossing it began as.
-std::vector<std::uint32_t> restore_lost(const Field& field, const Metric& metric, double reach_mm,
-                                        std::span<const Crossing> crossings,
-                                        std::span<const Triangle> extracted, const Context& context,
+std::vector<std::uint32_t> restore_lost(const StartSurface& surface, const Context& context,
                                         Tube& tube) {
+  const auto& crossings = surface.crossings;
+  const std::span<const Triangle> extracted = surface.mesh.triangles.span();
   const std::vector<std::uint32_t> components = components_of(crossings.size(), extracted);
   std::vector<std::uint32_t> all(crossings.size());
   std::iota(all.begin(), all.end(), 0U);
-  const auto lost = uncovered(field, {crossings, extracted, tube.vertices, tube.triangles, all},
-                              components, odd_edges(tube.vertices.size(), tube.triangles), context);
-  if (!lost.empty()) {
-    restore(field, metric, reach_mm, crossings, extracted, components, lost, tube);
-  }
+  const auto lost =
+      uncovered(surface.field, {crossings, extracted, tube.vertices, tube.triangles, all},
+                components, odd_edges(tube.vertices.size(), tube.triangles), context);
+  if (!lost.empty()) restore(surface, components, lost, tube);
   return compact(tube);
 }
 
@@ -164,7 +168,7 @@ double BoundedMesh::bound_at(std::span<const Vec3> places) const {
 }
 
 bool has_bound(const ExtractOptions& options) {
-  return options.scheme == Scheme::kSix && !options.close && !options.regularize;
+  return options.scheme == Scheme::kSix && !options.regularize;
 }
 
 template <class T>
@@ -178,28 +182,35 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
   };
   if (!has_bound(extract)) return unproven("There is no proof for such a surface.");
   if (mesh.triangles.size() == 0) return BoundedMesh();
-  const std::optional<Field> field = make_field(lattice, extract, context);
+  const std::uint32_t margin =
+      extract.close ? margin_for(Metric(lattice.to_space), options.max_error_mm) : 0;
+  const std::optional<Field> field = make_field(lattice, extract, margin, context);
   if (!field) return unproven("Single precision cannot hold the samples' differences.");
   const std::vector<Crossing> crossings = crossings_of(*field, context);
   if (crossings.size() != mesh.positions.size()) {
     return unproven("The surface is not the whole one of the samples.");
   }
-  const Metric metric(lattice.to_space);
+  const Metric metric = Metric(lattice.to_space).before(margin);
   const double shift = shift_of(lattice, extract, *field, crossings);
   const double reach =
-      options.max_error_mm - options.rounding_mm - shift - rounding_of(lattice.dims, metric);
+      options.max_error_mm - options.rounding_mm - shift - rounding_of(field->dims, metric);
   if (!(reach > kLeastReach * options.max_error_mm)) {
     return unproven("Rounding of coordinates takes up the limit.");
   }
 
+  const StartSurface surface = {*field,
+                                crossings,
+                                metric,
+                                mesh,
+                                reach,
+                                options.is_smoothed,
+                                0.5 * Placement::nearest_share(lattice.dims, lattice.to_space)};
   std::optional<Tube> tube =
-      make_start(*field, crossings, find_clusters(lattice, extract, crossings, context), metric,
-                 {.reach_mm = reach, .is_moved = options.is_smoothed}, mesh, context);
+      make_start(surface, find_clusters(lattice, extract, *field, crossings, context), context);
   if (!tube) return unproven("Samples differ too little from the iso-value.");
   collapse_edges(*field, metric, {.reach_mm = reach, .triangles = options.triangles}, context,
                  *tube);
-  const std::vector<std::uint32_t> origins =
-      restore_lost(*field, metric, reach, crossings, mesh.triangles.span(), context, *tube);
+  const std::vector<std::uint32_t> origins = restore_lost(surface, context, *tube);
   const Surfaces surfaces = {crossings, mesh.triangles.span(), tube->vertices, tube->triangles,
                              origins};
   if (!prove(*field, surfaces, context).holds()) return unproven("The final check failed.");

@@ -46,13 +46,14 @@ struct BoundedMesh {
 };
 
 // Whether simplify_within proves anything about such a surface: one of six tetrahedra a cell that
-// is neither closed nor regularised.
+// is not regularised.
 bool has_bound(const ExtractOptions& options);
 
 // Simplifies `mesh` in place, which extract_surface made of the lattice with these options, whole,
 // and which may have been smoothed since, by less than the error. Its boundary stays on the faces
-// of the volume and keeps its vertices. The mesh keeps its topology where components are larger
-// than the error, and what Mesh says of layers. The same mesh for any number of threads.
+// of the volume and keeps its vertices; the caps of a closed one stay in the faces. The mesh keeps
+// its topology where components are larger than the error, and what Mesh says of layers. The same
+// mesh for any number of threads.
 //
 // Nothing where that cannot be proven, because single precision does not tell the samples apart or
 // parts of the surface are missing; then the mesh is as it was, and `why_not` says why in a

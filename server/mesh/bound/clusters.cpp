@@ -15,16 +15,18 @@ namespace {
 // The clusters around the samples of one layer.
 class LayerClusters {
  public:
-  LayerClusters(const Dims& dims, std::span<const Crossing> crossings)
-      : dims_(dims), crossings_(crossings), links_(links_of(Scheme::kSix)) {}
+  // `before`: how many layers of the field are before what is marched over.
+  LayerClusters(const Field& field, std::uint32_t before, std::span<const Crossing> crossings)
+      : dims_(field.dims), before_(before), crossings_(crossings), links_(links_of(Scheme::kSix)) {}
 
   Clusters find(const ClusterLayer& layer, std::size_t z) const {
     Clusters clusters;
     if (layer.samples.empty()) return clusters;
-    for (std::size_t y = 0; y < dims_.y; ++y) {
+    for (std::size_t y = 0; y + 1 < layer.row_begin.size(); ++y) {
+      const std::size_t row = ((z + before_) * dims_.y + y + before_) * dims_.x + before_;
       for (std::uint32_t i = layer.row_begin[y]; i < layer.row_begin[y + 1]; ++i) {
         const JoiningSample& sample = layer.samples[i];
-        add(sample, static_cast<std::uint32_t>((z * dims_.y + y) * dims_.x + sample.x), clusters);
+        add(sample, static_cast<std::uint32_t>(row + sample.x), clusters);
       }
     }
     return clusters;
@@ -60,6 +62,7 @@ class LayerClusters {
   }
 
   const Dims& dims_;
+  const std::uint32_t before_;
   const std::span<const Crossing> crossings_;
   const Links& links_;
 };
@@ -67,13 +70,13 @@ class LayerClusters {
 }  // namespace
 
 template <class T>
-Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options,
+Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
                        std::span<const Crossing> crossings, const Context& context) {
   ExtractOptions joining = options;
   joining.regularize = true;
   const SurfaceCount count = count_surface(lattice, joining, context);
   std::vector<Clusters> layers(count.clusters.size());
-  const LayerClusters finder(lattice.dims, crossings);
+  const LayerClusters finder(field, options.close ? field.margin - 1 : 0, crossings);
   parallel_for(context, layers.size(),
                [&](std::size_t z) { layers[z] = finder.find(count.clusters[z], z); });
   Clusters all;
@@ -86,8 +89,8 @@ Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options,
   return all;
 }
 
-#define ISOMESH_INSTANTIATE(T, name, kType)                                 \
-  template Clusters find_clusters(const Lattice<T>&, const ExtractOptions&, \
+#define ISOMESH_INSTANTIATE(T, name, kType)                                               \
+  template Clusters find_clusters(const Lattice<T>&, const ExtractOptions&, const Field&, \
                                   std::span<const Crossing>, const Context&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE

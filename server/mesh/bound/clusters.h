@@ -26,7 +26,7 @@ struct Clusters {
 
 // `crossings`: all of the field's, in their order. Throws Error kCancelled.
 template <class T>
-Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options,
+Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
                        std::span<const Crossing> crossings, const Context& context);
 
 }  // namespace isomesh::mesh::bound

@@ -23,7 +23,8 @@ std::uint32_t previous(std::uint32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
 class Collapser {
  public:
   Collapser(const Field& field, const Metric& metric, double reach_mm, Block& block)
-      : metric_(metric),
+      : field_(field),
+        metric_(metric),
         reach_(static_cast<float>(reach_mm)),
         block_(block),
         clear_(field),
@@ -218,7 +219,9 @@ class Collapser {
 
   bool collapse(std::uint32_t a, std::size_t k, int bucket) {
     const std::uint32_t b = ring_[k];
-    if (stays(b)) return to_end(a, k, bucket);
+    // Caps stay in the faces of the volume, and their edges in both.
+    if ((block_.planes[a] & ~block_.planes[b]) != 0) return false;
+    if (stays(b) || block_.planes[a] != block_.planes[b]) return to_end(a, k, bucket);
     if (bucket < kEasy) return to_end(a, k, bucket) || to_best(a, k, bucket);
     return to_best(a, k, bucket) || to_end(a, k, bucket);
   }
@@ -229,7 +232,7 @@ class Collapser {
     loop_.clear();
     for (std::size_t j = 1; j < ring_.size(); ++j) loop_.push_back(ring_[(k + j) % ring_.size()]);
     is_closed_ = false;
-    if (!is_shapely(v_[b]) || !is_clear(v_[b])) return false;
+    if (!is_shapely(v_[b], block_.planes[b]) || !is_clear(v_[b])) return false;
     finish(a, k, bucket, quadrics_[a] + quadrics_[b].about(way(b, a)), v_[b].p);
     return true;
   }
@@ -250,12 +253,12 @@ class Collapser {
     const Quadric both = quadrics_[a] + quadrics_[b].about(half * -2.0F);
     const Vecf best = half + both.about(half).least(3 * length(half));
     Vertex x = place(a, best, reach);
-    if (!is_shapely(x)) return false;
+    if (!is_within(x.p, a) || !is_shapely(x, block_.planes[a])) return false;
     const Verdict verdict = judge(x);
     if (!verdict.is_clear) {
       if (!verdict.failed) return false;
       x = place(a, best + reach * (*verdict.failed == Side::kIn ? kShift : -kShift), reach);
-      if (!is_shapely(x) || !is_clear(x)) return false;
+      if (!is_within(x.p, a) || !is_shapely(x, block_.planes[a]) || !is_clear(x)) return false;
     }
     const Vecf p = x.p;
     v_[b] = x;
@@ -283,9 +286,18 @@ class Collapser {
   }
 
   Vertex place(std::uint32_t a, Vecf way_mm, Vecf reach_mm) const {
-    const Vecf p = snap(wide(v_[a].p) + metric_.steps(wide(way_mm)));
+    Vecf p = snap(wide(v_[a].p) + metric_.steps(wide(way_mm)));
+    const unsigned planes = block_.planes[a];
+    if ((planes & 0b000011) != 0) p.x = v_[a].p.x;
+    if ((planes & 0b001100) != 0) p.y = v_[a].p.y;
+    if ((planes & 0b110000) != 0) p.z = v_[a].p.z;
     const Vecd reach = metric_.steps(wide(reach_mm));
     return {p, snap(wide(p) + reach), snap(wide(p) - reach)};
+  }
+
+  // Beside caps a surface stays on their inner side, or it would cross them.
+  bool is_within(Vecf p, std::uint32_t a) const {
+    return field_.margin == 0 || block_.planes[a] != 0 || field_.encloses(p);
   }
 
   // The new triangles are x and two that follow each other in loop_; the last and the first too
@@ -293,7 +305,8 @@ class Collapser {
   std::size_t new_triangles() const { return loop_.size() - (is_closed_ ? 0 : 1); }
   std::uint32_t after(std::size_t i) const { return loop_[i + 1 < loop_.size() ? i + 1 : 0]; }
 
-  bool is_shapely(const Vertex& x) const {
+  // `planes`: of x.
+  bool is_shapely(const Vertex& x, unsigned planes) const {
     for (std::size_t i = 0; i < new_triangles(); ++i) {
       const Vertex& a = v_[loop_[i]];
       const Vertex& b = v_[after(i)];
@@ -303,7 +316,8 @@ class Collapser {
       const float longest = std::max({dot(e, e), dot(f, f), dot(g, g)});
       if (!(length(cross(e, f)) >= kLeastShape * longest)) return false;
       if (is_wide(x.in, a.in) || is_wide(x.out, a.out) || is_wide(x.in, b.in) ||
-          is_wide(x.out, b.out) || !is_upright(x, a, b)) {
+          is_wide(x.out, b.out) ||
+          !is_upright(x, a, b, planes & block_.planes[loop_[i]] & block_.planes[after(i)])) {
         return false;
       }
     }
@@ -405,6 +419,7 @@ class Collapser {
     std::array<PlaneNumbers, 2 * kMostNeighbours> rim;
   };
 
+  const Field& field_;
   const Metric& metric_;
   const float reach_;
   Block& block_;

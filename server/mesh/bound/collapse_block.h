@@ -17,8 +17,9 @@ namespace isomesh::mesh::bound {
 struct Block {
   std::vector<Vertex> vertices;
   std::vector<Triangle> triangles;
-  std::vector<std::uint8_t> stays;  // of each vertex: may not change
-  std::vector<std::uint8_t> first;  // of each vertex: to begin with
+  std::vector<std::uint8_t> stays;   // of each vertex: may not change
+  std::vector<std::uint8_t> planes;  // of each vertex: the faces of the volume that it stays in
+  std::vector<std::uint8_t> first;   // of each vertex: to begin with
 };
 
 // Collapses what may go until `least` triangles are left, and leaves only the triangles that

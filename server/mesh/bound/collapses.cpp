@@ -149,6 +149,7 @@ class Rounds {
     for (const std::uint32_t v : names) {
       block.vertices.push_back(tube_.vertices[v]);
       block.stays.push_back(tube_.border[v]);
+      block.planes.push_back(tube_.planes[v]);
     }
     block.first.assign(names.size(), round == 0 ? 1 : 0);
     for (const std::size_t t : members) {

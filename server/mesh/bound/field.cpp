@@ -62,24 +62,31 @@ void visit_crossings(const Field& field, std::uint32_t z, Visit visit) {
 
 template <class T>
 std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions& options,
-                                const Context& context) {
-  const Dims& dims = lattice.dims;
-  if (!dims.has_cells() || dims.samples() > std::numeric_limits<std::uint32_t>::max()) return {};
+                                std::uint32_t margin, const Context& context) {
+  const Dims& inner = lattice.dims;
+  const Dims dims = {inner.x + 2 * margin, inner.y + 2 * margin, inner.z + 2 * margin};
+  if (!inner.has_cells() || dims.samples() > std::numeric_limits<std::uint32_t>::max()) return {};
   const double largest = largest_difference(lattice, options.iso);
   if (!(largest > 0) || std::isinf(largest)) return {};
   const int exponent = std::ilogb(kLargest) - 1 - std::ilogb(largest);
   const bool is_sign = options.interpolation == Interpolation::kMidpoint;
   std::optional<Field> field(std::in_place);
   field->dims = dims;
-  const auto layer = static_cast<std::size_t>(field->step_z());
-  field->values.assign(dims.samples() + layer + dims.x + 2, 0);
-  parallel_for(context, dims.z, [&](std::size_t z) {
-    for (std::size_t i = z * layer; i < (z + 1) * layer; ++i) {
-      const double difference = static_cast<double>(lattice.samples[i]) - options.iso;
-      const bool inside = static_cast<double>(lattice.samples[i]) >= options.iso;
-      const auto scaled = static_cast<float>(std::scalbn(std::abs(difference), exponent));
-      const float value = is_sign ? 1 : std::max(scaled, kLeast);
-      field->values[i] = inside ? value : -value;
+  field->margin = margin;
+  const auto value_of = [&](T sample) {
+    const double difference = static_cast<double>(sample) - options.iso;
+    const auto scaled = static_cast<float>(std::scalbn(std::abs(difference), exponent));
+    const float value = is_sign ? 1 : std::max(scaled, kLeast);
+    return static_cast<double>(sample) >= options.iso ? value : -value;
+  };
+  field->values.assign(dims.samples() + static_cast<std::size_t>(field->step_z()) + dims.x + 2,
+                       margin == 0 ? 0 : kPhantom);
+  parallel_for(context, inner.z, [&](std::size_t z) {
+    const T* from = lattice.samples + z * inner.x * inner.y;
+    for (std::size_t y = 0; y < inner.y; ++y, from += inner.x) {
+      const std::size_t row = ((z + margin) * dims.y + y + margin) * dims.x + margin;
+      std::transform(from, from + inner.x, field->values.begin() + static_cast<std::ptrdiff_t>(row),
+                     value_of);
     }
   });
   return field;
@@ -112,12 +119,19 @@ Vecd zero_between(const Field& field, const Crossing& crossing) {
 template <class T>
 double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
                 const std::vector<Crossing>& crossings) {
-  if (options.interpolation == Interpolation::kMidpoint) return 0;
+  double most = field.margin == 0 ? 0 : -kLargest / double{kPhantom};
   const Metric metric(lattice.to_space);
-  double most = 0;
+  if (options.interpolation == Interpolation::kMidpoint) return most * metric.largest_step();
+  const auto difference = [&](std::uint32_t sample) {
+    const Vecd at = field.place(sample) - Vecd{1, 1, 1} * field.margin;
+    const Dims& inner = lattice.dims;
+    const auto number = static_cast<std::size_t>(at.x + inner.x * (at.y + inner.y * at.z));
+    return static_cast<double>(lattice.samples[number]) - options.iso;
+  };
   for (const Crossing& crossing : crossings) {
-    const double a = static_cast<double>(lattice.samples[crossing.inside]) - options.iso;
-    const double b = static_cast<double>(lattice.samples[crossing.outside]) - options.iso;
+    if (field.is_phantom(crossing.outside)) continue;
+    const double a = difference(crossing.inside);
+    const double b = difference(crossing.outside);
     const double p = field.values[crossing.inside];
     const double q = field.values[crossing.outside];
     const double moved = std::abs(a / (a - b) - p / (p - q));
@@ -129,7 +143,7 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                          \
   template std::optional<Field> make_field(const Lattice<T>&, const ExtractOptions&, \
-                                           const Context&);                          \
+                                           std::uint32_t, const Context&);           \
   template double shift_of(const Lattice<T>&, const ExtractOptions&, const Field&,   \
                            const std::vector<Crossing>&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)

@@ -14,18 +14,30 @@
 
 namespace isomesh::mesh::bound {
 
-// How far F must be from zero to have a sign. Values are below 256, and the rounding errors of what
-// is computed from them are below 1e-10.
+// How far F must be from zero to have a sign. The rounding errors of what is computed from values
+// below 256 are below 1e-10, and beside phantoms below 1e-8.
 inline constexpr double kMargin = 1e-7;
+inline constexpr float kPhantom = -4194304;  // -2^22
 
 // Samples inside are positive, the others negative, and none is nearer to zero than 1e-6. With
-// midpoint placement they are 1 and -1. Immutable once made, so safe to read from several threads.
+// midpoint placement they are 1 and -1. Around a surface that is closed there are some layers of
+// kPhantom, so that it ends that little outside of the volume: see shift_of. Immutable once made,
+// so safe to read from several threads.
 struct Field {
-  Dims dims;
+  Dims dims;                  // with the layers around the volume
+  std::uint32_t margin = 0;   // how many those are on each side
   std::vector<float> values;  // and one layer more, which is read with a weight of zero
 
   std::ptrdiff_t step_y() const { return dims.x; }
   std::ptrdiff_t step_z() const { return std::ptrdiff_t{dims.x} * dims.y; }
+  // Whether a place is between the faces of the volume.
+  bool encloses(Vecf p) const {
+    const auto is_between = [this](float x, std::uint32_t samples) {
+      return x > static_cast<float>(margin) && x < static_cast<float>(samples - 1 - margin);
+    };
+    return is_between(p.x, dims.x) && is_between(p.y, dims.y) && is_between(p.z, dims.z);
+  }
+  bool is_phantom(std::uint32_t sample) const { return values[sample] == kPhantom; }
   Vecd place(std::uint32_t sample) const {
     const std::uint32_t row = sample / dims.x;
     return {static_cast<double>(sample % dims.x), static_cast<double>(row % dims.y),
@@ -39,10 +51,11 @@ struct Crossing {
   std::uint32_t outside = 0;
 };
 
-// Nothing where the samples are too many, or too different, to be told apart in single precision.
+// `margin`: more than 0 where the surface is closed. Nothing where the samples are too many, or too
+// different, to be told apart in single precision.
 template <class T>
 std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions& options,
-                                const Context& context);
+                                std::uint32_t margin, const Context& context);
 
 // All crossings in the order in which extraction numbers its vertices.
 std::vector<Crossing> crossings_of(const Field& field, const Context& context);
@@ -50,8 +63,10 @@ std::vector<Crossing> crossings_of(const Field& field, const Context& context);
 // Where F is zero between the ends, in numbers of samples.
 Vecd zero_between(const Field& field, const Crossing& crossing);
 
-// The farthest that a crossing of F is from that of the samples themselves, in millimetres. Both
-// surfaces are made of the same triangles, so neither is farther from the other.
+// How far S is at most from the surface of the samples themselves, in millimetres: the farthest
+// that a crossing of F is from theirs, since both are made of the same triangles. The caps of a
+// closed surface are where it leaves the volume: those of S are farther out by what F rises between
+// a sample and a phantom.
 template <class T>
 double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
                 const std::vector<Crossing>& crossings);

@@ -29,23 +29,69 @@ bool is_in_face(const Dims& dims, const Vecd& a, const Vecd& b) {
          share_face(a.z, b.z, dims.z);
 }
 
+// Puts a place of a closed surface's border into the faces that it is in but for rounding. Returns
+// which those are, a bit each.
+unsigned pin(const StartSurface& surface, Vecd& place) {
+  const Field& field = surface.field;
+  unsigned planes = 0;
+  unsigned bit = 1;
+  const auto pin_to = [&](double& coordinate, double plane) {
+    if (std::abs(coordinate - plane) <= surface.rounding) {
+      coordinate = plane;
+      planes |= bit;
+    }
+    bit <<= 1;
+  };
+  const auto pin_along = [&](double& coordinate, std::uint32_t samples) {
+    pin_to(coordinate, field.margin);
+    pin_to(coordinate, samples - 1.0 - field.margin);
+  };
+  pin_along(place.x, field.dims.x);
+  pin_along(place.y, field.dims.y);
+  pin_along(place.z, field.dims.z);
+  return planes;
+}
+
+// Where a vertex of the surface is, in numbers of samples.
+Vecd place_of(const StartSurface& surface, std::size_t v) {
+  const Vec3& at = surface.mesh.positions[v];
+  Vecd place = surface.metric.index({at[0], at[1], at[2]});
+  if (surface.mesh.is_on_border(v)) pin(surface, place);
+  return place;
+}
+
+// T is where the vertex is, in a face of the volume, T+ nearer to the sample inside, and T-
+// straight outward.
+Vertex on_cap(const StartSurface& surface, std::size_t v) {
+  Vecd place = place_of(surface, v);
+  const unsigned planes = pin(surface, place);
+  const auto outward = [&](unsigned first) {
+    return static_cast<double>(planes >> (first + 1) & 1) -
+           static_cast<double>(planes >> first & 1);
+  };
+  const Vecd way = {outward(0), outward(2), outward(4)};
+  const auto along = [&](const Vecd& direction, double most) {
+    const double long_mm = std::max(length(surface.metric.mm(direction)), 1e-9);
+    return snap(place + direction * std::min(most, 0.5 * surface.reach_mm / long_mm));
+  };
+  const Vecd inside = surface.field.place(surface.crossings[v].inside);
+  return {snap(place), along(inside - place, 1), along(way, 1e9)};
+}
+
 class Starter {
  public:
-  Starter(const Field& field, std::span<const Crossing> crossings, const Clusters& clusters,
-          const Metric& metric, const StartOptions& options, const Mesh& mesh,
-          const Context& context)
-      : field_(field),
-        crossings_(crossings),
+  Starter(const StartSurface& surface, const Clusters& clusters, const Context& context)
+      : surface_(surface),
+        field_(surface.field),
+        crossings_(surface.crossings),
+        metric_(surface.metric),
         clusters_(clusters),
-        metric_(metric),
-        options_(options),
-        mesh_(mesh),
         context_(context),
-        vertex_(crossings.size()),
-        is_joined_(crossings.size(), 0),
-        stepped_(crossings.size(), 0),
-        changed_(crossings.size(), 1),
-        is_unclear_(crossings.size(), 0) {}
+        vertex_(crossings_.size()),
+        is_joined_(crossings_.size(), 0),
+        stepped_(crossings_.size(), 0),
+        changed_(crossings_.size(), 1),
+        is_unclear_(crossings_.size(), 0) {}
 
   std::optional<Tube> run() {
     set_up();
@@ -65,7 +111,8 @@ class Starter {
   void set_up() {
     tube_.vertices.resize(crossings_.size());
     tube_.border.resize(crossings_.size());
-    tube_.triangles.assign(mesh_.triangles.begin(), mesh_.triangles.end());
+    tube_.planes.resize(crossings_.size());
+    tube_.triangles.assign(surface_.mesh.triangles.begin(), surface_.mesh.triangles.end());
     if (!metric_.is_left_handed()) {
       for (auto& [a, b, c] : tube_.triangles) std::swap(b, c);
     }
@@ -77,6 +124,10 @@ class Starter {
             is_in_face(field_.dims, field_.place(inside), field_.place(outside)));
         stepped_[v] = tube_.border[v];
         vertex_[v] = static_cast<std::uint32_t>(v);
+        if (surface_.mesh.is_on_border(v)) {
+          Vecd place = place_of(surface_, v);
+          tube_.planes[v] = static_cast<std::uint8_t>(pin(surface_, place));
+        }
         place_alone(v);
       });
     });
@@ -90,14 +141,9 @@ class Starter {
 
   // Where a vertex is that no other is joined with.
   void place_alone(std::size_t v) {
-    tube_.vertices[v] = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
-    if (!options_.is_moved || stepped_[v] != 0) return;
-    tube_.vertices[v].p = snap(moved(v));
-  }
-
-  Vecd moved(std::size_t v) const {
-    const Vec3& at = mesh_.positions[v];
-    return metric_.index({at[0], at[1], at[2]});
+    tube_.vertices[v] = on_lattice_edge(surface_, v);
+    const bool is_elsewhere = surface_.is_moved || tube_.planes[v] != 0;
+    if (is_elsewhere && stepped_[v] == 0) tube_.vertices[v].p = snap(place_of(surface_, v));
   }
 
   // Makes one vertex of crossings, at their mean.
@@ -105,7 +151,7 @@ class Starter {
     Vecd sum = {};
     for (const std::uint32_t v : crossings) {
       vertex_[v] = crossings.front();
-      sum = sum + (options_.is_moved ? moved(v) : zero_between(field_, crossings_[v]));
+      sum = sum + (surface_.is_moved ? place_of(surface_, v) : zero_between(field_, crossings_[v]));
     }
     is_joined_[crossings.front()] = 1;
     tube_.vertices[crossings.front()].p = snap(sum * (1.0 / static_cast<double>(crossings.size())));
@@ -155,7 +201,7 @@ class Starter {
         if (changed_[v] == 0 || vertex_[v] != v) return;
         Vertex& vertex = tube_.vertices[v];
         if (stepped_[v] != 0) {
-          vertex = on_lattice_edge(field_, crossings_[v], metric_, options_.reach_mm);
+          vertex = on_lattice_edge(surface_, v);
         } else {
           place_along_normal(clear, v);
         }
@@ -170,8 +216,8 @@ class Starter {
     if (!(length(normal) > 0)) {
       normal = metric_.mm(field_.place(crossings_[v].inside) - field_.place(crossings_[v].outside));
     }
-    const Vecd way = metric_.steps(normal * (options_.reach_mm / length(normal)));
-    if (is_joined_[v] != 0 && !options_.is_moved)
+    const Vecd way = metric_.steps(normal * (surface_.reach_mm / length(normal)));
+    if (is_joined_[v] != 0 && !surface_.is_moved)
       vertex.p = nearer_to_surface(clear, vertex.p, way);
     vertex.in = snap(wide(vertex.p) + way);
     vertex.out = snap(wide(vertex.p) - way);
@@ -189,7 +235,8 @@ class Starter {
     const double rise = clear.value(clear.at(inner)) - clear.value(clear.at(outer));
     if (!(rise > 0)) return p;
     const double step = -2 * clear.value(clear.at(p)) / rise;
-    return snap(wide(p) + way * (kShare * std::clamp(step, -kFarthest, kFarthest)));
+    const Vecf nearer = snap(wide(p) + way * (kShare * std::clamp(step, -kFarthest, kFarthest)));
+    return field_.margin == 0 || field_.encloses(nearer) ? nearer : p;
   }
 
   static bool has_clear_ends(Clear& clear, const Vertex& vertex) {
@@ -215,7 +262,8 @@ class Starter {
     const Vertex& y = tube_.vertices[b];
     const Vertex& z = tube_.vertices[c];
     const bool all_stepped = (stepped_[a] & stepped_[b] & stepped_[c]) != 0;
-    if (!all_stepped && !is_upright(x, y, z)) return true;
+    const unsigned planes = tube_.planes[a] & tube_.planes[b] & tube_.planes[c];
+    if (!all_stepped && !is_upright(x, y, z, planes)) return true;
     return !is_clear(clear, triangle, x.in, y.in, z.in, 1) ||
            !is_clear(clear, triangle, x.out, y.out, z.out, -1);
   }
@@ -286,12 +334,11 @@ class Starter {
     tube_.triangles.resize(count);
   }
 
+  const StartSurface& surface_;
   const Field& field_;
   const std::span<const Crossing> crossings_;
-  const Clusters& clusters_;
   const Metric& metric_;
-  const StartOptions& options_;
-  const Mesh& mesh_;
+  const Clusters& clusters_;
   const Context& context_;
   Tube tube_;  // while it is repaired, with the triangles of S
   std::vector<Vecf> normals_;
@@ -304,8 +351,10 @@ class Starter {
 
 }  // namespace
 
-Vertex on_lattice_edge(const Field& field, const Crossing& crossing, const Metric& metric,
-                       double reach_mm) {
+Vertex on_lattice_edge(const StartSurface& surface, std::size_t vertex) {
+  const auto& [field, crossings, metric, mesh, reach_mm, is_moved, rounding] = surface;
+  const Crossing& crossing = crossings[vertex];
+  if (field.margin != 0 && field.is_phantom(crossing.outside)) return on_cap(surface, vertex);
   const Vecd inside = field.place(crossing.inside);
   const Vecd outside = field.place(crossing.outside);
   const Vecd way = outside - inside;
@@ -320,11 +369,9 @@ Vertex on_lattice_edge(const Field& field, const Crossing& crossing, const Metri
           snap(inside + way * std::min(1.0, share + reach))};
 }
 
-std::optional<Tube> make_start(const Field& field, std::span<const Crossing> crossings,
-                               const Clusters& clusters, const Metric& metric,
-                               const StartOptions& options, const Mesh& mesh,
+std::optional<Tube> make_start(const StartSurface& surface, const Clusters& clusters,
                                const Context& context) {
-  return Starter(field, crossings, clusters, metric, options, mesh, context).run();
+  return Starter(surface, clusters, context).run();
 }
 
 }  // namespace isomesh::mesh::bound

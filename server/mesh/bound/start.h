@@ -19,20 +19,22 @@
 
 namespace isomesh::mesh::bound {
 
-struct StartOptions {
+// What the tube is made around.
+struct StartSurface {
+  const Field& field;
+  std::span<const Crossing> crossings;
+  const Metric& metric;
+  const Mesh& mesh;       // plain: a vertex for each crossing
   double reach_mm = 0;    // how far T+ and T- are from T
   bool is_moved = false;  // whether vertices are not on their lattice edges any more
+  double rounding = 0;    // how far from a face of the volume a vertex in it may be, in samples
 };
 
-// `mesh`: the surface that is not regularised, a vertex for each of `crossings`. Nothing where
-// single precision cannot tell the tube from S. The same for any number of threads.
-std::optional<Tube> make_start(const Field& field, std::span<const Crossing> crossings,
-                               const Clusters& clusters, const Metric& metric,
-                               const StartOptions& options, const Mesh& mesh,
+// Nothing where single precision cannot tell the tube from S. The same for any number of threads.
+std::optional<Tube> make_start(const StartSurface& surface, const Clusters& clusters,
                                const Context& context);
 
-// A vertex that stepped back.
-Vertex on_lattice_edge(const Field& field, const Crossing& crossing, const Metric& metric,
-                       double reach_mm);
+// A vertex that stepped back. On a cap, which is in a face of the volume, it stays there.
+Vertex on_lattice_edge(const StartSurface& surface, std::size_t vertex);
 
 }  // namespace isomesh::mesh::bound

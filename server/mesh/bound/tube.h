@@ -24,6 +24,8 @@ struct Tube {
   std::vector<Vertex> vertices;
   std::vector<Triangle> triangles;
   std::vector<std::uint8_t> border;  // of each vertex: lies in a face of the volume, and stays
+  std::vector<std::uint8_t>
+      planes;  // of each vertex of a closed surface: the faces that it stays in
 };
 
 // All three places of a vertex lie on a grid of this many points to the voxel, so that differences
@@ -47,11 +49,18 @@ inline bool is_wide(Vecf a, Vecf b) {
 }
 
 // Whether the ways from T- to T and on to T+ rise from the triangle's front at each corner. T does
-// not turn back over an edge between such triangles.
-inline bool is_upright(const Vertex& a, const Vertex& b, const Vertex& c) {
+// not turn back over an edge between such triangles. `planes`: the faces of the volume that all
+// corners stay in, a bit each: low x, high x, low y, ... There the front is to be inside.
+inline bool is_upright(const Vertex& a, const Vertex& b, const Vertex& c, unsigned planes) {
+  constexpr double kLeast = 1e-10;
   const Vecd normal = cross(wide(b.p - a.p), wide(c.p - a.p));
+  if (planes != 0) {
+    const double along = (planes & 0b000011) != 0   ? normal.x
+                         : (planes & 0b001100) != 0 ? normal.y
+                                                    : normal.z;
+    return ((planes & 0b010101) != 0 ? along : -along) > kLeast;
+  }
   const auto rises = [&](const Vertex& v) {
-    constexpr double kLeast = 1e-10;
     return dot(normal, wide(v.in - v.p)) > kLeast && dot(normal, wide(v.p - v.out)) > kLeast;
   };
   return rises(a) && rises(b) && rises(c);

@@ -65,8 +65,19 @@ class Metric {
   Vecd place(Vecd at) const { return origin_ + mm(at); }
   Vecd index(Vecd place) const { return steps(place - origin_); }
 
+  // The same space with numbers that begin so many samples earlier.
+  Metric before(std::uint32_t samples) const {
+    Metric metric = *this;
+    metric.origin_ = origin_ - mm(Vecd{1, 1, 1} * samples);
+    return metric;
+  }
+
   // The length in millimetres of the longest way across a cell.
   double largest_step() const { return length(x_) + length(y_) + length(z_); }
+  // The least distance between two planes of samples.
+  double least_step() const {
+    return 1 / std::max(length(back_x_), std::max(length(back_y_), length(back_z_)));
+  }
   bool is_left_handed() const { return determinant_ < 0; }
   // What to multiply a cross product of millimetres with, whose factors have the turn of one that
   // points inward in numbers of samples.

@@ -131,7 +131,6 @@ TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
     return certificate.why_unproven.value_or("");
   };
   EXPECT_EQ(why([](auto& job) { job.scheme = Scheme::kFive; }), "The proof is for scheme 6.");
-  EXPECT_EQ(why([](auto& job) { job.close = true; }), "The proof is for surfaces without close.");
   EXPECT_EQ(why([](auto& job) { job.components.keep = 1; }),
             "The proof is for all components together.");
   EXPECT_EQ(why([](auto& job) { job.max_error_mm.reset(); }), "A proof needs max_error_mm.");

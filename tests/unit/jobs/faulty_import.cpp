@@ -128,7 +128,9 @@ void misbehave(const std::string& what, const ImportOrder& order) {
     hang();
   }
   if (what == "chatter") {
-    for (;;) say(reading_message("nifti"));
+    std::string crowd;
+    for (int n = 0; n < 4096; ++n) crowd += reading_message("nifti");
+    for (;;) say(crowd);
   }
   if (what == "babble") say("{\"reading\": 7}\n");
   if (what == "forge") say("{\"reading\": \"nifti\\u000a[error] forged\"}\n");

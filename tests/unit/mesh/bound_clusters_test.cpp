@@ -40,10 +40,10 @@ std::vector<Vecd> vertices_of(const Field& field, const std::vector<Crossing>& c
 
 template <class T>
 void expect_the_regularised(const test::SampleVolume<T>& volume, const ExtractOptions& plain) {
-  const auto field = make_field(volume.lattice(), plain, {});
+  const auto field = make_field(volume.lattice(), plain, plain.close ? 3 : 0, {});
   ASSERT_TRUE(field);
   const std::vector<Crossing> crossings = crossings_of(*field, {});
-  const Clusters clusters = find_clusters(volume.lattice(), plain, crossings, {});
+  const Clusters clusters = find_clusters(volume.lattice(), plain, *field, crossings, {});
   EXPECT_GT(clusters.size(), 0U);
   const std::vector<Vecd> places = vertices_of(*field, crossings, clusters);
   ExtractOptions joining = plain;

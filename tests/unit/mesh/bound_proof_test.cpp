@@ -36,10 +36,10 @@ struct Scene {
       : volume(std::move(samples)),
         mesh(test::extracted(volume, {})),
         metric(volume.lattice().to_space),
-        field(make_field(volume.lattice(), {}, {})),
+        field(make_field(volume.lattice(), {}, 0, {})),
         crossings(crossings_of(*field, {})),
-        tube(make_start(*field, crossings, find_clusters(volume.lattice(), {}, crossings, {}),
-                        metric, {.reach_mm = kReach}, mesh, {})
+        tube(make_start({*field, crossings, metric, mesh, kReach},
+                        find_clusters(volume.lattice(), {}, *field, crossings, {}), {})
                  .value()),
         origins(crossings.size()) {
     collapse_edges(*field, metric, {.reach_mm = kReach}, {}, tube);
@@ -204,7 +204,7 @@ TEST(BoundProofTest, BothTestsOfATriangleAgreeWithManyValues) {
     if (n % 100 == 0) {
       auto volume = test::noise_between<float>(-0.25, n % 300 == 0 ? 0.75 : 1.75, dims,
                                                static_cast<std::uint64_t>(n));
-      field = make_field(volume.lattice(), {}, {});
+      field = make_field(volume.lattice(), {}, 0, {});
     }
     const std::array<Vecf, 3> corners = triangles.next();
     const double sign = n % 5 == 0 ? -1 : 1;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/measure/measure.h"
 #include "server/mesh/smooth/smooth.h"
 #include "server/mesh/topology/topology.h"
 #include "tests/support/exact_distance.h"
@@ -73,6 +75,34 @@ TEST(BoundTest, KeepsAllOfASphereWithinTheError) {
 TEST(BoundTest, KeepsAllOfASurfaceThatEndsAtTheBorderWithinTheError) {
   const auto volume = test::sample<float>(test::gyroid(7), {10, 9, 8});
   for (const double error : {0.05, 0.3}) expect_within(volume, {}, error);
+}
+
+TEST(BoundTest, KeepsAllOfAClosedSurfaceWithinTheError) {
+  const auto gyroid = test::sample<float>(test::gyroid(7), {10, 9, 8});
+  const auto noise = test::noise<std::uint8_t>({0, 1, 2, 3}, {7, 6, 5}, 5);
+  const auto full = test::constant<std::int16_t>(100, {6, 5, 4});  // caps alone
+  for (const double error : {0.05, 0.3, 1.5}) {
+    expect_within(gyroid, {.close = true}, error);
+    expect_within(noise, {.iso = 2, .close = true}, error);
+    expect_within(noise, {.iso = 1.5, .interpolation = Interpolation::kMidpoint, .close = true},
+                  error);
+    expect_within(full, {.iso = 50, .close = true}, error);
+  }
+}
+
+// Each vertex of a cap is in the cap's plane, to the bit, and few are left.
+TEST(BoundTest, KeepsCapsFlat) {
+  const auto volume = test::sample<float>(test::sphere({16, 16, 0}, 13.3), {33, 33, 20});
+  Mesh mesh = test::extracted(volume, {.close = true});
+  const auto in_cap = [](const Vec3& p) { return p[2] == 0; };
+  const auto before = std::ranges::count_if(mesh.positions, in_cap);
+  ASSERT_TRUE(simplified(volume, {.close = true}, {.max_error_mm = 0.1}, mesh));
+  EXPECT_EQ(std::ranges::min(mesh.positions, {}, [](const Vec3& p) { return p[2]; })[2], 0);
+  const auto after = std::ranges::count_if(mesh.positions, in_cap);
+  EXPECT_GT(after, 10);
+  EXPECT_LT(after, before / 5);
+  const double area = measure_extent(mesh, {}).area_mm2;
+  EXPECT_NEAR(area, 3 * std::numbers::pi * 13.3 * 13.3, 0.01 * area);
 }
 
 TEST(BoundTest, KeepsAllOfNoiseWithinTheError) {
@@ -155,7 +185,6 @@ TEST(BoundTest, GivesTheSameMeshForAnyNumberOfThreads) {
 TEST(BoundTest, ClaimsNothingWhereItProvesNothing) {
   const auto volume = test::sample<float>(test::sphere({8, 8, 8}, 6.3), {17, 17, 17});
   EXPECT_FALSE(has_bound({.scheme = Scheme::kFive}));
-  EXPECT_FALSE(has_bound({.close = true}));
   EXPECT_FALSE(has_bound({.regularize = true}));
   Mesh mesh = test::extracted(volume, {});
   const std::size_t vertices = mesh.positions.size();

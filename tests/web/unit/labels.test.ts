@@ -88,7 +88,7 @@ describe('a job by labels', () => {
     expect(inWords(all)).toBe('6 tetrahedra, without steps');
     expect(inWords({ ...all, smoothing: 'taubin' })).toBe('6 tetrahedra, 10 passes (Taubin)');
     const jobs = [defaults, all].map((parameters) => ({ parameters }) as Parameters<typeof titlesOf>[0][0]);
-    expect(titlesOf(jobs)).toEqual(['iso 60, not regularized, 5 passes, laplacian', 'all labels, regularized, 10 passes, labels']);
+    expect(titlesOf(jobs)).toEqual(['iso 60, 5 passes, laplacian', 'all labels, 10 passes, labels']);
   });
 });
 
