@@ -67,7 +67,10 @@ void write_field(Json& object, const Parameter& parameter, const std::optional<T
 
 template <class T>
 void write(Json& place, const T& value) {
-  if constexpr (std::is_same_v<T, Scheme> || Numbered<T>) {
+  if constexpr (std::is_same_v<T, Scheme>) {
+    const bool has_number = value == numbered(value);
+    has_number ? assign(place, static_cast<std::int64_t>(value)) : assign(place, to_string(value));
+  } else if constexpr (Numbered<T>) {
     assign(place, static_cast<std::int64_t>(value));
   } else if constexpr (Enumeration<T>) {
     assign(place, to_string(value));
@@ -198,7 +201,10 @@ void read_members(const Json& json, T& value) {
 template <class T>
 void read(const Json& json, T& value) {
   if constexpr (std::is_same_v<T, Scheme>) {
-    value = whole(json, 9) == 5 ? Scheme::kFive : Scheme::kSix;
+    const auto known =
+        from_string<Scheme>(is_string(json) ? text(json) : std::to_string(whole(json, 9)));
+    if (!known) throw Error(ErrorCode::kInternal, "has an unknown value");
+    value = *known;
   } else if constexpr (Numbered<T>) {
     value = static_cast<T>(whole(json, static_cast<std::uint64_t>(last_of(value))));
   } else if constexpr (Enumeration<T>) {

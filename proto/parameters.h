@@ -162,10 +162,11 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                 .help = "Number of tetrahedra per cell.",
                 .more = "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision "
                         "of the face-centred cubic lattice: every second cell is mirrored; "
-                        "the cell (0,0,0) is not.",
+                        "the cell (0,0,0) is not. The names `kuhn` and `fcc` mean 6 and 5.",
                 .values = {"The face-centred lattice, with fewer triangles; every second cell is "
                            "mirrored",
-                           "The primitive lattice, with the same split in every cell"}},
+                           "The primitive lattice, with the same split in every cell",
+                           "The same as 5", "The same as 6"}},
       self.scheme);
   if (by_iso) {
     parameter(

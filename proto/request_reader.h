@@ -109,13 +109,11 @@ class RequestReader {
 
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
                    Scheme& value) {
-    if (json == 5) {
-      value = Scheme::kFive;
-    } else if (json == 6) {
-      value = Scheme::kSix;
-    } else {
-      add(path, "must be 5 or 6");
-    }
+    const auto known =
+        from_string<Scheme>(json.is_string() ? json.get<std::string>() : json.dump());
+    const bool is_number = known && *known == numbered(*known);
+    if (!known || is_number == json.is_string()) return add(path, "must be " + names_of<Scheme>());
+    value = *known;
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,

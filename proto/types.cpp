@@ -32,6 +32,13 @@ struct Names<NiftiForm> {
 };
 
 template <>
+struct Names<Scheme> {
+  static constexpr std::array kTable = {std::pair{Scheme::kFive, "5"}, std::pair{Scheme::kSix, "6"},
+                                        std::pair{Scheme::kFcc, "fcc"},
+                                        std::pair{Scheme::kKuhn, "kuhn"}};
+};
+
+template <>
 struct Names<Interpolation> {
   static constexpr std::array kTable = {std::pair{Interpolation::kLinear, "linear"},
                                         std::pair{Interpolation::kMidpoint, "midpoint"}};
@@ -180,6 +187,17 @@ bool is_final(JobState state) {
          state == JobState::kCancelled;
 }
 
+Scheme numbered(Scheme scheme) {
+  switch (scheme) {
+    case Scheme::kFcc:
+      return Scheme::kFive;
+    case Scheme::kKuhn:
+      return Scheme::kSix;
+    default:
+      return scheme;
+  }
+}
+
 double default_lambda(const MeshParameters& parameters) {
   // Factor 1 keeps the steps between half-way vertices, and takes 0.5 to 1 % off the volume of
   // labels in ten passes. Factor 1/3 evens out the steps, and takes a third of a percent.
@@ -232,6 +250,7 @@ std::string mesh_path(const std::string& job, MeshFormat format,
 
 std::string_view to_string(SampleType value) { return name_of(value); }
 std::string_view to_string(NiftiForm value) { return name_of(value); }
+std::string_view to_string(Scheme value) { return name_of(value); }
 std::string_view to_string(Interpolation value) { return name_of(value); }
 std::string_view to_string(Smoothing value) { return name_of(value); }
 std::string_view to_string(MeshFormat value) { return name_of(value); }
@@ -253,6 +272,7 @@ std::optional<Enum> from_string(std::string_view name) {
 
 template std::optional<SampleType> from_string(std::string_view);
 template std::optional<NiftiForm> from_string(std::string_view);
+template std::optional<Scheme> from_string(std::string_view);
 template std::optional<Interpolation> from_string(std::string_view);
 template std::optional<Smoothing> from_string(std::string_view);
 template std::optional<MeshFormat> from_string(std::string_view);
@@ -272,6 +292,7 @@ std::vector<Enum> values_of() {
 }
 
 template std::vector<NiftiForm> values_of();
+template std::vector<Scheme> values_of();
 template std::vector<Interpolation> values_of();
 template std::vector<Smoothing> values_of();
 template std::vector<MeshFormat> values_of();
@@ -279,19 +300,24 @@ template std::vector<GlbCodec> values_of();
 template std::vector<Space> values_of();
 template std::vector<Priority> values_of();
 
+// Written as a number in JSON.
+bool is_number(std::string_view name) { return name.find_first_not_of("0123456789") == name.npos; }
+
 template <class Enum>
 std::string names_of() {
   const auto& table = Names<Enum>::kTable;
   std::string text;
   for (std::size_t row = 0; row < table.size(); ++row) {
     if (row > 0) text += row + 1 == table.size() ? " or " : ", ";
-    text += '"' + std::string(table[row].second) + '"';
+    const std::string name(table[row].second);
+    text += is_number(name) ? name : '"' + name + '"';
   }
   return text;
 }
 
 template std::string names_of<SampleType>();
 template std::string names_of<NiftiForm>();
+template std::string names_of<Scheme>();
 template std::string names_of<Interpolation>();
 template std::string names_of<Smoothing>();
 template std::string names_of<MeshFormat>();

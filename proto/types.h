@@ -176,7 +176,11 @@ struct UploadedVolume {
   bool operator==(const UploadedVolume&) const = default;
 };
 
-enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
+// How cells are split into tetrahedra: by their number, or by the lattice whose edges these have.
+enum class Scheme { kFive = 5, kSix = 6, kFcc, kKuhn };
+
+// The number that a lattice's name stands for; numbers stand for themselves.
+Scheme numbered(Scheme scheme);
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize, kLabels };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
@@ -389,6 +393,7 @@ struct JobEvent {
 // The API's names of the values.
 std::string_view to_string(SampleType value);
 std::string_view to_string(NiftiForm value);
+std::string_view to_string(Scheme value);
 std::string_view to_string(Interpolation value);
 std::string_view to_string(Smoothing value);
 std::string_view to_string(MeshFormat value);

@@ -22,9 +22,7 @@ namespace {
 // The default in words, or one for each kind of smoothing; empty if there is none.
 template <class T>
 std::string default_of(const Parameter& parameter, const T& standard) {
-  if constexpr (std::is_same_v<T, Scheme>) {
-    return std::to_string(static_cast<int>(standard));
-  } else if constexpr (Enumeration<T>) {
+  if constexpr (Enumeration<T>) {
     return std::string(to_string(standard));
   } else if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
     return std::string(to_string(standard.front()));
@@ -45,9 +43,7 @@ std::string default_of(const Parameter& parameter, const T& standard) {
 // The enumerated values; empty if there are none.
 template <class T>
 std::string words_of() {
-  if constexpr (std::is_same_v<T, Scheme>) {
-    return "5 or 6";
-  } else if constexpr (Enumeration<T>) {
+  if constexpr (Enumeration<T>) {
     return listed(names_from<T>());
   } else {
     return "";
@@ -109,13 +105,6 @@ class ParameterOptions {
           ->group("Job");
     }
     return on;
-  }
-
-  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
-                        const std::string& help, Scheme& value) {
-    return add_number<int>(
-               app_, name, help, [&value](int given) { value = Scheme{given}; }, "must be 5 or 6")
-        ->type_name("5|6");
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,

@@ -299,7 +299,7 @@ std::string job_report(const Job& job, const LengthUnit& unit) {
   }
   rows.push_back({"volume", asked.volume});
   rows.push_back({"parameters",
-                  subject_of(asked) + ", scheme " + std::to_string(static_cast<int>(asked.scheme)) +
+                  subject_of(asked) + ", scheme " + std::string(to_string(asked.scheme)) +
                       (asked.regularize ? ", regularized, " : ", ") + std::to_string(asked.passes) +
                       " passes of " + std::string(to_string(asked.smoothing)) +
                       (asked.close ? ", closed" : "")});

@@ -44,23 +44,13 @@ constexpr bool kIsOfLabels = std::is_same_v<T, LabelTexts> || std::is_same_v<T, 
 template <class Enum>
 std::vector<std::string> value_names() {
   std::vector<std::string> names;
-  if constexpr (std::is_same_v<Enum, Scheme>) {
-    for (const Scheme value : {Scheme::kFive, Scheme::kSix}) {
-      names.push_back(std::to_string(static_cast<int>(value)));
-    }
-  } else {
-    for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
-  }
+  for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
   return names;
 }
 
 template <class T>
 std::string name_of(const T& value) {
-  if constexpr (std::is_same_v<T, Scheme>) {
-    return std::to_string(static_cast<int>(value));
-  } else {
-    return std::string(to_string(value));
-  }
+  return std::string(to_string(value));
 }
 
 template <class T>
@@ -71,7 +61,9 @@ std::string type_of() {
     return "boolean";
   } else if constexpr (std::is_same_v<T, double>) {
     return "number";
-  } else if constexpr (std::is_integral_v<T> || std::is_same_v<T, Scheme>) {
+  } else if constexpr (std::is_same_v<T, Scheme>) {
+    return "[integer, string]";
+  } else if constexpr (std::is_integral_v<T>) {
     return "integer";
   } else {
     return "string";

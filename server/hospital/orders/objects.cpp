@@ -106,8 +106,8 @@ std::string description_of(const Job& job) {
   const std::string what = parameters.labels ? "label"
                            : parameters.iso  ? "iso " + to_text(*parameters.iso)
                                              : "iso otsu";
-  std::string text = what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) +
-                     ", " + std::to_string(parameters.passes) + " passes";
+  std::string text = what + ", scheme " + std::string(to_string(parameters.scheme)) + ", " +
+                     std::to_string(parameters.passes) + " passes";
   // Distance of the object's vertices and triangles from the extracted surface.
   if (const auto& certificate = job.mesh->certificate) {
     const double within = certificate->bound_mm.value_or(certificate->found_mm);

@@ -193,6 +193,7 @@ Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTa
     volume.ignored = std::move(upload.ignored);
     return volume;
   }
+  refuse_spacing(task.options);
   const std::vector<dicom::Source> sources =
       choose_series(std::move(upload.sources), task.options.series);
   std::vector<Note> notes = std::move(upload.notes);

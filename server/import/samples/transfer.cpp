@@ -19,11 +19,10 @@ namespace {
 
 // The geometry of a file that has a spacing, or of the request's.
 Geometry spaced_geometry(const SourceVolume& source, const ImportOptions& options) {
-  if (source.has_spacing && options.spacing) {
-    throw invalid_parameter("spacing",
-                            "applies to files without a spacing, but this file has its own");
+  if (source.has_spacing) {
+    refuse_spacing(options);
+    return source.geometry;
   }
-  if (source.has_spacing) return source.geometry;
   if (!options.spacing) {
     throw_choice(
         "The file does not say how far apart its samples are. Give the distances along x, y and z "
@@ -73,6 +72,12 @@ void note_labels(std::span<const std::byte> samples, Volume& volume) {
 }
 
 }  // namespace
+
+void refuse_spacing(const ImportOptions& options) {
+  if (!options.spacing) return;
+  throw invalid_parameter("spacing",
+                          "applies to files without a spacing, but this file has its own");
+}
 
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target) {

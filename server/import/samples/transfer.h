@@ -30,6 +30,9 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 // samples cannot be decoded, kTooLarge beyond the task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
+// Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
+void refuse_spacing(const ImportOptions& options);
+
 // Completes a canonical file: measures and flushes the samples. `volume` has dims, type and
 // geometry; returns it with range, suggested iso-value and bytes set. Throws Error kUnusableVolume
 // if a sample is not finite, kOutOfSpace, kInternal.

@@ -52,7 +52,7 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
 // samples define, whole.
 const char* why_measured(const MeshParameters& parameters) {
   if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
-  if (parameters.scheme != Scheme::kSix) return "The proof is for scheme 6.";
+  if (numbered(parameters.scheme) != Scheme::kSix) return "The proof is for scheme 6.";
   if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
   if (!parameters.components.keeps_all()) return "The proof is for all components together.";
   return nullptr;
@@ -141,7 +141,7 @@ void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& me
 
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
   return {.iso = iso,
-          .scheme = parameters.scheme,
+          .scheme = numbered(parameters.scheme),
           .interpolation = parameters.interpolation,
           .close = parameters.close,
           .regularize = is_regularized(parameters)};

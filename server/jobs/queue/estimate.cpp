@@ -157,8 +157,9 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
       return process_.count(order, stop);
     });
   };
-  return *counts_.get(
-      {viewer, volume.id, iso, key_of_part(parameters), parameters.scheme, parameters.close}, find);
+  return *counts_.get({viewer, volume.id, iso, key_of_part(parameters), numbered(parameters.scheme),
+                       parameters.close},
+                      find);
 }
 
 CostModel Estimator::model(const store::Viewer& viewer) const {

@@ -147,6 +147,15 @@ TEST(JobBody, TakesEveryMember) {
             unusual);
 }
 
+TEST(JobBody, TellsANameOfASchemeAsItWasGiven) {
+  for (const std::string name : {"5", "6", R"("fcc")", R"("kuhn")"}) {
+    const JobParameters parameters = parsed(R"("scheme": )" + name);
+    EXPECT_THAT(to_json(parameters), testing::HasSubstr(R"("scheme":)" + name + ','));
+  }
+  EXPECT_EQ(numbered(parsed(R"("scheme": "fcc")").scheme), Scheme::kFive);
+  EXPECT_EQ(numbered(parsed(R"("scheme": "kuhn")").scheme), Scheme::kSix);
+}
+
 TEST(JobBody, IsWhatToJsonWrites) {
   JobParameters parameters;
   parameters.volume = "a";
@@ -323,7 +332,7 @@ TEST(JobBody, MessagesSayWhatIsAllowed) {
             "draco.position_bits: must be a whole number from 8 to 30");
   EXPECT_EQ(detail(R"("draco": {"speed": 31})"),
             "draco.speed: must be a whole number from 0 to 10");
-  EXPECT_EQ(detail(R"("scheme": 7)"), "scheme: must be 5 or 6");
+  EXPECT_EQ(detail(R"("scheme": 7)"), R"(scheme: must be 5, 6, "fcc" or "kuhn")");
   EXPECT_EQ(detail(R"("priority": "x")"), R"(priority: must be "stat", "routine" or "bulk")");
   EXPECT_EQ(detail(R"("isovalue": 3)"), "isovalue: is not a known member");
 }

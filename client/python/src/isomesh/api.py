@@ -257,7 +257,7 @@ class Estimate(TypedDict):
     iso: NotRequired[float]
     #: Number of tetrahedra per cell. 6 is Kuhn's split of the primitive cubic lattice. 5 is the
     #: subdivision of the face-centred cubic lattice: every second cell is mirrored; the cell
-    #: (0,0,0) is not.
+    #: (0,0,0) is not. The names kuhn and fcc mean 6 and 5.
     scheme: Scheme
     #: The exact number for the extracted surface, before components and fill_cavities remove
     #: anything and before simplification.
@@ -311,7 +311,7 @@ LabelColors = Union['Union[Mapping[int, str], Mapping[str, str]]']
 LabelValues = Union['Union[Mapping[int, Sequence[int]], Mapping[str, Sequence[int]]]']
 
 
-Scheme = Literal[5, 6]
+Scheme = Literal[5, 6, 'fcc', 'kuhn']
 
 
 Interpolation = Literal['linear', 'midpoint']
@@ -1001,7 +1001,7 @@ class JobOptions(TypedDict, total=False):
     scheme
         Number of tetrahedra per cell. 6 is Kuhn's split of the primitive cubic lattice. 5 is
         the subdivision of the face-centred cubic lattice: every second cell is mirrored; the
-        cell (0,0,0) is not.
+        cell (0,0,0) is not. The names kuhn and fcc mean 6 and 5.
 
     interpolation
         Position of a vertex on the edge between two samples. linear interpolates the two

@@ -1,12 +1,12 @@
 // The differences between jobs: the surface that each makes, and the parameters in which they differ.
 import type { Job, JobParameters } from '../api/types';
 import { formatValue } from '../ui/format';
-import { surfaceInWords } from './parameters';
+import { schemeInWords, surfaceInWords } from './parameters';
 import { applies, asText, defaultOf, parameters, valueIn, type Parameter, type Value } from './table';
 
 // Shorter than the title and the value.
 const words: Record<string, (job: JobParameters) => string> = {
-  scheme: ({ scheme }) => `${scheme} tetrahedra`,
+  scheme: schemeInWords,
   interpolation: ({ interpolation }) => interpolation ?? 'midpoint',
   passes: ({ passes }) => (passes === 1 ? '1 pass' : `${passes} passes`),
   smoothing: ({ smoothing }) => smoothing,

@@ -110,9 +110,15 @@ export function isOfKind({ jobs }: Parameter, job: JobParameters): boolean {
   return jobs === 'any' || jobs === (isByLabels(job) ? 'labels' : 'iso');
 }
 
+// Of schemes that have a number, too.
+const secondNames: readonly (string | number)[] = ['fcc', 'kuhn'];
+
 // The choices that the daemon takes for this job: one kind of smoothing is for labels alone.
 export function choicesOf({ name, values = [] }: Parameter, job: JobParameters): readonly (string | number)[] {
-  return values.filter((value) => name !== 'smoothing' || value !== 'labels' || isByLabels(job));
+  return values.filter((value) => {
+    if (name === 'smoothing' && value === 'labels') return isByLabels(job);
+    return name !== 'scheme' || !secondNames.includes(value) || value === job.scheme;
+  });
 }
 
 // True if the parameter applies to this job.

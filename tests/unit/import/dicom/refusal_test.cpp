@@ -49,6 +49,14 @@ TEST(DicomRefusal, NamesAMissingSlice) {
   EXPECT_THAT(outcome.error, HasSubstr("slice 41 of 93 is missing"));
 }
 
+TEST(DicomRefusal, KeepsTheSpacingThatTheScannerGave) {
+  const Outcome outcome =
+      import_objects(files_of(DicomSeries{}, [](std::uint32_t, DicomObject&) { return true; }),
+                     {.spacing = {{1, 1, 1}}});
+  EXPECT_EQ(outcome.code, ErrorCode::kInvalidParameter);
+  EXPECT_THAT(outcome.error, HasSubstr("this file has its own"));
+}
+
 TEST(DicomRefusal, NumbersSlicesAsTheScannerDid) {
   DicomSeries series = long_series();
   series.step = {0, 0, -2.5};
