@@ -299,6 +299,8 @@ template std::vector<MeshFormat> values_of();
 template std::vector<GlbCodec> values_of();
 template std::vector<Space> values_of();
 template std::vector<Priority> values_of();
+template std::vector<JobState> values_of();
+template std::vector<SampleType> values_of();
 
 // Written as a number in JSON.
 bool is_number(std::string_view name) { return name.find_first_not_of("0123456789") == name.npos; }

@@ -102,13 +102,8 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, const std::strin
 // "linear|midpoint": the type that help shows and that completions offer.
 template <class Enum>
 std::string type_of_names() {
-  std::string names = names_of<Enum>();  // "linear" or "midpoint"
   std::string type;
-  for (std::size_t begin = names.find('"'); begin != std::string::npos;) {
-    const std::size_t end = names.find('"', begin + 1);
-    type += (type.empty() ? "" : "|") + names.substr(begin + 1, end - begin - 1);
-    begin = names.find('"', end + 1);
-  }
+  for (const std::string& name : names_from<Enum>()) type += (type.empty() ? "" : "|") + name;
   return type;
 }
 
