@@ -344,7 +344,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
           .title = "Write vertex normals to GLB",
           .help =
               "Write vertex normals to `glb`: means of the triangles' normals, weighted by area.",
-          .more = "Without normals, viewers shade each triangle flat or compute their own."},
+          .more = "Where `max_error_mm` or `triangles` simplifies a surface at an iso-value, they "
+                  "are the gradient of the samples instead, so facets are not seen. Without "
+                  "normals, viewers shade each triangle flat or compute their own."},
       self.normals);
   if (is_told(self, self.distances)) {
     parameter(

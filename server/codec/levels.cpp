@@ -45,6 +45,7 @@ mesh::Mesh copy_of(const mesh::Mesh& mesh) {
   result.layer_triangles = mesh.layer_triangles;
   result.on_border = mesh.on_border;
   result.on_line = mesh.on_line;
+  result.normals = mesh.normals;
   return result;
 }
 

@@ -41,6 +41,10 @@ struct Mesh {
   // a bit each. Empty of a surface that has one inside and one outside.
   std::vector<std::uint64_t> on_line;
 
+  // A unit vector for each vertex by which it is shaded. Empty: normals.h has those of the
+  // triangles.
+  std::vector<Vec3> normals;
+
   // False where on_line is empty.
   bool is_on_line(std::size_t vertex) const {
     return !on_line.empty() && (on_line[vertex / kFlagBits] >> (vertex % kFlagBits) & 1) != 0;

@@ -248,7 +248,7 @@ TEST(FullQueue, AnswersLater) {
   EXPECT_EQ(daemon.get("/livez").status, 200);
   EXPECT_EQ(job_from_json(daemon.send("DELETE", "/v1/jobs/" + queued.id).body).state,
             JobState::kCancelled);
-  EXPECT_EQ(daemon.get("/readyz").status, 200);
+  EXPECT_TRUE(eventually([&] { return daemon.get("/readyz").status == 200; }));
   daemon.client().cancel(running.id);
 }
 

@@ -120,7 +120,7 @@ TEST_F(BlobsInAFolder, AreApartFromTheDatabase) {
   kill();
   start_there();
   EXPECT_TRUE(mesh_of(made) == mesh);
-  EXPECT_EQ(daemon().get("/readyz").status, 200);
+  EXPECT_TRUE(eventually([&] { return daemon().get("/readyz").status == 200; }));
   std::filesystem::rename(folder_ / "shared", folder_ / "away");
   EXPECT_TRUE(eventually([&] { return daemon().get("/readyz").status == 503; }));
   std::filesystem::rename(folder_ / "away", folder_ / "shared");

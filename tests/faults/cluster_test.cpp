@@ -234,7 +234,9 @@ TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   const Job running = endless_job(0);
   node(0).client().cancel(running.id);
   EXPECT_TRUE(comes_to(0, running.id, JobState::kCancelled));
-  for (const std::size_t each : {0U, 1U}) EXPECT_EQ(node(each).get("/readyz").status, 200);
+  for (const std::size_t each : {0U, 1U}) {
+    EXPECT_TRUE(eventually([&] { return node(each).get("/readyz").status == 200; }));
+  }
   postgres_->stop_at_once();
   EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 503; }));
   EXPECT_EQ(node(0).get("/livez").status, 200);

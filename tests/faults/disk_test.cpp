@@ -109,7 +109,7 @@ TEST_F(Disk, AJobThatCanNeverFitFailsAndSaysSo) {
   ASSERT_TRUE(failed.error);
   EXPECT_EQ(failed.error->status, 413);
   EXPECT_THAT(failed.error->detail, HasSubstr("but the disk can hold at most"));
-  EXPECT_EQ(daemon().get("/readyz").status, 200);
+  EXPECT_TRUE(eventually([&] { return daemon().get("/readyz").status == 200; }));
 }
 
 TEST_F(Disk, AJobThatMayFitLaterWaitsAndSaysSo) {

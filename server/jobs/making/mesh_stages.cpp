@@ -11,6 +11,7 @@
 #include "server/mesh/bound/bound.h"
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/measure/shapes.h"
+#include "server/mesh/simplify/gradient_normals.h"
 #include "server/mesh/simplify/simplify.h"
 #include "server/mesh/smooth/smooth.h"
 
@@ -90,6 +91,21 @@ bool simplify_within_error(const SampleArray& samples, const MeshRequest& reques
   return true;
 }
 
+void simplify_measured(const MeshParameters& parameters, const ExtractedSurface& extracted,
+                       const Progress& progress, mesh::Mesh& mesh, mesh::SeparatingSurface* walls,
+                       MeshSummary& summary) {
+  mesh::SimplifyOptions options;
+  if (parameters.max_error_mm) {
+    options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);
+    options.before = extracted.positions;
+  }
+  options.triangles = parameters.triangles.value_or(0);
+  const mesh::SimplificationEffect effect =
+      walls != nullptr ? mesh::simplify(options, progress.context(), *walls)
+                       : mesh::simplify(options, progress.context(), mesh);
+  summary.simplified = {effect.triangles_before, bound_of(parameters, effect)};
+}
+
 void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
   summary.area_mm2 = extent.area_mm2;
   summary.volume_mm3.smoothed = extent.volume_mm3;
@@ -153,22 +169,16 @@ void simplify_stage(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
   progress.enter(Stage::kSimplify);
-  if (parameters.max_error_mm && simplify_within_error(samples, request, progress, mesh, summary)) {
-    return set_extent(measure_extent(mesh, progress.quiet()), summary);
+  const bool is_proven =
+      parameters.max_error_mm && simplify_within_error(samples, request, progress, mesh, summary);
+  if (!is_proven) simplify_measured(parameters, extracted, progress, mesh, walls, summary);
+  if (parameters.normals && walls == nullptr) {
+    with_sample(samples.type, [&](auto sample) {
+      set_gradient_normals(lattice_of<decltype(sample)>(samples), progress.quiet(), mesh);
+    });
   }
-  mesh::SimplifyOptions options;
-  if (parameters.max_error_mm) {
-    options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);
-    options.before = extracted.positions;
-  }
-  options.triangles = parameters.triangles.value_or(0);
-  const mesh::SimplificationEffect effect =
-      walls != nullptr ? mesh::simplify(options, progress.context(), *walls)
-                       : mesh::simplify(options, progress.context(), mesh);
-  summary.simplified = {effect.triangles_before, bound_of(parameters, effect)};
   set_extent(measure_extent(mesh, progress.quiet()), summary);
 }
-
 void measure_final_shapes(const MeshParameters& parameters, const Progress& progress,
                           const mesh::Mesh& mesh, MeshQuality& quality) {
   if (parameters.passes == 0 && !is_simplified(parameters)) return;

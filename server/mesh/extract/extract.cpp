@@ -59,6 +59,7 @@ void make_room(const SurfaceCount& count, const LatticeToSpace& to_space, bool c
   mesh.triangles.resize_for_overwrite(count.triangles());
   mesh.on_border.assign(close ? (count.vertices() + kFlagBits - 1) / kFlagBits : 0, 0);
   mesh.on_line.clear();
+  mesh.normals.clear();
 }
 
 SurfaceSize size_of(const SurfaceCount& count) {

@@ -73,6 +73,7 @@ class VertexChoice {
 void take_vertices(const Mesh& from, const VertexChoice& choice, Mesh& to) {
   to.positions.resize_for_overwrite(choice.count());
   to.on_line.clear();
+  to.normals.clear();
   to.on_border.assign(from.on_border.empty() ? 0 : (choice.count() + kFlagBits - 1) / kFlagBits, 0);
   std::size_t next = 0;
   choice.visit([&](std::uint64_t vertex) {

@@ -54,6 +54,10 @@ void write_normals(const Mesh& mesh, std::size_t first_layer, std::size_t end_la
 
 void vertex_normals(const Mesh& mesh, const Context& context, Buffer<Vec3>& normals) {
   normals.resize_for_overwrite(mesh.positions.size());
+  if (!mesh.normals.empty()) {
+    std::ranges::copy(mesh.normals, normals.begin());
+    return;
+  }
   const std::size_t slabs = (mesh.layers() + kLayersPerSlab - 1) / kLayersPerSlab;
   parallel_for(context, slabs, [&](std::size_t slab) {
     const std::size_t first = slab * kLayersPerSlab;

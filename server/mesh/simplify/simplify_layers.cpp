@@ -80,9 +80,11 @@ void replace_triangles(std::vector<Triangle>& triangles, std::vector<WallSides>&
     }
     if (v == numbers.size() || numbers[v] == kUnnamed) continue;
     mesh.positions[count] = mesh.positions[v];
+    if (!mesh.normals.empty()) mesh.normals[count] = mesh.normals[v];
     numbers[v] = count++;
   }
   mesh.positions.shrink(count);
+  if (!mesh.normals.empty()) mesh.normals.resize(count);
   take_flags(mesh.on_border, numbers, count);
   take_flags(mesh.on_line, numbers, count);
   for (Triangle& triangle : triangles) {

@@ -125,6 +125,15 @@ bool SqlJobStore::is_repaired(const Job& job) const {
          is_there_and_intact(blobs_, job.parameters.volume, {});
 }
 
+bool SqlJobStore::is_whole(const Job& job) const {
+  const auto is_intact = [this](const std::string& blob) {
+    return is_there_and_intact(blobs_, blob, {});
+  };
+  if (!job.mesh || (job.mesh->label_list && !is_intact(job.mesh->label_list->sha256))) return false;
+  return std::ranges::all_of(job.mesh->files,
+                             [&](const auto& file) { return is_intact(file.second.sha256); });
+}
+
 Job SqlJobStore::remake(const std::string& id) {
   JobSpec spec;
   const auto like = records_.read([&](SqlConnection& connection) -> std::optional<Job> {
@@ -139,12 +148,13 @@ Job SqlJobStore::remake(const std::string& id) {
             "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.id > ?3 ORDER BY j.id DESC LIMIT 1",
         row.owner, row.result_key, id);
     if (!rows.next()) return std::nullopt;
-    const Row youngest = row_of(rows);
-    if (is_final(youngest.job.state) && !youngest.job.error) return std::nullopt;
-    return with_progress(youngest);
+    return with_progress(row_of(rows));
   });
-  // Outside the transaction, because this may read the whole volume.
-  if (like && !is_repaired(*like)) return *like;
+  // Outside the transaction, because this may read the whole volume or the files. The job that
+  // makes it again may have ended since the damage was seen.
+  if (like && !is_repaired(*like) && (like->error || !is_final(like->state) || is_whole(*like))) {
+    return *like;
+  }
   try {
     return job_of(submit(spec));
   } catch (const Error& error) {

@@ -118,6 +118,8 @@ class SqlJobStore : public JobStore {
  private:
   // True if the job failed because of a damaged volume that is intact now.
   bool is_repaired(const Job& job) const;
+  // Whether the files of a job that succeeded are there and intact.
+  bool is_whole(const Job& job) const;
 
   SqlDatabase& records_;
 

@@ -204,6 +204,8 @@ class OrdersTest : public test::JobsFixture {
     orders_->on_end([](const std::string&) {});
   }
 
+  void stop() { orders_.reset(); }
+
   std::string submit(const std::string& pacs = "main", const std::string& series = kSeries) {
     OrderRequest request;
     request.source = {.pacs = pacs, .study = kStudy, .series = series};

@@ -1087,8 +1087,10 @@ class JobOptions(TypedDict, total=False):
         Options of the drc format, and of the Draco streams in glb.
 
     normals
-        Write vertex normals to glb: means of the triangles' normals, weighted by area. Without
-        normals, viewers shade each triangle flat or compute their own.
+        Write vertex normals to glb: means of the triangles' normals, weighted by area. Where
+        max_error_mm or triangles simplifies a surface at an iso-value, they are the gradient of
+        the samples instead, so facets are not seen. Without normals, viewers shade each
+        triangle flat or compute their own.
 
     distances
         Write each vertex's distance to the extracted surface to glb, in millimetres. The vertex

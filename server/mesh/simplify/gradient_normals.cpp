@@ -1,0 +1,115 @@
+#include "server/mesh/simplify/gradient_normals.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "proto/samples.h"
+#include "server/mesh/measure/normals.h"
+#include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
+
+namespace isomesh::mesh {
+namespace {
+
+constexpr std::size_t kChunk = 1 << 14;
+constexpr double kLeastAgreement = 0.25;  // a cosine
+
+template <class T>
+class Gradient {
+ public:
+  explicit Gradient(const Lattice<T>& lattice)
+      : lattice_(lattice), scale_(lattice.to_space.determinant()) {}
+
+  // In units of the samples by millimetre.
+  Point at(const Vec3& place) const {
+    const auto& [a, b, c] =
+        std::array{lattice_.to_space.step_x, lattice_.to_space.step_y, lattice_.to_space.step_z};
+    const Point slope = slopes_at(index_of(lattice_.to_space, {place[0], place[1], place[2]}));
+    Point sum = {0, 0, 0};
+    const std::array<Point, 3> ways = {cross(b, c), cross(c, a), cross(a, b)};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 3; ++i) sum[i] += ways[axis][i] * slope[axis] / scale_;
+    }
+    return sum;
+  }
+
+ private:
+  using Sample = std::array<std::uint32_t, 3>;
+
+  // By sample along each axis, linear between the eight samples around.
+  Point slopes_at(const Point& index) const {
+    const std::array<std::uint32_t, 3> counts = {lattice_.dims.x, lattice_.dims.y, lattice_.dims.z};
+    Sample first;
+    Point share;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double within = std::clamp(index[axis], 0.0, counts[axis] - 1.0);
+      first[axis] = std::min(static_cast<std::uint32_t>(within), counts[axis] - 2);
+      share[axis] = within - first[axis];
+    }
+    Point sum = {0, 0, 0};
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      Sample sample = first;
+      double weight = 1;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const bool is_second = (corner >> axis & 1) != 0;
+        sample[axis] += is_second ? 1 : 0;
+        weight *= is_second ? share[axis] : 1 - share[axis];
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        sum[axis] += weight * slope_of(sample, axis, counts[axis]);
+      }
+    }
+    return sum;
+  }
+
+  // A central difference; at the border of the volume one to the sample inside.
+  double slope_of(Sample sample, std::size_t axis, std::uint32_t count) const {
+    Sample before = sample;
+    if (sample[axis] > 0) --before[axis];
+    if (sample[axis] + 1 < count) ++sample[axis];
+    return (value(sample) - value(before)) / (sample[axis] - before[axis]);
+  }
+
+  double value(const Sample& sample) const {
+    const std::size_t row = std::size_t{sample[2]} * lattice_.dims.y + sample[1];
+    return static_cast<double>(lattice_.samples[row * lattice_.dims.x + sample[0]]);
+  }
+
+  const Lattice<T>& lattice_;
+  const double scale_;
+};
+
+}  // namespace
+
+template <class T>
+void set_gradient_normals(const Lattice<T>& lattice, const Context& context, Mesh& mesh) {
+  mesh.normals.clear();
+  if (!lattice.dims.has_cells()) return;
+  Buffer<Vec3> of_triangles;
+  vertex_normals(mesh, context, of_triangles);
+  mesh.normals.assign(of_triangles.begin(), of_triangles.end());
+  const Gradient<T> gradient(lattice);
+  const std::size_t count = mesh.positions.size();
+  parallel_for(context, (count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    for (std::size_t v = chunk * kChunk; v < std::min(count, (chunk + 1) * kChunk); ++v) {
+      if (mesh.is_on_border(v)) continue;
+      const Point inward = gradient.at(mesh.positions[v]);
+      const double length = -std::sqrt(dot(inward, inward));
+      Vec3& normal = mesh.normals[v];
+      const double agreement =
+          (inward[0] * normal[0] + inward[1] * normal[1] + inward[2] * normal[2]) / length;
+      if (!(agreement > kLeastAgreement)) continue;
+      for (std::size_t i = 0; i < 3; ++i) normal[i] = static_cast<float>(inward[i] / length);
+    }
+  });
+}
+
+#define ISOMESH_INSTANTIATE(T, name, kType) \
+  template void set_gradient_normals(const Lattice<T>&, const Context&, Mesh&);
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
+
+}  // namespace isomesh::mesh
