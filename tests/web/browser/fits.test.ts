@@ -32,11 +32,12 @@ beforeAll(async () => {
 });
 
 async function open(page: Page, path: string): Promise<void> {
+  // From an empty page, so that nothing of the view before is taken for this one.
+  await page.goto('about:blank');
   await page.goto(`${at.daemon.url}/#/${path}`);
   await page.locator('main h1').first().waitFor();
   await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
-  const panes = await page.locator('.pane').count();
-  if (panes > 0) await surfaceLoaded(page, panes);
+  await surfaceLoaded(page, await page.locator('.pane').count());
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
