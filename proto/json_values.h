@@ -68,8 +68,8 @@ void write_field(Json& object, const Parameter& parameter, const std::optional<T
 template <class T>
 void write(Json& place, const T& value) {
   if constexpr (std::is_same_v<T, Scheme>) {
-    const bool has_number = value == numbered(value);
-    has_number ? assign(place, static_cast<std::int64_t>(value)) : assign(place, to_string(value));
+    is_number(value) ? assign(place, static_cast<std::int64_t>(value))
+                     : assign(place, to_string(value));
   } else if constexpr (Numbered<T>) {
     assign(place, static_cast<std::int64_t>(value));
   } else if constexpr (Enumeration<T>) {

@@ -159,14 +159,19 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   parameter(
       Parameter{.name = "scheme",
                 .title = "Tetrahedra per cell",
-                .help = "Number of tetrahedra per cell.",
-                .more = "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision "
-                        "of the face-centred cubic lattice: every second cell is mirrored; "
-                        "the cell (0,0,0) is not. The names `kuhn` and `fcc` mean 6 and 5.",
+                .help = "Number of tetrahedra per cell, or lattice.",
+                .more =
+                    "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision "
+                    "of the face-centred cubic lattice: every second cell is mirrored; "
+                    "the cell (0,0,0) is not. The names `kuhn` and `fcc` mean 6 and 5. `bcc` is "
+                    "the body-centred cubic lattice, which has a sample in the centre of each "
+                    "cell, too, the mean of its corners: 1.4 times as many triangles as 6, with "
+                    "larger angles. It is not for labels.",
                 .values = {"The face-centred lattice, with fewer triangles; every second cell is "
                            "mirrored",
                            "The primitive lattice, with the same split in every cell",
-                           "The same as 5", "The same as 6"}},
+                           "The same as 5", "The same as 6",
+                           "The body-centred lattice, with more triangles and larger angles"}},
       self.scheme);
   if (by_iso) {
     parameter(

@@ -111,8 +111,8 @@ class RequestReader {
                    Scheme& value) {
     const auto known =
         from_string<Scheme>(json.is_string() ? json.get<std::string>() : json.dump());
-    const bool is_number = known && *known == numbered(*known);
-    if (!known || is_number == json.is_string()) return add(path, "must be " + names_of<Scheme>());
+    if (!known || is_number(*known) == json.is_string())
+      return add(path, "must be " + names_of<Scheme>());
     value = *known;
   }
 

@@ -200,6 +200,8 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
                      "\"zip\" holds one file per label, so it needs labels");
   }
   refuse_if(json.contains("iso"), "iso", "cannot be combined with labels");
+  refuse_if(parameters.scheme == Scheme::kBcc, "scheme",
+            "cannot be \"bcc\" with labels: there are no values between two labels");
   refuse_if(parameters.fill_cavities, "fill_cavities",
             "cannot be combined with labels: other labels may lie in their cavities");
   refuse_if(json.contains("interpolation") && parameters.interpolation == Interpolation::kLinear,

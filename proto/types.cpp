@@ -33,9 +33,9 @@ struct Names<NiftiForm> {
 
 template <>
 struct Names<Scheme> {
-  static constexpr std::array kTable = {std::pair{Scheme::kFive, "5"}, std::pair{Scheme::kSix, "6"},
-                                        std::pair{Scheme::kFcc, "fcc"},
-                                        std::pair{Scheme::kKuhn, "kuhn"}};
+  static constexpr std::array kTable = {
+      std::pair{Scheme::kFive, "5"}, std::pair{Scheme::kSix, "6"}, std::pair{Scheme::kFcc, "fcc"},
+      std::pair{Scheme::kKuhn, "kuhn"}, std::pair{Scheme::kBcc, "bcc"}};
 };
 
 template <>

@@ -177,10 +177,13 @@ struct UploadedVolume {
 };
 
 // How cells are split into tetrahedra: by their number, or by the lattice whose edges these have.
-enum class Scheme { kFive = 5, kSix = 6, kFcc, kKuhn };
+// kBcc is the body-centred one, of the samples and the centres of the cells.
+enum class Scheme { kFive = 5, kSix = 6, kFcc, kKuhn, kBcc };
 
-// The number that a lattice's name stands for; numbers stand for themselves.
+// The number that a lattice's name stands for, if there is one; others stand for themselves.
 Scheme numbered(Scheme scheme);
+// False where it is a name, although it may stand for a number.
+constexpr bool is_number(Scheme scheme) { return scheme <= Scheme::kSix; }
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize, kLabels };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression

@@ -210,13 +210,18 @@ void configure(benchmark::internal::Benchmark* registered, const Source& source)
       ->ReportAggregatesOnly();
 }
 
+const char* lattice_name(Scheme scheme) {
+  if (scheme == Scheme::kBcc) return "/bcc/";
+  return scheme == Scheme::kSix ? "/six/" : "/five/";
+}
+
 class Registry {
  public:
   explicit Registry(const Plan& plan) : plan_(plan) {}
 
   void add(const Source& source) {
     for (const StageCase& stage : stage_cases()) {
-      for (const Scheme scheme : {Scheme::kSix, Scheme::kFive}) {
+      for (const Scheme scheme : {Scheme::kSix, Scheme::kFive, Scheme::kBcc}) {
         for (const Interpolation way : {Interpolation::kLinear, Interpolation::kMidpoint}) {
           if (!stage.is_for(way, source)) continue;
           for (const int threads : threads_of(stage.parallel)) {
@@ -245,10 +250,9 @@ class Registry {
 
   void add_stage(const Source& source, const StageCase& stage, const Surface& surface,
                  int threads) {
-    const std::string name = stage.name + (surface.scheme == Scheme::kSix ? "/six/" : "/five/") +
-                             (surface.regularize ? "regular/" : "") +
-                             std::string(to_string(surface.interpolation)) +
-                             suffix(source, threads);
+    const std::string name =
+        stage.name + lattice_name(surface.scheme) + (surface.regularize ? "regular/" : "") +
+        std::string(to_string(surface.interpolation)) + suffix(source, threads);
     const auto body = [this, source, stage, surface, threads](benchmark::State& state) {
       set_threads(threads);
       Stages& stages = workbench_.stages(source, surface);

@@ -20,6 +20,8 @@ namespace {
 constexpr int kPasses = 5;
 constexpr Goal kExtractGoal = {0.5};
 constexpr Goal kFreshMemoryGoal = {0.6};
+constexpr Goal kBccGoal = {1.5};
+constexpr Goal kRegularGoal = {1.4};
 constexpr Goal kSmoothRateGoal = {200, false};   // Mvertex-passes/s
 constexpr Goal kSmoothFactorGoal = {40, false};  // times vtkSmoothPolyDataFilter
 constexpr Goal kDrcJobGoal = {0.35};
@@ -55,6 +57,10 @@ class Comparison {
 
   void run() {
     if (wanted("smooth_rate")) compare_smoothing();
+    compare_with_plain("extract_regular", "regularised", Scheme::kSix, true, kRegularGoal);
+    compare_with_plain("extract_bcc", "body-centred", Scheme::kBcc, false, kBccGoal);
+    compare_with_plain("extract_bcc_regular", "body-centred, regularised", Scheme::kBcc, true,
+                       kBccGoal);
     compare_encoding();
     if (!peers_available()) return;
     if (wanted("extract_reused_memory")) compare_extraction("extract_reused_memory", false);
@@ -86,6 +92,15 @@ class Comparison {
         std::string("extraction, 6 tetrahedra, ") + (fresh ? "fresh" : "reused") +
             " memory / Flying Edges",
         time_in_pairs(ours, theirs), fresh ? kFreshMemoryGoal : kExtractGoal);
+  }
+
+  void compare_with_plain(const std::string& name, const std::string& what, Scheme scheme,
+                          bool regularize, Goal goal) {
+    if (!wanted(name)) return;
+    Stages other(samples_, {.iso = iso_, .scheme = scheme, .regularize = regularize});
+    const Timed ours = {[&] { other.extract(); }};
+    const Timed plain = {[&] { stages_.extract(); }};
+    add(name, "extraction, " + what + " / plain, 6 tetrahedra", time_in_pairs(ours, plain), goal);
   }
 
   void compare_smoothing() {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -13,68 +12,44 @@
 #include "proto/samples.h"
 #include "tests/support/joined.h"
 #include "tests/support/points.h"
-#include "tests/support/stars.h"
-#include "tests/support/tetrahedra.h"
+#include "tests/support/reference.h"
 
 namespace isomesh::test {
 namespace {
 
-template <class T>
-class RegularBuilder {
+class Joining {
  public:
-  RegularBuilder(const mesh::Lattice<T>& lattice, const mesh::ExtractOptions& options)
-      : lattice_(lattice), options_(options), margin_(options.close ? 1 : 0) {
-    reference_.plain = reference_surface(lattice, options);
-    stars_ = &stars_of(reference_.plain.dims, options.scheme, margin_);
-  }
+  explicit Joining(const JoiningField& field)
+      : field_(field), clusters_(field.crossings.size(), kNotJoined) {}
 
-  RegularReference build() {
-    for (std::uint32_t v = 0; v < reference_.plain.vertices.size(); ++v) add_crossing(v);
+  std::vector<std::uint32_t> join() {
+    for (std::uint32_t v = 0; v < field_.crossings.size(); ++v) add_crossing(v);
     for (const auto& [sample, own] : own_) find_candidates(sample, own);
     for (const auto& [sample, candidates] : candidates_) {
       for (const Samples& component : candidates) {
         if (!clashes(sample, component)) join(sample, component);
       }
     }
-    return std::move(reference_);
+    return std::move(clusters_);
   }
 
  private:
   void add_crossing(std::uint32_t v) {
-    const ReferenceVertex& vertex = reference_.plain.vertices[v];
-    number_[{vertex.inside, vertex.outside}] = number_[{vertex.outside, vertex.inside}] = v;
-    crossed_[vertex.inside].insert(vertex.outside);
-    crossed_[vertex.outside].insert(vertex.inside);
-    if (distance(vertex.inside) <= distance(vertex.outside)) {
-      own_[vertex.inside].insert(vertex.outside);
+    const auto& [inside, outside] = field_.crossings[v];
+    number_[{inside, outside}] = number_[{outside, inside}] = v;
+    crossed_[inside].insert(outside);
+    crossed_[outside].insert(inside);
+    if (field_.distance(inside) <= field_.distance(outside)) {
+      own_[inside].insert(outside);
     } else {
-      own_[vertex.outside].insert(vertex.inside);
+      own_[outside].insert(inside);
     }
-    inside_.insert(vertex.inside);
-  }
-
-  float distance(const Sample& s) const {
-    if (options_.interpolation == Interpolation::kMidpoint) return 0;
-    if (reference_.plain.is_phantom(s)) return std::numeric_limits<float>::infinity();
-    const mesh::Dims& dims = lattice_.dims;
-    const T value =
-        lattice_.samples[((s[2] - margin_) * dims.y + (s[1] - margin_)) * dims.x + s[0] - margin_];
-    return static_cast<float>(std::abs(static_cast<double>(value) - options_.iso));
-  }
-
-  // Whether all samples around it are samples of the volume.
-  bool is_within(const Sample& s) const {
-    const mesh::Dims& dims = reference_.plain.dims;
-    const std::array counts = {dims.x, dims.y, dims.z};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (s[axis] < 1 + margin_ || s[axis] + 1 + margin_ >= counts[axis]) return false;
-    }
-    return true;
+    inside_.insert(inside);
   }
 
   void find_candidates(const Sample& sample, const Samples& own) {
-    if (!is_within(sample)) return;
-    const Star& star = stars_->at(sample);
+    if (!field_.is_within(sample)) return;
+    const Star& star = field_.stars.at(sample);
     for (const Samples& component : components_of(star, own)) {
       bool joins = leaves_connected(star, component);
       for (const Sample& other : crossed_.at(sample)) {
@@ -87,7 +62,7 @@ class RegularBuilder {
   }
 
   bool clashes(const Sample& sample, const Samples& component) const {
-    const Star& star = stars_->at(sample);
+    const Star& star = field_.stars.at(sample);
     for (const auto& [neighbour, ring] : star) {
       const auto theirs = candidates_.find(neighbour);
       if (theirs == candidates_.end() || !is_before(neighbour, sample) ||
@@ -102,19 +77,13 @@ class RegularBuilder {
   }
 
   void join(const Sample& sample, const Samples& component) {
-    ReferenceCluster cluster = {sample, {}};
-    for (const Sample& other : component) {
-      cluster.vertices.push_back(number_.at({sample, other}));
-    }
-    std::ranges::sort(cluster.vertices);
-    reference_.clusters.push_back(std::move(cluster));
+    for (const Sample& other : component) clusters_[number_.at({sample, other})] = count_;
+    ++count_;
   }
 
-  const mesh::Lattice<T>& lattice_;
-  const mesh::ExtractOptions& options_;
-  const std::uint32_t margin_;
-  RegularReference reference_;
-  const Stars* stars_;
+  const JoiningField& field_;
+  std::vector<std::uint32_t> clusters_;
+  std::uint32_t count_ = 0;
   std::map<std::pair<Sample, Sample>, std::uint32_t> number_;
   std::map<Sample, Samples> crossed_;
   std::map<Sample, Samples> own_;
@@ -143,33 +112,54 @@ std::vector<std::uint32_t> plain_numbers(const ReferenceMesh& plain) {
   return numbers;
 }
 
-// For each vertex of the kernels' plain mesh its cluster, or kNotJoined.
-std::vector<std::uint32_t> clusters_of(const RegularReference& reference) {
-  const std::vector<std::uint32_t> numbers = plain_numbers(reference.plain);
-  std::vector<std::uint32_t> clusters(numbers.size(), kNotJoined);
-  for (std::uint32_t c = 0; c < reference.clusters.size(); ++c) {
-    for (const std::uint32_t v : reference.clusters[c].vertices) clusters[numbers[v]] = c;
+}  // namespace
+
+std::vector<std::uint32_t> joined_crossings(const JoiningField& field) {
+  return Joining(field).join();
+}
+
+template <class T>
+std::vector<std::uint32_t> regular_clusters(const mesh::Lattice<T>& lattice,
+                                            const mesh::ExtractOptions& options) {
+  const ReferenceMesh plain = reference_surface(lattice, options);
+  const std::uint32_t margin = options.close ? 1 : 0;
+  std::vector<Crossing> crossings;
+  for (const ReferenceVertex& vertex : plain.vertices) {
+    crossings.push_back({vertex.inside, vertex.outside});
   }
+  const auto distance = [&](const Sample& s) {
+    if (options.interpolation == Interpolation::kMidpoint) return 0.F;
+    if (plain.is_phantom(s)) return std::numeric_limits<float>::infinity();
+    const mesh::Dims& dims = lattice.dims;
+    const T value =
+        lattice.samples[((s[2] - margin) * dims.y + (s[1] - margin)) * dims.x + s[0] - margin];
+    return static_cast<float>(std::abs(static_cast<double>(value) - options.iso));
+  };
+  const auto is_within = [&](const Sample& s) {
+    const std::array counts = {plain.dims.x, plain.dims.y, plain.dims.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (s[axis] < 1 + margin || s[axis] + 1 + margin >= counts[axis]) return false;
+    }
+    return true;
+  };
+  const auto joined = joined_crossings(
+      {stars_of(plain.dims, options.scheme, margin), crossings, distance, is_within});
+  const std::vector<std::uint32_t> numbers = plain_numbers(plain);
+  std::vector<std::uint32_t> clusters(numbers.size());
+  for (std::size_t v = 0; v < numbers.size(); ++v) clusters[numbers[v]] = joined[v];
   return clusters;
 }
 
-}  // namespace
-
-template <class T>
-RegularReference regular_reference(const mesh::Lattice<T>& lattice,
-                                   const mesh::ExtractOptions& options) {
-  return RegularBuilder<T>(lattice, options).build();
-}
-
-testing::AssertionResult matches(const mesh::Mesh& regular, const mesh::Mesh& plain,
-                                 const RegularReference& reference) {
-  const std::vector<std::uint32_t> clusters = clusters_of(reference);
+testing::AssertionResult is_joined(const mesh::Mesh& regular, const mesh::Mesh& plain,
+                                   std::span<const std::uint32_t> clusters) {
   if (clusters.size() != plain.positions.size()) {
     return testing::AssertionFailure() << "the plain mesh is not the reference's";
   }
-  const std::size_t joined = static_cast<std::size_t>(
-      std::ranges::count_if(clusters, [](std::uint32_t c) { return c != kNotJoined; }));
-  const std::size_t expected = clusters.size() - joined + reference.clusters.size();
+  std::size_t expected = 0;
+  std::set<std::uint32_t> several;
+  for (const std::uint32_t c : clusters) {
+    expected += c == kNotJoined || several.insert(c).second ? 1 : 0;
+  }
   if (regular.positions.size() != expected) {
     return testing::AssertionFailure()
            << regular.positions.size() << " vertices instead of " << expected;
@@ -202,17 +192,12 @@ testing::AssertionResult matches(const mesh::Mesh& regular, const mesh::Mesh& pl
       }
     }
   }
-  return testing::AssertionSuccess();
+  return has_topology(regular.triangles.span(), plain.triangles.span(), to);
 }
 
-testing::AssertionResult has_topology_of(const mesh::Mesh& regular, const mesh::Mesh& plain,
-                                         const RegularReference& reference) {
-  return has_topology(regular.triangles.span(), plain.triangles.span(),
-                      joined_to(regular, plain, clusters_of(reference)));
-}
-
-#define ISOMESH_INSTANTIATE(T, name, kType) \
-  template RegularReference regular_reference(const mesh::Lattice<T>&, const mesh::ExtractOptions&);
+#define ISOMESH_INSTANTIATE(T, name, kType)                                     \
+  template std::vector<std::uint32_t> regular_clusters(const mesh::Lattice<T>&, \
+                                                       const mesh::ExtractOptions&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,35 +13,36 @@
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/mesh.h"
-#include "tests/support/reference.h"
+#include "tests/support/stars.h"
 
 namespace isomesh::test {
 
-// The vertices of the plain surface that become one, all on edges of one sample.
-struct ReferenceCluster {
-  std::array<std::uint32_t, 3> sample;
-  std::vector<std::uint32_t> vertices;  // of the reference's, ascending
+// An edge of a tetrahedron with a vertex of the plain surface.
+struct Crossing {
+  Sample inside;
+  Sample outside;
 };
 
-struct RegularReference {
-  ReferenceMesh plain;
-  std::vector<ReferenceCluster> clusters;
+struct JoiningField {
+  const Stars& stars;
+  std::span<const Crossing> crossings;
+  std::function<float(const Sample&)> distance;  // from the iso-value
+  std::function<bool(const Sample&)> is_within;  // whether all around it belong to the volume
 };
 
+// For each crossing its cluster, or kNotJoined.
+std::vector<std::uint32_t> joined_crossings(const JoiningField& field);
+
+// For each vertex of the kernels' plain mesh of five or six tetrahedra its cluster, or kNotJoined.
 // Instantiated for the eight types of SampleType.
 template <class T>
-RegularReference regular_reference(const mesh::Lattice<T>& lattice,
-                                   const mesh::ExtractOptions& options);
+std::vector<std::uint32_t> regular_clusters(const mesh::Lattice<T>& lattice,
+                                            const mesh::ExtractOptions& options);
 
-// `regular` is what `plain`, the kernels' mesh without joining, becomes when the reference's
-// clusters are joined: its vertices at their means, the others where they were, and the same
-// triangles in the same order without those that vanish.
-testing::AssertionResult matches(const mesh::Mesh& regular, const mesh::Mesh& plain,
-                                 const RegularReference& reference);
-
-// Both are oriented manifolds, and the one has the other's connected components, each with its
-// Euler number and boundary curves. No two triangles of `regular` have the same corners.
-testing::AssertionResult has_topology_of(const mesh::Mesh& regular, const mesh::Mesh& plain,
-                                         const RegularReference& reference);
+// `regular` is what `plain`, the kernels' mesh without joining, becomes when the clusters are
+// joined: its vertices at their means, the others where they were, and the same triangles in the
+// same order without those that vanish. The one has the other's topology.
+testing::AssertionResult is_joined(const mesh::Mesh& regular, const mesh::Mesh& plain,
+                                   std::span<const std::uint32_t> clusters);
 
 }  // namespace isomesh::test

@@ -10,6 +10,16 @@ bool is_before(const Sample& a, const Sample& b) {
   return std::tuple(a[2], a[1], a[0]) < std::tuple(b[2], b[1], b[0]);
 }
 
+void add_to_stars(std::span<const Sample, 4> corners, Stars& stars) {
+  for (const Sample& centre : corners) {
+    for (const Sample& a : corners) {
+      for (const Sample& b : corners) {
+        if (a != centre && b != centre && a != b) stars[centre][a].insert(b);
+      }
+    }
+  }
+}
+
 const Stars& stars_of(const mesh::Dims& dims, Scheme scheme, std::uint32_t margin) {
   static std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, Scheme, std::uint32_t>,
                   Stars>
@@ -17,15 +27,8 @@ const Stars& stars_of(const mesh::Dims& dims, Scheme scheme, std::uint32_t margi
   const auto [place, is_new] = known.try_emplace({dims.x, dims.y, dims.z, scheme, margin});
   Stars& stars = place->second;
   if (!is_new) return stars;
-  for_each_tetrahedron(dims, scheme, margin, [&](const Tetrahedron& corners) {
-    for (const Sample& centre : corners.samples) {
-      for (const Sample& a : corners.samples) {
-        for (const Sample& b : corners.samples) {
-          if (a != centre && b != centre && a != b) stars[centre][a].insert(b);
-        }
-      }
-    }
-  });
+  for_each_tetrahedron(dims, scheme, margin,
+                       [&](const Tetrahedron& corners) { add_to_stars(corners.samples, stars); });
   return stars;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <span>
 #include <vector>
 
 #include "tests/support/tetrahedra.h"
@@ -17,7 +18,11 @@ using Star = std::map<Sample, Samples>;
 
 using Stars = std::map<Sample, Star>;
 
-// Those of all samples of a lattice. Most tests ask for a few again and again.
+// Makes the corners neighbours of each other, around each of them.
+void add_to_stars(std::span<const Sample, 4> corners, Stars& stars);
+
+// Those of all samples of a lattice of five or six tetrahedra. Most tests ask for a few again and
+// again.
 const Stars& stars_of(const mesh::Dims& dims, Scheme scheme, std::uint32_t margin);
 
 // z first, as samples are stored.

@@ -30,6 +30,11 @@ std::optional<T> smallest_inside(double iso) {
   }
 }
 
+std::size_t places_of(const ExtractOptions& options) {
+  if (options.scheme != Scheme::kBcc) return kEdgePlaces;
+  return options.regularize ? kRegularBccPlaces : kBccPlaces;
+}
+
 }  // namespace
 
 // A left-handed lattice turns the tables' triangles inside out.
@@ -101,7 +106,7 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
 
   Extraction extraction(lattice, options, *smallest);
   extraction.clusters = count.clusters;
-  write_pass(extraction, kEdgePlaces, context, mesh, mesh);
+  write_pass(extraction, places_of(options), context, mesh, mesh);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                                      \

@@ -9,6 +9,11 @@
 // 1960), which tiles by translation; of the five-way split every cell with odd i+j+k is mirrored,
 // or the diagonals of shared faces would cross.
 //
+// On the body-centred lattice the centres of the cells are samples, too, each the mean of eight
+// (lattice/bcc_faces.h). Its tetrahedra lie around the faces of the cells, four around each; a
+// tetrahedron between the layers k and k+1 belongs to layer k. So a vertex of layer k may lie up to
+// half a step beyond plane k+1: on the edge between two centres.
+//
 // A surface that is regularised has a third as many triangles: crossings around a sample become one
 // vertex at their mean, wherever that keeps the topology (links.h). Those on edges in the border of
 // the volume stay, and so does every boundary.

@@ -22,14 +22,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// Calls visit(sample, its points, or null) for the samples of a row that join crossings.
+// Calls visit(sample, its points, or null) for the samples of a row of plane z that join crossings.
 template <class Visit>
-void visit_joining(std::span<const ClusterLayer> clusters, std::uint32_t y, std::uint32_t z,
+void visit_joining(std::span<const ClusterLayer> clusters, std::uint32_t row, std::uint32_t z,
                    Visit visit) {
   if (z >= clusters.size() || clusters[z].samples.empty()) return;
   const ClusterLayer& layer = clusters[z];
-  const JoinedPoints* points = layer.points.data() + layer.points_begin[y];
-  for (std::uint32_t i = layer.row_begin[y]; i < layer.row_begin[y + 1]; ++i) {
+  const JoinedPoints* points = layer.points.data() + layer.points_begin[row];
+  for (std::uint32_t i = layer.row_begin[row]; i < layer.row_begin[row + 1]; ++i) {
     const JoiningSample& sample = layer.samples[i];
     const bool is_junction = (sample.directions & JoiningSample::kJunction) != 0;
     visit(sample, is_junction ? points++ : nullptr);
@@ -44,8 +44,9 @@ struct JoinedName {
   std::uint8_t place = 0;
 };
 
-// `Places`: an integer with a bit for each place of a sample.
-template <class Places>
+// `Places`: an integer with a bit for each place of a sample. `kKinds`: how many rows of points
+// that join crossings belong to each row of samples.
+template <class Places, std::uint32_t kKinds = 1>
 class JoinedRows {
  public:
   JoinedRows(const Dims& dims, std::uint32_t first)
@@ -60,9 +61,8 @@ class JoinedRows {
   }
 
   // Marks what the clusters of the rows around (y, z) join: the rest of that row then has vertices
-  // of its own. `visit_names(sample, y, z, points, visit)` tells the names of all that a sample
-  // joins. To
-  // be called row by row.
+  // of its own. `visit_names(sample, row, z, points, visit)` tells the names of all that a sample
+  // joins, of a row of plane z. To be called row by row.
   template <class VisitNames>
   void mark(std::span<const ClusterLayer> clusters, std::uint32_t y, std::uint32_t z,
             VisitNames visit_names) {
@@ -73,13 +73,15 @@ class JoinedRows {
       const auto row_y = static_cast<std::uint32_t>(next_row_ % dims_.y);
       const std::array<Places*, 4> rows = {at(next_row_), at(next_row_ - 1),
                                            at(next_row_ - dims_.y), at(next_row_ - dims_.y - 1)};
-      visit_joining(clusters, row_y, row_z,
-                    [&](const JoiningSample& sample, const JoinedPoints* points) {
-                      visit_names(sample, row_y, row_z, points, [&](const JoinedName& name) {
-                        Places& places = rows[name.row][sample.x - name.before];
-                        places = static_cast<Places>(places | Places{1} << name.place);
+      for (std::uint32_t row = row_y * kKinds; row < (row_y + 1) * kKinds; ++row) {
+        visit_joining(clusters, row, row_z,
+                      [&](const JoiningSample& sample, const JoinedPoints* points) {
+                        visit_names(sample, row, row_z, points, [&](const JoinedName& name) {
+                          Places& places = rows[name.row][sample.x - name.before];
+                          places = static_cast<Places>(places | Places{1} << name.place);
+                        });
                       });
-                    });
+      }
     }
   }
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <tuple>
 
+#include "server/mesh/lattice/bcc_faces.h"
 #include "server/mesh/lattice/tetrahedra.h"
 
 namespace isomesh::mesh {
@@ -72,11 +73,21 @@ const RingSets& ring_sets(std::size_t size) {
 
 Links::Links(Scheme scheme) {
   add_directions(scheme);
-  for (std::size_t d = 0; d < directions_.size(); ++d) {
-    if ((directions_[d].corner >> 2) != 0) below_ |= bit(d);
-  }
-  links_.push_back(make_link(scheme, 0));
-  if (scheme == Scheme::kFive) links_.push_back(make_link(scheme, 1));
+  sort_directions();
+  const auto has = [&](unsigned parity, const Step& step) {
+    return find(step) >= 0 && (scheme == Scheme::kSix || parity == 0 || axes_of(step) == 1);
+  };
+  links_.push_back(make_link(0, 1, has));
+  if (scheme == Scheme::kFive) links_.push_back(make_link(1, 1, has));
+}
+
+// A tetrahedron belongs to the layer of the lower of its two centres: that of a sample's is half a
+// cell below it, that of a centre's a whole one.
+Links::Links(BccPoint point) {
+  add_directions(point);
+  sort_directions();
+  const auto has = [&](unsigned /*parity*/, const Step& step) { return find(step) >= 0; };
+  links_.push_back(make_link(0, point == BccPoint::kSample ? 1 : 2, has));
 }
 
 // From the owners' edges to those of the samples at their ends.
@@ -95,6 +106,30 @@ void Links::add_directions(Scheme scheme) {
       }
     }
   }
+}
+
+void Links::add_directions(BccPoint point) {
+  const bool is_centre = point == BccPoint::kCentre;
+  for (std::uint8_t corner = 0; corner < 8; ++corner) {
+    Step to_corner;  // from the centre
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      to_corner[axis] = 2 * position(corner)[axis] - 1;
+    }
+    directions_.push_back(is_centre
+                              ? LinkDirection{to_corner, 0, corner, false}
+                              : LinkDirection{minus({0, 0, 0}, to_corner), corner, corner, true});
+  }
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    Step step = {0, 0, 0};
+    step[axis] = 2;
+    const auto corner = static_cast<std::uint8_t>(1U << axis);
+    const auto slot = static_cast<std::uint8_t>((is_centre ? kBccCentreSlot : kBccAxisSlot) + axis);
+    directions_.push_back({step, 0, slot, false});
+    directions_.push_back({minus({0, 0, 0}, step), corner, slot, true});
+  }
+}
+
+void Links::sort_directions() {
   // Along the axes first, so that sets of those alone are small numbers.
   const auto rank = [](const LinkDirection& direction) {
     Step step = direction.step;
@@ -103,6 +138,9 @@ void Links::add_directions(Scheme scheme) {
     return std::tuple(!later, axes_of(step), step);
   };
   std::ranges::sort(directions_, {}, rank);
+  for (std::size_t d = 0; d < directions_.size(); ++d) {
+    if ((directions_[d].corner >> 2) != 0) below_ |= bit(d);
+  }
 }
 
 int Links::find(const Step& step) const {
@@ -110,13 +148,11 @@ int Links::find(const Step& step) const {
   return found == directions_.end() ? -1 : static_cast<int>(found - directions_.begin());
 }
 
-Links::Link Links::make_link(Scheme scheme, unsigned parity) const {
+template <class Has>
+Links::Link Links::make_link(unsigned parity, int below, Has has) const {
   Link link;
   const auto parity_at = [&](const Step& step) {
     return (parity + static_cast<unsigned>(step[0] + step[1] + step[2])) & 1;
-  };
-  const auto has = [&](unsigned of, const Step& step) {
-    return find(step) >= 0 && (scheme == Scheme::kSix || of == 0 || axes_of(step) == 1);
   };
   for (std::size_t d = 0; d < directions_.size(); ++d) {
     if (has(parity, directions_[d].step)) link.existing |= bit(d);
@@ -133,9 +169,9 @@ Links::Link Links::make_link(Scheme scheme, unsigned parity) const {
     for (std::size_t b = a + 1; b < directions_.size(); ++b) {
       for (std::size_t c = b + 1; c < directions_.size(); ++c) {
         if ((link.adjacent[a] >> b & link.adjacent[a] >> c & link.adjacent[b] >> c & 1) != 0) {
-          bool is_above = false;
-          for (const std::size_t d : {a, b, c}) is_above |= directions_[d].step[2] > 0;
-          (is_above ? link.above : link.below).push_back(bit(a) | bit(b) | bit(c));
+          bool is_below = false;
+          for (const std::size_t d : {a, b, c}) is_below |= directions_[d].step[2] <= -below;
+          (is_below ? link.below : link.above).push_back(bit(a) | bit(b) | bit(c));
         }
       }
     }
@@ -221,6 +257,12 @@ const Links& links_of(Scheme scheme) {
   static const Links six(Scheme::kSix);
   static const Links five(Scheme::kFive);
   return scheme == Scheme::kSix ? six : five;
+}
+
+const Links& links_of(BccPoint point) {
+  static const Links samples(BccPoint::kSample);
+  static const Links centres(BccPoint::kCentre);
+  return point == BccPoint::kSample ? samples : centres;
 }
 
 }  // namespace isomesh::mesh

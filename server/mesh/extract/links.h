@@ -37,9 +37,10 @@ inline constexpr std::size_t kMostDirections = 18;
 
 // The edge from a sample to a neighbour.
 struct LinkDirection {
-  std::array<int, 3> step = {0, 0, 0};
+  std::array<int, 3> step = {0, 0, 0};  // in cells; on the body-centred lattice in half cells
   // Its name in tetrahedra.h: which corner the sample is of the cell of the edge's owner, and the
-  // edge's direction there. `is_end`: the sample is the second of the edge's ends.
+  // edge's direction there. `is_end`: the sample is the second of the edge's ends. On the
+  // body-centred lattice that of the record and the slot in bcc_faces.h.
   std::uint8_t corner = 0;
   std::uint8_t place = 0;
   bool is_end = false;
@@ -90,10 +91,14 @@ class ClusterFacts {
   std::uint64_t bits_ = 0;
 };
 
-// The links of one scheme's samples. Safe to use from several threads.
+// The points of the body-centred lattice.
+enum class BccPoint : std::uint8_t { kSample, kCentre };
+
+// The links of one scheme's samples, or of one kind of points. Safe to use from several threads.
 class Links {
  public:
   explicit Links(Scheme scheme);
+  explicit Links(BccPoint point);
 
   // All that a sample can have: first those to samples that come later in x-fastest order, then
   // their opposites in the same order. With five tetrahedra, samples of odd i+j+k have those along
@@ -153,7 +158,12 @@ class Links {
 
   const Link& link_of(unsigned parity) const { return links_[links_.size() == 1 ? 0 : parity]; }
   void add_directions(Scheme scheme);
-  Link make_link(Scheme scheme, unsigned parity) const;
+  void add_directions(BccPoint point);
+  void sort_directions();
+  // `has(parity, step)`: whether samples have the direction. A triangle is one of the layer below
+  // if a corner is so far below the sample.
+  template <class Has>
+  Link make_link(unsigned parity, int below, Has has) const;
   Ring make_ring(const Link& link, std::size_t direction) const;
   int find(const std::array<int, 3>& step) const;
   ClusterFacts find_facts(const Link& link, Directions set) const;
@@ -163,6 +173,8 @@ class Links {
   std::vector<Link> links_;  // of even and odd samples, or of both
 };
 
+// Of five or six tetrahedra.
 const Links& links_of(Scheme scheme);
+const Links& links_of(BccPoint point);
 
 }  // namespace isomesh::mesh

@@ -6,12 +6,16 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <optional>
+#include <type_traits>
+#include <utility>
 
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 #include "proto/samples.h"
+#include "server/mesh/lattice/bcc_faces.h"
 #include "server/mesh/lattice/rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -29,6 +33,33 @@ HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
   return pack_word(flags);
 }
 
+// The mean of the eight samples of a cell, of which `first` is corner 0.
+template <class T>
+HWY_INLINE double mean_of_cell(const T* first, std::ptrdiff_t row, std::ptrdiff_t plane) {
+  constexpr double kEighth = 0.125;
+  if constexpr (std::is_integral_v<T>) {
+    using Sum = std::conditional_t<sizeof(T) <= 2, std::int32_t, std::int64_t>;
+    Sum sum = 0;
+    for (const T* at : {first, first + row, first + plane, first + row + plane}) {
+      sum += static_cast<Sum>(at[0]) + static_cast<Sum>(at[1]);
+    }
+    return static_cast<double>(sum) * kEighth;
+  } else {
+    const auto face = [&](const T* at, double scale) {
+      const auto value = [&](std::ptrdiff_t offset) {
+        return static_cast<double>(at[offset]) * scale;
+      };
+      return (value(0) + value(row)) + (value(plane) + value(row + plane));
+    };
+    const double mean = (face(first, 1) + face(first + 1, 1)) * kEighth;
+    // Sums of doubles can overflow; those of their eighths cannot.
+    if constexpr (std::is_same_v<T, double>) {
+      if (!std::isfinite(mean)) return face(first, kEighth) + face(first + 1, kEighth);
+    }
+    return mean;
+  }
+}
+
 template <class T>
 class RowsOf final : public SampleRows {
  public:
@@ -36,7 +67,9 @@ class RowsOf final : public SampleRows {
       : lattice_(lattice),
         iso_(options.iso),
         smallest_(smallest),
-        placement_(options, lattice.dims, lattice.to_space) {
+        placement_(options, lattice.dims, lattice.to_space),
+        // An edge from a centre to a corner takes half a step along each axis.
+        half_edges_(options, std::min(2 * placement_.nearest(), kMostNearest)) {
     if (options.close) border_.emplace(lattice, options, smallest, placement_);
   }
 
@@ -53,12 +86,17 @@ class RowsOf final : public SampleRows {
                 std::span<std::int32_t> out) const override {
     const T* samples = row(y, z) + begin;
     for (std::size_t x = 0; x < out.size(); ++x) {
-      const auto distance = static_cast<float>(std::abs(static_cast<double>(samples[x]) - iso_));
-      // Its bits rise with a number that is not negative; they are moved down to where signed
-      // numbers begin, since those are what processors compare.
-      const std::uint32_t rank =
-          std::bit_cast<std::uint32_t>(distance) << 1 | (samples[x] < smallest_ ? 1U : 0U);
-      out[x] = std::bit_cast<std::int32_t>(rank ^ std::uint32_t{1} << 31);
+      out[x] = rank(static_cast<double>(samples[x]), samples[x] < smallest_);
+    }
+  }
+
+  void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
+                       std::span<std::int32_t> out) const override {
+    const T* samples = row(y, z) + begin;
+    const auto [next_row, next_plane] = steps();
+    for (std::size_t x = 0; x < out.size(); ++x) {
+      const double mean = mean_of_cell(samples + x, next_row, next_plane);
+      out[x] = rank(mean, mean < iso_);
     }
   }
 
@@ -74,11 +112,72 @@ class RowsOf final : public SampleRows {
     }
   }
 
+  void add_centres(std::uint32_t y, std::uint32_t z, std::uint32_t margin,
+                   std::span<const std::uint64_t> uncertain, std::uint64_t* out) const override {
+    const T* samples = row(y, z) - margin;
+    const auto [next_row, next_plane] = steps();
+    for (std::size_t w = 0; w < uncertain.size(); ++w) {
+      const T* begin = samples + w * kWordBits;
+      Word inside = 0;
+      for (Word rest = uncertain[w]; rest != 0; rest &= rest - 1) {
+        const int bit = std::countr_zero(rest);
+        inside |= Word{mean_of_cell(begin + bit, next_row, next_plane) >= iso_} << bit;
+      }
+      out[w] |= inside;
+    }
+  }
+
+  void bcc_shares(const BccRowEdges& edges, double* out) const override {
+    const T* samples = row(edges.y, edges.z) - edges.margin;
+    const auto [next_row, next_plane] = steps();
+    const std::array<std::ptrdiff_t, 3> next = {1, next_row, next_plane};
+    std::uint32_t known = ~std::uint32_t{0};  // the cell whose mean is `centre`
+    double centre = 0;
+    for (const std::uint32_t edge : edges.edges) {
+      const std::uint32_t x = edge / kBccSlotRange;
+      const unsigned slot = edge % kBccSlotRange;
+      const T* at = samples + x;
+      if (!is_from_centre(slot)) {
+        const T to = at[sample_offset(lattice_.dims, bcc_direction_of(slot))];
+        *out++ = placement_.share(*at, to);
+        continue;
+      }
+      if (std::exchange(known, x) != x) centre = mean_of_cell(at, next_row, next_plane);
+      if (slot < kBccAxisSlot) {
+        const auto to = static_cast<double>(at[sample_offset(lattice_.dims, slot)]);
+        *out++ = half_edges_.share(centre, to);
+      } else {
+        const T* other = at + next[slot - kBccCentreSlot];
+        *out++ = placement_.share(centre, mean_of_cell(other, next_row, next_plane));
+      }
+    }
+  }
+
   BorderVertex place_at_border(const BorderSample& cell, const EdgeEnds& ends) const override {
     return border_->place(cell, ends);
   }
 
  private:
+  static constexpr double kMostNearest = 0.25;
+
+  HWY_INLINE std::int32_t rank(double value, bool is_outside) const {
+    const auto distance = static_cast<float>(std::abs(value - iso_));
+    // Its bits rise with a number that is not negative; they are moved down to where signed
+    // numbers begin, since those are what processors compare.
+    const std::uint32_t rank =
+        std::bit_cast<std::uint32_t>(distance) << 1 | static_cast<std::uint32_t>(is_outside);
+    return std::bit_cast<std::int32_t>(rank ^ std::uint32_t{1} << 31);
+  }
+
+  static bool is_from_centre(unsigned slot) {
+    return slot < kBccAxisSlot || (slot >= kBccCentreSlot && slot < kBccDiagonalSlot);
+  }
+
+  // From a sample to the next ones along y and z.
+  std::array<std::ptrdiff_t, 2> steps() const {
+    return {sample_offset(lattice_.dims, 2), sample_offset(lattice_.dims, 4)};
+  }
+
   const T* row(std::uint32_t y, std::uint32_t z) const {
     return lattice_.samples + (std::size_t{z} * lattice_.dims.y + y) * lattice_.dims.x;
   }
@@ -87,6 +186,7 @@ class RowsOf final : public SampleRows {
   const double iso_;
   const T smallest_;
   const Placement placement_;
+  const Placement half_edges_;  // of the body-centred lattice
   std::optional<BorderPlacement<T>> border_;
 };
 

@@ -31,6 +31,18 @@ struct RowEdges {
   std::span<const std::uint32_t> edges;
 };
 
+// For each sample a place in such a list is this times x, plus its slot (bcc_faces.h).
+inline constexpr std::uint32_t kBccSlotRange = 32;
+
+// Crossed edges of the body-centred lattice that samples of one row own. Those of one sample are
+// best together.
+struct BccRowEdges {
+  std::uint32_t y = 0;
+  std::uint32_t z = 0;
+  std::uint32_t margin = 0;  // as in RowEdges
+  std::span<const std::uint32_t> edges;
+};
+
 // Immutable, so safe to read from several threads. Rows are in the lattice's own numbers.
 class SampleRows {
  public:
@@ -46,8 +58,22 @@ class SampleRows {
   virtual void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
                         std::span<std::int32_t> out) const = 0;
 
+  // As nearness(), of the centres of cells.
+  virtual void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
+                               std::span<std::int32_t> out) const = 0;
+
   // How far the surface is along each edge from its first end, as a share of the edge.
   virtual void shares(const RowEdges& row, double* out) const = 0;
+
+  // Sets those bits of `out` whose cells' means of eight samples are inside, of the cells that are
+  // in `uncertain`. Bit x is the cell that begins at sample x - `margin` of the row. The sums of
+  // integers are exact; those of others are in double precision, in an order that is always the
+  // same, and are compared before they are rounded to less.
+  virtual void add_centres(std::uint32_t y, std::uint32_t z, std::uint32_t margin,
+                           std::span<const std::uint64_t> uncertain, std::uint64_t* out) const = 0;
+
+  // As shares(), on the body-centred lattice, from the centre or the sample that names the edge.
+  virtual void bcc_shares(const BccRowEdges& row, double* out) const = 0;
 
   // As BorderPlacement::place. Only for a surface that is closed.
   virtual BorderVertex place_at_border(const BorderSample& cell, const EdgeEnds& ends) const = 0;

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <hwy/highway.h>
@@ -26,12 +27,13 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// How near the samples of two planes are to the iso-value. Each word of a row is looked up once, if
-// it is asked for.
+// How near the samples of two planes, or the centres of their cells, are to the iso-value. Each
+// word of a row is looked up once, if it is asked for.
 class NearnessPlanes {
  public:
-  explicit NearnessPlanes(const Extraction& extraction)
+  explicit NearnessPlanes(const Extraction& extraction, BccPoint point = BccPoint::kSample)
       : extraction_(extraction),
+        point_(point),
         words_(words_of(extraction.dims.x) + 1),
         rows_(std::size_t{2} * extraction.dims.y),
         known_(rows_ * words_),
@@ -58,17 +60,22 @@ class NearnessPlanes {
   void look_up(std::size_t w, std::uint32_t y, std::uint32_t z, std::int32_t* out) const {
     std::fill_n(out, kWordBits, std::numeric_limits<std::int32_t>::max());
     const std::uint32_t margin = extraction_.margin;
-    const Dims& inner = extraction_.inner;
+    const bool is_centre = point_ == BccPoint::kCentre;
+    const std::uint32_t less = is_centre ? 1 : 0;
+    const Dims inner = {extraction_.inner.x - less, extraction_.inner.y - less,
+                        extraction_.inner.z - less};
     if (y - margin >= inner.y || z - margin >= inner.z) return;  // before the first, it wraps
     const std::size_t begin = std::max<std::size_t>(w * kWordBits, margin);
     const std::size_t end = std::min<std::size_t>((w + 1) * kWordBits, inner.x + margin);
     if (begin >= end) return;
-    extraction_.samples->nearness(y - margin, z - margin,
-                                  static_cast<std::uint32_t>(begin - margin),
-                                  {out + (begin - w * kWordBits), end - begin});
+    const auto first = static_cast<std::uint32_t>(begin - margin);
+    const std::span found(out + (begin - w * kWordBits), end - begin);
+    is_centre ? extraction_.samples->centre_nearness(y - margin, z - margin, first, found)
+              : extraction_.samples->nearness(y - margin, z - margin, first, found);
   }
 
   const Extraction& extraction_;
+  const BccPoint point_;
   const std::size_t words_;  // of a row, and one that is read past the last
   const std::size_t rows_;
   std::vector<std::uint8_t> known_;

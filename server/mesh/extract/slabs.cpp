@@ -9,6 +9,9 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "server/mesh/extract/bcc_clusters-inl.h"
+#include "server/mesh/extract/bcc_regular-inl.h"
+#include "server/mesh/extract/bcc_walk-inl.h"
 #include "server/mesh/extract/regular-inl.h"
 #include "server/mesh/extract/sign_clusters-inl.h"
 #include "server/mesh/extract/signs-inl.h"
@@ -18,11 +21,19 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
 void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
+  if (extraction.scheme == Scheme::kBcc) {
+    return extraction.regularize ? BccClusterWalk(extraction, slab, count).count()
+                                 : count_bcc_slab(extraction, slab, count);
+  }
   if (extraction.regularize) return ClusterWalk<SignClusters>(extraction, slab, count).count();
   count_slab_of<SignField>(extraction, slab, count);
 }
 
 void write_signs(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh) {
+  if (extraction.scheme == Scheme::kBcc) {
+    return extraction.regularize ? BccWriter<BccRegular>(extraction, slab, memory, mesh).write()
+                                 : BccWriter<BccPlain>(extraction, slab, memory, mesh).write();
+  }
   if (extraction.regularize) return write_slab_of<RegularField>(extraction, slab, memory, mesh);
   write_slab_of<SignField>(extraction, slab, memory, mesh);
 }

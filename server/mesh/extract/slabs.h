@@ -105,6 +105,11 @@ class IndexMemory {
 // Places a sample, by direction, for the indices of the vertices on the edges that it owns.
 inline constexpr std::size_t kEdgePlaces = 8;
 
+// The same for the body-centred lattice: two numbers for all the vertices that a sample owns, or
+// one for each slot (bcc_faces.h) where some are joined.
+inline constexpr std::size_t kBccPlaces = 2;
+inline constexpr std::size_t kRegularBccPlaces = 17;
+
 // How many indices a slab works with that marches over such samples: those of one plane and two
 // rows, of so many places a sample.
 inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {

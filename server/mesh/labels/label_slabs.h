@@ -13,11 +13,14 @@
 
 namespace isomesh::mesh {
 
+// Returns the scheme. Throws Error kInvalidParameter for one that labels do not have.
+Scheme scheme_of_labels(Scheme scheme);
+
 // What all slabs share whose labels are separated. Phantoms are background.
 struct Separation : Marching {
   template <class T>
   Separation(const Lattice<T>& lattice, const SeparateOptions& options)
-      : Marching(lattice.dims, lattice.to_space, options.scheme, options.close),
+      : Marching(lattice.dims, lattice.to_space, scheme_of_labels(options.scheme), options.close),
         regularize(options.regularize),
         parts(options.labels, options.values),
         samples(std::make_unique<PartsOf<T>>(lattice, parts)),

@@ -7,6 +7,7 @@ namespace isomesh::mesh {
 namespace {
 
 bool has_walls(const Dims& dims, const SeparateOptions& options) {
+  scheme_of_labels(options.scheme);
   return dims.has_cells() && !options.labels.empty();
 }
 
@@ -33,6 +34,12 @@ void write_all(const Separation& separation, const Context& context, SeparatingS
 }
 
 }  // namespace
+
+Scheme scheme_of_labels(Scheme scheme) {
+  if (scheme == Scheme::kFive || scheme == Scheme::kSix) return scheme;
+  throw Error(ErrorCode::kInvalidParameter,
+              "labels cannot be extracted with scheme bcc; use 5 or 6");
+}
 
 template <class T>
 SurfaceCount count_walls(const Lattice<T>& lattice, const SeparateOptions& options,

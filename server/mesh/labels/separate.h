@@ -35,9 +35,9 @@ struct SeparateOptions {
   // as select_labels (labels.h) gives them. All other values are background: a label's surface is
   // whole whatever its neighbours are, and between two values that are not listed there is no wall.
   std::vector<std::int64_t> labels;
-  Scheme scheme = Scheme::kSix;
-  bool close = false;       // cap labels where they meet the lattice's border
-  bool regularize = false;  // join the vertices around a sample, see label_clusters-inl.h
+  Scheme scheme = Scheme::kSix;  // kFive or kSix; others throw Error kInvalidParameter
+  bool close = false;            // cap labels where they meet the lattice's border
+  bool regularize = false;       // join the vertices around a sample, see label_clusters-inl.h
   // Of labels that are not the samples of their own value: all values whose samples belong to them.
   // One value may belong to several labels; what overlaps is separated from what does not.
   std::map<std::int64_t, std::vector<std::int64_t>> values = {};

@@ -130,7 +130,7 @@ const CellSplit& cell_split(Scheme scheme, bool odd) {
   static const CellSplit six = make_split(kPaperSix, 0);
   static const CellSplit five_even = make_split(kPaperFive, 0);
   static const CellSplit five_odd = make_split(kPaperFive, kMirrorX);
-  if (scheme == Scheme::kSix) return six;
+  if (scheme != Scheme::kFive) return six;
   return odd ? five_odd : five_even;
 }
 

@@ -56,6 +56,7 @@ struct CellSplit {
 CellCase tetrahedron_case(const std::array<std::uint8_t, 4>& corners, unsigned inside);
 
 // The split of a cell whose corner 0 has even or odd i+j+k; with six tetrahedra they are the same.
+// On the body-centred lattice: the six-way split of the cells that have no centre (bcc_faces.h).
 const CellSplit& cell_split(Scheme scheme, bool odd);
 
 }  // namespace isomesh::mesh

@@ -120,7 +120,7 @@ TEST_F(CommandLine, RejectionsNameTheOptionAndItsRange) {
       {{"--passes", "2.5"}, "--passes: must be a whole number from 0 to 1000\n"},
       {{"--passes", "1001"}, "--passes: must be a whole number from 0 to 1000\n"},
       {{"--lambda", "2"}, "--lambda: must be a number above 0 and at most 1"},
-      {{"--scheme", "7"}, R"(--scheme: must be 5, 6, "fcc" or "kuhn")"},
+      {{"--scheme", "7"}, R"(--scheme: must be 5, 6, "fcc", "kuhn" or "bcc")"},
       {{"--position-bits", "7"}, "--position-bits: must be a whole number from 8 to 30"},
       {{"--max-error", "0"}, "--max-error: must be a number from 0.001 to 1000"},
       {{"--crop", "1,1,1,0,0,0"}, "--crop: must have a first corner that is smaller"},

@@ -219,7 +219,7 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   std::istringstream stream(help);
   for (std::string word; stream >> word;) words += (words.empty() ? "" : " ") + word;
   for (const std::string text :
-       {"Number of tetrahedra per cell (5, 6, fcc or kuhn; default: 6)",
+       {"Number of tetrahedra per cell, or lattice (5, 6, fcc, kuhn or bcc; default: 6)",
         "(laplacian, taubin, angle, optimize or labels; default: laplacian, "
         "labels with --labels)",
         "keeps the topology (default) --no-regularize Switch off --regularize",

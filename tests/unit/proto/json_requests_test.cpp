@@ -148,7 +148,7 @@ TEST(JobBody, TakesEveryMember) {
 }
 
 TEST(JobBody, TellsANameOfASchemeAsItWasGiven) {
-  for (const std::string name : {"5", "6", R"("fcc")", R"("kuhn")"}) {
+  for (const std::string name : {"5", "6", R"("fcc")", R"("kuhn")", R"("bcc")"}) {
     const JobParameters parameters = parsed(R"("scheme": )" + name);
     EXPECT_THAT(to_json(parameters), testing::HasSubstr(R"("scheme":)" + name + ','));
   }
@@ -332,7 +332,12 @@ TEST(JobBody, MessagesSayWhatIsAllowed) {
             "draco.position_bits: must be a whole number from 8 to 30");
   EXPECT_EQ(detail(R"("draco": {"speed": 31})"),
             "draco.speed: must be a whole number from 0 to 10");
-  EXPECT_EQ(detail(R"("scheme": 7)"), R"(scheme: must be 5, 6, "fcc" or "kuhn")");
+  EXPECT_EQ(detail(R"("scheme": 7)"), R"(scheme: must be 5, 6, "fcc", "kuhn" or "bcc")");
+  EXPECT_EQ(
+      std::string(thrown_by([] {
+                    parse_job_parameters(R"({"volume": "a", "labels": "all", "scheme": "bcc"})");
+                  })->what()),
+      R"(scheme: cannot be "bcc" with labels: there are no values between two labels)");
   EXPECT_EQ(detail(R"("priority": "x")"), R"(priority: must be "stat", "routine" or "bulk")");
   EXPECT_EQ(detail(R"("isovalue": 3)"), "isovalue: is not a known member");
 }

@@ -173,7 +173,7 @@ export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string 
   return labels.length === 1 ? `label ${only}` : `${labels.length} labels`;
 }
 
-const lattices = { 5: '5 tetrahedra', 6: '6 tetrahedra', fcc: 'face-centred lattice', kuhn: 'primitive lattice' };
+const lattices = { 5: '5 tetrahedra', 6: '6 tetrahedra', fcc: 'face-centred lattice', kuhn: 'primitive lattice', bcc: 'body-centred lattice' };
 
 export function schemeInWords({ scheme }: Pick<JobParameters, 'scheme'>): string {
   return lattices[scheme];

@@ -91,13 +91,18 @@ export function withValue<Job extends Partial<JobParameters>>(job: Job, { name }
   return { ...job, [owner]: member === undefined ? value : { ...inner, [member]: value } };
 }
 
-// The job by those labels, or at its iso-value. What has the default of the one kind gets that of the other.
+// The job by those labels, or at its iso-value. What has the default of the one kind, or a choice that the other kind does
+// not have, gets the default of the other.
 export function withLabels(job: JobParameters, labels: JobParameters['labels']): JobParameters {
   const next = { ...job, labels };
   if (labels === undefined) delete next.labels;
+  const isLeft = (parameter: Parameter): boolean => {
+    const value = valueIn(job, parameter);
+    if (parameter.kind === 'choice' && value !== undefined && !fits(parameter, value, next)) return true;
+    return parameter.byLabels !== undefined && value === defaultOf(parameter, job);
+  };
   return parameters
-    .filter(({ byLabels }) => byLabels !== undefined)
-    .filter((parameter) => valueIn(job, parameter) === defaultOf(parameter, job))
+    .filter(isLeft)
     .reduce((result, parameter) => withValue(result, parameter, defaultOf(parameter, next) ?? null), next);
 }
 
@@ -113,10 +118,11 @@ export function isOfKind({ jobs }: Parameter, job: JobParameters): boolean {
 // Of schemes that have a number, too.
 const secondNames: readonly (string | number)[] = ['fcc', 'kuhn'];
 
-// The choices that the daemon takes for this job: one kind of smoothing is for labels alone.
+// The choices that the daemon takes for this job: one kind of smoothing is for labels alone, one lattice never for them.
 export function choicesOf({ name, values = [] }: Parameter, job: JobParameters): readonly (string | number)[] {
   return values.filter((value) => {
     if (name === 'smoothing' && value === 'labels') return isByLabels(job);
+    if (name === 'scheme' && value === 'bcc') return !isByLabels(job);
     return name !== 'scheme' || !secondNames.includes(value) || value === job.scheme;
   });
 }

@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { isSameJob, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
-import { fits, isByLabels, meshFormats, parameterOf } from '../../job/table';
+import { fits, isByLabels, isOfKind, meshFormats, parameterOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNames, formatNumber, formatValue } from '../../ui/format';
@@ -197,6 +197,7 @@ export const comparisons: readonly Comparison[] = [
       { scheme: 6, interpolation: 'midpoint' },
     ],
   },
+  { title: 'the three lattices', variants: [{ scheme: 6 }, { scheme: 5 }, { scheme: 'bcc' }] },
   { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
   {
     title: 'all kinds of smoothing',
@@ -211,13 +212,15 @@ export const comparisons: readonly Comparison[] = [
 ];
 
 export function compareSection(job: Job): HTMLElement {
-  const smoothing = parameterOf('smoothing');
   const takes = (variant: Partial<JobParameters>): boolean =>
-    variant.smoothing === undefined || fits(smoothing, variant.smoothing, job.parameters);
-  const start = async (comparison: Comparison): Promise<void> => {
+    Object.entries(variant).every(([name, value]) => {
+      const parameter = parameterOf(name);
+      return isOfKind(parameter, job.parameters) && fits(parameter, value, job.parameters);
+    });
+  const start = async (variants: Partial<JobParameters>[]): Promise<void> => {
     try {
       const jobs = await Promise.all(
-        comparison.variants.filter(takes).map((variant) =>
+        variants.map((variant) =>
           isSame(job, variant) ? Promise.resolve(job) : submitVariant(job, variant),
         ),
       );
@@ -231,7 +234,10 @@ export function compareSection(job: Job): HTMLElement {
     h(
       'div',
       { class: 'stack' },
-      ...comparisons.map((comparison) => button(comparison.title, () => void start(comparison))),
+      ...comparisons
+        .map(({ title, variants }) => ({ title, variants: variants.filter(takes) }))
+        .filter(({ variants }) => variants.length > 1)
+        .map(({ title, variants }) => button(title, () => void start(variants))),
     ),
     h('p', { class: 'hint' }, 'Starts the jobs that are missing. The list of jobs can compare any other jobs.'),
   );

@@ -1,0 +1,160 @@
+#include "server/mesh/lattice/bcc_faces.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+namespace isomesh::mesh {
+namespace {
+
+constexpr unsigned kPoints = 6;
+constexpr unsigned kFirstCorner = 2;
+constexpr std::uint8_t kNone = 0xFF;
+
+using Place = std::array<int, 3>;  // in half cells
+
+Place operator-(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+int determinant(const Place& a, const Place& b, const Place& c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+// Builds the cases of one face.
+class FaceBuilder {
+ public:
+  FaceBuilder(unsigned axis, BccSide side, bool left_handed)
+      : axis_(axis), side_(side), left_handed_(left_handed) {
+    for (auto& row : numbers_) row.fill(kNone);
+    number_edges();
+  }
+
+  BccFace build() {
+    for (unsigned inside = 0; inside < face_.cases.size(); ++inside) {
+      for (const auto& tetrahedron : tetrahedra()) add(tetrahedron, inside);
+    }
+    return face_;
+  }
+
+ private:
+  using Points = std::array<std::uint8_t, 4>;
+
+  std::span<const Points> tetrahedra() const {
+    if (side_ == BccSide::kInner) return kBccInnerTetrahedra;
+    return std::span(kBccBorderTetrahedra).first(2);
+  }
+
+  // The lattice's point that a point of the tables stands for.
+  unsigned real(unsigned point) const { return point == 0 && side_ == BccSide::kLow ? 1 : point; }
+
+  Place place(unsigned point) const {
+    Place result = {1, 1, 1};
+    if (point < kFirstCorner) {
+      result[axis_] = point == 0 ? -1 : 1;
+      return result;
+    }
+    const unsigned corner = bcc_corners(axis_)[point - kFirstCorner];
+    for (unsigned a = 0; a < 3; ++a) result[a] = static_cast<int>(corner >> a & 1) * 2;
+    return result;
+  }
+
+  void number_edges() {
+    const auto second = static_cast<std::uint8_t>((axis_ + 1) % 3);
+    const auto third = static_cast<std::uint8_t>((axis_ + 2) % 3);
+    if (side_ == BccSide::kInner) number(0, 1, BccRecord::kLower, kBccCentreSlot + axis_);
+    for (unsigned c = 0; c < 4; ++c) {
+      const unsigned corner = bcc_corners(axis_)[c];
+      const unsigned point = kFirstCorner + c;
+      if (side_ != BccSide::kLow) number(0, point, BccRecord::kLower, corner | 1U << axis_);
+      if (side_ != BccSide::kHigh) number(1, point, BccRecord::kUpper, corner);
+    }
+    number(2, 3, BccRecord::kUpper, kBccAxisSlot + second);
+    number(3, 4, BccRecord::kSecond, kBccAxisSlot + third);
+    number(4, 5, BccRecord::kThird, kBccAxisSlot + second);
+    number(2, 5, BccRecord::kUpper, kBccAxisSlot + third);
+    if (side_ != BccSide::kInner) number(2, 4, BccRecord::kUpper, kBccDiagonalSlot + axis_);
+  }
+
+  void number(unsigned a, unsigned b, BccRecord record, unsigned slot) {
+    numbers_[a][b] = numbers_[b][a] = count_;
+    edges_[count_++] = {record, static_cast<std::uint8_t>(slot)};
+  }
+
+  void add(const Points& tetrahedron, unsigned inside) {
+    std::array<unsigned, 4> in = {};
+    std::array<unsigned, 4> out = {};
+    std::size_t ins = 0;
+    std::size_t outs = 0;
+    for (const unsigned listed : tetrahedron) {
+      const unsigned point = real(listed);
+      ((inside >> point & 1) != 0 ? in[ins++] : out[outs++]) = point;
+    }
+    BccFaceCase& result = face_.cases[inside];
+    if (ins == 1) {
+      const bool turn = volume(in[0], out[0], out[1], out[2]) < 0;
+      add_triangle(result, {in[0], out[0]}, {in[0], out[1]}, {in[0], out[2]}, turn);
+    } else if (ins == 3) {
+      const bool turn = volume(out[0], in[0], in[1], in[2]) > 0;
+      add_triangle(result, {in[0], out[0]}, {in[1], out[0]}, {in[2], out[0]}, turn);
+    } else if (ins == 2) {
+      const bool turn = volume(in[0], in[1], out[0], out[1]) < 0;
+      add_triangle(result, {in[0], out[0]}, {in[0], out[1]}, {in[1], out[1]}, turn);
+      add_triangle(result, {in[0], out[0]}, {in[1], out[1]}, {in[1], out[0]}, turn);
+    }
+  }
+
+  int volume(unsigned from, unsigned a, unsigned b, unsigned c) const {
+    return determinant(place(a) - place(from), place(b) - place(from), place(c) - place(from));
+  }
+
+  using Ends = std::array<unsigned, 2>;
+
+  void add_triangle(BccFaceCase& result, Ends a, Ends b, Ends c, bool turn) const {
+    if (turn != left_handed_) std::swap(b, c);
+    result.triangles[result.triangle_count++] = {named(result, a), named(result, b),
+                                                 named(result, c)};
+  }
+
+  // The place of an edge among those that the case crosses.
+  std::uint8_t named(BccFaceCase& result, const Ends& ends) const {
+    const BccEdge& edge = edges_[numbers_[ends[0]][ends[1]]];
+    const auto known = std::span(result.edges).first(result.edge_count);
+    const auto found = std::ranges::find_if(known, [&](const BccEdge& other) {
+      return other.record == edge.record && other.slot == edge.slot;
+    });
+    const auto place = static_cast<std::uint8_t>(found - known.begin());
+    if (found == known.end()) {
+      if (place == 0) result.edges.fill(edge);
+      result.edges[result.edge_count++] = edge;
+    }
+    return place;
+  }
+
+  const unsigned axis_;
+  const BccSide side_;
+  const bool left_handed_;
+  BccFace face_;
+  std::array<BccEdge, 13> edges_ = {};
+  std::uint8_t count_ = 0;
+  std::array<std::array<std::uint8_t, kPoints>, kPoints> numbers_ = {};
+};
+
+BccFaces make_faces(bool left_handed) {
+  BccFaces faces;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    for (const BccSide side : {BccSide::kInner, BccSide::kLow, BccSide::kHigh}) {
+      faces[axis][static_cast<std::size_t>(side)] = FaceBuilder(axis, side, left_handed).build();
+    }
+  }
+  return faces;
+}
+
+}  // namespace
+
+const BccFaces& bcc_faces(bool left_handed) {
+  static const BccFaces right = make_faces(false);
+  static const BccFaces left = make_faces(true);
+  return left_handed ? left : right;
+}
+
+}  // namespace isomesh::mesh
