@@ -157,6 +157,7 @@ async function show(): Promise<void> {
   shownPath = route.path.join('/') || '/';
   main.setAttribute('aria-busy', 'true');
   const slow = setTimeout(() => main.replaceChildren(h('p', { class: 'loading' }, 'Loading')), 300);
+  mine.onEnd(() => clearTimeout(slow));
   try {
     const view = await place.show(mine, route);
     if (mine.isOver) return;

@@ -32,6 +32,28 @@ describe('the page', () => {
     await page.waitForURL(/#\/jobs$/);
   });
 
+  it('keeps the view that was opened last, however late the one before is', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/volumes/${ball}`);
+    await page.locator('.histogram .bars').waitFor();
+    const held: { go: () => void } = { go: () => undefined };
+    await page.route(/\/v1\/jobs(\?|$)/, async (route) => {
+      await new Promise<void>((resolve) => {
+        held.go = resolve;
+      });
+      await route.continue();
+    });
+    await page.getByRole('link', { name: 'Jobs', exact: true }).click();
+    await page.goBack();
+    const view = page.locator('.histogram .bars');
+    await view.waitFor();
+    await page.waitForTimeout(600); // when a view that is still to come says that it loads
+    held.go();
+    await page.waitForTimeout(200);
+    expect(await view.count()).toBe(1);
+    expect(await page.locator('.loading').count()).toBe(0);
+  });
+
   it('shows where one is also in colours that a person forces', async () => {
     const { page, daemon } = at;
     await page.emulateMedia({ forcedColors: 'active' });

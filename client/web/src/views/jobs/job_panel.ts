@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { isSameJob, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
-import { fits, isByLabels, isOfKind, meshFormats, parameterOf } from '../../job/table';
+import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNames, formatNumber, formatValue } from '../../ui/format';
@@ -213,9 +213,9 @@ export const comparisons: readonly Comparison[] = [
 
 export function compareSection(job: Job): HTMLElement {
   const takes = (variant: Partial<JobParameters>): boolean =>
-    Object.entries(variant).every(([name, value]) => {
+    Object.keys(variant).every((name) => {
       const parameter = parameterOf(name);
-      return isOfKind(parameter, job.parameters) && fits(parameter, value, job.parameters);
+      return isOfKind(parameter, job.parameters) && fits(parameter, valueIn(variant, parameter) ?? null, job.parameters);
     });
   const start = async (variants: Partial<JobParameters>[]): Promise<void> => {
     try {
