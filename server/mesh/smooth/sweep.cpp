@@ -34,9 +34,9 @@ struct MoreNeighbor {
 constexpr std::uint32_t kNoVertex = UINT32_MAX;  // ends a list
 
 // A vertex and its neighbours, as the triangles around it name them one after the other.
-class Links {
+class Neighbors {
  public:
-  explicit Links(Place of_zero) { neighbors_.fill(of_zero); }
+  explicit Neighbors(Place of_zero) { neighbors_.fill(of_zero); }
 
   // A triangle's next and previous corner. False when there is no place left for the neighbour.
   bool add(std::uint32_t next, std::uint32_t previous, Place next_place) {
@@ -93,7 +93,7 @@ struct LayerLinks {
 // on it too, whichever side they are of. The differences below are modulo 2^32 and 2^64.
 template <bool kHasLines, class IsOnLine>
 void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
-                   const LayerLinks& upper, IsOnLine is_on_line, Links* links) {
+                   const LayerLinks& upper, IsOnLine is_on_line, Neighbors* links) {
   const Place upper_shift = upper.first_place - upper.first * kPlacesPerPosition;
   const Place lower_shift = lower.first_place - lower.first * kPlacesPerPosition;
   const auto place_of = [&](std::uint32_t vertex) {
@@ -179,7 +179,7 @@ class Sweep {
       rings_.back()[kRingLayers * width_] = Float4{};  // for places of no neighbour
     }
     moved_.resize_for_overwrite(width_);
-    links_.resize((steps_ + 1) * width_, Links(place_of_zero()));
+    links_.resize((steps_ + 1) * width_, Neighbors(place_of_zero()));
     more_.resize(steps_ + 1);
     on_line_.resize(steps_ + 1);
   }
@@ -213,7 +213,9 @@ class Sweep {
   Float4* positions(std::size_t step, std::ptrdiff_t layer) {
     return rings_[step].data() + turn(layer, kRingLayers) * width_;
   }
-  Links* links(std::ptrdiff_t layer) { return links_.data() + turn(layer, steps_ + 1) * width_; }
+  Neighbors* links(std::ptrdiff_t layer) {
+    return links_.data() + turn(layer, steps_ + 1) * width_;
+  }
   std::vector<MoreNeighbor>& more_neighbors(std::ptrdiff_t layer) {
     return more_[turn(layer, steps_ + 1)];
   }
@@ -262,7 +264,7 @@ class Sweep {
   }
 
   void begin_links(std::ptrdiff_t layer) {
-    std::fill_n(links(layer), vertices(layer), Links(place_of_zero()));
+    std::fill_n(links(layer), vertices(layer), Neighbors(place_of_zero()));
     more_neighbors(layer).clear();
     on_line_[turn(layer, steps_ + 1)].clear();
   }
@@ -314,7 +316,7 @@ class Sweep {
   // Decides which of the layer's vertices stay where they are.
   void weigh(std::ptrdiff_t layer) {
     find_lines(layer);
-    Links* link = links(layer);
+    Neighbors* link = links(layer);
     const std::uint64_t first = round_.first_vertex(layer);
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
@@ -339,7 +341,7 @@ class Sweep {
 
   void move(std::size_t step, std::ptrdiff_t layer, Float4* to) {
     const float share = round_.shares[step - 1];
-    const Links* link = links(layer);
+    const Neighbors* link = links(layer);
     const MoreNeighbor* more = more_neighbors(layer).data();
     const Float4* ring = rings_[step - 1].data();
     const Float4* from = positions(step - 1, layer);
@@ -355,7 +357,7 @@ class Sweep {
   }
 
   void hold_within(std::ptrdiff_t layer, Float4* to) {
-    const Links* link = links(layer);
+    const Neighbors* link = links(layer);
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
       if (link[v].weight() == 0) continue;
@@ -413,7 +415,7 @@ class Sweep {
   std::size_t width_ = 0;              // the vertices of the largest layer
   std::vector<Buffer<Float4>> rings_;  // positions before each step
   Buffer<Float4> moved_;               // the positions of one layer after the last step
-  std::vector<Links> links_;
+  std::vector<Neighbors> links_;
   std::vector<std::vector<MoreNeighbor>> more_;  // in the order of the vertices
   std::vector<std::vector<MoreNeighbor>> on_line_;
 };
@@ -432,7 +434,7 @@ void sweep(const Round& round, const LayerRange& slab, const LayerCopy& below,
 }
 
 std::uint64_t sweep_bytes_per_vertex(std::size_t steps) {
-  return (kRingLayers * steps + 1) * sizeof(Float4) + (steps + 1) * sizeof(Links);
+  return (kRingLayers * steps + 1) * sizeof(Float4) + (steps + 1) * sizeof(Neighbors);
 }
 
 }  // namespace isomesh::mesh
