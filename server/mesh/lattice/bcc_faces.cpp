@@ -13,7 +13,7 @@ constexpr std::uint8_t kNone = 0xFF;
 
 using Place = std::array<int, 3>;  // in half cells
 
-Place operator-(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Place difference(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 int determinant(const Place& a, const Place& b, const Place& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
@@ -104,7 +104,8 @@ class FaceBuilder {
   }
 
   int volume(unsigned from, unsigned a, unsigned b, unsigned c) const {
-    return determinant(place(a) - place(from), place(b) - place(from), place(c) - place(from));
+    const auto way = [&](std::uint8_t to) { return difference(place(to), place(from)); };
+    return determinant(way(a), way(b), way(c));
   }
 
   using Ends = std::array<unsigned, 2>;
