@@ -292,7 +292,7 @@ class Enumeration {
 using Triangles = std::map<mesh::Triangle, int>;
 
 mesh::Triangle turned(mesh::Triangle triangle) {
-  std::ranges::rotate(triangle, std::ranges::min_element(triangle));
+  std::rotate(triangle.begin(), std::ranges::min_element(triangle), triangle.end());
   return triangle;
 }
 
