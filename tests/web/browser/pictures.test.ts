@@ -7,7 +7,7 @@ import { gunzipSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
-import { brain, brainHull, contourPixels, Daemon, openPage, pixelsOf, silhouette, startBrowser, still, surfaceLoaded } from './support';
+import { ballNrrd, brain, brainHull, contourPixels, Daemon, openPage, pixelsOf, silhouette, startBrowser, still, surfaceLoaded } from './support';
 
 const skullProject = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
 const atlas = '/usr/share/mricron/templates/aal.nii';
@@ -162,9 +162,20 @@ describe('pictures', () => {
     await show(`compare?jobs=${jobs.join(',')}`, 4);
     await take(page, 'compare');
 
+    const ball = await daemon.upload(ballNrrd(24, 9));
+    const lattices = [];
+    for (const scheme of [6, 5, 'bcc']) {
+      lattices.push((await daemon.submit({ volume: ball, iso: 100, scheme, smoothing: 'optimize', formats: ['glb'] }, 30)).id);
+    }
+    await show(`compare?jobs=${lattices.join(',')}`, 3);
+    await page.getByRole('button', { name: 'Flat' }).click();
+    await page.getByRole('button', { name: 'Edges' }).click();
+    await still(page);
+    await take(page, 'lattices');
+
     await page.goto(daemon.url);
-    await expect.poll(() => page.locator('.card').count()).toBe(3);
-    await expect.poll(() => page.locator('.thumbnail[data-painted]').count()).toBe(3);
+    await expect.poll(() => page.locator('.card').count()).toBe(4);
+    await expect.poll(() => page.locator('.thumbnail[data-painted]').count()).toBe(4);
     await take(page, 'volumes');
     expect(faults).toEqual([]);
   }, 400_000);

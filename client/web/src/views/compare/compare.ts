@@ -13,6 +13,7 @@ import { refusal } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { KnownVolumes } from '../../volume/known';
+import { distributionChart } from '../jobs/charts';
 import { SurfacePane } from '../surface/surface_pane';
 
 const most = 4;
@@ -33,7 +34,6 @@ function numbersOf(job: Job): HTMLElement {
     ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: the surface is open'] as [string, string]]),
     // An equal job's files were there already.
     ['Time', work < 1 ? 'already made' : formatMilliseconds(work)],
-    ['Mean smallest angle', `${formatNumber(mesh.quality.smallest_angle_deg.smoothed.mean, 1)}\u00b0`],
   ];
   return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
 }
@@ -61,6 +61,7 @@ class Cell {
   private readonly status: HTMLElement;
   private readonly view: HTMLElement;
   private readonly numbers = h('div', { class: 'cell-numbers' });
+  private readonly angles = h('div', { class: 'cell-angles' });
 
   constructor(job: Job, title: string) {
     this.status = h('p', { class: 'cell-status', role: 'status' }, job.state);
@@ -70,6 +71,7 @@ class Cell {
       { class: 'cell', 'aria-label': title },
       h('header', {}, h('h2', {}, h('a', { href: hashOf(['jobs', job.id]) }, title)), this.numbers),
       this.view,
+      this.angles,
     );
   }
 
@@ -79,6 +81,7 @@ class Cell {
 
   showNumbers(job: Job): void {
     this.numbers.replaceChildren(numbersOf(job));
+    if (job.mesh) this.angles.replaceChildren(distributionChart('Smallest angle', job.mesh.quality.smallest_angle_deg, 60, '\u00b0'));
   }
 
   show(content: HTMLElement): void {
