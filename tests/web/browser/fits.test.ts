@@ -62,6 +62,19 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
     }
   });
 
+  it('no choice of a parameter is cut off', async () => {
+    const { page } = at;
+    await page.setViewportSize(size);
+    for (const name of ['a volume', 'a volume of labels']) {
+      await open(page, views.get(name) ?? '');
+      await page.locator('.parameters summary', { hasText: 'More' }).click();
+      const cut = await page.locator('.parameters .segments').evaluateAll((rows) =>
+        rows.filter((row) => row.scrollWidth > row.clientWidth).map(({ textContent }) => textContent),
+      );
+      expect(cut, name).toEqual([]);
+    }
+  });
+
   it('the list of jobs leaves nothing out, and has no column of single words', async () => {
     const { page } = at;
     await page.setViewportSize(size);

@@ -42,7 +42,7 @@ interface Control {
 const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
 // The parameters that are always visible, in rows. All others are under "More", these first.
 const front = [['max_error_mm'], ['triangles', 'certify'], ['fill_cavities']];
-const behind = [['scheme', 'interpolation'], ['regularize'], ['smoothing', 'passes'], ['priority']];
+const behind = [['scheme', 'interpolation'], ['regularize'], ['smoothing'], ['passes', 'lambda'], ['priority']];
 
 export const shown = parameters.filter(({ name }) => !elsewhere.includes(name));
 
@@ -54,8 +54,10 @@ function labelOf({ title, unit }: Parameter): string {
   return unit === '' ? title : `${title}, in ${unit}`;
 }
 
+const abbreviations = ['bcc', 'fcc', 'lps', 'ras'];
+
 function capitalised(text: string): string {
-  return text.charAt(0).toUpperCase() + text.slice(1);
+  return abbreviations.includes(text) ? text.toUpperCase() : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 function choiceControl(parameter: Parameter, host: FormHost): Control {
