@@ -161,6 +161,20 @@ SampleVolume<T> noise_between(double low, double high, const mesh::Dims& dims, s
   return volume;
 }
 
+SampleVolume<float> thin_shell(std::uint32_t seed) {
+  const mesh::Dims dims = {9, 8, 9};
+  auto volume = noise_between<float>(-0.3, 0.3, dims, seed);
+  for (std::uint32_t z = 0; z < dims.z; ++z) {
+    for (std::uint32_t y = 0; y < dims.y; ++y) {
+      for (std::uint32_t x = 0; x < dims.x; ++x) {
+        const double way = std::hypot(x - 4.1, y - 3.9, z - 4.2) - 2.6;
+        volume.at(x, y, z) += static_cast<float>(0.3 + 0.05 * seed - std::abs(way));
+      }
+    }
+  }
+  return volume;
+}
+
 template <class T>
 SampleVolume<T> constant(T value, const mesh::Dims& dims) {
   return {std::vector<T>(dims.samples(), value), dims, {}};

@@ -70,6 +70,10 @@ SampleVolume<T> noise(const std::vector<T>& values, const mesh::Dims& dims, std:
 template <class T>
 SampleVolume<T> noise_between(double low, double high, const mesh::Dims& dims, std::uint64_t seed);
 
+// A sphere's wall of about the thickness of a voxel, thicker with a larger seed, in noise: both of
+// its sides want the same samples. Iso-value 0.
+SampleVolume<float> thin_shell(std::uint32_t seed);
+
 template <class T>
 SampleVolume<T> constant(T value, const mesh::Dims& dims);
 

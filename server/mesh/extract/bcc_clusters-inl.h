@@ -154,7 +154,7 @@ class BccClusterWalk {
       auto crossed = row.crossed_edges(w, corners);
       for (const Word edges : crossed) vertices_ += static_cast<unsigned>(std::popcount(edges));
       triangles_ += count_bcc_triangles(row, w, corners, extraction_.splits[0]);
-      // What is left out here leads to no point that may join crossings.
+      // Phantom cells have no centre, and no point of theirs may join crossings.
       crossed[0] &= ~row.split_in_six(w);
       for (unsigned slot = 0; slot < kBccDiagonalSlot; ++slot) {
         if (crossed[slot] == 0) continue;
@@ -234,7 +234,7 @@ class BccClusterWalk {
     count_.layer_triangles[z + 1] = triangles_;
   }
 
-  // Of the candidates in a row, those that clash with none of an earlier point.
+  // Keeps the candidates in a row that clash with none of an earlier point.
   void find_clusters(BccPoint point, std::uint32_t y, std::uint32_t z) {
     layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
     layer_.points_begin.push_back(0);

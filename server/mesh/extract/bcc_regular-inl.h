@@ -26,7 +26,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// What each sample of a numbered row has: the index of the vertex of each slot.
+// A sample's record in a numbered row: the index of the vertex of each slot.
 struct BccIndices {
   static constexpr std::size_t kPlaces = kRegularBccPlaces;
   static_assert(kPlaces == kBccSlots);
@@ -147,7 +147,7 @@ class BccRegular {
   JoinedRows<std::uint32_t, kKinds> joined_;
   std::array<std::array<JoinedName, kMostDirections>, kKinds> names_ = {};
   std::array<std::array<EdgeFrame, kMostDirections>, kKinds> frames_ = {};
-  // Of the row that is numbered: its clusters, and their edges by the row that owns those, each as
+  // The clusters of the row that is numbered, and their edges by the row that owns those, each as
   // kBccSlotRange * x + slot.
   std::vector<Cluster> clusters_;
   std::array<std::vector<std::uint32_t>, 4> edges_;

@@ -36,7 +36,7 @@ HWY_INLINE Word bits_between(std::size_t w, std::int64_t low, std::int64_t high)
   return below(high) & ~below(low);
 }
 
-// Which cells have a centre: those between the lattice's own samples.
+// The cells that have a centre: those between the lattice's own samples.
 class BccShape {
  public:
   explicit BccShape(const Extraction& extraction)
@@ -44,7 +44,7 @@ class BccShape {
         end_{extraction.dims.x - 1 - first_, extraction.dims.y - 1 - first_,
              extraction.dims.z - 1 - first_} {}
 
-  // Of the cells `shift` farther along x than those of word w.
+  // The same of the cells that are `shift` farther along x than those of word w.
   HWY_INLINE Word cells_along_x(std::size_t w, std::int64_t shift = 0) const {
     return bits_between(w, first_ - shift, end_[0] - shift);
   }
@@ -203,7 +203,7 @@ class BccRow {
     return axis == 1 ? centres_.next_y[w] : centres_.next_z[w];
   }
 
-  // Of the cells of word w, those whose next or last one along the axis has a centre.
+  // The cells of word w whose next or last one along the axis has a centre.
   Word has_next(std::size_t w, unsigned axis) const {
     if (axis == 0) return shape_.cells_along_x(w, 1);
     return (axis == 1 ? has_next_y_ : has_next_z_) ? ~Word{0} : 0;

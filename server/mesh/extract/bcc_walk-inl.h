@@ -24,7 +24,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// Of each slot, from the sample that names the edge.
+// The edges of the slots, from the sample that names them.
 inline std::array<EdgeFrame, kBccSlots> bcc_frames(const LatticeToSpace& map) {
   std::array<EdgeFrame, kBccSlots> frames = {};
   const Double4 centre = space_offset(map, 7) * 0.5;
@@ -39,8 +39,8 @@ inline std::array<EdgeFrame, kBccSlots> bcc_frames(const LatticeToSpace& map) {
   return frames;
 }
 
-// What each sample of a numbered row has of the vertices that it owns: their slots and the index of
-// the first. The others follow in the order of their slots.
+// A sample's record in a numbered row: the slots of the vertices that it owns, and the index of the
+// first. The others follow in the order of their slots.
 struct BccNumbers {
   static constexpr std::size_t kPlaces = kBccPlaces;
 

@@ -228,7 +228,7 @@ class ClusterWalk {
     return static_cast<Directions>(directions);
   }
 
-  // Of the candidates in a row, those that clash with none of an earlier sample.
+  // Keeps the candidates in a row that clash with none of an earlier sample.
   void find_clusters(std::uint32_t y, std::uint32_t z) {
     layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
     layer_.points_begin.push_back(static_cast<std::uint32_t>(layer_.points.size()));

@@ -173,7 +173,7 @@ class Links {
   std::vector<Link> links_;  // of even and odd samples, or of both
 };
 
-// Of five or six tetrahedra.
+// Those of samples of five or six tetrahedra.
 const Links& links_of(Scheme scheme);
 const Links& links_of(BccPoint point);
 

@@ -112,21 +112,10 @@ TEST(RegularSurface, OfNoiseAndPlateausIsTheReferences) {
   }
 }
 
-// Sheets of about the thickness of a voxel, with noise: both sides want the same samples.
 TEST(RegularSurface, OfThinShellsIsTheReferences) {
   for (std::uint32_t seed = 0; seed < 12 && !testing::Test::HasFailure(); seed += test::kStep) {
     SCOPED_TRACE(seed);
-    const Dims dims = {9, 8, 9};
-    auto volume = test::noise_between<float>(-0.3, 0.3, dims, seed);
-    for (std::uint32_t z = 0; z < dims.z; ++z) {
-      for (std::uint32_t y = 0; y < dims.y; ++y) {
-        for (std::uint32_t x = 0; x < dims.x; ++x) {
-          const double way = std::hypot(x - 4.1, y - 3.9, z - 4.2) - 2.6;
-          volume.at(x, y, z) += static_cast<float>(0.3 + 0.05 * seed - std::abs(way));
-        }
-      }
-    }
-    expect_regular_surfaces(volume, 0);
+    expect_regular_surfaces(test::thin_shell(seed), 0);
   }
 }
 
