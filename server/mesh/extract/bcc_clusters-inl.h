@@ -53,8 +53,6 @@ class BccClusterWalk {
       field_.reach(z);
       open(z + 1);
       layer_ = {};
-      vertices_ = 0;
-      triangles_ = 0;
       for (std::uint32_t y = 0; y < dims_.y; ++y) find_edges(y, z);
       if (z + 1 < slab_.begin) continue;
       for (const BccPoint point : kBccPoints) {
@@ -152,8 +150,9 @@ class BccClusterWalk {
       if (!row.may_cross(w)) continue;
       const CornerWords corners = row.corners(w);
       auto crossed = row.crossed_edges(w, corners);
-      for (const Word edges : crossed) vertices_ += static_cast<unsigned>(std::popcount(edges));
-      triangles_ += count_bcc_triangles(row, w, corners, extraction_.splits[0]);
+      for (const Word edges : crossed)
+        layer_.vertices += static_cast<unsigned>(std::popcount(edges));
+      layer_.triangles += count_bcc_triangles(row, w, corners, extraction_.splits[0]);
       // Phantom cells have no centre, and no point of theirs may join crossings.
       crossed[0] &= ~row.split_in_six(w);
       for (unsigned slot = 0; slot < kBccDiagonalSlot; ++slot) {
@@ -227,17 +226,12 @@ class BccClusterWalk {
     for (std::uint32_t y = 0; y < dims_.y; ++y) {
       for (const BccPoint point : kBccPoints) find_clusters(point, y, z);
     }
-    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
-    if (layer_.samples.empty()) layer_ = {};
-    count_.clusters[z] = std::move(layer_);
-    count_.layer_vertices[z + 1] = vertices_;
-    count_.layer_triangles[z + 1] = triangles_;
+    layer_.end(z, count_);
   }
 
   // Keeps the candidates in a row that clash with none of an earlier point.
   void find_clusters(BccPoint point, std::uint32_t y, std::uint32_t z) {
-    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
-    layer_.points_begin.push_back(0);
+    layer_.begin_row();
     Kind& points = kind(point);
     const Word* candidates = points.candidates_of(y, z);
     for (std::size_t w = 0; w < words_; ++w) {
@@ -278,12 +272,8 @@ class BccClusterWalk {
   void add_clusters(const Links& links, std::size_t x, Directions joined) {
     const ClusterFacts facts = links.facts(0, joined);
     const Directions flags = facts.components() > 1 ? JoiningSample::kSeveral : 0;
-    layer_.samples.push_back({static_cast<std::uint32_t>(x), joined | flags});
-    const ClusterLoss loss = loss_of_components(links, joined, facts);
-    vertices_ -= loss.vertices;
-    triangles_ -= loss.triangles;
-    layer_.vertices_below += loss.vertices_below;
-    layer_.triangles_below += loss.triangles_below;
+    layer_.clusters.samples.push_back({static_cast<std::uint32_t>(x), joined | flags});
+    layer_.take_off(loss_of_components(links, joined, facts));
   }
 
   const Extraction& extraction_;
@@ -296,9 +286,7 @@ class BccClusterWalk {
   BccField field_;
   std::array<Kind, 2> kinds_;
   std::array<Ends, kBccDiagonalSlot> ends_ = {};
-  ClusterLayer layer_;
-  std::uint64_t vertices_ = 0;  // of the layer
-  std::uint64_t triangles_ = 0;
+  CountedLayer layer_;
 };
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

@@ -15,6 +15,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <hwy/highway.h>
@@ -77,6 +78,33 @@ struct ClusterLoss {
   std::uint64_t vertices_below = 0;
   std::uint64_t triangles = 0;
   std::uint64_t triangles_below = 0;
+};
+
+// One layer, while it is counted.
+struct CountedLayer {
+  ClusterLayer clusters;
+  std::uint64_t vertices = 0;
+  std::uint64_t triangles = 0;
+
+  void begin_row() {
+    clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.samples.size()));
+    clusters.points_begin.push_back(static_cast<std::uint32_t>(clusters.points.size()));
+  }
+
+  void take_off(const ClusterLoss& loss) {
+    vertices -= loss.vertices;
+    triangles -= loss.triangles;
+    clusters.vertices_below += loss.vertices_below;
+    clusters.triangles_below += loss.triangles_below;
+  }
+
+  void end(std::uint32_t z, SurfaceCount& count) {
+    clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.samples.size()));
+    if (clusters.samples.empty()) clusters = {};
+    count.clusters[z] = std::move(clusters);
+    count.layer_vertices[z + 1] = vertices;
+    count.layer_triangles[z + 1] = triangles;
+  }
 };
 
 // Returns the components of the sample's own crossings that keep the first two conditions of
@@ -144,14 +172,12 @@ class ClusterWalk {
       rule_.reach(z);
       rule_.open(z + 1);
       layer_ = {};
-      vertices_ = 0;
-      triangles_ = 0;
       for (std::uint32_t y = 0; y < dims_.y; ++y) {
         find_edges(y, z);
         if (z + 1 >= slab_.begin) find_candidates(y, z);
         if (z >= slab_.begin) find_clusters(y, z);
       }
-      if (z >= slab_.begin) end_layer(z);
+      if (z >= slab_.begin) layer_.end(z, count_);
     }
   }
 
@@ -163,8 +189,8 @@ class ClusterWalk {
     EdgeWords* out = edges(y, z);
     for (std::size_t w = 0; w < words_; ++w) {
       const WordCount plain = rule_.split_edges(w, y, z, out[w]);
-      vertices_ += plain.vertices;
-      triangles_ += plain.triangles;
+      layer_.vertices += plain.vertices;
+      layer_.triangles += plain.triangles;
     }
   }
 
@@ -230,8 +256,7 @@ class ClusterWalk {
 
   // Keeps the candidates in a row that clash with none of an earlier sample.
   void find_clusters(std::uint32_t y, std::uint32_t z) {
-    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
-    layer_.points_begin.push_back(static_cast<std::uint32_t>(layer_.points.size()));
+    layer_.begin_row();
     const Word* candidates = candidate_samples(y, z);
     for (std::size_t w = 0; w < words_; ++w) {
       for (Word rest = candidates[w]; rest != 0; rest &= rest - 1) {
@@ -264,20 +289,8 @@ class ClusterWalk {
     const Directions joined = kept & ~JoiningSample::kFlags;
     const ClusterFacts facts = links_.facts(parity(sample), joined);
     if (facts.components() > 1) kept |= JoiningSample::kSeveral;
-    layer_.samples.push_back({static_cast<std::uint32_t>(sample.x), kept});
-    const ClusterLoss loss = rule_.loss(sample, kept, facts, layer_);
-    vertices_ -= loss.vertices;
-    triangles_ -= loss.triangles;
-    layer_.vertices_below += loss.vertices_below;
-    layer_.triangles_below += loss.triangles_below;
-  }
-
-  void end_layer(std::uint32_t z) {
-    layer_.row_begin.push_back(static_cast<std::uint32_t>(layer_.samples.size()));
-    if (layer_.samples.empty()) layer_ = {};
-    count_.clusters[z] = std::move(layer_);
-    count_.layer_vertices[z + 1] = vertices_;
-    count_.layer_triangles[z + 1] = triangles_;
+    layer_.clusters.samples.push_back({static_cast<std::uint32_t>(sample.x), kept});
+    layer_.take_off(rule_.loss(sample, kept, facts, layer_.clusters));
   }
 
   static bool has(const Word* row, std::size_t x) {
@@ -312,9 +325,7 @@ class ClusterWalk {
   std::vector<EdgeWords> edges_;
   std::vector<Word> candidates_;        // of two planes: which samples have some
   std::vector<Directions> directions_;  // and in which directions
-  ClusterLayer layer_;
-  std::uint64_t vertices_ = 0;  // of the layer
-  std::uint64_t triangles_ = 0;
+  CountedLayer layer_;
 };
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE
