@@ -133,11 +133,12 @@ TEST(CommandWithoutAServer, SaysWhatToDo) {
 TEST(CommandInterrupted, EndsTheShellsLoop) {
   const Daemon daemon;
   const TemporaryFolder folder;
-  write_file(folder / "noise.raw", long_upload().bytes);
-  const std::string mesh = std::string(ISOMESH) + " --server " + daemon.url() + " mesh " +
-                           (folder / "noise.raw").string() +
-                           " --dims 96,96,96 --type uint8 --iso 50 --passes 1000 -o " +
-                           (folder / "out.drc").string();
+  write_file(folder / "noise.raw", rough_upload().bytes);
+  const std::string mesh =
+      std::string(ISOMESH) + " --server " + daemon.url() + " mesh " +
+      (folder / "noise.raw").string() +
+      " --dims 48,48,48 --type uint8 --iso 50 --smoothing optimize --passes 1000 -o " +
+      (folder / "out.drc").string();
   // env: a test that runs in the background has inherited that SIGINT is ignored.
   Process shell({"env", "--default-signal=INT", "bash", "-c",
                  "for round in 1 2; do " + mesh + "; echo round $round; done; echo end"});

@@ -70,6 +70,12 @@ RawUpload sphere_upload() {
   return raw_upload(sample<std::uint8_t>(field, {21, 20, 19}));
 }
 
+RawUpload rough_upload() { return raw_upload(noise<std::uint8_t>({0, 100}, {48, 48, 48}, 11)); }
+
+std::string slow_smoothing(int passes) {
+  return R"("smoothing": "optimize", "draco": {"speed": 10}, "passes": )" + std::to_string(passes);
+}
+
 RawUpload long_upload() { return raw_upload(noise<std::uint8_t>({0, 100}, {96, 96, 96}, 11)); }
 
 Volume upload(const Daemon& daemon, const RawUpload& raw) {
@@ -94,7 +100,7 @@ Job finished_job(const Daemon& daemon, const std::string& members) {
 }
 
 Job long_job(const Daemon& daemon) {
-  const Job job = submit(daemon, upload(daemon, long_upload()), 50, "\"passes\": 1000");
+  const Job job = submit(daemon, upload(daemon, rough_upload()), 50, slow_smoothing(1000));
   Job seen;
   const bool runs = eventually([&] {
     seen = daemon.client().job(job.id);

@@ -74,7 +74,14 @@ RawUpload raw_upload(const SampleVolume<std::uint8_t>& volume);
 // A sphere at iso 100, of some thousand triangles.
 RawUpload sphere_upload();
 
-// Noise at iso 50 whose surface takes many seconds to smooth 1000 times.
+// Noise at iso 50 whose surface is extracted soon, also on a busy machine, and takes minutes for
+// slow_smoothing(1000).
+RawUpload rough_upload();
+
+// Members of a job that smooths for long, by so many passes.
+std::string slow_smoothing(int passes);
+
+// More samples of noise, whose surface has a million triangles at iso 50.
 RawUpload long_upload();
 
 // Uploads it; throws std::runtime_error when it is refused.

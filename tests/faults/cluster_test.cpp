@@ -70,9 +70,9 @@ class Cluster : public testing::Test {
   // A job that runs for longer than anybody waits.
   Job endless_job(std::size_t node) {
     Daemon& daemon = this->node(node);
-    const std::string id = submit(daemon, upload(daemon, long_upload()), 50 + 0.01 * ++endless_,
-                                  R"("draco": {"speed": 10}, "passes": 1000)")
-                               .id;
+    const std::string id =
+        submit(daemon, upload(daemon, rough_upload()), 50 + 0.01 * ++endless_, slow_smoothing(1000))
+            .id;
     if (!comes_to(node, id, JobState::kRunning)) throw std::runtime_error("it does not run");
     return daemon.client().job(id);
   }

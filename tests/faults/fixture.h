@@ -39,9 +39,8 @@ class FaultTest : public testing::Test {
   // A job of so many passes as it is when it has begun to smooth, or has ended before that was
   // seen.
   Job begun_job(int passes, double iso = 50) {
-    const std::string id = submit(daemon(), upload(daemon(), long_upload()), iso,
-                                  R"("draco": {"speed": 10}, "passes": )" + std::to_string(passes))
-                               .id;
+    const std::string id =
+        submit(daemon(), upload(daemon(), rough_upload()), iso, slow_smoothing(passes)).id;
     Job seen;
     const bool is_begun = eventually([&] {
       seen = job(id);

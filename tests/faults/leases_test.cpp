@@ -194,26 +194,30 @@ class Blockade {
 };
 
 TEST_F(Leases, KilledBetweenResultAndFinishItRunsAgainToTheSameBytes) {
-  start({"--lease-seconds", "600"});  // no renewal has to pass the blockade
-  EXPECT_TRUE(with_a_job_that_is_long_enough([&](int passes) {
-    upload(daemon(), long_upload());
-    const std::size_t blobs = blob_count();
-    const Job before = begun_job(passes);
-    {
-      const Blockade blockade(daemon().data() / "isomesh.sqlite");
-      EXPECT_TRUE(blockade.holds());
-      if (job(before.id).state != JobState::kRunning) return false;
-      EXPECT_TRUE(eventually([&] { return blob_count() == blobs + 1; }));
-      kill();
-    }
-    const std::vector<std::string> stored = blobs_below(folder_ / "data");
-    start();
-    const Job after = ended(before.id);
-    EXPECT_NE(after.started, before.started);
-    EXPECT_EQ(after.state, JobState::kSucceeded);
-    EXPECT_EQ(blobs_below(folder_ / "data"), stored);
-    return true;
-  }));
+  start({"--lease-seconds", "600", "--workers", "1"});  // no renewal has to pass the blockade
+  const Volume volume = small_volume();
+  ended(submit(daemon(), volume, 90).id);  // the worker has its process now
+  const std::set<pid_t> processes = job_processes();
+  ASSERT_EQ(processes.size(), 1U);
+  const std::size_t blobs = blob_count();
+  // The process stands still, so the job has begun and has no result when the blockade begins.
+  ::kill(*processes.begin(), SIGSTOP);
+  const std::string id = submit(daemon(), volume, 100).id;
+  ASSERT_TRUE(comes_to(id, JobState::kRunning));
+  const Job before = job(id);
+  {
+    const Blockade blockade(daemon().data() / "isomesh.sqlite");
+    ASSERT_TRUE(blockade.holds());
+    ::kill(*processes.begin(), SIGCONT);
+    ASSERT_TRUE(eventually([&] { return blob_count() == blobs + 1; }));
+    kill();
+  }
+  const std::vector<std::string> stored = blobs_below(folder_ / "data");
+  start();
+  const Job after = ended(id);
+  EXPECT_NE(after.started, before.started);
+  EXPECT_EQ(after.state, JobState::kSucceeded);
+  EXPECT_EQ(blobs_below(folder_ / "data"), stored);
 }
 
 TEST_F(Leases, ACancelledJobStopsAndPublishesNothing) {

@@ -1,11 +1,13 @@
 """The audit trail over syslog-TLS (IHE ITI-20), to a collector that may be down."""
 import contextlib
 import os
+import select
 import socket
 import sqlite3
 import ssl
 import subprocess
 import threading
+import time
 import xml.etree.ElementTree
 
 import peers
@@ -15,10 +17,13 @@ from fixture import Loop
 class Collector:
     """Takes syslog over TLS (RFC 5425)."""
 
-    def __init__(self, folder, port=None, name="localhost", client=None):
+    def __init__(self, folder, port=None, name="localhost", client=None, slow_s=0, tickets=2):
+        """Waits `slow_s` seconds before it looks at a client's certificate."""
         self.folder = folder
         self.port = port or peers.free_port()
         self.client = client
+        self.slow_s = slow_s
+        self.tickets = tickets
         self.messages = []
         self.certificate = os.path.join(folder, "collector.pem")
         self.key = os.path.join(folder, "collector-key.pem")
@@ -32,6 +37,7 @@ class Collector:
     def start(self):
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.load_cert_chain(self.certificate, self.key)
+        context.num_tickets = self.tickets
         if self.client:
             context.verify_mode = ssl.CERT_REQUIRED
             context.load_verify_locations(self.client)
@@ -60,7 +66,11 @@ class Collector:
 
     def _one(self, connection, context):
         try:
-            connection = context.wrap_socket(connection, server_side=True)
+            connection = context.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
+            if self.slow_s:
+                self._answer_hello(connection)
+                time.sleep(self.slow_s)
+            connection.do_handshake()
             self.connections.append(connection)
             stream = connection.makefile("rb")
             while True:
@@ -75,6 +85,18 @@ class Collector:
                     self.messages.append(message.decode("utf-8"))
         except (OSError, ValueError):
             connection.close()
+
+    @staticmethod
+    def _answer_hello(connection):
+        """Afterwards a client of TLS 1.3 may send, although its certificate was not looked at."""
+        connection.setblocking(False)
+        while True:
+            select.select([connection], [], [])
+            try:
+                connection.do_handshake()
+            except ssl.SSLWantReadError:
+                connection.setblocking(True)
+                return
 
     def events(self):
         """Of each message: the code of its event, its type's, and the ids of its objects."""
@@ -105,12 +127,18 @@ class Syslog(Loop):
         return self.daemon(rules=f'[audit]\nsyslog = "tls://localhost:{collector.port}"\n'
                            f'ca-file = "{collector.certificate}"\n{more}\n')
 
-    def noted(self, daemon):
-        """Waits until the daemon has noted that all has been sent: what is not noted comes again."""
+    @staticmethod
+    def asked(daemon, query):
         database = f"file:{os.path.join(daemon.data, 'isomesh.sqlite')}?mode=ro"
         with contextlib.closing(sqlite3.connect(database, uri=True)) as records:
-            peers.until(lambda: records.execute(
-                "SELECT (SELECT max(id) FROM audit) = (SELECT id FROM audit_sent)").fetchone()[0])
+            return records.execute(query).fetchone()[0]
+
+    def sent(self, daemon):
+        return self.asked(daemon, "SELECT id FROM audit_sent")
+
+    def noted(self, daemon):
+        """Waits until the daemon has noted that all has been sent: what is not noted comes again."""
+        peers.until(lambda: self.sent(daemon) == self.asked(daemon, "SELECT max(id) FROM audit"))
 
     def test_every_event_comes(self):
         collector = self.collector().start()
@@ -174,3 +202,18 @@ class Syslog(Loop):
         peers.until(lambda: "cannot be sent to its collector" in without.logged())
         self.assertEqual(len(collector.messages), 1)
         self.assertEqual(daemon.stop(), 0)
+
+    def test_a_rejection_that_comes_late(self):
+        """A client of TLS 1.3 sends before the collector has looked at its certificate. That is not lost."""
+        ours = self.collector(name="isomesh-1")
+        collector = self.collector(client=ours.certificate, slow_s=3).start()
+        daemon = self.audited(collector)
+        peers.until(lambda: "cannot be sent to its collector" in daemon.logged())
+        self.assertEqual(collector.messages, [])
+        self.assertEqual(self.sent(daemon), 0)
+
+    def test_a_collector_without_tickets(self):
+        collector = self.collector(tickets=0).start()
+        daemon = self.audited(collector)
+        self.noted(daemon)
+        self.assertEqual([kind for _, kind, _ in collector.events()], ["110120"])

@@ -13,7 +13,7 @@ class TimeLimit(BaseException):
 class LimitedTest(unittest.TestCase):
     """`limit_s` is for each test with its setUp and tearDown, and for setUpClass."""
 
-    limit_s = 120
+    limit_s = 300
 
     def run(self, result=None):
         with limited(self.limit_s, self.id()):

@@ -44,8 +44,12 @@ struct TlsClient::Session {
     SSL_CTX_set_min_proto_version(context.get(), TLS1_2_VERSION);
     SSL_CTX_set_verify(context.get(), SSL_VERIFY_PEER, nullptr);
     SSL_CTX_set_mode(context.get(), SSL_MODE_AUTO_RETRY);
+    SSL_CTX_set_session_cache_mode(context.get(),
+                                   SSL_SESS_CACHE_CLIENT | SSL_SESS_CACHE_NO_INTERNAL);
+    SSL_CTX_sess_set_new_cb(context.get(), &Session::note_ticket);
     load_files(server);
     ssl.reset(SSL_new(context.get()));
+    SSL_set_ex_data(ssl.get(), 0, this);
     X509_VERIFY_PARAM* const parameters = SSL_get0_param(ssl.get());
     if (is_address(server.host)) {
       X509_VERIFY_PARAM_set1_ip_asc(parameters, server.host.c_str());
@@ -56,12 +60,24 @@ struct TlsClient::Session {
       X509_VERIFY_PARAM_set1_host(parameters, server.host.c_str(), server.host.size());
     }
     SSL_set_fd(ssl.get(), socket);
-    if (SSL_connect(ssl.get()) == 1) return;
+    if (SSL_connect(ssl.get()) == 1) {
+      is_accepted = is_accepted || SSL_version(ssl.get()) < TLS1_3_VERSION;
+      return;
+    }
     const bool is_stranger = SSL_get_verify_result(ssl.get()) != X509_V_OK;
     ERR_clear_error();
     throw Error(ErrorCode::kUnreachable, is_stranger
                                              ? "the collector's certificate is not trusted"
                                              : "the TLS connection to the collector failed");
+  }
+
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  // Called by OpenSSL for each session ticket.
+  static int note_ticket(SSL* ssl, SSL_SESSION*) {
+    static_cast<Session*>(SSL_get_ex_data(ssl, 0))->is_accepted = true;
+    return 0;  // OpenSSL keeps the ticket's ownership
   }
 
   void load_files(const TlsServer& server) const {
@@ -80,6 +96,9 @@ struct TlsClient::Session {
 
   Context context;
   Ssl ssl;
+  // The server has verified the client. A handshake of TLS 1.2 ends after that. One of TLS 1.3 ends
+  // before it; the first session ticket comes after it.
+  bool is_accepted = false;
 };
 
 TlsClient::TlsClient(const TlsServer& server, std::chrono::seconds timeout,
@@ -123,13 +142,24 @@ void TlsClient::send(std::string_view bytes) {
 void TlsClient::await_receipt() {
   constexpr std::chrono::milliseconds kLookForReceipt{5};
   const auto deadline = std::chrono::steady_clock::now() + timeout_;
+  const auto is_late = [&] { return std::chrono::steady_clock::now() >= deadline; };
   int unsent = 1;
   while (::ioctl(socket_.number(), SIOCOUTQ, &unsent) == 0 && unsent > 0) {
-    if (std::chrono::steady_clock::now() >= deadline || stop_.stop_requested()) throw_lost();
+    if (is_late() || stop_.stop_requested()) throw_lost();
     std::this_thread::sleep_for(kLookForReceipt);
   }
   // A reset connection has no unsent bytes either.
-  if (unsent != 0 || !is_open()) throw_lost();
+  if (unsent != 0) throw_lost();
+  while (is_open()) {
+    // A server that sends no tickets has had enough time to reject the client.
+    if (session_->is_accepted || is_late()) {
+      session_->is_accepted = true;
+      return;
+    }
+    if (stop_.stop_requested()) break;
+    std::this_thread::sleep_for(kLookForReceipt);
+  }
+  throw_lost();
 }
 
 }  // namespace isomesh::audit

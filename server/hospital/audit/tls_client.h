@@ -38,8 +38,10 @@ class TlsClient {
   // Throws Error kUnreachable.
   void send(std::string_view bytes);
 
-  // Returns when the server's TCP has confirmed all sent bytes. Throws Error kUnreachable if that
-  // takes longer than the timeout.
+  // Returns when the server's TCP has confirmed all sent bytes, and the server has accepted this
+  // client's certificate: until then it may reject what it has confirmed. A server of TLS 1.3 that
+  // sends no session ticket counts as accepting if the connection is open after the timeout. Throws
+  // Error kUnreachable if the connection is lost, or if bytes are unconfirmed after the timeout.
   void await_receipt();
 
  private:
