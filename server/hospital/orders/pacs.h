@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "server/hospital/orders/hospital.h"
+#include "server/hospital/orders/settings.h"
 #include "server/store/blob_store.h"
 
 namespace isomesh::orders {

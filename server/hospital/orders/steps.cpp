@@ -7,7 +7,7 @@
 #include "base/sha256.h"
 #include "proto/error.h"
 #include "proto/json.h"
-#include "server/hospital/orders/objects.h"
+#include "server/hospital/orders/make_objects.h"
 #include "server/hospital/orders/received.h"
 #include "server/jobs/library/settle_labels.h"
 
@@ -155,17 +155,17 @@ Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_tok
       throw PacsFailure(PacsFault::kRefused, "the PACS does not know the series");
     }
     return save_after(OrderState::kWaiting, record,
-                      now + hospital_.first_delay * (1 << work.looks));
+                      now + settings_.first_delay * (1 << work.looks));
   }
   work.looks = 0;
   if (listed != work.listed || !work.listed_since) {
     work.listed = listed;
     work.listed_since = timestamp_of(now);
   }
-  const Time settled = time_of(*work.listed_since) + hospital_.settle;
+  const Time settled = time_of(*work.listed_since) + settings_.settle;
   const bool is_whole = !series->instances || *series->instances == listed.size();
   if (now < settled || !is_whole) {
-    const Time poll = now + hospital_.poll;
+    const Time poll = now + settings_.poll;
     return save_after(OrderState::kWaiting, record, now < settled ? std::min(settled, poll) : poll);
   }
   source.instances = static_cast<std::uint32_t>(listed.size());
@@ -272,12 +272,12 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     }
     std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
     for (const SendTarget& target : record.order.send) {
-      const PacsSettings* pacs = hospital_.find_pacs(target.pacs);
+      const PacsSettings* pacs = settings_.find_pacs(target.pacs);
       if (pacs != nullptr) most_bytes = std::min(most_bytes, pacs->max_send_bytes);
     }
     if (record.work.max_error_mm && !record.work.triangles) {
       const auto triangles =
-          triangles_that_fit(record, job, hospital_.station_name, most_bytes, services_.blobs);
+          triangles_that_fit(record, job, settings_.station_name, most_bytes, services_.blobs);
       if (triangles) {
         record.work.triangles = *triangles;
         record.order.job.reset();
@@ -285,7 +285,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       }
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
-    objects = make_objects(record, job, hospital_.station_name, most_bytes, made, services_.blobs);
+    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "server/hospital/orders/hospital.h"
 #include "server/hospital/orders/pacs.h"
+#include "server/hospital/orders/settings.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/volume_library.h"
 #include "server/store/audit_trail.h"
@@ -47,8 +47,8 @@ class OrderSteps {
  public:
   using Clock = std::function<store::Time()>;
 
-  OrderSteps(const OrderServices& services, const Hospital& hospital, Clock now)
-      : services_(services), hospital_(hospital), now_(std::move(now)) {}
+  OrderSteps(const OrderServices& services, const HospitalSettings& settings, Clock now)
+      : services_(services), settings_(settings), now_(std::move(now)) {}
 
   // Makes and saves the next step of an open order; returns when the following one is due. Throws
   // PacsFailure and Error if the step failed; `record` then has the state to save. Every return to
@@ -84,7 +84,7 @@ class OrderSteps {
   Pacs& pacs(const std::string& name) const;
 
   const OrderServices services_;
-  const Hospital& hospital_;
+  const HospitalSettings& settings_;
   const Clock now_;
 };
 

@@ -185,12 +185,12 @@ class OrdersTest : public test::JobsFixture {
       PacsSettings settings;
       settings.name = name;
       settings.dicomweb = "http://pacs.example.org";
-      hospital_.pacs.push_back(settings);
+      settings_.pacs.push_back(settings);
       auto pacs = std::make_unique<FakePacs>();
       (name == std::string("main") ? main_ : other_) = pacs.get();
       pacs_[name] = std::move(pacs);
     }
-    hospital_.settle = seconds(0);
+    settings_.settle = seconds(0);
     begin();
   }
 
@@ -199,7 +199,7 @@ class OrdersTest : public test::JobsFixture {
     orders_.reset();
     orders_ = std::make_unique<Orders>(OrderServices{data_, blobs_, volumes_, jobs_, library_,
                                                      labels_, store_, audit_, received_, pacs_},
-                                       hospital_,
+                                       settings_,
                                        OrderOptions{.now = [this] { return now(); }, .threads = 3});
     orders_->on_end([](const std::string&) {});
   }
@@ -238,7 +238,7 @@ class OrdersTest : public test::JobsFixture {
       ASSERT_TRUE(order.next_attempt && order.error);
       const auto pause = time_of(*order.next_attempt) - now();
       // A pause is at least half of its full length; some of it has passed by now.
-      EXPECT_GT(pause, hospital_.first_delay * (1 << (attempts - 1)) / 2 - seconds(2));
+      EXPECT_GT(pause, settings_.first_delay * (1 << (attempts - 1)) / 2 - seconds(2));
       pass(std::chrono::ceil<milliseconds>(pause));
     }
   }
@@ -279,7 +279,7 @@ class OrdersTest : public test::JobsFixture {
   }
 
   std::atomic<milliseconds> ahead_ = milliseconds(0);
-  Hospital hospital_;
+  HospitalSettings settings_;
   PacsByName pacs_;
   FakePacs* main_ = nullptr;
   FakePacs* other_ = nullptr;

@@ -63,13 +63,13 @@ TEST_F(OrdersTest, OfMoreLabelsThanAnOrderMayHaveObjectsFail) {
 class FittingOrdersTest : public OrdersTest {
  protected:
   FittingOrdersTest() {
-    hospital_.pacs.front().max_send_bytes = 20'000;
+    settings_.pacs.front().max_send_bytes = 20'000;
     Rule rule;
     rule.name = "fit";
     rule.max_error_mm = 0.5;
     rule.parameters = R"({"iso": 100})";
     rule.send = {{.pacs = "main"}};
-    hospital_.rules = {rule};
+    settings_.rules = {rule};
   }
   std::string submit_by_rule() {
     OrderRequest request;
@@ -115,10 +115,10 @@ class ReceivedOrdersTest : public OrdersTest {
     rule.name = "bone";
     rule.parameters = R"({"iso": 100})";
     rule.send = {{.pacs = "main"}};
-    hospital_.rules = {rule};
-    hospital_.settle = minutes(1);
-    hospital_.poll = seconds(1);
-    hospital_.dimse.emplace().routes = {{"BONE", "bone"}};
+    settings_.rules = {rule};
+    settings_.settle = minutes(1);
+    settings_.poll = seconds(1);
+    settings_.dimse.emplace().routes = {{"BONE", "bone"}};
     pacs_[received_by("BONE")] = std::make_unique<Received>("BONE", received_, blobs_);
     begin();
   }
@@ -201,9 +201,9 @@ TEST_F(ReceivedOrdersTest, WaitForTheRestOfWhatIsNotHeldAnyMore) {
 
 TEST_F(ReceivedOrdersTest, AreMadeThoughAnotherSeriesCannotBeRead) {
   orders_.reset();
-  hospital_.poll = minutes(1);
-  hospital_.dimse->routes["BROKEN"] = "bone";
-  hospital_.dimse->routes["SOUND"] = "bone";
+  settings_.poll = minutes(1);
+  settings_.dimse->routes["BROKEN"] = "bone";
+  settings_.dimse->routes["SOUND"] = "bone";
   pacs_[received_by("SOUND")] = std::make_unique<Received>("SOUND", received_, blobs_);
   begin();
   receive(0, kSlices, "BROKEN");

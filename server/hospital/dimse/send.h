@@ -3,9 +3,9 @@
 
 #include "server/process/dimse_message.h"
 
-namespace isomesh::association {
+namespace isomesh::dimse {
 
 // Sends the object over the process's connection.
 process::DimseSent send_object(const process::DimseSending& order);
 
-}  // namespace isomesh::association
+}  // namespace isomesh::dimse

@@ -1,4 +1,4 @@
-#include "server/hospital/orders/hospital.h"
+#include "server/hospital/orders/settings.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,9 +41,9 @@ parameters = { iso = 250, scheme = 6, passes = 5, close = true, components = { k
 send = [ { pacs = "main", format = "stl" } ]
 )";
 
-TEST(Hospital, IsRead) {
+TEST(HospitalSettings, IsRead) {
   using std::chrono::seconds;
-  const Hospital hospital = parse_hospital(kWhole);
+  const HospitalSettings hospital = parse_settings(kWhole);
   EXPECT_EQ(hospital.settle, seconds(7));
   EXPECT_EQ(hospital.poll, seconds(8));
   EXPECT_EQ(hospital.first_delay, seconds(9));
@@ -74,7 +74,7 @@ TEST(Hospital, IsRead) {
 }
 
 std::string refusal_of(const std::string& toml) {
-  const auto error = test::thrown_by([&] { parse_hospital(toml); });
+  const auto error = test::thrown_by([&] { parse_settings(toml); });
   if (!error) return "nothing";
   EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
   return error->what();
@@ -85,7 +85,7 @@ std::string with(const std::string& from, const std::string& to) {
   return text.replace(text.find(from), from.size(), to);
 }
 
-TEST(Hospital, NamesWhatIsWrong) {
+TEST(HospitalSettings, NamesWhatIsWrong) {
   const std::vector<std::pair<std::string, std::string>> wrong = {
       {"", "pacs"},
       {"x", "line 1"},
@@ -135,8 +135,8 @@ TEST(Hospital, NamesWhatIsWrong) {
   for (const auto& [toml, name] : wrong) EXPECT_THAT(refusal_of(toml), HasSubstr(name)) << toml;
 }
 
-TEST(Hospital, KnowsDimse) {
-  const Hospital hospital = parse_hospital(R"(
+TEST(HospitalSettings, KnowsDimse) {
+  const HospitalSettings hospital = parse_settings(R"(
 [[pacs]]
 name = "archive"
 send-by = "c-store"
@@ -189,7 +189,7 @@ key-file = "/etc/isomesh/key.pem"
 }
 
 // Secrets stand in files of their own, but who writes one into this is not to see it in a log.
-TEST(Hospital, RefusalsDoNotRepeatValues) {
+TEST(HospitalSettings, RefusalsDoNotRepeatValues) {
   const std::string said = refusal_of(with("timeout-seconds = 11", "password = \"hunter2\""));
   EXPECT_THAT(said, HasSubstr("pacs[0].password"));
   EXPECT_THAT(said, testing::Not(HasSubstr("hunter2")));

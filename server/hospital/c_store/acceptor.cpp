@@ -1,4 +1,4 @@
-#include "server/hospital/dimse/acceptor.h"
+#include "server/hospital/c_store/acceptor.h"
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@
 #include "proto/error.h"
 #include "server/net/address.h"
 
-namespace isomesh::dimse {
+namespace isomesh::c_store {
 namespace {
 
 constexpr int kMostEvents = 128;
@@ -205,4 +205,4 @@ AssociationAcceptor::PendingList::iterator AssociationAcceptor::close(
   return pending_.erase(pending);
 }
 
-}  // namespace isomesh::dimse
+}  // namespace isomesh::c_store

@@ -9,9 +9,9 @@
 #include <dcmtk/dcmdata/dctk.h>
 
 #include "base/error.h"
-#include "server/hospital/association/receive.h"
-#include "server/hospital/association/send.h"
-#include "server/hospital/association/talk.h"
+#include "server/hospital/dimse/daemon_channel.h"
+#include "server/hospital/dimse/receive.h"
+#include "server/hospital/dimse/send.h"
 #include "server/process/fork_server.h"
 #include "server/process/sandbox.h"
 
@@ -41,15 +41,15 @@ Confinement confinement_of(const DimseReceiving& order) {
           .time = kTime};
 }
 
-DimseReport work_on(const DimseSending& order) { return association::send_object(order); }
-DimseReport work_on(const DimseReceiving& order) { return association::receive_association(order); }
+DimseReport work_on(const DimseSending& order) { return dimse::send_object(order); }
+DimseReport work_on(const DimseReceiving& order) { return dimse::receive_association(order); }
 
 void serve_one() {
   confine_ahead_to_talk();
-  const std::string line = association::read_order();
+  const std::string line = dimse::read_order();
   if (line.empty()) return;
   const DimseOrder any_order = dimse_order_from(line);
-  association::say(to_line(std::visit(
+  dimse::report(to_line(std::visit(
       [](const auto& order) {
         confine_to(confinement_of(order));
         return work_on(order);

@@ -1,4 +1,4 @@
-#include "server/hospital/orders/objects.h"
+#include "server/hospital/orders/make_objects.h"
 
 #include <algorithm>
 #include <array>

@@ -16,7 +16,7 @@
 #include "server/net/fair_places.h"
 #include "server/net/wakeup.h"
 
-namespace isomesh::dimse {
+namespace isomesh::c_store {
 
 // A connection whose association request (PS3.8, A-ASSOCIATE-RQ) has arrived but is not read yet.
 struct AssociationRequest {
@@ -85,4 +85,4 @@ class AssociationAcceptor {
   std::jthread thread_;  // last: uses the other members
 };
 
-}  // namespace isomesh::dimse
+}  // namespace isomesh::c_store

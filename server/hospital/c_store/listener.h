@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "server/hospital/dimse/acceptor.h"
-#include "server/hospital/orders/hospital.h"
+#include "server/hospital/c_store/acceptor.h"
+#include "server/hospital/orders/settings.h"
 #include "server/net/fair_places.h"
 #include "server/net/listener.h"
 #include "server/process/dimse_message.h"
@@ -23,7 +23,7 @@
 #include "server/store/files/data_folder.h"
 #include "server/store/received_store.h"
 
-namespace isomesh::dimse {
+namespace isomesh::c_store {
 
 // Throws Error kInvalidParameter, field "dimse.listen".
 net::Address listen_address(const orders::DimseSettings& settings);
@@ -96,4 +96,4 @@ class DimseListener {
   std::vector<std::jthread> threads_;
 };
 
-}  // namespace isomesh::dimse
+}  // namespace isomesh::c_store

@@ -1,4 +1,4 @@
-#include "server/hospital/orders/hospital.h"
+#include "server/hospital/orders/settings.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,18 +136,18 @@ class Section {
 
 constexpr std::int64_t kMostSeconds = 30 * 24 * 3600;
 
-void read_orders(Section section, Hospital& hospital) {
-  section.read("settle-seconds", hospital.settle, 0, kMostSeconds);
-  section.read("poll-seconds", hospital.poll, 1, kMostSeconds);
-  section.read("first-delay-seconds", hospital.first_delay, 1, kMostSeconds);
-  section.read("max-open", hospital.most_open, 1, 1'000'000);
-  std::int64_t hours = std::chrono::duration_cast<std::chrono::hours>(hospital.give_up).count();
+void read_orders(Section section, HospitalSettings& settings) {
+  section.read("settle-seconds", settings.settle, 0, kMostSeconds);
+  section.read("poll-seconds", settings.poll, 1, kMostSeconds);
+  section.read("first-delay-seconds", settings.first_delay, 1, kMostSeconds);
+  section.read("max-open", settings.most_open, 1, 1'000'000);
+  std::int64_t hours = std::chrono::duration_cast<std::chrono::hours>(settings.give_up).count();
   section.read("give-up-hours", hours, 1, 24 * 365);
-  hospital.give_up = std::chrono::hours(hours);
-  section.read("station-name", hospital.station_name);
+  settings.give_up = std::chrono::hours(hours);
+  section.read("station-name", settings.station_name);
   constexpr std::size_t kLongestLo = 64;
-  if (hospital.station_name.size() > kLongestLo ||
-      hospital.station_name.find('\\') != std::string::npos) {
+  if (settings.station_name.size() > kLongestLo ||
+      settings.station_name.find('\\') != std::string::npos) {
     refuse(section.key_of("station-name"), "must have at most 64 characters and no backslash");
   }
   section.finish();
@@ -339,14 +339,14 @@ std::optional<SyslogSettings> read_audit(Section section) {
 }
 
 // Checks that names are unique and that all references exist.
-void check_names(const Hospital& hospital) {
+void check_names(const HospitalSettings& settings) {
   std::set<std::string> names;
-  for (const PacsSettings& pacs : hospital.pacs) {
+  for (const PacsSettings& pacs : settings.pacs) {
     if (!names.insert(pacs.name).second)
       refuse("pacs.name", "\"" + pacs.name + "\" is given twice");
   }
   std::set<std::string> rules;
-  for (const Rule& rule : hospital.rules) {
+  for (const Rule& rule : settings.rules) {
     if (!rules.insert(rule.name).second) {
       refuse("rules.name", "\"" + rule.name + "\" is given twice");
     }
@@ -357,12 +357,12 @@ void check_names(const Hospital& hospital) {
       if (names.contains(name)) continue;
       refuse("rules." + rule.name, "names the PACS \"" + name + "\", which is not configured");
     }
-    if (rule.watch && hospital.find_pacs(*rule.watch)->dicomweb.empty()) {
+    if (rule.watch && settings.find_pacs(*rule.watch)->dicomweb.empty()) {
       refuse("rules." + rule.name + ".watch", "names a PACS without dicomweb");
     }
   }
-  if (!hospital.dimse) return;
-  for (const auto& [title, rule] : hospital.dimse->routes) {
+  if (!settings.dimse) return;
+  for (const auto& [title, rule] : settings.dimse->routes) {
     if (!rules.contains(rule)) {
       refuse("dimse.routes." + title, "names the rule \"" + rule + "\", which is not configured");
     }
@@ -370,34 +370,34 @@ void check_names(const Hospital& hospital) {
 }
 
 Hospital hospital_of(const toml::table& table) {
-  Hospital hospital;
+  HospitalSettings settings;
   Section all(table, "");
-  if (auto orders = all.section("orders")) read_orders(std::move(*orders), hospital);
-  for (Section& section : all.sections("pacs")) hospital.pacs.push_back(read_pacs(section));
-  for (Section& section : all.sections("rules")) hospital.rules.push_back(read_rule(section));
-  if (auto dimse = all.section("dimse")) hospital.dimse = read_dimse(std::move(*dimse));
-  if (auto audit = all.section("audit")) hospital.syslog = read_audit(std::move(*audit));
+  if (auto orders = all.section("orders")) read_orders(std::move(*orders), settings);
+  for (Section& section : all.sections("pacs")) settings.pacs.push_back(read_pacs(section));
+  for (Section& section : all.sections("rules")) settings.rules.push_back(read_rule(section));
+  if (auto dimse = all.section("dimse")) settings.dimse = read_dimse(std::move(*dimse));
+  if (auto audit = all.section("audit")) settings.syslog = read_audit(std::move(*audit));
   all.finish();
-  if (hospital.pacs.empty()) refuse("pacs", "is required: orders need a PACS");
-  check_names(hospital);
-  return hospital;
+  if (settings.pacs.empty()) refuse("pacs", "is required: orders need a PACS");
+  check_names(settings);
+  return settings;
 }
 
 char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 }  // namespace
 
-const PacsSettings* Hospital::find_pacs(std::string_view name) const {
+const PacsSettings* HospitalSettings::find_pacs(std::string_view name) const {
   const auto found = std::ranges::find(pacs, name, &PacsSettings::name);
   return found == pacs.end() ? nullptr : &*found;
 }
 
-const Rule* Hospital::find_rule(std::string_view name) const {
+const Rule* HospitalSettings::find_rule(std::string_view name) const {
   const auto found = std::ranges::find(rules, name, &Rule::name);
   return found == rules.end() ? nullptr : &*found;
 }
 
-Hospital parse_hospital(std::string_view toml) {
+HospitalSettings parse_settings(std::string_view toml) {
   try {
     return hospital_of(toml::parse(toml));
   } catch (const toml::parse_error& error) {
@@ -409,9 +409,9 @@ Hospital parse_hospital(std::string_view toml) {
   }
 }
 
-Hospital read_hospital(const std::filesystem::path& file) {
+HospitalSettings read_settings(const std::filesystem::path& file) {
   const InputFile input = InputFile::chosen(file);
-  return parse_hospital(input.text(0, static_cast<std::size_t>(input.size())));
+  return parse_settings(input.text(0, static_cast<std::size_t>(input.size())));
 }
 
 bool matches(std::string_view pattern, std::string_view text) {

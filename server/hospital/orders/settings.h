@@ -76,7 +76,7 @@ struct SyslogSettings {
   std::filesystem::path key_file;
 };
 
-struct Hospital {
+struct HospitalSettings {
   std::chrono::seconds settle{60};  // a series' list of instances must be unchanged for this long
   std::chrono::seconds poll{30};
   std::chrono::seconds first_delay{5};  // after a failed attempt; doubles each time
@@ -96,8 +96,8 @@ struct Hospital {
 
 // Reads TOML. Throws Error kInvalidParameter that names the key that is unknown, missing, of the
 // wrong type or out of range (without its value), or the line with a syntax error.
-Hospital read_hospital(const std::filesystem::path& file);
-Hospital parse_hospital(std::string_view toml);
+HospitalSettings read_settings(const std::filesystem::path& file);
+HospitalSettings parse_settings(std::string_view toml);
 
 // True if the text matches the pattern: see SeriesMatch.
 bool matches(std::string_view pattern, std::string_view text);

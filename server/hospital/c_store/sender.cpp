@@ -1,10 +1,10 @@
-#include "server/hospital/dimse/c_store.h"
+#include "server/hospital/c_store/sender.h"
 
 #include "server/hospital/objects/encapsulated_stl.h"
 #include "server/net/connect.h"
 #include "server/process/dimse_message.h"
 
-namespace isomesh::dimse {
+namespace isomesh::c_store {
 namespace {
 
 using orders::PacsFailure;
@@ -145,4 +145,4 @@ void CStore::store(const orders::OutgoingObject& object, const std::stop_token& 
   check_sent(sent);
 }
 
-}  // namespace isomesh::dimse
+}  // namespace isomesh::c_store

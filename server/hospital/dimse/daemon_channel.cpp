@@ -1,4 +1,4 @@
-#include "server/hospital/association/talk.h"
+#include "server/hospital/dimse/daemon_channel.h"
 
 #include <array>
 #include <cerrno>
@@ -11,7 +11,7 @@
 #include "server/process/child.h"
 #include "server/process/passing.h"
 
-namespace isomesh::association {
+namespace isomesh::dimse {
 namespace {
 
 Descriptor& peer() {
@@ -36,7 +36,7 @@ std::string read_order() {
 
 int peer_socket() { return peer().number(); }
 
-void say(std::string_view line) {
+void report(std::string_view line) {
   while (!line.empty()) {
     const ssize_t count = ::send(process::kChildDescriptor, line.data(), line.size(), MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
@@ -45,7 +45,7 @@ void say(std::string_view line) {
   }
 }
 
-process::DimseVerdict hear_verdict() {
+process::DimseVerdict read_verdict() {
   char verdict = 0;
   ssize_t count = 0;
   do {
@@ -55,13 +55,13 @@ process::DimseVerdict hear_verdict() {
   return static_cast<process::DimseVerdict>(verdict);
 }
 
-}  // namespace isomesh::association
+}  // namespace isomesh::dimse
 
 // DCMTK opens its own connections, but this process may not open any. These functions replace those
 // of the C library, and give DCMTK the daemon's connection whenever it connects a socket.
 extern "C" {
 
-int socket(int, int, int) noexcept { return ::dup(isomesh::association::peer_socket()); }
+int socket(int, int, int) noexcept { return ::dup(isomesh::dimse::peer_socket()); }
 
 int connect(int, const sockaddr*, socklen_t) { return 0; }
 

@@ -1,4 +1,4 @@
-#include "server/hospital/dimse/listener.h"
+#include "server/hospital/c_store/listener.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include "base/log.h"
 #include "server/process/child.h"
 
-namespace isomesh::dimse {
+namespace isomesh::c_store {
 namespace {
 
 using process::DimseEnded;
@@ -259,4 +259,4 @@ void DimseListener::note_end(const DimseEnded& ended) {
                        .direction = "in"});
 }
 
-}  // namespace isomesh::dimse
+}  // namespace isomesh::c_store

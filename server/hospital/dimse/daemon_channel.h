@@ -6,7 +6,7 @@
 
 #include "server/process/dimse_message.h"
 
-namespace isomesh::association {
+namespace isomesh::dimse {
 
 // The first line from the daemon, which also passes the peer's connection. Empty if the daemon no
 // longer needs this process.
@@ -15,9 +15,9 @@ std::string read_order();
 int peer_socket();
 
 // Ends the process if the daemon has closed its socket.
-void say(std::string_view line);
+void report(std::string_view line);
 
-// The daemon's verdict on the object reported last. Ends the process as say() does.
-process::DimseVerdict hear_verdict();
+// The daemon's verdict on the object reported last. Ends the process as report() does.
+process::DimseVerdict read_verdict();
 
-}  // namespace isomesh::association
+}  // namespace isomesh::dimse

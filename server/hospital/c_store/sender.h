@@ -6,7 +6,7 @@
 #include "server/hospital/orders/pacs.h"
 #include "server/process/prepared.h"
 
-namespace isomesh::dimse {
+namespace isomesh::c_store {
 
 // Sends by DIMSE. Uses DICOMweb for everything else, if the PACS has it.
 class CStore : public orders::Pacs {
@@ -43,4 +43,4 @@ class CStore : public orders::Pacs {
   process::PreparedProcesses& processes_;
 };
 
-}  // namespace isomesh::dimse
+}  // namespace isomesh::c_store

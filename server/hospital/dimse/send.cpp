@@ -1,4 +1,4 @@
-#include "server/hospital/association/send.h"
+#include "server/hospital/dimse/send.h"
 
 #include <array>
 #include <cstdio>
@@ -9,7 +9,7 @@
 #include <dcmtk/dcmnet/dcmtrans.h>
 #include <dcmtk/dcmnet/diutil.h>
 
-namespace isomesh::association {
+namespace isomesh::dimse {
 namespace {
 
 using process::DimseEnd;
@@ -128,4 +128,4 @@ DimseSent send_object(const process::DimseSending& order) {
   return sent;
 }
 
-}  // namespace isomesh::association
+}  // namespace isomesh::dimse

@@ -1,25 +1,31 @@
-#include "server/hospital/association/receive.h"
+#include "server/hospital/dimse/receive.h"
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
 #include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcostrma.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/dcmtrans.h>
 #include <dcmtk/dcmnet/diutil.h>
+#include <fcntl.h>
 
+#include "base/descriptor.h"
+#include "base/error.h"
 #include "base/text.h"
 #include "proto/orders.h"
-#include "server/hospital/association/sink.h"
-#include "server/hospital/association/talk.h"
+#include "server/hospital/dimse/daemon_channel.h"
 #include "server/hospital/objects/file_head.h"
 #include "server/volume/object_classes.h"
 
-namespace isomesh::association {
+namespace isomesh::dimse {
 namespace {
 
 using process::DimseEnded;
@@ -82,6 +88,57 @@ OFCondition answer_proposals(T_ASC_Parameters* parameters) {
 bool is_among(const std::vector<std::string>& titles, const std::string& title) {
   return std::ranges::find(titles, title) != titles.end();
 }
+
+// Continues after write errors, so that the rest of the object is read from the connection and the
+// sender gets a status. DCMTK's own file output would end the association.
+class FileSink : public DcmConsumer {
+ public:
+  // Writes at most that many bytes.
+  FileSink(const std::filesystem::path& path, std::uint64_t most_bytes);
+
+  bool has_failed() const { return has_failed_; }
+
+  OFBool good() const override { return OFTrue; }
+  OFCondition status() const override { return EC_Normal; }
+  OFBool isFlushed() const override { return OFTrue; }
+  offile_off_t avail() const override { return kPieceBytes; }
+  offile_off_t write(const void* bytes, offile_off_t count) override;
+  void flush() override {}
+
+ private:
+  static constexpr offile_off_t kPieceBytes = 1 << 20;
+
+  Descriptor file_;
+  std::uint64_t room_;
+  bool has_failed_ = false;
+};
+
+FileSink::FileSink(const std::filesystem::path& path, std::uint64_t most_bytes)
+    : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)),
+      room_(most_bytes),
+      has_failed_(file_.number() < 0) {}
+
+offile_off_t FileSink::write(const void* bytes, offile_off_t count) {
+  const auto size = static_cast<std::size_t>(count);
+  if (has_failed_) return count;
+  if (size > room_) {
+    has_failed_ = true;
+    return count;
+  }
+  try {
+    write_all(file_, std::span(static_cast<const std::byte*>(bytes), size));
+    room_ -= size;
+  } catch (const Error&) {
+    has_failed_ = true;
+  }
+  return count;
+}
+
+// A stream of DCMTK that writes to a FileSink.
+class FileStream : public DcmOutputStream {
+ public:
+  explicit FileStream(FileSink& sink) : DcmOutputStream(&sink) {}
+};
 
 class Association {
  public:
@@ -234,8 +291,8 @@ DIC_US Association::status_of(const T_DIMSE_C_StoreRQ& request) {
       !is_uid(told.study) || !is_uid(told.series)) {
     return STATUS_STORE_Error_DataSetDoesNotMatchSOPClass;
   }
-  say(process::to_line(told));
-  return hear_verdict() == process::DimseVerdict::kStored ? STATUS_Success
+  report(process::to_line(told));
+  return read_verdict() == process::DimseVerdict::kStored ? STATUS_Success
                                                           : STATUS_STORE_Refused_OutOfResources;
 }
 
@@ -243,4 +300,4 @@ DIC_US Association::status_of(const T_DIMSE_C_StoreRQ& request) {
 
 DimseEnded receive_association(const DimseReceiving& order) { return Association(order).serve(); }
 
-}  // namespace isomesh::association
+}  // namespace isomesh::dimse
