@@ -103,28 +103,30 @@ class OpenHospital {
   }
 
  private:
-  std::unique_ptr<orders::Pacs> peer(const orders::PacsSettings& pacs,
-                                     const http::WingSettings& settings,
-                                     const std::filesystem::path& scratch) {
-    std::unique_ptr<orders::Pacs> web;
+  orders::Peer peer(const orders::PacsSettings& pacs, const http::WingSettings& settings,
+                    const std::filesystem::path& scratch) {
+    orders::Peer peer;
     if (!pacs.dicomweb.empty()) {
-      web = std::make_unique<dicomweb::DicomWeb>(
+      const auto web = std::make_shared<dicomweb::DicomWeb>(
           pacs, scratch, settings.max_upload_bytes,
           [this](const std::filesystem::path& file) { return answers_.read_answer(file); });
+      peer = {.source = web, .archive = web, .receiver = web};
     }
-    if (pacs.send_by == orders::SendBy::kStow) return web;
-    return std::make_unique<c_store::CStore>(pacs, std::move(web), *dimse_);
+    if (pacs.send_by == orders::SendBy::kCStore) {
+      peer.receiver = std::make_shared<c_store::Sender>(pacs, *dimse_);
+    }
+    return peer;
   }
 
-  orders::PacsByName peers(const http::WingSettings& settings, const http::WingServices& services) {
-    orders::PacsByName all;
+  orders::Peers peers(const http::WingSettings& settings, const http::WingServices& services) {
+    orders::Peers all;
     for (const orders::PacsSettings& pacs : settings_.pacs) {
       all[pacs.name] = peer(pacs, settings, services.folder.scratch());
     }
     if (!settings_.dimse) return all;
     for (const auto& [title, rule] : settings_.dimse->routes) {
-      all[orders::received_by(title)] =
-          std::make_unique<orders::Received>(title, services.received, services.blobs);
+      all[orders::received_by(title)].source =
+          std::make_shared<orders::Received>(title, services.received, services.blobs);
     }
     return all;
   }
@@ -132,7 +134,7 @@ class OpenHospital {
   const orders::HospitalSettings settings_;
   jobs::ImportRunner answers_;
   std::unique_ptr<process::PreparedProcesses> dimse_;
-  const orders::PacsByName peers_;
+  const orders::Peers peers_;
   std::unique_ptr<audit::SyslogSender> audit_;
   orders::Orders orders_;
   std::unique_ptr<c_store::DimseListener> listener_;  // null if no series are received

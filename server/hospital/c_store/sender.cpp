@@ -84,47 +84,7 @@ Descriptor connected(const orders::PacsSettings& settings, const std::stop_token
 
 }  // namespace
 
-orders::Pacs& CStore::web() const {
-  if (web_) return *web_;
-  throw PacsFailure(PacsFault::kRefused,
-                    "meshes can only be sent to this PACS: it has no dicomweb");
-}
-
-std::vector<orders::FoundSeries> CStore::find_recent(const std::string& from_day,
-                                                     const std::string& modality,
-                                                     const std::stop_token& stop) {
-  return web().find_recent(from_day, modality, stop);
-}
-
-std::optional<orders::FoundSeries> CStore::find_series(const std::string& study,
-                                                       const std::string& series,
-                                                       const std::stop_token& stop) {
-  return web().find_series(study, series, stop);
-}
-
-std::vector<std::string> CStore::list_instances(const std::string& study, const std::string& series,
-                                                const std::stop_token& stop) {
-  return web().list_instances(study, series, stop);
-}
-
-std::string CStore::fetch_series(const std::string& study, const std::string& series,
-                                 const std::filesystem::path& target, const std::stop_token& stop) {
-  return web().fetch_series(study, series, target, stop);
-}
-
-std::optional<std::string> CStore::patient_of(const std::string& study,
-                                              const std::stop_token& stop) {
-  if (!web_) return std::nullopt;
-  return web_->patient_of(study, stop);
-}
-
-std::optional<bool> CStore::has_instance(const orders::InstancePlace& place,
-                                         const std::stop_token& stop) {
-  if (!web_) return std::nullopt;
-  return web_->has_instance(place, stop);
-}
-
-void CStore::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
+void Sender::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
   // As for DICOMweb: one more second for each 4 MiB to store.
   constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
   const process::DimseSending order = {

@@ -224,8 +224,7 @@ std::optional<std::string> DicomWeb::patient_of(const std::string& study,
   return same->patient_id;
 }
 
-std::optional<bool> DicomWeb::has_instance(const orders::InstancePlace& place,
-                                           const std::stop_token& stop) {
+bool DicomWeb::has_instance(const orders::InstancePlace& place, const std::stop_token& stop) {
   return names(search("/studies/" + place.study + "/series/" + place.series +
                           "/instances?SOPInstanceUID=" + place.instance,
                       stop),

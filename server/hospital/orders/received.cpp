@@ -34,11 +34,6 @@ std::string received_by(const std::string& title) { return std::string(kPrefix) 
 
 bool is_received(std::string_view pacs) { return pacs.starts_with(kPrefix); }
 
-std::vector<FoundSeries> Received::find_recent(const std::string&, const std::string&,
-                                               const std::stop_token&) {
-  return {};
-}
-
 std::optional<FoundSeries> Received::find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token&) {
@@ -80,18 +75,6 @@ std::string Received::fetch_series(const std::string& study, const std::string& 
   }
   append(file, "\r\n--" + boundary + "--\r\n");
   return "multipart/related; type=\"application/dicom\"; boundary=" + boundary;
-}
-
-std::optional<std::string> Received::patient_of(const std::string&, const std::stop_token&) {
-  return std::nullopt;
-}
-
-std::optional<bool> Received::has_instance(const InstancePlace&, const std::stop_token&) {
-  return std::nullopt;
-}
-
-void Received::store(const OutgoingObject&, const std::stop_token&) {
-  throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
 }
 
 // Submits an order for the held series if it needs one. Releases the held instances once an order

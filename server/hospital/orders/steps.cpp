@@ -99,10 +99,23 @@ Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop
   }
 }
 
-Pacs& OrderSteps::pacs(const std::string& name) const {
-  const auto found = services_.pacs.find(name);
-  if (found != services_.pacs.end()) return *found->second;
+const Peer& OrderSteps::peer(const std::string& name) const {
+  const auto found = services_.peers.find(name);
+  if (found != services_.peers.end()) return found->second;
   throw PacsFailure(PacsFault::kUnreachable, "the PACS is no longer configured");
+}
+
+SeriesSource& OrderSteps::source(const std::string& name) const {
+  if (const auto& source = peer(name).source) return *source;
+  throw PacsFailure(PacsFault::kRefused,
+                    "meshes can only be sent to this PACS: it has no dicomweb");
+}
+
+std::optional<bool> OrderSteps::has_instance(const std::string& pacs, const InstancePlace& place,
+                                             const std::stop_token& stop) const {
+  const auto& archive = peer(pacs).archive;
+  if (!archive) return std::nullopt;
+  return archive->has_instance(place, stop);
 }
 
 Time OrderSteps::save(store::OrderRecord& record, Time next) const {
@@ -138,12 +151,12 @@ void OrderSteps::note_query(store::OrderRecord& record, bool success) const {
 Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const {
   OrderSource& source = record.order.source;
   OrderWork& work = record.work;
-  Pacs& peer = pacs(source.pacs);
+  SeriesSource& images = this->source(source.pacs);
   std::optional<FoundSeries> series;
   std::vector<std::string> listed;
   try {
-    series = peer.find_series(source.study, source.series, stop);
-    if (series) listed = peer.list_instances(source.study, source.series, stop);
+    series = images.find_series(source.study, source.series, stop);
+    if (series) listed = images.list_instances(source.study, source.series, stop);
   } catch (const Error&) {
     note_query(record, false);
     throw;
@@ -179,7 +192,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   const std::filesystem::path file = scratch.path() / "series";
   try {
     const std::string type =
-        pacs(source.pacs).fetch_series(source.study, source.series, file, stop);
+        this->source(source.pacs).fetch_series(source.study, source.series, file, stop);
     auto [volume, identity] = services_.library.add_peers(record.owner, file,
                                                           {.content_type = type,
                                                            .study = source.study,
@@ -307,8 +320,10 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
 bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderResult& result,
                                  const std::stop_token& stop) const {
   const DicomIdentity& identity = *record.work.identity;
-  const auto patient = pacs(result.pacs).patient_of(identity.study_uid, stop);
-  if (patient) return *patient == identity.patient_id;
+  if (const auto& archive = peer(result.pacs).archive) {
+    const auto patient = archive->patient_of(identity.study_uid, stop);
+    if (patient) return *patient == identity.patient_id;
+  }
   // Only the PACS of the images must know the study.
   if (result.pacs != record.order.source.pacs) return true;
   throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
@@ -337,7 +352,10 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
   const OrderResult& result = record.order.results[index];
   const DicomIdentity& identity = *record.work.identity;
   const auto blob = services_.blobs.open(record.work.blobs[index]);
-  Pacs& peer = pacs(result.pacs);
+  const auto& receiver = peer(result.pacs).receiver;
+  if (!receiver) {
+    throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
+  }
   const InstancePlace place = {.study = identity.study_uid,
                                .series = result.series_uid,
                                .instance = result.sop_instance_uid};
@@ -351,14 +369,15 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
                              .instances = 1,
                              .patient_id = identity.patient_id};
   try {
-    peer.store({.place = place,
-                .bytes = blob->size(),
-                .read = [&](std::uint64_t offset,
-                            std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
-                .file = services_.blobs.local(record.work.blobs[index])},
-               stop);
+    receiver->store(
+        {.place = place,
+         .bytes = blob->size(),
+         .read = [&](std::uint64_t offset,
+                     std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
+         .file = services_.blobs.local(record.work.blobs[index])},
+        stop);
     // A confirmed store proves nothing, so the object is queried.
-    if (peer.has_instance(place, stop) == false) {
+    if (has_instance(result.pacs, place, stop) == false) {
       throw PacsFailure(PacsFault::kNotStored,
                         "the PACS confirmed that it stored the mesh, but does not find it");
     }
@@ -377,7 +396,7 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     const InstancePlace place = {.study = record.work.identity->study_uid,
                                  .series = result.series_uid,
                                  .instance = result.sop_instance_uid};
-    if (pacs(result.pacs).has_instance(place, stop) != true) {
+    if (has_instance(result.pacs, place, stop) != true) {
       check_before_sending(record, index, stop);
       send_one(record, index, stop);
     }

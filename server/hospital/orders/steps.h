@@ -3,7 +3,7 @@
 #include <chrono>
 #include <functional>
 #include <map>
-#include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -22,7 +22,7 @@
 
 namespace isomesh::orders {
 
-using PacsByName = std::map<std::string, std::unique_ptr<Pacs>, std::less<>>;
+using Peers = std::map<std::string, Peer, std::less<>>;
 
 struct OrderServices {
   const store::DataFolder& folder;
@@ -34,7 +34,7 @@ struct OrderServices {
   store::OrderStore& orders;
   store::AuditTrail& audit;
   store::ReceivedStore& received;
-  const PacsByName& pacs;  // including those that represent received series
+  const Peers& peers;  // by name: the configured PACS, and the sources of received series
 };
 
 // The order ended during a step, for example because it was cancelled.
@@ -81,7 +81,12 @@ class OrderSteps {
   store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;
   // As above, without resetting failures.
   store::Time save(store::OrderRecord& record, store::Time next) const;
-  Pacs& pacs(const std::string& name) const;
+  // Throw PacsFailure if there is no such peer, or it cannot do that.
+  const Peer& peer(const std::string& name) const;
+  SeriesSource& source(const std::string& name) const;
+  // Empty if the PACS cannot be queried; its response to storing is then the only evidence.
+  std::optional<bool> has_instance(const std::string& pacs, const InstancePlace& place,
+                                   const std::stop_token& stop) const;
 
   const OrderServices services_;
   const HospitalSettings& settings_;

@@ -37,12 +37,12 @@ bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {
 }  // namespace
 
 void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
-  const auto peer = services_.pacs.find(*rule.watch);
-  if (peer == services_.pacs.end()) return;
+  const auto peer = services_.peers.find(*rule.watch);
+  if (peer == services_.peers.end() || !peer->second.archive) return;
   try {
     bool is_told = false;
-    const auto found = peer->second->find_recent(day_before(options_.now(), rule.match.days),
-                                                 rule.match.modality, stop);
+    const auto found = peer->second.archive->find_recent(
+        day_before(options_.now(), rule.match.days), rule.match.modality, stop);
     for (const FoundSeries& series : found) {
       if (!is_wanted(series, rule.match)) continue;
       const store::OrderRecord record = make_order(rule, *rule.watch, series);

@@ -57,7 +57,7 @@ inline std::string slice_file(int slice, const std::string& patient = "PAT-1") {
 }
 
 // One series, and what was stored.
-class FakePacs : public Pacs {
+class FakePacs : public Archive, public ObjectReceiver {
  public:
   std::atomic<bool> is_down = false;
   std::atomic<bool> hangs = false;
@@ -107,8 +107,7 @@ class FakePacs : public Pacs {
     answer(stop);
     return is_merged ? "PAT-2" : "PAT-1";
   }
-  std::optional<bool> has_instance(const InstancePlace& place,
-                                   const std::stop_token& stop) override {
+  bool has_instance(const InstancePlace& place, const std::stop_token& stop) override {
     answer(stop);
     const Lock lock(mutex_);
     return stored_.contains(place.instance);
@@ -186,9 +185,9 @@ class OrdersTest : public test::JobsFixture {
       settings.name = name;
       settings.dicomweb = "http://pacs.example.org";
       settings_.pacs.push_back(settings);
-      auto pacs = std::make_unique<FakePacs>();
+      const auto pacs = std::make_shared<FakePacs>();
       (name == std::string("main") ? main_ : other_) = pacs.get();
-      pacs_[name] = std::move(pacs);
+      peers_[name] = {.source = pacs, .archive = pacs, .receiver = pacs};
     }
     settings_.settle = seconds(0);
     begin();
@@ -198,7 +197,7 @@ class OrdersTest : public test::JobsFixture {
   void begin() {
     orders_.reset();
     orders_ = std::make_unique<Orders>(OrderServices{data_, blobs_, volumes_, jobs_, library_,
-                                                     labels_, store_, audit_, received_, pacs_},
+                                                     labels_, store_, audit_, received_, peers_},
                                        settings_,
                                        OrderOptions{.now = [this] { return now(); }, .threads = 3});
     orders_->on_end([](const std::string&) {});
@@ -280,7 +279,7 @@ class OrdersTest : public test::JobsFixture {
 
   std::atomic<milliseconds> ahead_ = milliseconds(0);
   HospitalSettings settings_;
-  PacsByName pacs_;
+  Peers peers_;
   FakePacs* main_ = nullptr;
   FakePacs* other_ = nullptr;
   jobs::LabelLists labels_{blobs_};

@@ -119,7 +119,7 @@ class ReceivedOrdersTest : public OrdersTest {
     settings_.settle = minutes(1);
     settings_.poll = seconds(1);
     settings_.dimse.emplace().routes = {{"BONE", "bone"}};
-    pacs_[received_by("BONE")] = std::make_unique<Received>("BONE", received_, blobs_);
+    peers_[received_by("BONE")].source = std::make_shared<Received>("BONE", received_, blobs_);
     begin();
   }
   void receive(int from, int to, const std::string& title = "BONE") {
@@ -204,7 +204,7 @@ TEST_F(ReceivedOrdersTest, AreMadeThoughAnotherSeriesCannotBeRead) {
   settings_.poll = minutes(1);
   settings_.dimse->routes["BROKEN"] = "bone";
   settings_.dimse->routes["SOUND"] = "bone";
-  pacs_[received_by("SOUND")] = std::make_unique<Received>("SOUND", received_, blobs_);
+  peers_[received_by("SOUND")].source = std::make_shared<Received>("SOUND", received_, blobs_);
   begin();
   receive(0, kSlices, "BROKEN");
   receive(0, kSlices, "SOUND");
