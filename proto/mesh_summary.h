@@ -211,7 +211,7 @@ struct MeshSummary {
   Displacement displacement_mm;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
-  // Of a job by labels, ascending. Jobs with more than kMostListedLabels have `labels_count` and a
+  // For a job by labels, ascending. Jobs with more than kMostListedLabels have `labels_count` and a
   // file instead. Only records name that file.
   std::vector<LabelSummary> labels = {};
   std::optional<std::uint64_t> labels_count = {};

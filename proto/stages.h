@@ -2,7 +2,9 @@
 // its time in types.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 
 #include "proto/types.h"
 
@@ -25,11 +27,14 @@ inline constexpr std::array kStages = {
     StageRow{Stage::kCertify, "certify", &Timing::certify, false},
     StageRow{Stage::kDone, "done", nullptr}};
 
-constexpr const StageRow& row_of(Stage stage) { return kStages[static_cast<std::size_t>(stage)]; }
+constexpr const StageRow& row_of(Stage stage) {
+  return *std::ranges::find(kStages, stage, &StageRow::stage);
+}
 
 static_assert([] {
-  for (std::size_t i = 0; i < kStages.size(); ++i) {
-    if (static_cast<std::size_t>(kStages[i].stage) != i) return false;
+  for (std::size_t number = 0; number < kStages.size(); ++number) {
+    if (std::ranges::count(kStages, static_cast<Stage>(number), &StageRow::stage) != 1)
+      return false;
   }
   return true;
 }());

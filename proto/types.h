@@ -176,7 +176,7 @@ struct UploadedVolume {
   bool operator==(const UploadedVolume&) const = default;
 };
 
-// How cells are split into tetrahedra: by their number, or by the lattice whose edges these have.
+// The division of cells into tetrahedra: by their number, or by the lattice whose edges these have.
 // kBcc is the body-centred one, of the samples and the centres of the cells.
 enum class Scheme { kFive = 5, kSix = 6, kFcc, kKuhn, kBcc };
 
@@ -249,7 +249,7 @@ struct MeshParameters {
   Space space = Space::kLps;     // of files whose format does not define it
   std::optional<Box> crop = {};  // empty: the whole volume
   bool fill_cavities = false;
-  // Of a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
+  // For a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
   // label_parameters() has its defaults.
   std::optional<LabelChoice> labels = {};
   std::int64_t background = 0;  // the value outside of all labels
@@ -293,6 +293,7 @@ std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
 double default_lambda(Smoothing smoothing);
 double default_lambda(const MeshParameters& parameters);  // labels have a default of their own
 
+// Databases contain the numbers of both, so a new one comes last.
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
 

@@ -22,7 +22,7 @@
 namespace isomesh::hospital {
 namespace {
 
-jobs::RunnerOptions answer_runner(const http::WingSettings& settings) {
+jobs::RunnerOptions response_runner(const http::WingSettings& settings) {
   jobs::RunnerOptions runner;
   runner.program = settings.program("isomesh-import");
   runner.bounds = {.memory_bytes = std::uint64_t{1} << 30, .time = std::chrono::minutes(1)};
@@ -69,24 +69,35 @@ class OpenHospital {
  public:
   OpenHospital(const http::WingSettings& settings, const http::WingServices& services)
       : settings_(orders::read_settings(settings.file)),
-        answers_(answer_runner(settings)),
+        responses_(response_runner(settings)),
         dimse_(prepare_dimse(settings_, settings)),
         peers_(peers(settings, services)),
         audit_(send_trail(settings_, services.audit)),
-        orders_({services.folder, services.blobs, services.volumes, services.jobs, services.library,
-                 services.labels, services.orders, services.audit, services.received, peers_},
+        orders_({.folder = services.folder,
+                 .blobs = services.blobs,
+                 .volumes = services.volumes,
+                 .jobs = services.jobs,
+                 .library = services.library,
+                 .labels = services.labels,
+                 .orders = services.orders,
+                 .audit = services.audit,
+                 .received = services.received,
+                 .peers = peers_},
                 settings_,
                 {.keep = settings.keep,
                  .believed_now = services.believed_now,
                  .cut_off = [this, &services] {
-                   answers_.stop();
+                   responses_.stop();
                    if (dimse_) dimse_->stop();
                    services.library.stop_imports();
                  }}) {
     if (!settings_.dimse) return;
     listener_ = std::make_unique<c_store::DimseListener>(
-        c_store::ListenerServices{services.folder, services.blobs, services.received,
-                                  services.audit, *dimse_},
+        c_store::ListenerServices{.folder = services.folder,
+                                  .blobs = services.blobs,
+                                  .received = services.received,
+                                  .audit = services.audit,
+                                  .processes = *dimse_},
         *settings_.dimse);
     log_info("receiving series by C-STORE on {}", listener_->authority());
   }
@@ -109,7 +120,7 @@ class OpenHospital {
     if (!pacs.dicomweb.empty()) {
       const auto web = std::make_shared<dicomweb::DicomWeb>(
           pacs, scratch, settings.max_upload_bytes,
-          [this](const std::filesystem::path& file) { return answers_.read_answer(file); });
+          [this](const std::filesystem::path& file) { return responses_.read_response(file); });
       peer = {.source = web, .archive = web, .receiver = web};
     }
     if (pacs.send_by == orders::SendBy::kCStore) {
@@ -132,7 +143,7 @@ class OpenHospital {
   }
 
   const orders::HospitalSettings settings_;
-  jobs::ImportRunner answers_;
+  jobs::ImportRunner responses_;
   std::unique_ptr<process::PreparedProcesses> dimse_;
   const orders::Peers peers_;
   std::unique_ptr<audit::SyslogSender> audit_;

@@ -86,7 +86,7 @@ AssociationAcceptor::AssociationAcceptor(int listening, const AcceptorLimits& li
     : listening_(listening),
       limits_(limits),
       begin_(std::move(begin)),
-      epoll_(net::new_epoll()),
+      epoll_(new_epoll()),
       places_(limits.most_pending, "connections"),
       last_id_(kWakeup) {
   ::fcntl(listening_, F_SETFL, ::fcntl(listening_, F_GETFL) | O_NONBLOCK);

@@ -13,8 +13,8 @@
 #include <unordered_map>
 
 #include "base/descriptor.h"
+#include "base/wakeup.h"
 #include "server/net/fair_places.h"
-#include "server/net/wakeup.h"
 
 namespace isomesh::c_store {
 
@@ -75,7 +75,7 @@ class AssociationAcceptor {
   const AcceptorLimits limits_;
   const Begin begin_;
   const Descriptor epoll_;
-  net::Wakeup wakeup_;
+  Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;
   net::FairPlaces places_;
   // Used by the acceptor's thread only, as are the next two members.

@@ -141,7 +141,7 @@ bool DimseListener::is_idle(const Association& association, std::chrono::millise
   constexpr std::chrono::seconds kBeforeTheFirst{1};
   constexpr std::chrono::seconds kBetween{10};
   // The time from the start until the peer gets our response; it is our delay, not the peer's.
-  constexpr std::chrono::seconds kUnanswered{5};
+  constexpr std::chrono::seconds kNoResponse{5};
   const Clock::time_point told = association.told;
   if (told == Clock::time_point() || association.is_storing) return false;
   tcp_info info = {};
@@ -150,7 +150,7 @@ bool DimseListener::is_idle(const Association& association, std::chrono::millise
     return false;
   }
   idle = std::chrono::floor<std::chrono::milliseconds>(Clock::now() - told);
-  if (info.tcpi_data_segs_out == 0) return idle >= kUnanswered;
+  if (info.tcpi_data_segs_out == 0) return idle >= kNoResponse;
   const auto moved = std::min(info.tcpi_last_data_recv, info.tcpi_last_data_sent);
   idle = std::min(idle, std::chrono::milliseconds(moved));
   return idle >= (association.has_sent ? kBetween : kBeforeTheFirst);
@@ -191,12 +191,13 @@ void DimseListener::serve_association(Association& association) {
   const std::stop_token stop = association.end.get_token();
   const store::ScratchFolder scratch(services_.folder.scratch());
   process::Child child = services_.processes.take(Clock::now() + settings_.idle);
-  child.say(process::to_line(process::DimseReceiving{.called = titles_of(settings_),
-                                                     .calling = settings_.calling,
-                                                     .folder = scratch.path(),
-                                                     .max_object_bytes = settings_.max_object_bytes,
-                                                     .idle = settings_.idle}),
-            association.peer.number());
+  child.send(
+      process::to_line(process::DimseReceiving{.called = titles_of(settings_),
+                                               .calling = settings_.calling,
+                                               .folder = scratch.path(),
+                                               .max_object_bytes = settings_.max_object_bytes,
+                                               .idle = settings_.idle}),
+      association.peer.number());
   association.told = Clock::now();
   Lines lines(child);
   while (true) {
@@ -208,7 +209,7 @@ void DimseListener::serve_association(Association& association) {
     if (object == nullptr) break;
     association.is_storing = true;
     const char verdict = static_cast<char>(keep(*object, scratch.path()));
-    child.say(std::string_view(&verdict, 1));
+    child.send(std::string_view(&verdict, 1));
     association.told = Clock::now();
     association.has_sent = true;
     association.is_storing = false;
@@ -234,7 +235,7 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
     services_.blobs.adopt(file, blob);
     services_.received.add({.route = object.called, .study = object.study, .series = object.series},
                            {.instance = object.instance, .blob = blob.key, .bytes = blob.bytes});
-    services_.blobs.settle(blob.key);
+    services_.blobs.mark_named(blob.key);
     return DimseVerdict::kStored;
   } catch (const Error& error) {
     log_error("a received object could not be stored, and its sender is told so: {}", error.what());

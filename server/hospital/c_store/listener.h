@@ -31,7 +31,7 @@ net::Address listen_address(const orders::DimseSettings& settings);
 // Dependencies of the listener, which must outlive it.
 struct ListenerServices {
   const store::DataFolder& folder;
-  const store::BlobStore& blobs;
+  store::BlobStore& blobs;
   store::ReceivedStore& received;
   store::AuditTrail& audit;
   process::PreparedProcesses& processes;  // running isomesh-dimse

@@ -12,7 +12,7 @@ using orders::PacsFault;
 using process::DimseEnd;
 
 // A response has a few bytes. A peer may be slow as long as it makes progress.
-constexpr std::size_t kMostAnswerBytes = 4096;
+constexpr std::size_t kMostResponseBytes = 4096;
 constexpr std::chrono::hours kLongest{24};
 
 std::string hex_of(std::uint16_t status) {
@@ -41,7 +41,7 @@ void check_stored(std::uint16_t status) {
 
 void check_sent(const process::DimseSent& sent) {
   switch (sent.end) {
-    case DimseEnd::kAnswered:
+    case DimseEnd::kResponded:
       return check_stored(sent.status);
     case DimseEnd::kRejected:
       throw PacsFailure(PacsFault::kUnauthorized, "the PACS rejected the association");
@@ -59,13 +59,13 @@ void check_sent(const process::DimseSent& sent) {
   throw PacsFailure(PacsFault::kUnreadable, "the response of the PACS cannot be read");
 }
 
-process::DimseSent sent_of(const process::Heard& heard) {
-  using Ending = process::Heard::Ending;
-  if (heard.ending == Ending::kStopped) throw Error(ErrorCode::kCancelled, "stopped");
-  if (heard.ending != Ending::kClosed || !heard.text.ends_with('\n')) {
+process::DimseSent sent_of(const process::Output& output) {
+  using Ending = process::Output::Ending;
+  if (output.ending == Ending::kStopped) throw Error(ErrorCode::kCancelled, "stopped");
+  if (output.ending != Ending::kClosed || !output.text.ends_with('\n')) {
     return {.end = DimseEnd::kUnreadable, .status = 0};
   }
-  const process::DimseReport report = process::dimse_report_from(heard.text);
+  const process::DimseReport report = process::dimse_report_from(output.text);
   if (const auto* sent = std::get_if<process::DimseSent>(&report)) return *sent;
   return {.end = DimseEnd::kUnreadable, .status = 0};
 }
@@ -94,13 +94,13 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
       .sop_class = std::string(dicom::kEncapsulatedStlStorage),
       .instance = object.place.instance,
       .timeout = settings_.timeout,
-      .answer_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
+      .response_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
   const Descriptor peer = connected(settings_, stop);
   process::Child child = processes_.take(std::chrono::steady_clock::now() + settings_.timeout);
-  child.say(process::to_line(order), peer.number());
-  const process::Heard heard =
-      child.listen(kMostAnswerBytes, std::chrono::steady_clock::now() + kLongest, stop);
-  const process::DimseSent sent = sent_of(heard);
+  child.send(process::to_line(order), peer.number());
+  const process::Output output =
+      child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
+  const process::DimseSent sent = sent_of(output);
   if (sent.end == DimseEnd::kUnreadable) processes_.renew();
   check_sent(sent);
 }

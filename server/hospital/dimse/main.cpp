@@ -9,9 +9,8 @@
 #include <dcmtk/dcmdata/dctk.h>
 
 #include "base/error.h"
+#include "server/hospital/dimse/associations.h"
 #include "server/hospital/dimse/daemon_channel.h"
-#include "server/hospital/dimse/receive.h"
-#include "server/hospital/dimse/send.h"
 #include "server/process/fork_server.h"
 #include "server/process/sandbox.h"
 

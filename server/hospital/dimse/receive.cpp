@@ -1,5 +1,3 @@
-#include "server/hospital/dimse/receive.h"
-
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -21,8 +19,9 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/orders.h"
+#include "server/hospital/dimse/associations.h"
 #include "server/hospital/dimse/daemon_channel.h"
-#include "server/hospital/objects/file_head.h"
+#include "server/hospital/objects/data_set.h"
 #include "server/volume/object_classes.h"
 
 namespace isomesh::dimse {

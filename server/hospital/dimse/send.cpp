@@ -1,5 +1,3 @@
-#include "server/hospital/dimse/send.h"
-
 #include <array>
 #include <cstdio>
 #include <memory>
@@ -8,6 +6,8 @@
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/dcmtrans.h>
 #include <dcmtk/dcmnet/diutil.h>
+
+#include "server/hospital/dimse/associations.h"
 
 namespace isomesh::dimse {
 namespace {
@@ -85,10 +85,10 @@ DimseSent store(const process::DimseSending& order, T_ASC_Association* associati
   DcmDataset* detail = nullptr;
   const OFCondition done = DIMSE_storeUser(
       association, context, &request, order.file.c_str(), nullptr, nullptr, nullptr,
-      DIMSE_NONBLOCKING, static_cast<int>(order.answer_timeout.count()), &response, &detail);
+      DIMSE_NONBLOCKING, static_cast<int>(order.response_timeout.count()), &response, &detail);
   delete detail;
   if (done.bad()) return {.end = end_of(done), .status = 0};
-  return {.end = DimseEnd::kAnswered, .status = response.DimseStatus};
+  return {.end = DimseEnd::kResponded, .status = response.DimseStatus};
 }
 
 }  // namespace
@@ -120,7 +120,7 @@ DimseSent send_object(const process::DimseSending& order) {
     return {.end = DimseEnd::kNotAccepted, .status = 0};
   }
   const DimseSent sent = store(order, association, context);
-  if (sent.end == DimseEnd::kAnswered) {
+  if (sent.end == DimseEnd::kResponded) {
     ASC_releaseAssociation(association);
   } else {
     ASC_abortAssociation(association);

@@ -17,7 +17,7 @@ namespace isomesh::orders {
 namespace {
 
 // The bytes of one STL file within a blob.
-struct Part {
+struct StlFile {
   std::optional<std::int64_t> label = {};
   std::string name = {};  // name of the label
   std::string blob;
@@ -26,23 +26,23 @@ struct Part {
   std::string sha256;
 };
 
-std::vector<Part> parts_of(const Job& job, const store::BlobStore& blobs) {
-  std::vector<Part> parts;
-  if (!job.mesh) return parts;
-  const auto& files = job.mesh->files;
-  if (const auto stl = files.find(MeshFormat::kStl); stl != files.end()) {
-    parts.push_back(
+std::vector<StlFile> stl_files_of(const Job& job, const store::BlobStore& blobs) {
+  std::vector<StlFile> files;
+  if (!job.mesh) return files;
+  const auto& stored = job.mesh->files;
+  if (const auto stl = stored.find(MeshFormat::kStl); stl != stored.end()) {
+    files.push_back(
         {.blob = stl->second.sha256, .bytes = stl->second.bytes, .sha256 = stl->second.sha256});
   }
-  const auto zip = files.find(MeshFormat::kZip);
-  if (zip == files.end()) return parts;
+  const auto zip = stored.find(MeshFormat::kZip);
+  if (zip == stored.end()) return files;
   const jobs::JobLabels labels(job, blobs);
   std::vector<LabelSummary> page = labels.after(std::nullopt);
   for (; !page.empty(); page = labels.after(page.back().label)) {
     for (const LabelSummary& label : page) {
       const auto stl = label.files.find(MeshFormat::kStl);
       if (stl == label.files.end() || label.triangles == 0) continue;
-      parts.push_back({.label = label.label,
+      files.push_back({.label = label.label,
                        .name = label.name.value_or("Label " + std::to_string(label.label)),
                        .blob = zip->second.sha256,
                        .offset = stl->second.offset,
@@ -50,7 +50,7 @@ std::vector<Part> parts_of(const Job& job, const store::BlobStore& blobs) {
                        .sha256 = stl->second.sha256});
     }
   }
-  return parts;
+  return files;
 }
 
 // Only the parameters that determine the mesh, not the other requested files.
@@ -67,7 +67,7 @@ std::string series_uid_of(const DicomIdentity& identity, const Job& job) {
 }
 
 std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& identity,
-                            const Part& part) {
+                            const StlFile& file) {
   std::vector<std::string> sources;
   for (const DicomInstance& instance : identity.instances) {
     sources.push_back(instance.sop_instance_uid);
@@ -77,8 +77,8 @@ std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& 
       "instance\n" + series_uid + '\n' + std::string(dicom::kEncapsulatedStlStorage) + '\n';
   for (const std::string& source : sources) name += source + '\n';
   // Two labels may have the same surface.
-  if (part.label) name += "label " + std::to_string(*part.label) + '\n';
-  return dicom::name_based_uid(name + part.sha256);
+  if (file.label) name += "label " + std::to_string(*file.label) + '\n';
+  return dicom::name_based_uid(name + file.sha256);
 }
 
 // Truncates to 64 characters, the limit of LO.
@@ -116,21 +116,21 @@ std::string description_of(const Job& job) {
   return in_short(text);
 }
 
-std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Part& part) {
-  if (!part.label) return std::nullopt;
-  const auto found = std::ranges::find(identity.segments, *part.label, &DicomSegment::label);
+std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const StlFile& file) {
+  if (!file.label) return std::nullopt;
+  const auto found = std::ranges::find(identity.segments, *file.label, &DicomSegment::label);
   if (found != identity.segments.end()) return *found;
   DicomSegment uncoded;
-  uncoded.label = *part.label;
+  uncoded.label = *file.label;
   return uncoded;
 }
 
-void copy(const store::BlobReader& from, const Part& part, store::BlobWriter& to) {
+void copy(const store::BlobReader& from, const StlFile& file, store::BlobWriter& to) {
   std::vector<std::byte> buffer(std::size_t{1} << 20);
-  for (std::uint64_t at = 0; at < part.bytes;) {
+  for (std::uint64_t at = 0; at < file.bytes;) {
     const auto piece =
-        std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), part.bytes - at));
-    const std::size_t count = from.read_at(part.offset + at, piece);
+        std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), file.bytes - at));
+    const std::size_t count = from.read_at(file.offset + at, piece);
     if (count == 0) throw Error(ErrorCode::kInternal, "a stored mesh became shorter");
     to.write(piece.first(count));
     at += count;
@@ -142,21 +142,21 @@ void write(const std::string& text, store::BlobWriter& to) {
 }
 
 // Throws if there is none.
-std::vector<Part> parts_of_surface(const Job& job, const store::BlobStore& blobs) {
-  std::vector<Part> parts = parts_of(job, blobs);
-  if (job.mesh && job.mesh->triangles > 0 && !parts.empty()) return parts;
+std::vector<StlFile> files_of_surface(const Job& job, const store::BlobStore& blobs) {
+  std::vector<StlFile> files = stl_files_of(job, blobs);
+  if (job.mesh && job.mesh->triangles > 0 && !files.empty()) return files;
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
 
 // Also sets the UIDs of `object`.
-dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job, const Part& part,
-                               const std::string& station_name,
+dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job,
+                               const StlFile& file, const std::string& station_name,
                                std::chrono::system_clock::time_point made, MadeObject& object) {
   const DicomIdentity& identity = record.work.identity.value();
-  object.label = part.label;
+  object.label = file.label;
   object.series_uid = series_uid_of(identity, job);
-  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, part);
-  const std::string title = part.label ? record.work.label + ' ' + part.name : record.work.label;
+  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, file);
+  const std::string title = file.label ? record.work.label + ' ' + file.name : record.work.label;
   return dicom::make_envelope(
       {.identity = identity,
        .series_uid = object.series_uid,
@@ -167,12 +167,12 @@ dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job,
        .station_name = station_name,
        .content_description = description_of(job),
        .algorithm_parameters = without_backslashes(canonical_parameters(job.parameters)),
-       .segment = segment_of(identity, part)},
-      part.bytes);
+       .segment = segment_of(identity, file)},
+      file.bytes);
 }
 
-std::uint64_t bytes_of(const dicom::StlEnvelope& envelope, const Part& part) {
-  return envelope.before.size() + part.bytes + envelope.after.size();
+std::uint64_t bytes_of(const dicom::StlEnvelope& envelope, const StlFile& file) {
+  return envelope.before.size() + file.bytes + envelope.after.size();
 }
 
 // Additional text in the object of a simplified mesh.
@@ -209,16 +209,16 @@ Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range)
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     const store::BlobStore& blobs) {
+                                     store::BlobStore& blobs) {
   std::vector<MadeObject> objects;
-  for (const Part& part : parts_of_surface(job, blobs)) {
+  for (const StlFile& file : files_of_surface(job, blobs)) {
     MadeObject object;
-    const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, made, object);
-    const std::uint64_t bytes = bytes_of(envelope, part);
+    const dicom::StlEnvelope envelope = envelope_of(record, job, file, station_name, made, object);
+    const std::uint64_t bytes = bytes_of(envelope, file);
     if (bytes > most_bytes) throw_too_large(bytes, most_bytes, record.work);
     const auto writer = blobs.begin();
     write(envelope.before, *writer);
-    copy(*blobs.open(part.blob), part, *writer);
+    copy(*blobs.open(file.blob), file, *writer);
     write(envelope.after, *writer);
     object.blob = writer->commit();
     objects.push_back(std::move(object));
@@ -233,15 +233,15 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
   // Bytes per triangle in an STL file.
   constexpr std::uint64_t kTriangleBytes = 50;
   double share = 1;
-  for (const Part& part : parts_of_surface(job, blobs)) {
+  for (const StlFile& file : files_of_surface(job, blobs)) {
     MadeObject object;
-    const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, {}, object);
-    const std::uint64_t bytes = bytes_of(envelope, part);
+    const dicom::StlEnvelope envelope = envelope_of(record, job, file, station_name, {}, object);
+    const std::uint64_t bytes = bytes_of(envelope, file);
     if (bytes <= most_bytes) continue;
     const std::uint64_t over = bytes - most_bytes + kGrowthOfText;
-    if (over + kTriangleBytes > part.bytes) throw_too_large(bytes, most_bytes, record.work);
+    if (over + kTriangleBytes > file.bytes) throw_too_large(bytes, most_bytes, record.work);
     share =
-        std::min(share, static_cast<double>(part.bytes - over) / static_cast<double>(part.bytes));
+        std::min(share, static_cast<double>(file.bytes - over) / static_cast<double>(file.bytes));
   }
   if (share == 1) return std::nullopt;
   // With labels, the largest one must fit, and simplification may keep a larger fraction of it than

@@ -26,13 +26,13 @@ struct MadeObject {
 inline constexpr std::size_t kMostObjects = 500;
 
 // Makes an object from each STL file of the job: the only one, or one for each label. UIDs are
-// derived from the content, so the same images with the same mesh always have the same UIDs. The
-// blobs are not settled (BlobStore::settle). Throws Error kUnusableVolume for an empty surface,
-// kTooLarge if an object exceeds `most_bytes`, kOutOfSpace.
+// derived from the content, so the same images with the same mesh always have the same UIDs. No
+// record names the blobs yet (BlobStore::mark_named). Throws Error kUnusableVolume for an empty
+// surface, kTooLarge if an object exceeds `most_bytes`, kOutOfSpace.
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     const store::BlobStore& blobs);
+                                     store::BlobStore& blobs);
 
 // The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
 Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);

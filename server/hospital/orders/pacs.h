@@ -72,7 +72,7 @@ struct OutgoingObject {
   store::LocalBlob file = {};
 };
 
-// Where an order's images come from. Thread safe. All methods may throw PacsFailure, and Error
+// A source of an order's images. Thread safe. All methods may throw PacsFailure, and Error
 // kCancelled if `stop` is requested.
 class SeriesSource {
  public:
@@ -118,7 +118,7 @@ class ObjectReceiver {
   virtual void store(const OutgoingObject& object, const std::stop_token& stop) = 0;
 };
 
-// What a peer can do; null for what it cannot.
+// The capabilities of a peer; null for those it lacks.
 struct Peer {
   std::shared_ptr<SeriesSource> source;
   std::shared_ptr<Archive> archive;

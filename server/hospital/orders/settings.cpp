@@ -136,6 +136,15 @@ class Section {
 
 constexpr std::int64_t kMostSeconds = 30 * 24 * 3600;
 
+// Reads a text that becomes the value of a DICOM element with the value representation LO.
+void read_long_string(Section& section, std::string_view key, std::string& text) {
+  constexpr std::size_t kLongest = 64;
+  section.read(key, text);
+  if (text.size() > kLongest || text.find('\\') != std::string::npos) {
+    refuse(section.key_of(key), "must have at most 64 characters and no backslash");
+  }
+}
+
 void read_orders(Section section, HospitalSettings& settings) {
   section.read("settle-seconds", settings.settle, 0, kMostSeconds);
   section.read("poll-seconds", settings.poll, 1, kMostSeconds);
@@ -144,12 +153,7 @@ void read_orders(Section section, HospitalSettings& settings) {
   std::int64_t hours = std::chrono::duration_cast<std::chrono::hours>(settings.give_up).count();
   section.read("give-up-hours", hours, 1, 24 * 365);
   settings.give_up = std::chrono::hours(hours);
-  section.read("station-name", settings.station_name);
-  constexpr std::size_t kLongestLo = 64;
-  if (settings.station_name.size() > kLongestLo ||
-      settings.station_name.find('\\') != std::string::npos) {
-    refuse(section.key_of("station-name"), "must have at most 64 characters and no backslash");
-  }
+  read_long_string(section, "station-name", settings.station_name);
   section.finish();
 }
 
@@ -266,11 +270,7 @@ Rule read_rule(Section section) {
   check_name(section, rule.name);
   section.read("owner", rule.owner);
   rule.label = rule.name;
-  section.read("label", rule.label);
-  constexpr std::size_t kLongestLo = 64;
-  if (rule.label.size() > kLongestLo || rule.label.find('\\') != std::string::npos) {
-    refuse(section.key_of("label"), "must have at most 64 characters and no backslash");
-  }
+  read_long_string(section, "label", rule.label);
   section.read("series-number", rule.series_number, 0, std::numeric_limits<std::int32_t>::max());
   section.read("max-error-mm", rule.max_error_mm);
   std::string watch;
@@ -369,7 +369,7 @@ void check_names(const HospitalSettings& settings) {
   }
 }
 
-Hospital hospital_of(const toml::table& table) {
+HospitalSettings settings_of(const toml::table& table) {
   HospitalSettings settings;
   Section all(table, "");
   if (auto orders = all.section("orders")) read_orders(std::move(*orders), settings);
@@ -399,7 +399,7 @@ const Rule* HospitalSettings::find_rule(std::string_view name) const {
 
 HospitalSettings parse_settings(std::string_view toml) {
   try {
-    return hospital_of(toml::parse(toml));
+    return settings_of(toml::parse(toml));
   } catch (const toml::parse_error& error) {
     throw Error(ErrorCode::kInvalidParameter, "the file of --hospital: line " +
                                                   std::to_string(error.source().begin.line) + ": " +

@@ -9,7 +9,7 @@
 #include "proto/json.h"
 #include "server/hospital/orders/make_objects.h"
 #include "server/hospital/orders/received.h"
-#include "server/jobs/library/settle_labels.h"
+#include "server/jobs/library/complete_labels.h"
 
 namespace isomesh::orders {
 namespace {
@@ -227,7 +227,7 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   const store::Viewer viewer = record.owner;
   if (parameters.labels) {
     const Volume volume = services_.volumes.get(viewer, parameters.volume);
-    parameters = jobs::settle_labels(std::move(parameters), viewer, volume, services_.labels);
+    parameters = jobs::complete_labels(std::move(parameters), viewer, volume, services_.labels);
   }
   const store::Submission submission =
       services_.jobs.submit({.owner = record.owner,
@@ -313,7 +313,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
   }
   record.order.state = OrderState::kSending;
   const Time next = save_after(OrderState::kMeshing, record, now_());
-  for (const MadeObject& object : objects) services_.blobs.settle(object.blob.key);
+  for (const MadeObject& object : objects) services_.blobs.mark_named(object.blob.key);
   return next;
 }
 

@@ -26,7 +26,7 @@ using Peers = std::map<std::string, Peer, std::less<>>;
 
 struct OrderServices {
   const store::DataFolder& folder;
-  const store::BlobStore& blobs;
+  store::BlobStore& blobs;
   const store::VolumeStore& volumes;
   store::JobStore& jobs;
   jobs::VolumeLibrary& library;

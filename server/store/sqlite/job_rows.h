@@ -12,7 +12,7 @@ namespace isomesh::store {
 // One transaction and its events, which become visible when it ends.
 class SqliteJobStore::Change {
  public:
-  Change(const SqliteJobStore& store, Durability durability = Durability::kFull)
+  Change(SqliteJobStore& store, Durability durability = Durability::kFull)
       : log_(store.log_), transaction_(store.database_.writer(), durability) {}
   // The transaction's lock is still held, so its events are the last ones.
   ~Change() {

@@ -196,8 +196,16 @@ class OrdersTest : public test::JobsFixture {
   // As a process that goes on after the last one.
   void begin() {
     orders_.reset();
-    orders_ = std::make_unique<Orders>(OrderServices{data_, blobs_, volumes_, jobs_, library_,
-                                                     labels_, store_, audit_, received_, peers_},
+    orders_ = std::make_unique<Orders>(OrderServices{.folder = data_,
+                                                     .blobs = blobs_,
+                                                     .volumes = volumes_,
+                                                     .jobs = jobs_,
+                                                     .library = library_,
+                                                     .labels = labels_,
+                                                     .orders = store_,
+                                                     .audit = audit_,
+                                                     .received = received_,
+                                                     .peers = peers_},
                                        settings_,
                                        OrderOptions{.now = [this] { return now(); }, .threads = 3});
     orders_->on_end([](const std::string&) {});

@@ -129,7 +129,7 @@ class ReceivedOrdersTest : public OrdersTest {
       writer->write(std::as_bytes(std::span(file)));
       const store::Blob blob = writer->commit();
       received_.add({title, kStudy, kSeries}, {instance_of(slice), blob.key, blob.bytes});
-      blobs_.settle(blob.key);
+      blobs_.mark_named(blob.key);
     }
   }
   std::vector<Order> all() const { return orders_->list(std::nullopt, {}, "", 10); }

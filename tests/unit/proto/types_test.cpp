@@ -16,8 +16,10 @@ using test::names;
 template <class Enum>
 void expect_names(const std::vector<std::string>& expected) {
   EXPECT_EQ(names<Enum>(), expected);
-  for (std::size_t number = 0; number < expected.size(); ++number) {
-    EXPECT_EQ(from_string<Enum>(expected[number]), Enum{static_cast<int>(number)});
+  for (const std::string& name : expected) {
+    const auto value = from_string<Enum>(name);
+    ASSERT_TRUE(value) << name;
+    EXPECT_EQ(to_string(*value), name);
   }
   for (const std::string wrong : {"", " ", "DRC", "Linear", "uint8 ", "0", "5"}) {
     EXPECT_EQ(from_string<Enum>(wrong), std::nullopt) << wrong;

@@ -233,7 +233,7 @@ TEST_F(SharedFolder, IsNotMade) {
 TEST_F(SharedFolder, DoesNotAnswerOnceItIsGone) {
   const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
   std::filesystem::remove_all(folder_ / "shared");
-  EXPECT_FALSE(blobs.answers());
+  EXPECT_FALSE(blobs.responds());
 }
 
 TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {
@@ -241,7 +241,7 @@ TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {
   const auto writer = blobs.begin();
   writer->write(as_span("hello"));
   writer->commit();
-  blobs.settle(kHello);
+  blobs.mark_named(kHello);
   const auto hold = folder_ / ("shared/holds/" + std::string(kHello) + ".0123");
   test::write_file(hold, "");
   const auto nothing = [](const std::string& /*key*/) { return false; };
