@@ -187,7 +187,6 @@ constexpr bool is_number(Scheme scheme) { return scheme <= Scheme::kSix; }
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize, kLabels };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
-enum class Space { kLps, kRas };           // directions of a file's x, y and z
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {

@@ -31,8 +31,6 @@ TEST(Names, AreThoseOfTheContract) {
       {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"});
   expect_names<Interpolation>({"linear", "midpoint"});
   expect_names<Smoothing>({"laplacian", "taubin", "angle", "optimize", "labels"});
-  expect_names<MeshFormat>({"drc", "glb", "stl", "ply", "obj", "3mf", "usda", "usdz", "off", "vtk",
-                            "vtp", "gii", "zip"});
   expect_names<GlbCodec>({"draco", "meshopt"});
   expect_names<Space>({"lps", "ras"});
   expect_names<Priority>({"stat", "routine", "bulk"});
@@ -45,9 +43,6 @@ TEST(NamesOf, AreForPeople) {
   EXPECT_EQ(names_of<Interpolation>(), R"("linear" or "midpoint")");
   EXPECT_EQ(names_of<Smoothing>(), R"("laplacian", "taubin", "angle", "optimize" or "labels")");
   EXPECT_EQ(names_of<Priority>(), R"("stat", "routine" or "bulk")");
-  EXPECT_EQ(
-      names_of<MeshFormat>(),
-      R"("drc", "glb", "stl", "ply", "obj", "3mf", "usda", "usdz", "off", "vtk", "vtp", "gii" or "zip")");
   EXPECT_EQ(names_of<JobState>(), R"("queued", "running", "succeeded", "failed" or "cancelled")");
 }
 
