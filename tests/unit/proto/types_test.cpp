@@ -35,8 +35,6 @@ TEST(Names, AreThoseOfTheContract) {
   expect_names<Space>({"lps", "ras"});
   expect_names<Priority>({"stat", "routine", "bulk"});
   expect_names<JobState>({"queued", "running", "succeeded", "failed", "cancelled"});
-  expect_names<Stage>(
-      {"queue", "load", "extract", "smooth", "simplify", "encode", "certify", "done"});
 }
 
 TEST(NamesOf, AreForPeople) {
