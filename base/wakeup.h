@@ -21,7 +21,6 @@ class Wakeup {
   const int event_;
 };
 
-// Returns a new epoll instance.
 int new_epoll();
 
 }  // namespace isomesh

@@ -230,7 +230,6 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
                                                 const std::string& station_name,
                                                 std::uint64_t most_bytes,
                                                 const store::BlobStore& blobs) {
-  // Bytes per triangle in an STL file.
   constexpr std::uint64_t kTriangleBytes = 50;
   double share = 1;
   for (const StlFile& file : files_of_surface(job, blobs)) {

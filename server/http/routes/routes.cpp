@@ -26,7 +26,7 @@ void check_is_json(const Request& request) {
 
 std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
                                           const Job& job, std::chrono::milliseconds wait,
-                                          const JobAnswer& answer) {
+                                          const JobResponder& answer) {
   if (is_final(job.state) || wait.count() == 0 || app.stopping) {
     answer(request, response, job);
     return std::nullopt;

@@ -89,13 +89,13 @@ JobParameters complete_parameters(const App& app, const Request& request, JobPar
 // Submits a job. Throws as store::job_of does, with a Retry-After in `response`.
 Job submitted(App& app, const store::JobSpec& spec, Response& response);
 
-using JobAnswer = std::function<void(const Request&, Response&, const Job&)>;
+using JobResponder = std::function<void(const Request&, Response&, const Job&)>;
 
 // Calls `answer` with the job's state when it has ended or `wait` is over: now, or by a
 // continuation.
 std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
                                           const Job& job, std::chrono::milliseconds wait,
-                                          const JobAnswer& answer);
+                                          const JobResponder& answer);
 
 struct WhichMesh {
   MeshFormat format = MeshFormat::kDrc;

@@ -328,7 +328,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   const std::string hold = holds_ ? holds_->hold(key) : "";
   std::string traits;
   const auto stored = [&](std::uint64_t replaced) ISOMESH_REQUIRES(places_) {
-    room_.settle(taken + replaced, bytes);
+    room_.correct(taken + replaced, bytes);
     unnamed_.note(key, hold);
     traits = traits_of(place);
   };
@@ -346,7 +346,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
     if (folders_.outlive_crashes) file.sync();
   } catch (...) {
     // The file counts until it is swept; the caller gives back the bytes that it took.
-    if (has_moved) room_.settle(0, taken);
+    if (has_moved) room_.correct(0, taken);
     throw;
   }
   if (!has_moved) {

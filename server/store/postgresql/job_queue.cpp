@@ -257,12 +257,12 @@ bool PostgresJobStore::put_back(const Lease& lease, std::chrono::milliseconds de
 }
 
 std::size_t PostgresJobStore::reap() {
-  const bool is_settled = has_responded_for_long();
+  const bool judges_leases = has_responded_for_long();
   Rows rows = database_.query(select_ +
                                   "WHERE (?3 <> 0 AND r.lease_until < isomesh_now()) OR r.node IN "
                                   "(SELECT id FROM nodes WHERE "
                                   "name = ?1 AND id <> ?2::uuid)",
-                              database_.node_name(), database_.node(), is_settled);
+                              database_.node_name(), database_.node(), judges_leases);
   note_response();
   std::size_t reaped = 0;
   while (rows.next()) {

@@ -29,7 +29,7 @@ class SqliteJobStore::Change {
 
   void commit() {
     if (announced_ > 0) {
-      transaction_.at_end([&log = log_](bool is_committed) { log.settle(is_committed); });
+      transaction_.at_end([&log = log_](bool is_committed) { log.end_transaction(is_committed); });
     }
     transaction_.commit();
   }

@@ -22,7 +22,7 @@ class IdentityTest : public testing::Test {
   void live(const std::string& bytes, const OperatorOverrides& overrides = {}) {
     const DataFolder data(root());
     Database database(data);
-    const FileBlobStore blobs(data);
+    FileBlobStore blobs(data);
     Identity identity(database, blobs, overrides, {});
     if (!bytes.empty()) {
       const auto writer = blobs.begin();
@@ -148,7 +148,7 @@ TEST_F(IdentityTest, RemembersTheTimeThatItHasSeen) {
   }
   const DataFolder data(root());
   Database database(data);
-  const FileBlobStore blobs(data);
+  FileBlobStore blobs(data);
   const auto now = std::chrono::system_clock::now();
   {
     Identity identity(database, blobs, {}, {});
@@ -169,7 +169,7 @@ TEST_F(IdentityTest, ASharedStoreIsOneDatabasesFromTheBeginning) {
   const auto start = [&](const std::string& name, const OperatorOverrides& overrides) {
     const DataFolder data(folder_ / name);
     Database database(data);
-    const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data.reserve());
+    FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data.reserve());
     Identity(database, blobs, overrides, {}).now();
   };
   start("one", {});

@@ -1,4 +1,4 @@
-#include "server/codec/zip/threemf.h"
+#include "server/codec/threemf.h"
 
 #include <array>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
 #include "server/codec/space.h"
-#include "server/codec/zip/zip_writer.h"
+#include "server/codec/zip_writer.h"
 
 namespace isomesh::codec {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/codec/zip/usdz.h"
+#include "server/codec/usdz.h"
 
 #include <cstdint>
 #include <functional>

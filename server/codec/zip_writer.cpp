@@ -1,4 +1,4 @@
-#include "server/codec/zip/zip_writer.h"
+#include "server/codec/zip_writer.h"
 
 #include <exception>
 #include <optional>

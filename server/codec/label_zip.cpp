@@ -1,4 +1,4 @@
-#include "server/codec/zip/label_zip.h"
+#include "server/codec/label_zip.h"
 
 #include <algorithm>
 #include <set>
@@ -12,7 +12,7 @@
 #include "server/codec/draco/grid.h"
 #include "server/codec/formats.h"
 #include "server/codec/space.h"
-#include "server/codec/zip/zip_writer.h"
+#include "server/codec/zip_writer.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"
 
