@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace isomesh {
@@ -29,6 +30,46 @@ enum class MeshFormat {
   kGii,
   kZip
 };
+
+enum class Space { kLps, kRas };  // directions of a file's x, y and z
+
+// What clients know of a format, too. The server's own row is in server/codec/formats.cpp.
+struct FormatRow {
+  MeshFormat format;
+  std::string_view name;
+  // A job by labels writes one file of all labels, a file of each label in a ZIP, or both.
+  bool holds_all_labels = false;
+  bool is_zipped = true;
+  std::optional<Space> own_space = {};  // of a format that defines its space
+};
+
+inline constexpr std::array kFormatRows = {
+    FormatRow{.format = MeshFormat::kDrc, .name = "drc"},
+    FormatRow{.format = MeshFormat::kGlb,
+              .name = "glb",
+              .holds_all_labels = true,
+              .is_zipped = false,
+              .own_space = Space::kLps},
+    FormatRow{.format = MeshFormat::kStl, .name = "stl"},
+    FormatRow{.format = MeshFormat::kPly, .name = "ply", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kObj, .name = "obj", .holds_all_labels = true},
+    FormatRow{
+        .format = MeshFormat::k3mf, .name = "3mf", .holds_all_labels = true, .is_zipped = false},
+    FormatRow{.format = MeshFormat::kUsda,
+              .name = "usda",
+              .holds_all_labels = true,
+              .is_zipped = false,
+              .own_space = Space::kLps},
+    FormatRow{.format = MeshFormat::kUsdz,
+              .name = "usdz",
+              .holds_all_labels = true,
+              .is_zipped = false,
+              .own_space = Space::kLps},
+    FormatRow{.format = MeshFormat::kOff, .name = "off"},
+    FormatRow{.format = MeshFormat::kVtk, .name = "vtk", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kGii, .name = "gii", .own_space = Space::kRas},
+    FormatRow{.format = MeshFormat::kZip, .name = "zip", .is_zipped = false}};
 
 struct MeshFile {
   std::uint64_t bytes = 0;
@@ -211,7 +252,7 @@ struct MeshSummary {
   Displacement displacement_mm;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
-  // Of a job by labels, ascending. Jobs with more than kMostListedLabels have `labels_count` and a
+  // For a job by labels, ascending. Jobs with more than kMostListedLabels have `labels_count` and a
   // file instead. Only records name that file.
   std::vector<LabelSummary> labels = {};
   std::optional<std::uint64_t> labels_count = {};

@@ -221,7 +221,7 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   refuse_if(has_background, "label_values", names_background);
 }
 
-void settle(const Json& json, JobParameters& parameters, RequestReader& reader) {
+void complete(const Json& json, JobParameters& parameters, RequestReader& reader) {
   // Clients that send every member also send the default of `close`.
   if (parameters.crop) parameters.close = true;
   // Simplification is measured unless the request says otherwise.
@@ -263,7 +263,7 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
     }
   });
   check_labels(json, parameters, reader);
-  settle(json, parameters, reader);
+  complete(json, parameters, reader);
   reader.throw_if_any();
   if (!parameters.lambda) parameters.lambda = default_lambda(parameters);
   return parameters;

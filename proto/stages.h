@@ -2,7 +2,9 @@
 // its time in types.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 
 #include "proto/types.h"
 
@@ -11,25 +13,32 @@ namespace isomesh {
 struct StageRow {
   Stage stage;
   const char* name;           // of the API
+  const char* help;           // in its description
   double Timing::*elapsed;    // milliseconds; null for the end, which takes no time
   bool is_always_run = true;  // otherwise only a job that asks for it has it
 };
 
 inline constexpr std::array kStages = {
-    StageRow{Stage::kQueue, "queue", &Timing::queue},
-    StageRow{Stage::kLoad, "load", &Timing::load},
-    StageRow{Stage::kExtract, "extract", &Timing::extract},
-    StageRow{Stage::kSmooth, "smooth", &Timing::smooth},
-    StageRow{Stage::kSimplify, "simplify", &Timing::simplify, false},
-    StageRow{Stage::kEncode, "encode", &Timing::encode},
-    StageRow{Stage::kCertify, "certify", &Timing::certify, false},
-    StageRow{Stage::kDone, "done", nullptr}};
+    StageRow{Stage::kQueue, "queue", "From acceptance to start.", &Timing::queue},
+    StageRow{Stage::kLoad, "load", "Loading the samples into memory.", &Timing::load},
+    StageRow{Stage::kExtract, "extract", "Marching tetrahedra.", &Timing::extract},
+    StageRow{Stage::kSmooth, "smooth", "All smoothing passes.", &Timing::smooth},
+    StageRow{Stage::kSimplify, "simplify", "Simplification, if fewer triangles are requested.",
+             &Timing::simplify, false},
+    StageRow{Stage::kEncode, "encode", "Writing the files and measuring the mesh.",
+             &Timing::encode},
+    StageRow{Stage::kCertify, "certify", "Measuring the error, if requested.", &Timing::certify,
+             false},
+    StageRow{Stage::kDone, "done", "", nullptr}};
 
-constexpr const StageRow& row_of(Stage stage) { return kStages[static_cast<std::size_t>(stage)]; }
+constexpr const StageRow& row_of(Stage stage) {
+  return *std::ranges::find(kStages, stage, &StageRow::stage);
+}
 
 static_assert([] {
-  for (std::size_t i = 0; i < kStages.size(); ++i) {
-    if (static_cast<std::size_t>(kStages[i].stage) != i) return false;
+  for (std::size_t number = 0; number < kStages.size(); ++number) {
+    if (std::ranges::count(kStages, static_cast<Stage>(number), &StageRow::stage) != 1)
+      return false;
   }
   return true;
 }());

@@ -52,44 +52,6 @@ struct Names<Smoothing> {
       std::pair{Smoothing::kLabels, "labels"}};
 };
 
-// Client and server both know this row; the server's own is in server/codec/formats.cpp.
-struct FormatRow {
-  MeshFormat format;
-  std::string_view name;
-  // A job by labels writes one file of all labels, a file of each label in a ZIP, or both.
-  bool holds_all_labels = false;
-  bool is_zipped = true;
-  std::optional<Space> own_space = {};  // of a format that defines its space
-};
-
-constexpr std::array kFormatRows = {
-    FormatRow{.format = MeshFormat::kDrc, .name = "drc"},
-    FormatRow{.format = MeshFormat::kGlb,
-              .name = "glb",
-              .holds_all_labels = true,
-              .is_zipped = false,
-              .own_space = Space::kLps},
-    FormatRow{.format = MeshFormat::kStl, .name = "stl"},
-    FormatRow{.format = MeshFormat::kPly, .name = "ply", .holds_all_labels = true},
-    FormatRow{.format = MeshFormat::kObj, .name = "obj", .holds_all_labels = true},
-    FormatRow{
-        .format = MeshFormat::k3mf, .name = "3mf", .holds_all_labels = true, .is_zipped = false},
-    FormatRow{.format = MeshFormat::kUsda,
-              .name = "usda",
-              .holds_all_labels = true,
-              .is_zipped = false,
-              .own_space = Space::kLps},
-    FormatRow{.format = MeshFormat::kUsdz,
-              .name = "usdz",
-              .holds_all_labels = true,
-              .is_zipped = false,
-              .own_space = Space::kLps},
-    FormatRow{.format = MeshFormat::kOff, .name = "off"},
-    FormatRow{.format = MeshFormat::kVtk, .name = "vtk", .holds_all_labels = true},
-    FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .holds_all_labels = true},
-    FormatRow{.format = MeshFormat::kGii, .name = "gii", .own_space = Space::kRas},
-    FormatRow{.format = MeshFormat::kZip, .name = "zip", .is_zipped = false}};
-
 const FormatRow& row_of(MeshFormat format) {
   return *std::ranges::find(kFormatRows, format, &FormatRow::format);
 }

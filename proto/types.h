@@ -176,7 +176,7 @@ struct UploadedVolume {
   bool operator==(const UploadedVolume&) const = default;
 };
 
-// How cells are split into tetrahedra: by their number, or by the lattice whose edges these have.
+// The division of cells into tetrahedra: by their number, or by the lattice whose edges these have.
 // kBcc is the body-centred one, of the samples and the centres of the cells.
 enum class Scheme { kFive = 5, kSix = 6, kFcc, kKuhn, kBcc };
 
@@ -187,7 +187,6 @@ constexpr bool is_number(Scheme scheme) { return scheme <= Scheme::kSix; }
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize, kLabels };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
-enum class Space { kLps, kRas };           // directions of a file's x, y and z
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {
@@ -249,7 +248,7 @@ struct MeshParameters {
   Space space = Space::kLps;     // of files whose format does not define it
   std::optional<Box> crop = {};  // empty: the whole volume
   bool fill_cavities = false;
-  // Of a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
+  // For a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
   // label_parameters() has its defaults.
   std::optional<LabelChoice> labels = {};
   std::int64_t background = 0;  // the value outside of all labels
@@ -293,6 +292,7 @@ std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
 double default_lambda(Smoothing smoothing);
 double default_lambda(const MeshParameters& parameters);  // labels have a default of their own
 
+// Databases contain the numbers of both, so a new one comes last.
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
 

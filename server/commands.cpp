@@ -12,7 +12,7 @@
 #include "base/command_line/manual.h"
 #include "base/log.h"
 #include "server/options.h"
-#include "server/records.h"
+#include "server/record_stores.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
 #include "server/store/postgresql/move.h"

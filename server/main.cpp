@@ -43,7 +43,7 @@
 #include "server/net/descriptors.h"
 #include "server/net/tls.h"
 #include "server/options.h"
-#include "server/records.h"
+#include "server/record_stores.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
 #include "server/store/retention.h"
@@ -202,7 +202,7 @@ int run(const Options& options, const sigset_t& signals) {
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
   const std::unique_ptr<store::BlobStore> opened_blobs = open_blobs(options.blobs, folder);
   store::BlobStore& blobs = *opened_blobs;
-  const auto records = open_records(options, folder, blobs, clock_tolerance(keep));
+  const auto records = open_record_stores(options, folder, blobs, clock_tolerance(keep));
   store::VolumeStore& volumes = records->volumes();
   store::JobStore& jobs = records->jobs();
   if (const std::size_t count = jobs.reap()) {
@@ -220,8 +220,7 @@ int run(const Options& options, const sigset_t& signals) {
   runner.program = program_of_ours("isomesh-import");
   jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import, runner);
   http::Metrics metrics;
-  store::Outbox& outbox = records->outbox();
-  callbacks::Callbacks callbacks(outbox, targets, callback_options(options),
+  callbacks::Callbacks callbacks(records->outbox(), targets, callback_options(options),
                                  http::callback_reporter(metrics));
   const jobs::JobProgram job_program = {.file = program_of_ours("isomesh-job"),
                                         .setup = {.threads = mesh::thread_count()}};
@@ -236,16 +235,36 @@ int run(const Options& options, const sigset_t& signals) {
   server_options.part_bytes = options.max_disk / 4;
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
   if (!options.hospital.empty()) records->take_orders();
-  const std::unique_ptr<http::Wing> hospital = hospital::open(
-      {.file = options.hospital,
-       .max_upload_bytes = options.http.upload.max_bytes,
-       .keep = std::chrono::duration_cast<std::chrono::hours>(keep),
-       .program = program_of_ours},
-      {folder, blobs, volumes, jobs, library, labels, records->orders(), records->audit(),
-       records->received(), [&records] { return records->now(); }});
-  const http::Services services = {
-      folder,    blobs,   volumes, jobs,      library, histograms,         labels,        estimator,
-      retention, metrics, outbox,  callbacks, targets, files.tokens.get(), hospital.get()};
+  const std::unique_ptr<http::Wing> hospital =
+      hospital::open({.file = options.hospital,
+                      .max_upload_bytes = options.http.upload.max_bytes,
+                      .keep = std::chrono::duration_cast<std::chrono::hours>(keep),
+                      .program = program_of_ours},
+                     {.folder = folder,
+                      .blobs = blobs,
+                      .volumes = volumes,
+                      .jobs = jobs,
+                      .library = library,
+                      .labels = labels,
+                      .orders = records->orders(),
+                      .audit = records->audit(),
+                      .received = records->received(),
+                      .believed_now = [&records] { return records->now(); }});
+  const http::Services services = {.folder = folder,
+                                   .blobs = blobs,
+                                   .volumes = volumes,
+                                   .jobs = jobs,
+                                   .outbox = records->outbox(),
+                                   .library = library,
+                                   .histograms = histograms,
+                                   .labels = labels,
+                                   .estimator = estimator,
+                                   .retention = retention,
+                                   .metrics = metrics,
+                                   .callbacks = callbacks,
+                                   .callback_targets = targets,
+                                   .tokens = files.tokens.get(),
+                                   .hospital = hospital.get()};
   http::Server server(services, server_options);
   const std::string url = server.bind(address);
   server.start();

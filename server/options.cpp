@@ -220,12 +220,12 @@ class FileBelowEnvironment : public CLI::ConfigTOML {
 };
 
 // For a single start, so neither in a file nor in the environment.
-void add_operators_word(CLI::App& cli, Options& options) {
-  cli.add_flag("--adopt", options.word.adopt,
+void add_operator_overrides(CLI::App& cli, Options& options) {
+  cli.add_flag("--adopt", options.overrides.adopt,
                "Start although the database and the files of volumes and meshes do not belong "
                "together. For this start only")
       ->configurable(false);
-  cli.add_flag("--trust-clock", options.word.trust_clock,
+  cli.add_flag("--trust-clock", options.overrides.trust_clock,
                "Trust the clock although it is far ahead of the newest record. For this start only")
       ->configurable(false);
 }
@@ -354,7 +354,7 @@ void add_options(CLI::App& cli, Options& options) {
   add_security_options(cli, options);
   add_callback_options(cli, options);
   add_blob_options(cli, options);
-  add_operators_word(cli, options);
+  add_operator_overrides(cli, options);
   add_check(cli, options);
 }
 

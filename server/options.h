@@ -14,7 +14,7 @@
 #include "server/jobs/library/import_runner.h"
 #include "server/process/import_message.h"
 #include "server/store/job_store.h"
-#include "server/store/operators_word.h"
+#include "server/store/operator_overrides.h"
 
 namespace CLI {
 class App;
@@ -46,7 +46,7 @@ struct Options {
   double keep_days = 30;
   std::uint64_t max_disk = 0;
   std::optional<std::uint64_t> disk_reserve;  // empty: the default for a disk of that size
-  store::OperatorsWord word;
+  store::OperatorOverrides overrides;
   unsigned lease_seconds = 30;
   unsigned longest_job_minutes = 60;
   http::ServerOptions http;

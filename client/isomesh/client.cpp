@@ -127,9 +127,9 @@ std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem
   };
   constexpr int kMultiStatus = 207;
   const bool is_resumable = file.size() >= options.resumable_bytes;
-  const HttpAnswer answer = is_resumable ? impl_->resumed(request) : impl_->answer(request);
-  if (answer.status == kMultiStatus) return uploaded_volumes_from_json(answer.body);
-  return {{.member = {}, .status = answer.status, .volume = volume_from_json(answer.body)}};
+  const HttpResponse response = is_resumable ? impl_->resumed(request) : impl_->exchange(request);
+  if (response.status == kMultiStatus) return uploaded_volumes_from_json(response.body);
+  return {{.member = {}, .status = response.status, .volume = volume_from_json(response.body)}};
 }
 
 Volume Client::volume(const std::string& id) {

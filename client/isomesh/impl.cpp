@@ -80,20 +80,20 @@ ErrorCode code_of_status(int status) {
 
 }  // namespace
 
-Error refusal(const HttpAnswer& answer) {
-  const std::string status = "the server responded with status " + std::to_string(answer.status);
-  if (!answer.content_type.starts_with("application/problem+json")) {
-    return {code_of_status(answer.status), status};
+Error refusal(const HttpResponse& response) {
+  const std::string status = "the server responded with status " + std::to_string(response.status);
+  if (!response.content_type.starts_with("application/problem+json")) {
+    return {code_of_status(response.status), status};
   }
   Problem problem;
   try {
-    problem = problem_from_json(answer.body);
+    problem = problem_from_json(response.body);
   } catch (const Error&) {
-    return {code_of_status(answer.status), status};
+    return {code_of_status(response.status), status};
   }
   Error error = to_error(problem);
-  if (error.code() != ErrorCode::kInternal || answer.status == 500) return error;
-  return Error(code_of_status(answer.status), problem.detail.empty() ? status : problem.detail,
+  if (error.code() != ErrorCode::kInternal || response.status == 500) return error;
+  return Error(code_of_status(response.status), problem.detail.empty() ? status : problem.detail,
                problem.errors)
       .with_remedy(problem.remedy);
 }
@@ -101,19 +101,19 @@ Error refusal(const HttpAnswer& answer) {
 Client::Impl::Impl(ClientOptions&& options)
     : stop_(options.stop), transport_(transport_options(std::move(options))) {}
 
-HttpAnswer Client::Impl::answer(const HttpRequest& request) const {
-  HttpAnswer answer = transport_.send(request);
-  if (!is_success(answer)) throw refusal(answer);
-  return answer;
+HttpResponse Client::Impl::exchange(const HttpRequest& request) const {
+  HttpResponse response = transport_.send(request);
+  if (!is_success(response)) throw refusal(response);
+  return response;
 }
 
-HttpAnswer Client::Impl::repeated(const HttpRequest& request,
-                                  const std::function<void()>& before) const {
+HttpResponse Client::Impl::repeated(const HttpRequest& request,
+                                    const std::function<void()>& before) const {
   for (int attempt = 1;; ++attempt) {
     try {
       if (before) before();
-      return answer(request);
-    } catch (const NoAnswer& lost) {
+      return exchange(request);
+    } catch (const NoResponse& lost) {
       if (!lost.broken() || attempt == kTries) throw;
     }
     pause(kFirstPause * (1 << (attempt - 1)));

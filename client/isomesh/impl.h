@@ -18,11 +18,11 @@ inline constexpr std::chrono::seconds kLongestWait{30};
 inline constexpr std::chrono::milliseconds kShortestLook{200};
 inline constexpr std::size_t kKeyBytes = 16;
 
-inline bool is_success(const HttpAnswer& answer) {
-  return answer.status >= 200 && answer.status < 300;
+inline bool is_success(const HttpResponse& response) {
+  return response.status >= 200 && response.status < 300;
 }
 
-Error refusal(const HttpAnswer& answer);
+Error refusal(const HttpResponse& response);
 
 // Thread safe.
 class Client::Impl {
@@ -30,27 +30,27 @@ class Client::Impl {
   explicit Impl(ClientOptions&& options);
 
   // Returns a successful response; throws all others as Error.
-  HttpAnswer answer(const HttpRequest& request) const;
+  HttpResponse exchange(const HttpRequest& request) const;
 
-  std::string send(const HttpRequest& request) const { return answer(request).body; }
+  std::string send(const HttpRequest& request) const { return exchange(request).body; }
 
   // Sends a request that may be repeated after a broken connection. Calls `before` ahead of each
   // attempt.
-  HttpAnswer repeated(const HttpRequest& request, const std::function<void()>& before = {}) const;
+  HttpResponse repeated(const HttpRequest& request, const std::function<void()>& before = {}) const;
   std::string repeat(const HttpRequest& request, const std::function<void()>& before = {}) const {
     return repeated(request, before).body;
   }
 
-  // Sends a request with a source, and resumes it after a broken connection. Works as answer() with
-  // a server that does not support this.
-  HttpAnswer resumed(const HttpRequest& request) const;
+  // Sends a request with a source, and resumes it after a broken connection. Works as exchange()
+  // with a server that does not support this.
+  HttpResponse resumed(const HttpRequest& request) const;
 
   // Throws Error kCancelled immediately on a stop request.
   void pause(std::chrono::milliseconds duration) const;
 
  private:
   std::string begin_upload(const HttpRequest& request) const;
-  HttpAnswer finish_upload(const HttpRequest& request, const std::string& place) const;
+  HttpResponse finish_upload(const HttpRequest& request, const std::string& place) const;
   void give_up(const std::string& place) const;
 
   std::stop_token stop_;

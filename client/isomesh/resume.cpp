@@ -66,12 +66,12 @@ struct Progress {
   bool is_whole = false;
 };
 
-Progress progress_of(const HttpAnswer& answer, std::uint64_t bytes) {
-  const auto offset = parse_uint64(answer.header("upload-offset"));
+Progress progress_of(const HttpResponse& response, std::uint64_t bytes) {
+  const auto offset = parse_uint64(response.header("upload-offset"));
   if (!offset || *offset > bytes) {
     throw Error(ErrorCode::kInternal, "the server's response does not match the API");
   }
-  return {*offset, answer.header("upload-complete") == "?1"};
+  return {*offset, response.header("upload-complete") == "?1"};
 }
 
 class Patience {
@@ -107,16 +107,16 @@ std::string Client::Impl::begin_upload(const HttpRequest& request) const {
   }
 }
 
-HttpAnswer Client::Impl::resumed(const HttpRequest& request) const {
+HttpResponse Client::Impl::resumed(const HttpRequest& request) const {
   const std::string place = begin_upload(request);
-  if (place.empty()) return answer(request);
+  if (place.empty()) return exchange(request);
   try {
     return finish_upload(request, place);
-  } catch (const NoAnswer&) {
+  } catch (const NoResponse&) {
     throw;  // cannot be reported to the server
   } catch (const Error& error) {
     // It has expired, or another daemon answered.
-    if (error.code() == ErrorCode::kGone) return answer(request);
+    if (error.code() == ErrorCode::kGone) return exchange(request);
     give_up(place);
     throw;
   } catch (...) {
@@ -133,26 +133,27 @@ void Client::Impl::give_up(const std::string& place) const {
   }
 }
 
-HttpAnswer Client::Impl::finish_upload(const HttpRequest& request, const std::string& place) const {
+HttpResponse Client::Impl::finish_upload(const HttpRequest& request,
+                                         const std::string& place) const {
   std::optional<Progress> known = Progress();
   std::uint64_t reached = 0;
   Patience patience;
   while (true) {
     try {
-      HttpAnswer heard;
-      if (!known) heard = transport_.send({.method = "HEAD", .target = place});
-      if (!known && is_success(heard)) {
-        known = progress_of(heard, request.source_bytes);
+      HttpResponse response;
+      if (!known) response = transport_.send({.method = "HEAD", .target = place});
+      if (!known && is_success(response)) {
+        known = progress_of(response, request.source_bytes);
         if (known->offset > reached) patience.renew();
         reached = known->offset;
       }
       if (known) {
-        heard = transport_.send(known->is_whole ? reading_of(request, place)
-                                                : rest_of(request, place, known->offset));
-        if (is_success(heard)) return heard;
+        response = transport_.send(known->is_whole ? reading_of(request, place)
+                                                   : rest_of(request, place, known->offset));
+        if (is_success(response)) return response;
       }
-      if (!may_pass(heard.status) || patience.is_over()) throw refusal(heard);
-    } catch (const NoAnswer&) {
+      if (!may_pass(response.status) || patience.is_over()) throw refusal(response);
+    } catch (const NoResponse&) {
       if (patience.is_over()) throw;
     }
     known.reset();

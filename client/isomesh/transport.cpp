@@ -89,22 +89,23 @@ class Transfer {
   Transfer(const Transfer&) = delete;
   Transfer& operator=(const Transfer&) = delete;
 
-  HttpAnswer answer() {
+  HttpResponse response() {
     const std::optional<CURLcode> end = run();
     guard_.rethrow();
     if (!end) {
       if (options_.stop.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-      throw no_answer("the server did not respond in time", is_sending());
+      throw no_response("the server did not respond in time", is_sending());
     }
-    if (*end != CURLE_OK) throw no_answer(reason_of(*end), is_broken(*end));
+    if (*end != CURLE_OK) throw no_response(reason_of(*end), is_broken(*end));
     // libcurl accepts a truncated head.
-    if (!head_is_whole_) throw no_answer(reason_of(CURLE_PARTIAL_FILE), true);
-    answer_.status = static_cast<int>(info<long>(CURLINFO_RESPONSE_CODE));
+    if (!head_is_whole_) throw no_response(reason_of(CURLE_PARTIAL_FILE), true);
+    response_.status = static_cast<int>(info<long>(CURLINFO_RESPONSE_CODE));
     // libcurl 8.14 accepts the first three digits of an invalid status.
-    if (answer_.status > kLastStatus) throw no_answer(reason_of(CURLE_WEIRD_SERVER_REPLY), false);
+    if (response_.status > kLastStatus)
+      throw no_response(reason_of(CURLE_WEIRD_SERVER_REPLY), false);
     const char* type = info<char*>(CURLINFO_CONTENT_TYPE);
-    if (type != nullptr) answer_.content_type = type;
-    return std::move(answer_);
+    if (type != nullptr) response_.content_type = type;
+    return std::move(response_);
   }
 
  private:
@@ -200,7 +201,7 @@ class Transfer {
                                   static_cast<curl_off_t>(request_.source_bytes);
   }
 
-  NoAnswer no_answer(const std::string& reason, bool broken) const {
+  NoResponse no_response(const std::string& reason, bool broken) const {
     return {"no response from " + options_.server_url + ": " + reason, broken};
   }
 
@@ -232,13 +233,13 @@ class Transfer {
   void take_head(std::string_view line) {
     if (line.starts_with("HTTP/")) {
       head_is_whole_ = false;
-      answer_.headers.clear();
+      response_.headers.clear();
     } else if (line.empty()) {
       head_is_whole_ = true;
     } else {
       const std::size_t colon = std::min(line.find(':'), line.size());
       const std::string_view value = line.substr(std::min(colon + 1, line.size()));
-      answer_.headers.emplace_back(lower(line.substr(0, colon)), trimmed(value));
+      response_.headers.emplace_back(lower(line.substr(0, colon)), trimmed(value));
     }
   }
 
@@ -249,10 +250,10 @@ class Transfer {
       if (is_first && request_.before_sink) request_.before_sink(static_cast<int>(status));
       return request_.sink(piece);
     }
-    if (answer_.body.size() + piece.size() > kLongestBody) {
+    if (response_.body.size() + piece.size() > kLongestBody) {
       throw Error(ErrorCode::kInternal, "the server's response does not match the API");
     }
-    answer_.body += piece;
+    response_.body += piece;
   }
 
   // A server that responds during a body may close the connection, and then sending fails. So its
@@ -280,7 +281,7 @@ class Transfer {
   Multi multi_ = make_multi();  // before the easy handle, because it initialises libcurl
   Easy easy_ = make_easy();
 
-  HttpAnswer answer_;
+  HttpResponse response_;
   curl::Guard guard_;
   std::uint64_t provided_ = 0;
   bool sink_has_begun_ = false;
@@ -293,13 +294,13 @@ class Transfer {
 
 }  // namespace
 
-std::string HttpAnswer::header(std::string_view name) const {
+std::string HttpResponse::header(std::string_view name) const {
   const auto found = std::ranges::find(headers, name, &std::pair<std::string, std::string>::first);
   return found == headers.end() ? std::string() : found->second;
 }
 
-HttpAnswer Transport::send(const HttpRequest& request) const {
-  return Transfer(options_, request).answer();
+HttpResponse Transport::send(const HttpRequest& request) const {
+  return Transfer(options_, request).response();
 }
 
 }  // namespace isomesh

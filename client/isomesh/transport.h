@@ -29,7 +29,7 @@ struct HttpRequest {
   std::uint64_t source_bytes = 0;
 
   // Takes the body of a successful response. Without it, and for errors, the body is in the
-  // HttpAnswer.
+  // HttpResponse.
   std::function<void(std::string_view piece)> sink = {};
   // Called with the status before the sink's first piece.
   std::function<void(int status)> before_sink = {};
@@ -38,7 +38,7 @@ struct HttpRequest {
   std::chrono::milliseconds patience{0};
 };
 
-struct HttpAnswer {
+struct HttpResponse {
   int status = 0;
   std::string content_type;
   std::string body;
@@ -49,9 +49,9 @@ struct HttpAnswer {
 };
 
 // kUnreachable; `broken` if the connection was established and broke, so that a retry may help.
-class NoAnswer : public Error {
+class NoResponse : public Error {
  public:
-  NoAnswer(const std::string& detail, bool broken)
+  NoResponse(const std::string& detail, bool broken)
       : Error(ErrorCode::kUnreachable, detail), broken_(broken) {}
 
   bool broken() const { return broken_; }
@@ -80,12 +80,12 @@ class Transport {
  public:
   explicit Transport(TransportOptions options) : options_(std::move(options)) {}
 
-  // Returns the response, whatever its status. Throws NoAnswer; Error kCancelled on a stop request,
-  // kInvalidParameter for a header with control characters, kInternal for a body larger than the
-  // API's; and exceptions of source and sink.
+  // Returns the response, whatever its status. Throws NoResponse; Error kCancelled on a stop
+  // request, kInvalidParameter for a header with control characters, kInternal for a body larger
+  // than the API's; and exceptions of source and sink.
   //
   // If the server responds before it has read the whole body, the rest is not sent.
-  HttpAnswer send(const HttpRequest& request) const;
+  HttpResponse send(const HttpRequest& request) const;
 
  private:
   TransportOptions options_;

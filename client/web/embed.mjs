@@ -1,5 +1,5 @@
 // node embed.mjs DIST BYTES SOURCE: the built page as one file of bytes, and the C++ source that makes
-// it part of the daemon (server/http/answers/page.h).
+// it part of the daemon (server/http/responses/page.h).
 import { createHash } from 'node:crypto';
 import { readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { extname, join, relative, resolve } from 'node:path';
@@ -61,7 +61,7 @@ writeFileSync(
   `// Made by client/web/embed.mjs.
 #include <array>
 
-#include "server/http/answers/page.h"
+#include "server/http/responses/page.h"
 
 asm(R"(
 .section .rodata

@@ -6,16 +6,12 @@
 #include <utility>
 #include <vector>
 
+#include "proto/openapi/schemas.h"
 #include "proto/openapi/yaml.h"
 #include "proto/parameters.h"
-#include "proto/volume_formats.h"
 
 namespace isomesh {
 namespace {
-
-std::string in_brackets(const std::vector<std::string>& items) {
-  return '[' + with_commas(items) + ']';
-}
 
 std::string in_braces(const std::vector<std::string>& items) {
   return items.empty() ? "{}" : "{ " + with_commas(items) + " }";
@@ -372,64 +368,6 @@ std::string formats() {
   return yaml.str();
 }
 
-// All codes of notes with their meanings, and the codes that can be accepted.
-std::string notes() {
-  std::vector<std::string> all;
-  std::vector<std::string> acceptable;
-  for (const NoteDescription& note : note_descriptions()) {
-    all.emplace_back(note.name);
-    if (note.is_acceptable) acceptable.emplace_back(note.name);
-  }
-  Yaml yaml(2);
-  yaml.under("NoteCode", [&] {
-    yaml.line("description: |");
-    yaml.line("  A stable name, for programs.");
-    for (const NoteDescription& note : note_descriptions()) {
-      yaml.line("  * `" + std::string(note.name) + "`: " + std::string(note.meaning));
-    }
-    yaml.line("type: string");
-    yaml.under("enum", [&] {
-      for (const std::string& name : all) yaml.line("- " + name);
-    });
-  });
-  yaml.under("AcceptableNote", [&] {
-    yaml.line("description: A reason to reject a volume, unless the query accepts it.");
-    yaml.line("type: string");
-    yaml.line("enum: " + in_brackets(acceptable));
-  });
-  return yaml.str();
-}
-
-// The formats of volumes, with what a client shows and looks for.
-std::string volumes() {
-  std::vector<std::string> names;
-  for (const VolumeFormat& format : volume_formats()) names.emplace_back(format.name);
-  Yaml yaml(2);
-  yaml.under("VolumeFormat", [&] {
-    yaml.line("description: |");
-    yaml.line("  The format of an upload.");
-    for (const VolumeFormat& format : volume_formats()) {
-      yaml.line("  * `" + std::string(format.name) + "`: " + std::string(format.title) + " (`" +
-                std::string(format.suffixes) + "`)");
-    }
-    yaml.line("type: string");
-    yaml.under("enum", [&] {
-      for (const std::string& name : names) yaml.line("- " + name);
-    });
-    yaml.under("x-titles", [&] {
-      for (const VolumeFormat& format : volume_formats()) {
-        yaml.line(std::string(format.name) + ": " + std::string(format.title));
-      }
-    });
-    yaml.under("x-suffixes", [&] {
-      for (const VolumeFormat& format : volume_formats()) {
-        yaml.line(std::string(format.name) + ": '" + std::string(format.suffixes) + "'");
-      }
-    });
-  });
-  return yaml.str();
-}
-
 // The start of the line that holds `text`, and of the next line.
 std::pair<std::size_t, std::size_t> line_with(const std::string& description,
                                               const std::string& text, std::size_t from) {
@@ -446,13 +384,15 @@ std::string with_parameters(const std::string& description) {
     std::string name;
     std::string text;
   };
-  const std::vector<Part> parts = {{"parameters.h", "schemas of parameters", schemas()},
-                                   {"parameters.h", "formats", formats()},
-                                   {"parameters.h", "parameters of a query", query()},
-                                   {"parameters.h", "query of an estimate", query_references()},
-                                   {"parameters.h", "query of a mesh", query_references()},
-                                   {"volume_formats.h", "formats of volumes", volumes()},
-                                   {"notes.h", "codes of notes", notes()}};
+  const std::vector<Part> parts = {
+      {"parameters.h", "schemas of parameters", schemas()},
+      {"parameters.h", "formats", formats()},
+      {"parameters.h", "parameters of a query", query()},
+      {"parameters.h", "query of an estimate", query_references()},
+      {"parameters.h", "query of a mesh", query_references()},
+      {"volume_formats.h", "formats of volumes", schema_of_volume_formats()},
+      {"notes.h", "codes of notes", schemas_of_notes()},
+      {"stages.h", "stages of a job", schemas_of_stages()}};
   std::string result = description;
   for (const auto& [source, name, text] : parts) {
     const std::size_t begin = line_with(result, "made of " + source + ": " + name, 0).second;

@@ -29,6 +29,10 @@ inline std::string with_commas(const std::vector<std::string>& items) {
   return text;
 }
 
+inline std::string in_brackets(const std::vector<std::string>& items) {
+  return '[' + with_commas(items) + ']';
+}
+
 // Lines of YAML, each indented by its depth.
 class Yaml {
  public:

@@ -96,7 +96,7 @@ class Callbacks::Sender {
       try {
         const auto now = std::chrono::system_clock::now();
         begin_due(now);
-        sleep = turn(now);
+        sleep = advance(now);
       } catch (const std::exception& error) {
         log_error("callbacks could not be sent and are retried: {}", error.what());
         sleep = kPause;
@@ -164,7 +164,7 @@ class Callbacks::Sender {
   // Advances all attempts and finishes those that have ended. Returns the time until the next
   // action, unless a socket or wake() comes first. Deliveries due before `now` have begun, or wait
   // for a place, which the end of an attempt frees.
-  milliseconds turn(store::Time now) {
+  milliseconds advance(store::Time now) {
     int running = 0;
     curl_multi_perform(multi_.get(), &running);
     int left = 0;

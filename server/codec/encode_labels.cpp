@@ -12,7 +12,7 @@
 
 #include "server/codec/block_writer.h"
 #include "server/codec/faces.h"
-#include "server/codec/records.h"
+#include "server/codec/ply_obj_records.h"
 
 namespace isomesh::codec {
 namespace {

@@ -9,9 +9,9 @@
 #include "proto/error.h"
 #include "server/codec/decode/decoders.h"
 #include "server/codec/space.h"
+#include "server/codec/threemf.h"
 #include "server/codec/usda.h"
-#include "server/codec/zip/threemf.h"
-#include "server/codec/zip/usdz.h"
+#include "server/codec/usdz.h"
 
 namespace isomesh::codec {
 namespace {

@@ -16,7 +16,7 @@
 
 namespace isomesh::codec {
 
-// Of chunks and buffer views, in bytes.
+// Alignment of chunks and buffer views, in bytes.
 inline constexpr std::size_t kGlbAlignment = 4;
 
 constexpr std::size_t glb_padded(std::size_t bytes) {

@@ -1,6 +1,6 @@
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
-#include "server/codec/records.h"
+#include "server/codec/ply_obj_records.h"
 
 namespace isomesh::codec {
 

@@ -9,12 +9,12 @@
 
 #include "base/log.h"
 #include "server/hospital/audit/syslog.h"
+#include "server/hospital/c_store/listener.h"
+#include "server/hospital/c_store/sender.h"
 #include "server/hospital/dicomweb/dicomweb.h"
-#include "server/hospital/dimse/c_store.h"
-#include "server/hospital/dimse/listener.h"
-#include "server/hospital/orders/hospital.h"
 #include "server/hospital/orders/orders.h"
 #include "server/hospital/orders/received.h"
+#include "server/hospital/orders/settings.h"
 #include "server/hospital/routes.h"
 #include "server/jobs/library/import_runner.h"
 #include "server/process/prepared.h"
@@ -22,21 +22,21 @@
 namespace isomesh::hospital {
 namespace {
 
-jobs::RunnerOptions answer_runner(const http::WingSettings& settings) {
+jobs::RunnerOptions response_runner(const http::WingSettings& settings) {
   jobs::RunnerOptions runner;
   runner.program = settings.program("isomesh-import");
   runner.bounds = {.memory_bytes = std::uint64_t{1} << 30, .time = std::chrono::minutes(1)};
   return runner;
 }
 
-bool needs_dimse(const orders::Hospital& hospital) {
+bool needs_dimse(const orders::HospitalSettings& hospital) {
   return hospital.dimse || std::ranges::any_of(hospital.pacs, [](const orders::PacsSettings& pacs) {
            return pacs.send_by == orders::SendBy::kCStore;
          });
 }
 
 // Null if DIMSE is not configured.
-std::unique_ptr<process::PreparedProcesses> prepare_dimse(const orders::Hospital& hospital,
+std::unique_ptr<process::PreparedProcesses> prepare_dimse(const orders::HospitalSettings& hospital,
                                                           const http::WingSettings& settings) {
   // Expected number of simultaneous starts; further processes start with a short delay.
   constexpr std::size_t kPrepared = 2;
@@ -50,7 +50,7 @@ std::string host_name() {
 }
 
 // Null if no collector is configured.
-std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital,
+std::unique_ptr<audit::SyslogSender> send_trail(const orders::HospitalSettings& hospital,
                                                 store::AuditTrail& trail) {
   if (!hospital.syslog) return nullptr;
   const orders::SyslogSettings& to = *hospital.syslog;
@@ -68,26 +68,37 @@ std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital
 class OpenHospital {
  public:
   OpenHospital(const http::WingSettings& settings, const http::WingServices& services)
-      : hospital_(orders::read_hospital(settings.file)),
-        answers_(answer_runner(settings)),
-        dimse_(prepare_dimse(hospital_, settings)),
+      : settings_(orders::read_settings(settings.file)),
+        responses_(response_runner(settings)),
+        dimse_(prepare_dimse(settings_, settings)),
         peers_(peers(settings, services)),
-        audit_(send_trail(hospital_, services.audit)),
-        orders_({services.folder, services.blobs, services.volumes, services.jobs, services.library,
-                 services.labels, services.orders, services.audit, services.received, peers_},
-                hospital_,
+        audit_(send_trail(settings_, services.audit)),
+        orders_({.folder = services.folder,
+                 .blobs = services.blobs,
+                 .volumes = services.volumes,
+                 .jobs = services.jobs,
+                 .library = services.library,
+                 .labels = services.labels,
+                 .orders = services.orders,
+                 .audit = services.audit,
+                 .received = services.received,
+                 .peers = peers_},
+                settings_,
                 {.keep = settings.keep,
                  .believed_now = services.believed_now,
                  .cut_off = [this, &services] {
-                   answers_.stop();
+                   responses_.stop();
                    if (dimse_) dimse_->stop();
                    services.library.stop_imports();
                  }}) {
-    if (!hospital_.dimse) return;
-    listener_ = std::make_unique<dimse::DimseListener>(
-        dimse::ListenerServices{services.folder, services.blobs, services.received, services.audit,
-                                *dimse_},
-        *hospital_.dimse);
+    if (!settings_.dimse) return;
+    listener_ = std::make_unique<c_store::DimseListener>(
+        c_store::ListenerServices{.folder = services.folder,
+                                  .blobs = services.blobs,
+                                  .received = services.received,
+                                  .audit = services.audit,
+                                  .processes = *dimse_},
+        *settings_.dimse);
     log_info("receiving series by C-STORE on {}", listener_->authority());
   }
 
@@ -103,39 +114,41 @@ class OpenHospital {
   }
 
  private:
-  std::unique_ptr<orders::Pacs> peer(const orders::PacsSettings& pacs,
-                                     const http::WingSettings& settings,
-                                     const std::filesystem::path& scratch) {
-    std::unique_ptr<orders::Pacs> web;
+  orders::Peer peer(const orders::PacsSettings& pacs, const http::WingSettings& settings,
+                    const std::filesystem::path& scratch) {
+    orders::Peer peer;
     if (!pacs.dicomweb.empty()) {
-      web = std::make_unique<dicomweb::DicomWeb>(
+      const auto web = std::make_shared<dicomweb::DicomWeb>(
           pacs, scratch, settings.max_upload_bytes,
-          [this](const std::filesystem::path& file) { return answers_.read_answer(file); });
+          [this](const std::filesystem::path& file) { return responses_.read_response(file); });
+      peer = {.source = web, .archive = web, .receiver = web};
     }
-    if (pacs.send_by == orders::SendBy::kStow) return web;
-    return std::make_unique<dimse::CStore>(pacs, std::move(web), *dimse_);
+    if (pacs.send_by == orders::SendBy::kCStore) {
+      peer.receiver = std::make_shared<c_store::Sender>(pacs, *dimse_);
+    }
+    return peer;
   }
 
-  orders::PacsByName peers(const http::WingSettings& settings, const http::WingServices& services) {
-    orders::PacsByName all;
-    for (const orders::PacsSettings& pacs : hospital_.pacs) {
+  orders::Peers peers(const http::WingSettings& settings, const http::WingServices& services) {
+    orders::Peers all;
+    for (const orders::PacsSettings& pacs : settings_.pacs) {
       all[pacs.name] = peer(pacs, settings, services.folder.scratch());
     }
-    if (!hospital_.dimse) return all;
-    for (const auto& [title, rule] : hospital_.dimse->routes) {
-      all[orders::received_by(title)] =
-          std::make_unique<orders::Received>(title, services.received, services.blobs);
+    if (!settings_.dimse) return all;
+    for (const auto& [title, rule] : settings_.dimse->routes) {
+      all[orders::received_by(title)].source =
+          std::make_shared<orders::Received>(title, services.received, services.blobs);
     }
     return all;
   }
 
-  const orders::Hospital hospital_;
-  jobs::ImportRunner answers_;
+  const orders::HospitalSettings settings_;
+  jobs::ImportRunner responses_;
   std::unique_ptr<process::PreparedProcesses> dimse_;
-  const orders::PacsByName peers_;
+  const orders::Peers peers_;
   std::unique_ptr<audit::SyslogSender> audit_;
   orders::Orders orders_;
-  std::unique_ptr<dimse::DimseListener> listener_;  // null if no series are received
+  std::unique_ptr<c_store::DimseListener> listener_;  // null if no series are received
 };
 
 http::MeasuredFamily orders_of(const store::OrderCounts& counts) {
@@ -219,8 +232,8 @@ class HospitalWing final : public http::Wing {
 }  // namespace
 
 http::ConfiguredFiles check(const std::filesystem::path& file) {
-  const orders::Hospital hospital = orders::read_hospital(file);
-  if (hospital.dimse) dimse::listen_address(*hospital.dimse);
+  const orders::HospitalSettings hospital = orders::read_settings(file);
+  if (hospital.dimse) c_store::listen_address(*hospital.dimse);
   http::ConfiguredFiles files;
   for (const orders::PacsSettings& pacs : hospital.pacs) {
     const std::string name = "pacs " + pacs.name + ": ";

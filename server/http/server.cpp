@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::chrono::seconds kLongestWatch{1};
 // Time limit for sending the last responses on shutdown.
-constexpr std::chrono::seconds kLastAnswers{5};
+constexpr std::chrono::seconds kLastResponses{5};
 
 // Distributes events of jobs to waiting requests, streams, the log and the metrics, until the
 // service stops.
@@ -61,7 +61,6 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_inspect_routes(state_->app);
   add_page_routes(state_->app);
   add_service_routes(state_->app);
-  add_metrics_route(state_->app);
   if (services.hospital != nullptr) services.hospital->add_routes(state_->app);
 }
 
@@ -104,7 +103,7 @@ void Server::stop() {
   app.services.library.stop_imports();
   app.services.jobs.close();
   if (state_->watching.joinable()) state_->watching.join();
-  app.connections.close(kLastAnswers);
+  app.connections.close(kLastResponses);
 }
 
 }  // namespace isomesh::http

@@ -16,7 +16,7 @@
 #include "proto/error.h"
 #include "server/import/dicom/elements/text.h"
 #include "server/import/import.h"
-#include "server/import/peers/answer.h"
+#include "server/import/peers/response.h"
 #include "server/process/fork_server.h"
 #include "server/process/import_message.h"
 #include "server/process/sandbox.h"
@@ -47,7 +47,7 @@ void say(std::string_view message) {
   }
 }
 
-Confinement confinement_of(const AnswerOrder& order) {
+Confinement confinement_of(const ResponseOrder& order) {
   return {.readable = order.task.source,
           .writable = {},
           .memory_bytes = order.bounds.memory_bytes,
@@ -70,8 +70,8 @@ std::string read(const ImportOrder& order) {
       order.task, [](std::string_view format) { say(reading_message(format)); }));
 }
 
-std::string read(const AnswerOrder& order) {
-  return answer_message(import::read_answer(order.task.source));
+std::string read(const ResponseOrder& order) {
+  return response_message(import::read_response(order.task.source));
 }
 
 // Every exception becomes a message, the only output of this process.

@@ -178,7 +178,8 @@ std::optional<FairPlaces::Place> Acceptor::place_for(const std::string& party) {
   }
 }
 
-// Of that party, or of all for "". Returns false if there is none.
+// Closes the oldest pending connection of the party, or of all for "". Returns false if there is
+// none.
 bool Acceptor::close_oldest_of(const std::string& party) {
   const auto oldest = std::ranges::find_if(
       pending_, [&](const Pending& pending) { return party.empty() || pending.party == party; });

@@ -14,11 +14,11 @@
 #include <thread>
 #include <unordered_map>
 
+#include "base/wakeup.h"
 #include "proto/error.h"
 #include "server/net/byte_stream.h"
 #include "server/net/fair_places.h"
 #include "server/net/request_head.h"
-#include "server/net/wakeup.h"
 
 namespace isomesh::net {
 

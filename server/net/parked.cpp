@@ -96,7 +96,11 @@ void Parked::work() {
     const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, milliseconds_to_next());
     for (int i = 0; i < count; ++i) {
       const std::uint64_t who = events.at(static_cast<std::size_t>(i)).data.u64;
-      who == kWakeup ? wakeup_.clear() : notice_end(who);
+      if (who == kWakeup) {
+        wakeup_.clear();
+      } else {
+        notice_end(who);
+      }
     }
     const auto now = Clock::now();
     resume_if([&](const ParkedRequest& request) { return now >= request.until; });

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "base/mutex.h"
-#include "server/net/wakeup.h"
+#include "base/wakeup.h"
 
 namespace isomesh::net {
 

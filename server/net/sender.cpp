@@ -123,7 +123,10 @@ void Sender::work() {
 
 void Sender::serve_event(const epoll_event& event) {
   const std::uint64_t id = event.data.u64;  // a copy: the kernel's struct is packed
-  if (id == kWakeup) return wakeup_.clear();
+  if (id == kWakeup) {
+    wakeup_.clear();
+    return;
+  }
   const auto sending = by_id_.find(id);  // may have been closed in this batch
   if (sending != by_id_.end()) go_on(sending->second, event.events);
 }

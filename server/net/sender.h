@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "base/mutex.h"
+#include "base/wakeup.h"
 #include "server/net/byte_stream.h"
 #include "server/net/task_queue.h"
-#include "server/net/wakeup.h"
 
 struct epoll_event;
 

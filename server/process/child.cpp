@@ -100,7 +100,7 @@ Child& Child::operator=(Child&& other) noexcept {
   return *this;
 }
 
-void Child::say(std::string_view message) const {
+void Child::send(std::string_view message) const {
   while (!message.empty()) {
     const ssize_t count = ::send(socket_.number(), message.data(), message.size(), MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
@@ -109,34 +109,34 @@ void Child::say(std::string_view message) const {
   }
 }
 
-void Child::say(std::string_view message, int passed) const {
+void Child::send(std::string_view message, int passed) const {
   ssize_t count = 0;
   do {
     count = send_with(socket_.number(), message, passed);
   } while (count < 0 && errno == EINTR);
-  if (count >= 0) return say(message.substr(static_cast<std::size_t>(count)));
+  if (count >= 0) return send(message.substr(static_cast<std::size_t>(count)));
   if (errno != EPIPE && errno != ECONNRESET) throw_system_error("sendmsg", errno);
 }
 
-void Child::tell(std::string_view message) const {
-  say(message);
+void Child::send_last(std::string_view message) const {
+  send(message);
   ::shutdown(socket_.number(), SHUT_WR);
 }
 
-Heard Child::listen(std::size_t most_bytes, Clock::time_point deadline,
-                    const std::stop_token& stop) const {
-  Heard heard;
+Output Child::receive(std::size_t most_bytes, Clock::time_point deadline,
+                      const std::stop_token& stop) const {
+  Output output;
   std::array<char, 4096> piece;
   for (;;) {
-    if (stop.stop_requested()) return {Heard::Ending::kStopped, {}};
-    if (Clock::now() >= deadline) return {Heard::Ending::kTooLong, std::move(heard.text)};
-    if (heard.text.size() > most_bytes) return {Heard::Ending::kTooMuch, {}};
+    if (stop.stop_requested()) return {Output::Ending::kStopped, {}};
+    if (Clock::now() >= deadline) return {Output::Ending::kTooLong, std::move(output.text)};
+    if (output.text.size() > most_bytes) return {Output::Ending::kTooMuch, {}};
     pollfd waiting = {socket_.number(), POLLIN, 0};
     if (::poll(&waiting, 1, static_cast<int>(kLook.count())) <= 0) continue;
     const ssize_t count = ::read(socket_.number(), piece.data(), piece.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return heard;
-    heard.text.append(piece.data(), static_cast<std::size_t>(count));
+    if (count <= 0) return output;
+    output.text.append(piece.data(), static_cast<std::size_t>(count));
   }
 }
 

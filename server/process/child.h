@@ -32,7 +32,7 @@ struct SocketPair {
 SocketPair make_socket_pair();
 
 // The bytes a child sent until it closed its end, or until reading ended.
-struct Heard {
+struct Output {
   enum class Ending { kClosed, kTooLong, kTooMuch, kStopped };
 
   Ending ending = Ending::kClosed;
@@ -52,19 +52,19 @@ class Child {
   pid_t pid() const { return pid_; }
   const Descriptor& socket() const { return socket_; }
 
-  // Sends the whole message. A child that has ended is not an error here; listen() notices it.
-  void say(std::string_view message) const;
+  // Sends the whole message. A child that has ended is not an error here; receive() notices it.
+  void send(std::string_view message) const;
 
   // The same with a descriptor, which the caller keeps. Throws Error kInternal or kUnavailable if
   // it cannot be passed.
-  void say(std::string_view message, int passed) const;
+  void send(std::string_view message, int passed) const;
 
   // As the first, and closes this direction.
-  void tell(std::string_view message) const;
+  void send_last(std::string_view message) const;
 
   // Reads until the child closes its end, at most about `most_bytes`.
-  Heard listen(std::size_t most_bytes, std::chrono::steady_clock::time_point deadline,
-               const std::stop_token& stop) const;
+  Output receive(std::size_t most_bytes, std::chrono::steady_clock::time_point deadline,
+                 const std::stop_token& stop) const;
 
   // True if it has ended on its own.
   bool has_ended() { return reap(false); }

@@ -18,7 +18,7 @@ void visit(Is<DimseSending> auto& self, auto&& field) {
   field("sop_class", self.sop_class);
   field("instance", self.instance);
   field("timeout", self.timeout);
-  field("answer_timeout", self.answer_timeout);
+  field("response_timeout", self.response_timeout);
 }
 
 void visit(Is<DimseReceiving> auto& self, auto&& field) {

@@ -21,9 +21,9 @@ struct DimseSending {
   std::string called;
   std::filesystem::path file;
   std::string sop_class;
-  std::string instance;                     // SOP Instance UID
-  std::chrono::seconds timeout{30};         // limit without a byte
-  std::chrono::seconds answer_timeout{30};  // limit for the peer's C-STORE response
+  std::string instance;                       // SOP Instance UID
+  std::chrono::seconds timeout{30};           // limit without a byte
+  std::chrono::seconds response_timeout{30};  // limit for the peer's C-STORE response
 };
 
 // An incoming association.
@@ -39,7 +39,7 @@ using DimseOrder = std::variant<DimseSending, DimseReceiving>;
 
 // The result of sending an object.
 enum class DimseEnd {
-  kAnswered,     // the peer responded to the C-STORE
+  kResponded,    // the peer responded to the C-STORE
   kRejected,     // the association, for example because of an unknown title
   kBusy,         // the association, temporarily
   kNotAccepted,  // presentation context of the object's class
@@ -50,7 +50,7 @@ enum class DimseEnd {
 
 struct DimseSent {
   DimseEnd end = DimseEnd::kBroken;
-  std::uint16_t status = 0;  // of the C-STORE response, for kAnswered
+  std::uint16_t status = 0;  // of the C-STORE response, for kResponded
 
   bool operator==(const DimseSent&) const = default;
 };

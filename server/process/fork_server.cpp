@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 
 // Initialisation takes tens of milliseconds, on a busy machine hundreds. Restarting it earlier
 // would not be faster.
-constexpr std::chrono::seconds kLongestAnswer{60};
+constexpr std::chrono::seconds kLongestResponse{60};
 
 // Returns none if the peer has closed.
 Descriptor receive_descriptor() {
@@ -46,7 +46,7 @@ pid_t fork_sibling() {
 }
 
 // Sends the copy's id, or the negative error number.
-[[nodiscard]] bool answer(std::int32_t number) {
+[[nodiscard]] bool respond(std::int32_t number) {
   return ::send(kChildDescriptor, &number, sizeof(number), MSG_NOSIGNAL) == sizeof(number);
 }
 
@@ -81,7 +81,7 @@ void serve_copies(const std::function<void()>& work) {
     if (socket.number() < 0) std::_Exit(EXIT_SUCCESS);
     const pid_t pid = fork_sibling();
     if (pid == 0) become_copy(std::move(socket), work);
-    if (!answer(pid > 0 ? pid : -errno)) std::_Exit(EXIT_FAILURE);
+    if (!respond(pid > 0 ? pid : -errno)) std::_Exit(EXIT_FAILURE);
   }
 }
 
@@ -91,7 +91,7 @@ Child copy_of(const Child& server, const std::stop_token& stop) {
     throw_system_error("sendmsg", errno);
   }
   sockets.theirs = Descriptor();
-  const auto deadline = Clock::now() + kLongestAnswer;
+  const auto deadline = Clock::now() + kLongestResponse;
   while (Clock::now() < deadline) {
     if (stop.stop_requested()) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
     pollfd waiting = {server.socket().number(), POLLIN, 0};

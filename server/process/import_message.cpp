@@ -38,11 +38,11 @@ void visit(Is<ImportBounds> auto& self, auto&& field) {
   field("seconds", self.time);
 }
 
-void visit(Is<AnswerTask> auto& self, auto&& field) { field("source", self.source); }
+void visit(Is<ResponseTask> auto& self, auto&& field) { field("source", self.source); }
 
 template <class Order>
 requires std::is_same_v<std::remove_const_t<Order>, ImportOrder> ||
-    std::is_same_v<std::remove_const_t<Order>, AnswerOrder>
+    std::is_same_v<std::remove_const_t<Order>, ResponseOrder>
 void visit(Order& self, auto&& field) {
   field("task", self.task);
   field("bounds", self.bounds);
@@ -59,7 +59,7 @@ void visit(Is<PeersObject> auto& self, auto&& field) {
   field("failure", self.failure);
 }
 
-void visit(Is<PeersAnswer> auto& self, auto&& field) {
+void visit(Is<PeersResponse> auto& self, auto&& field) {
   field("objects", self.objects);
   field("stored", self.stored);
   field("failed", self.failed);
@@ -71,12 +71,12 @@ constexpr const char* kImport = "import";
 constexpr const char* kBegun = "begun";
 constexpr const char* kReading = "reading";
 constexpr const char* kVolume = "volume";
-constexpr const char* kAnswer = "answer";
+constexpr const char* kResponse = "response";
 constexpr const char* kError = "error";
 
 // UIDs become parts of URLs, so they are validated again: their sender reads untrusted bytes.
-void check_uids(const PeersAnswer& answer) {
-  for (const auto* objects : {&answer.objects, &answer.stored, &answer.failed}) {
+void check_uids(const PeersResponse& response) {
+  for (const auto* objects : {&response.objects, &response.stored, &response.failed}) {
     for (const PeersObject& object : *objects) {
       for (const std::string* uid : {&object.study, &object.series, &object.instance}) {
         if (!uid->empty() && !is_uid(*uid)) throw_malformed();
@@ -101,9 +101,9 @@ void add_line(ImportReport& report, const ReadLine& line) {
     report.reading = *format;
   }
   if (auto volume = line.find<Volume>(kVolume)) report.volume = std::move(volume);
-  if (auto answer = line.find<PeersAnswer>(kAnswer)) {
-    check_uids(*answer);
-    report.answer = std::move(answer);
+  if (auto response = line.find<PeersResponse>(kResponse)) {
+    check_uids(*response);
+    report.response = std::move(response);
   }
   if (const auto problem = line.find<Problem>(kError)) report.error = to_error(*problem);
 }
@@ -111,12 +111,12 @@ void add_line(ImportReport& report, const ReadLine& line) {
 }  // namespace
 
 std::string to_message(const ImportOrder& order) { return line_of(kImport, order); }
-std::string to_message(const AnswerOrder& order) { return line_of(kAnswer, order); }
+std::string to_message(const ResponseOrder& order) { return line_of(kResponse, order); }
 
-std::variant<ImportOrder, AnswerOrder> order_from(std::string_view message) {
+std::variant<ImportOrder, ResponseOrder> order_from(std::string_view message) {
   const ReadLine line(message);
   if (auto order = line.find<ImportOrder>(kImport)) return *std::move(order);
-  if (auto order = line.find<AnswerOrder>(kAnswer)) return *std::move(order);
+  if (auto order = line.find<ResponseOrder>(kResponse)) return *std::move(order);
   throw_malformed();
 }
 
@@ -132,7 +132,7 @@ std::string volume_message(const Volume& volume) {
   return dump(line.root()) + '\n';
 }
 
-std::string answer_message(const PeersAnswer& answer) { return line_of(kAnswer, answer); }
+std::string response_message(const PeersResponse& response) { return line_of(kResponse, response); }
 std::string error_message(const Error& error) { return line_of(kError, error); }
 
 ImportReport report_from(std::string_view messages) {

@@ -68,12 +68,12 @@ struct ImportOrder {
 };
 
 // Reading a file with a PACS's response in DICOM JSON (PS3.18, F).
-struct AnswerTask {
+struct ResponseTask {
   std::filesystem::path source;
 };
 
-struct AnswerOrder {
-  AnswerTask task;
+struct ResponseOrder {
+  ResponseTask task;
   ImportBounds bounds;
 };
 
@@ -92,32 +92,32 @@ struct PeersObject {
   bool operator==(const PeersObject&) const = default;
 };
 
-struct PeersAnswer {
+struct PeersResponse {
   std::vector<PeersObject> objects;  // search results
   std::vector<PeersObject> stored;   // reported as stored
   std::vector<PeersObject> failed;   // reported as not stored
 
-  bool operator==(const PeersAnswer&) const = default;
+  bool operator==(const PeersResponse&) const = default;
 };
 
 std::string to_message(const ImportOrder& order);
-std::string to_message(const AnswerOrder& order);
+std::string to_message(const ResponseOrder& order);
 
 // Returns either order. Throws Error kInternal if the message is malformed.
-std::variant<ImportOrder, AnswerOrder> order_from(std::string_view message);
+std::variant<ImportOrder, ResponseOrder> order_from(std::string_view message);
 
 // Return one line, with its line break.
 std::string begun_message();
 std::string reading_message(std::string_view format);
 std::string volume_message(const Volume& volume);
-std::string answer_message(const PeersAnswer& answer);
+std::string response_message(const PeersResponse& response);
 std::string error_message(const Error& error);
 
 struct ImportReport {
   bool begun = false;   // it has its order and will open the file
   std::string reading;  // the last format it named; printable
   std::optional<Volume> volume;
-  std::optional<PeersAnswer> answer;
+  std::optional<PeersResponse> response;
   std::optional<Error> error;
 };
 

@@ -92,7 +92,7 @@ class BlobStore {
   virtual void limit_room(std::uint64_t max_bytes, MakeRoom make) = 0;
 
   // True if the store responds. Fast, so it can be called often.
-  virtual bool answers() const = 0;
+  virtual bool responds() const = 0;
 
   // True if other daemons may use the store too.
   virtual bool is_shared() const = 0;
@@ -102,9 +102,9 @@ class BlobStore {
   // A short text stored with the blobs that names the database they belong to (see Identity); empty
   // if there is none.
   virtual std::string mark() const = 0;
-  virtual void set_mark(const std::string& text) const = 0;
+  virtual void set_mark(const std::string& text) = 0;
 
-  virtual std::unique_ptr<BlobWriter> begin() const = 0;
+  virtual std::unique_ptr<BlobWriter> begin() = 0;
 
   // False if space is so short that no new work should start.
   virtual bool has_room() const = 0;
@@ -120,7 +120,7 @@ class BlobStore {
   // Turns a finished local file into a blob that survives a crash, and removes the file. `blob` is
   // the recent result of digest_of(file), so that is_intact() need not read it again. Throws Error
   // kOutOfSpace.
-  virtual void adopt(const std::filesystem::path& file, const Blob& blob) const = 0;
+  virtual void adopt(const std::filesystem::path& file, const Blob& blob) = 0;
 
   // Opens a local copy: a remote blob is first fetched and verified. Throws Error kNotFound;
   // kInternal if its bytes do not match the key.
@@ -147,27 +147,25 @@ class BlobStore {
 
   // Erases a blob; the caller must know that nobody is about to name it. Does nothing if it is
   // missing. Open readers stay valid.
-  virtual void erase(const std::string& key) const = 0;
+  virtual void erase(const std::string& key) = 0;
 
-  // Tells the store that a record now names the blob. Until then erase_unnamed() and sweep(), of
-  // any daemon, spare it as long as it counts as unsettled. Call once for each time the blob was
-  // stored.
-  virtual void settle(const std::string& key) const = 0;
+  // Tells the store that a record names the blob now. Call once for each time the blob was stored.
+  virtual void mark_named(const std::string& key) = 0;
 
-  // Erases the given blobs, except those that `names` reports and those stored since `unsettled`
-  // and not settled. Returns the latter.
+  // Erases the given blobs, except those that `names` reports, and those that any daemon has stored
+  // since `spare_since` and not marked as named. Returns the latter.
   virtual std::vector<std::string> erase_unnamed(std::span<const std::string> keys,
-                                                 Steady unsettled, const Names& names) const = 0;
+                                                 Steady spare_since, const Names& names) = 0;
 
   // Moves unnamed blobs into quarantine, with the same exceptions. One sweep moves only a fraction
   // of all blobs: if the records name almost none, the records are more likely wrong. Reading a
   // quarantined blob brings it back. Engines for which sweeping is expensive do it only now and
   // then.
-  virtual Swept sweep(Steady unsettled, const Names& names) const = 0;
+  virtual Swept sweep(Steady spare_since, const Names& names) = 0;
 
   // Removes blobs that have been in quarantine since before that time and are still unnamed.
   // Returns their number.
-  virtual std::size_t empty_quarantine(Time before, const Names& names) const = 0;
+  virtual std::size_t empty_quarantine(Time before, const Names& names) = 0;
 };
 
 // As is_intact, but returns false if the blob is missing.

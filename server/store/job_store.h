@@ -168,8 +168,8 @@ class JobStore {
   virtual Job remake(const std::string& id) = 0;
 
   // Leases the next job for `lease` from now: by priority, then by turns of the owners
-  // (sql/turns.h), then by age. Skips a job while an equal one of the same owner runs. Empty if
-  // there is none.
+  // (sql/fair_queue.h), then by age. Skips a job while an equal one of the same owner runs. Empty
+  // if there is none.
   virtual std::optional<Lease> claim(const std::string& worker,
                                      std::chrono::milliseconds lease) = 0;
 
@@ -221,7 +221,7 @@ class JobStore {
   virtual std::uint64_t last_event() const = 0;
 
   // True if the records can be read now.
-  virtual bool answers() const = 0;
+  virtual bool responds() const = 0;
 
   // Counts jobs visible to the viewer.
   virtual QueueDepth depth(const Viewer& viewer) const = 0;
@@ -246,7 +246,7 @@ class JobStore {
 
   // The lease for retention: of the processes that share the records, one has it at a time, until
   // it releases the result. Null if another process has it.
-  virtual std::shared_ptr<const void> turn_to_remove() = 0;
+  virtual std::shared_ptr<const void> claim_removal() = 0;
 
   // Total size of the blobs that meshes name; each counts once.
   virtual std::uint64_t named_bytes() const = 0;

@@ -9,10 +9,6 @@
 
 namespace isomesh::store {
 
-// The first final state. Conditions in SQL use the number.
-inline constexpr int kFirstFinalOrder = 4;
-static_assert(static_cast<int>(OrderState::kSucceeded) == kFirstFinalOrder);
-
 // The last order made for a watched series.
 struct LastOrder {
   std::uint32_t instances = 0;             // of the series at that time

@@ -75,8 +75,8 @@ Retention::Gone Retention::enforce() {
   const Time of_files = std::min(now, std::chrono::system_clock::now());
   Gone gone;
   sweep_scratch(of_files);
-  const auto turn = jobs_.turn_to_remove();
-  if (!turn) return gone;
+  const auto removal = jobs_.claim_removal();
+  if (!removal) return gone;
   {
     const Lock lock(mutex_);
     expire_old(now, gone);
@@ -188,14 +188,14 @@ void Retention::expire(std::span<const Expirable> items, std::uint64_t enough, G
 }
 
 // Blobs stored since this time may still be named: a worker names its blobs at the end of its run.
-Steady Retention::unsettled_since() const {
+Steady Retention::spare_since() const {
   const Steady now = Steady::clock::now();
   return std::min(now, jobs_.oldest_run().value_or(now)) - options_.grace;
 }
 
 std::size_t Retention::erase_garbage() {
   const std::size_t before = garbage_.size();
-  garbage_ = blobs_.erase_unnamed(garbage_, unsettled_since(), names());
+  garbage_ = blobs_.erase_unnamed(garbage_, spare_since(), names());
   return before - garbage_.size();
 }
 
@@ -206,14 +206,14 @@ void Retention::sweep_blobs(Gone& gone) {
     const Lock lock(mutex_);
     if (now < next_sweep_) return;
   }
-  const Swept swept = blobs_.sweep(unsettled_since(), names());
+  const Swept swept = blobs_.sweep(spare_since(), names());
   gone.quarantined = swept.quarantined;
   gone.left = swept.left;
   const Lock lock(mutex_);
   if (swept.left > 0) next_sweep_ = now + options_.sweep_pause;
 }
 
-void Retention::sweep_scratch(Time now) const {
+void Retention::sweep_scratch(Time now) {
   std::error_code gone;  // files come and go meanwhile
   const auto cutoff = std::chrono::file_clock::from_sys(now) - kLongestScratch;
   for (const auto& entry : std::filesystem::directory_iterator(scratch_, gone)) {

@@ -46,8 +46,8 @@ class Retention {
     std::size_t left = 0;         // further ones, too many to quarantine at once
   };
 
-  Retention(JobStore& jobs, VolumeStore& volumes, const BlobStore& blobs,
-            std::filesystem::path scratch, const RetentionOptions& options)
+  Retention(JobStore& jobs, VolumeStore& volumes, BlobStore& blobs, std::filesystem::path scratch,
+            const RetentionOptions& options)
       : jobs_(jobs),
         volumes_(volumes),
         blobs_(blobs),
@@ -80,15 +80,15 @@ class Retention {
   class Report;
   void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone, Report& report)
       ISOMESH_REQUIRES(mutex_);
-  Steady unsettled_since() const;
+  Steady spare_since() const;
   std::size_t erase_garbage() ISOMESH_REQUIRES(mutex_);
   void sweep_blobs(Gone& gone);
-  void sweep_scratch(Time now) const;
+  void sweep_scratch(Time now);
   void forget(Time now);
 
   JobStore& jobs_;
   VolumeStore& volumes_;
-  const BlobStore& blobs_;
+  BlobStore& blobs_;
   const std::filesystem::path scratch_;
   const RetentionOptions options_;
   // Serialises callers of make_room(); otherwise two would free twice as much.

@@ -262,7 +262,6 @@ TEST_F(OpenApiTest, EnumerationsAreThoseOfTheProgram) {
   EXPECT_EQ(listed("MeshFormat"), names<MeshFormat>());
   EXPECT_EQ(listed("Priority"), names<Priority>());
   EXPECT_EQ(listed("JobState"), names<JobState>());
-  EXPECT_EQ(listed("Stage"), names<Stage>());
 }
 
 TEST_F(OpenApiTest, ProblemTypesAreThoseOfTheProgram) {

@@ -308,7 +308,7 @@ void measure_stores(Postgres& postgres, std::vector<Finding>& findings) {
   const std::string url = postgres.new_place();
   const test::TemporaryFolder folder;
   const store::DataFolder data(folder / "data");
-  const store::FileBlobStore blobs(data);
+  store::FileBlobStore blobs(data);
   Node node(url, "one", blobs, kQueueConnections);
   Volume volume;
   volume.id = kVolume;

@@ -201,49 +201,56 @@ void read_json(Bytes bytes) {
   read_text(bytes, [](std::string_view text) { jobs_from_json(text); });
 }
 
-constexpr Target kTargets[] = {
-    {"upload", import_anything},
-    {"nifti", [](Bytes bytes) { import_only("nifti", bytes); }},
-    {"nrrd", [](Bytes bytes) { import_only("nrrd", bytes); }},
-    {"metaimage", [](Bytes bytes) { import_only("metaimage", bytes); }},
-    {"vti", [](Bytes bytes) { import_only("vti", bytes); }},
-    {"vtk", [](Bytes bytes) { import_only("vtk", bytes); }},
-    {"mgh", [](Bytes bytes) { import_only("mgh", bytes); }},
-    {"isq", [](Bytes bytes) { import_only("isq", bytes); }},
-    {"mrc", [](Bytes bytes) { import_only("mrc", bytes); }},
-    {"cube", [](Bytes bytes) { import_only("cube", bytes); }},
-    {"numpy", [](Bytes bytes) { import_spaced("numpy", bytes); }},
-    {"tiff", [](Bytes bytes) { import_spaced("tiff", bytes); }},
-    {"png", [](Bytes bytes) { import_pages("png", bytes); }},
-    {"bmp", [](Bytes bytes) { import_pages("bmp", bytes); }},
-    {"afni", [](Bytes bytes) { import_beside_samples("a.HEAD", "a.BRIK", bytes); }},
-    {"par", [](Bytes bytes) { import_beside_samples("a.PAR", "a.REC", bytes); }},
-    {"dicom", [](Bytes bytes) { import_only("dicom", bytes); }},
-    {"structures", import_structures},
-    {"ascconv",
-     [](Bytes bytes) {
-       read_text(bytes, [](auto text) { import::dicom::protocol_slices(text); });
-     }},
-    {"csa",
-     [](Bytes bytes) {
-       read_text(bytes, [](auto text) { import::dicom::parse_csa_header(text); });
-     }},
-    {"archive", [](Bytes bytes) { import_only("archive", bytes); }},
-    {"labels", read_labels},
-    {"raw", import_raw},
-    {"canonical", open_canonical},
-    {"report", read_report},
-    {"json", read_json},
-    {"draco", encode_mesh},
-};
+const std::vector<Target>& special_targets() {
+  static const std::vector<Target> targets = {
+      {"upload", import_anything},
+      {"numpy", [](Bytes bytes) { import_spaced("numpy", bytes); }},
+      {"tiff", [](Bytes bytes) { import_spaced("tiff", bytes); }},
+      {"png", [](Bytes bytes) { import_pages("png", bytes); }},
+      {"bmp", [](Bytes bytes) { import_pages("bmp", bytes); }},
+      {"afni", [](Bytes bytes) { import_beside_samples("a.HEAD", "a.BRIK", bytes); }},
+      {"par", [](Bytes bytes) { import_beside_samples("a.PAR", "a.REC", bytes); }},
+      {"structures", import_structures},
+      {"ascconv",
+       [](Bytes bytes) {
+         read_text(bytes, [](auto text) { import::dicom::protocol_slices(text); });
+       }},
+      {"csa",
+       [](Bytes bytes) {
+         read_text(bytes, [](auto text) { import::dicom::parse_csa_header(text); });
+       }},
+      {"labels", read_labels},
+      {"raw", import_raw},
+      {"canonical", open_canonical},
+      {"report", read_report},
+      {"json", read_json},
+      {"draco", encode_mesh},
+  };
+  return targets;
+}
+
+std::vector<Target> all_targets() {
+  std::vector<Target> all = special_targets();
+  for (const import::Reader& reader : import::readers()) {
+    // libhdf5 is known to crash on damaged files.
+    if (reader.name == "hdf5" || std::ranges::find(all, reader.name, &Target::name) != all.end()) {
+      continue;
+    }
+    all.push_back({reader.name, [name = reader.name](Bytes bytes) { import_only(name, bytes); }});
+  }
+  return all;
+}
 
 }  // namespace
 
-std::span<const Target> targets() { return kTargets; }
+const std::vector<Target>& targets() {
+  static const std::vector<Target> all = all_targets();
+  return all;
+}
 
 const Target& target(std::string_view name) {
-  const auto* found = std::ranges::find(kTargets, name, &Target::name);
-  if (found == std::end(kTargets)) throw std::out_of_range("no such target");
+  const auto found = std::ranges::find(targets(), name, &Target::name);
+  if (found == targets().end()) throw std::out_of_range("no such target");
   return *found;
 }
 

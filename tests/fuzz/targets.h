@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,10 +14,11 @@ namespace isomesh::fuzz {
 struct Target {
   std::string_view name;
   // Refuses or reads; anything else is a finding, and ends the program.
-  void (*run)(std::span<const std::byte> bytes);
+  std::function<void(std::span<const std::byte> bytes)> run;
 };
 
-std::span<const Target> targets();
+// Every reader of uploads has one, besides those of parts of readers.
+const std::vector<Target>& targets();
 
 // Throws std::out_of_range.
 const Target& target(std::string_view name);

@@ -222,14 +222,21 @@ class StoreScp:
         return sorted(os.path.join(self.folder, name) for name in os.listdir(self.folder))
 
 
-class Relay:
-    """Passes bytes on to a port, and may cut connections: after so many bytes of what comes, or of
-    what is answered."""
+def fill_disk(path):
+    """Writes a file until its disk is full."""
+    # A buffer's rest would be written, and fail, when the file is closed.
+    with open(path, "wb", buffering=0) as file:
+        try:
+            while file.write(bytes(1 << 12)):
+                pass
+        except OSError:
+            pass
 
-    def __init__(self, port):
-        self.target = port
-        self.cut_after = None
-        self.cut_answer_after = None
+
+class Listener:
+    """Takes connections on a free port; each is passed to `_take` in the listening thread."""
+
+    def __init__(self):
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         threading.Thread(target=self._serve, daemon=True).start()
@@ -244,10 +251,24 @@ class Relay:
                 connection, _ = self.listener.accept()
             except OSError:
                 return
-            there = socket.create_connection(("127.0.0.1", self.target))
-            for source, sink, most in [(connection, there, self.cut_after),
-                                       (there, connection, self.cut_answer_after)]:
-                threading.Thread(target=self._pass, args=(source, sink, most), daemon=True).start()
+            self._take(connection)
+
+
+class Relay(Listener):
+    """Passes bytes on to a port, and may cut connections: after so many bytes of what comes, or of
+    what is answered."""
+
+    def __init__(self, port):
+        self.target = port
+        self.cut_after = None
+        self.cut_answer_after = None
+        super().__init__()
+
+    def _take(self, connection):
+        there = socket.create_connection(("127.0.0.1", self.target))
+        for source, sink, most in [(connection, there, self.cut_after),
+                                   (there, connection, self.cut_answer_after)]:
+            threading.Thread(target=self._pass, args=(source, sink, most), daemon=True).start()
 
     @staticmethod
     def _pass(source, sink, most):
@@ -268,7 +289,7 @@ class Relay:
                 pass
 
 
-class Proxy:
+class Proxy(Listener):
     """Passes HTTP on to a PACS. `fault`, when it is set, is called with each request and the answer
     and returns bytes to answer with, an answer (status, headers, body) or None to pass it on."""
 
@@ -277,20 +298,10 @@ class Proxy:
         self.fault = None  # before the request is passed on: (method, path, body) -> answer or None
         self.twist = None  # after: (method, path, answer) -> answer
         self.requests = []
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.port = self.listener.getsockname()[1]
-        threading.Thread(target=self._serve, daemon=True).start()
+        super().__init__()
 
-    def close(self):
-        self.listener.close()
-
-    def _serve(self):
-        while True:
-            try:
-                connection, _ = self.listener.accept()
-            except OSError:
-                return
-            threading.Thread(target=self._one, args=(connection,), daemon=True).start()
+    def _take(self, connection):
+        threading.Thread(target=self._one, args=(connection,), daemon=True).start()
 
     def _one(self, connection):
         with connection:

@@ -357,12 +357,7 @@ class Receiving(Loop):
             daemon = self.receiver(3, 2, 3, 1 << 30, 1 << 30, "--data", folder)
             self.send(daemon, files[:4])
             filling = os.path.join(folder, "filling")
-            with open(filling, "wb", buffering=0) as file:
-                try:
-                    while file.write(bytes(1 << 12)):
-                        pass
-                except OSError:
-                    pass
+            peers.fill_disk(filling)
             said = self.send(daemon, files[4:], check=False)
             self.assertNotIn("Received Store Response (Success)", said)
             self.assertIn("OutOfResources", said)

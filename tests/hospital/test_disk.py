@@ -23,13 +23,7 @@ class Disk(Loop):
         series = self.series()
         daemon = self.daemon(None, 0, 2, 500_000_000, "", "", "--data", folder)
         filling = os.path.join(folder, "filling")
-        # Without a buffer, whose rest would be written, and fail, when the file is closed.
-        with open(filling, "wb", buffering=0) as file:
-            try:
-                while file.write(bytes(1 << 12)):
-                    pass
-            except OSError:
-                pass
+        peers.fill_disk(filling)
         status, _, answer = daemon.call("POST", "/v1/orders", {
             "source": {"pacs": "main", "study": series.study, "series": series.uid},
             "rule": "bone"})

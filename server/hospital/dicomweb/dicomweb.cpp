@@ -15,7 +15,7 @@ using orders::PacsFailure;
 using orders::PacsFault;
 using process::PeersObject;
 
-constexpr std::uint64_t kMostAnswerBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kMostResponseBytes = std::uint64_t{64} << 20;
 constexpr const char* kDicomJson = "application/dicom+json";
 // Optional attributes to include in results about series and studies.
 constexpr const char* kSeriesFields =
@@ -23,7 +23,7 @@ constexpr const char* kSeriesFields =
 constexpr const char* kPatientField = "includefield=00100020";
 
 // Throws unless the status promises a response of the requested kind.
-void check_status(const PeerAnswerHead& head) {
+void check_status(const PeerResponseHead& head) {
   const int status = head.status;
   if (status >= 200 && status < 300) return;
   const std::string said = "the PACS responded with status " + std::to_string(status);
@@ -116,24 +116,24 @@ bool names(const std::vector<PeersObject>& objects, const std::string& instance)
 }  // namespace
 
 DicomWeb::DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
-                   std::uint64_t most_series_bytes, AnswerReader read_answer)
+                   std::uint64_t most_series_bytes, ResponseReader read_response)
     : settings_(settings),
       peer_(settings),
       scratch_(std::move(scratch)),
       most_series_bytes_(most_series_bytes),
-      read_answer_(std::move(read_answer)) {}
+      read_response_(std::move(read_response)) {}
 
 std::vector<PeersObject> DicomWeb::search(const std::string& target, const std::stop_token& stop) {
   constexpr int kNotFound = 404;
-  const ScratchFile answer(scratch_, ".answer");
-  const PeerAnswerHead head = peer_.send({.target = target,
-                                          .accept = kDicomJson,
-                                          .answer = answer.path(),
-                                          .most_bytes = kMostAnswerBytes},
-                                         stop);
+  const ScratchFile response(scratch_, ".response");
+  const PeerResponseHead head = peer_.send({.target = target,
+                                            .accept = kDicomJson,
+                                            .response_file = response.path(),
+                                            .most_bytes = kMostResponseBytes},
+                                           stop);
   if (head.status == kNotFound) return {};  // some PACS respond so if nothing is found
   check_status(head);
-  return read_answer_(answer.path()).objects;
+  return read_response_(response.path()).objects;
 }
 
 std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
@@ -199,11 +199,11 @@ std::vector<std::string> DicomWeb::list_instances(const std::string& study,
 std::string DicomWeb::fetch_series(const std::string& study, const std::string& series,
                                    const std::filesystem::path& target,
                                    const std::stop_token& stop) {
-  const PeerAnswerHead head =
+  const PeerResponseHead head =
       peer_.send({.target = "/studies/" + study + "/series/" + series,
                   .accept = "multipart/related; type=\"application/dicom\"; transfer-syntax=" +
                             settings_.transfer_syntax,
-                  .answer = target,
+                  .response_file = target,
                   .most_bytes = most_series_bytes_},
                  stop);
   constexpr int kPartialContent = 206;
@@ -224,8 +224,7 @@ std::optional<std::string> DicomWeb::patient_of(const std::string& study,
   return same->patient_id;
 }
 
-std::optional<bool> DicomWeb::has_instance(const orders::InstancePlace& place,
-                                           const std::stop_token& stop) {
+bool DicomWeb::has_instance(const orders::InstancePlace& place, const std::stop_token& stop) {
   return names(search("/studies/" + place.study + "/series/" + place.series +
                           "/instances?SOPInstanceUID=" + place.instance,
                       stop),
@@ -242,16 +241,16 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
       .content_type = "multipart/related; type=\"application/dicom\"; boundary=" + boundary,
       .bytes = multipart.bytes(),
       .read = [&](std::span<std::byte> buffer) { return multipart.read(buffer); }};
-  const ScratchFile answer(scratch_, ".answer");
-  const PeerAnswerHead head = peer_.send({.target = "/studies/" + object.place.study,
-                                          .accept = kDicomJson,
-                                          .body = &body,
-                                          .answer = answer.path(),
-                                          .most_bytes = kMostAnswerBytes},
-                                         stop);
+  const ScratchFile response(scratch_, ".response");
+  const PeerResponseHead head = peer_.send({.target = "/studies/" + object.place.study,
+                                            .accept = kDicomJson,
+                                            .body = &body,
+                                            .response_file = response.path(),
+                                            .most_bytes = kMostResponseBytes},
+                                           stop);
   constexpr int kConflict = 409;  // the body has the reason
   if (head.status != kConflict) check_status(head);
-  const process::PeersAnswer said = read_answer_(answer.path());
+  const process::PeersResponse said = read_response_(response.path());
   const std::string& instance = object.place.instance;
   if (names(said.stored, instance)) return;
   const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);

@@ -10,14 +10,14 @@
 
 namespace isomesh::dicomweb {
 
-// Parses a PACS response in a confined process: see jobs::ImportRunner::read_answer.
-using AnswerReader = std::function<process::PeersAnswer(const std::filesystem::path& file)>;
+// Parses a PACS response in a confined process: see jobs::ImportRunner::read_response.
+using ResponseReader = std::function<process::PeersResponse(const std::filesystem::path& file)>;
 
-class DicomWeb : public orders::Pacs {
+class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
  public:
   // `scratch` is a folder for responses; the limit of bytes applies to one series.
   DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
-           std::uint64_t most_series_bytes, AnswerReader read_answer);
+           std::uint64_t most_series_bytes, ResponseReader read_response);
 
   std::vector<orders::FoundSeries> find_recent(const std::string& from_day,
                                                const std::string& modality,
@@ -32,8 +32,7 @@ class DicomWeb : public orders::Pacs {
                            const std::stop_token& stop) override;
   std::optional<std::string> patient_of(const std::string& study,
                                         const std::stop_token& stop) override;
-  std::optional<bool> has_instance(const orders::InstancePlace& place,
-                                   const std::stop_token& stop) override;
+  bool has_instance(const orders::InstancePlace& place, const std::stop_token& stop) override;
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:
@@ -48,7 +47,7 @@ class DicomWeb : public orders::Pacs {
   const HttpPeer peer_;
   const std::filesystem::path scratch_;
   const std::uint64_t most_series_bytes_;
-  const AnswerReader read_answer_;
+  const ResponseReader read_response_;
 };
 
 }  // namespace isomesh::dicomweb

@@ -36,17 +36,18 @@ class Exchange {
   Exchange(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)
       : request_(request),
         stop_(std::move(stop)),
-        target_(::open(request.answer.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)),
+        target_(
+            ::open(request.response_file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)),
         easy_(curl::make_easy()) {
     if (target_.number() < 0) throw_system_error("open", errno);
     set_connection(settings);
     set_request();
   }
 
-  PeerAnswerHead perform() {
+  PeerResponseHead perform() {
     const CURLcode result = curl::Transfer(easy_.get(), callbacks(), stop_).perform();
     if (result != CURLE_OK) throw_failure(result);
-    PeerAnswerHead head;
+    PeerResponseHead head;
     long status = 0;
     curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
     head.status = static_cast<int>(status);
@@ -145,7 +146,7 @@ class Exchange {
 
 }  // namespace
 
-PeerAnswerHead HttpPeer::send(const PeerRequest& request, const std::stop_token& stop) const {
+PeerResponseHead HttpPeer::send(const PeerRequest& request, const std::stop_token& stop) const {
   return Exchange(settings_, request, stop).perform();
 }
 

@@ -23,12 +23,12 @@ struct RequestBody {
 struct PeerRequest {
   std::string target;  // path and query, relative to the PACS' address
   std::string accept;
-  const RequestBody* body = nullptr;  // null: a GET
-  std::filesystem::path answer;       // the file for the response's body
-  std::uint64_t most_bytes = 0;       // limit of the response's body
+  const RequestBody* body = nullptr;    // null: a GET
+  std::filesystem::path response_file;  // for the response's body
+  std::uint64_t most_bytes = 0;         // limit of the response's body
 };
 
-struct PeerAnswerHead {
+struct PeerResponseHead {
   int status = 0;
   std::string content_type;  // as sent by the PACS; printable characters only
   std::chrono::seconds retry_after{0};
@@ -42,7 +42,7 @@ class HttpPeer {
   // Throws PacsFailure kUnreachable or kTimeout; kUnauthorized if the file of the password or token
   // cannot be read; Error kTooLarge if the response has more than most_bytes; kOutOfSpace;
   // kCancelled if `stop` is requested.
-  PeerAnswerHead send(const PeerRequest& request, const std::stop_token& stop) const;
+  PeerResponseHead send(const PeerRequest& request, const std::stop_token& stop) const;
 
  private:
   const orders::PacsSettings settings_;

@@ -1,4 +1,4 @@
-// Writes data sets in Explicit VR Little Endian (PS3.5, 7).
+// Writes DICOM files: their heads, and data sets in Explicit VR Little Endian (PS3.5, 7).
 #pragma once
 
 #include <cstdint>
@@ -42,5 +42,10 @@ class DataSet {
 
 // The header of an element whose value has `bytes` bytes, an even number below 2^32 - 1.
 std::string element_head(Tag tag, std::string_view vr, std::uint32_t bytes);
+
+// The part of a DICOM file before its data set (PS3.10, 7.1): preamble, prefix and file meta
+// information. Pure function.
+std::string file_head(std::string_view sop_class, std::string_view instance,
+                      std::string_view transfer_syntax);
 
 }  // namespace isomesh::dicom

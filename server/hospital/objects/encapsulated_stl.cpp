@@ -8,7 +8,6 @@
 
 #include "proto/error.h"
 #include "server/hospital/objects/data_set.h"
-#include "server/hospital/objects/file_head.h"
 #include "server/hospital/objects/uid.h"
 
 namespace isomesh::dicom {

@@ -21,11 +21,11 @@ constexpr std::size_t kMostMeshing = 1'000'000;
 
 // Exponential back-off with jitter over the upper half, so that orders that failed together do not
 // retry together.
-milliseconds delay_after(std::uint32_t failures, const Hospital& hospital) {
+milliseconds delay_after(std::uint32_t failures, const HospitalSettings& settings) {
   constexpr std::uint32_t kMostDoublings = 20;
   const milliseconds whole = std::min<milliseconds>(
-      hospital.first_delay * (std::int64_t{1} << std::min(failures, kMostDoublings)),
-      hospital.longest_delay);
+      settings.first_delay * (std::int64_t{1} << std::min(failures, kMostDoublings)),
+      settings.longest_delay);
   thread_local std::mt19937_64 random{std::random_device()()};
   return milliseconds(
       std::uniform_int_distribution<std::int64_t>(whole.count() / 2, whole.count())(random));
@@ -49,13 +49,14 @@ bool may_pass(ErrorCode code) {
 
 }  // namespace
 
-Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOptions options)
+Orders::Orders(const OrderServices& services, const HospitalSettings& settings,
+               OrderOptions options)
     : services_(services),
-      hospital_(hospital),
+      settings_(settings),
       options_(std::move(options)),
-      steps_(services, hospital, options_.now) {
+      steps_(services, settings, options_.now) {
   services_.audit.add({.event = store::AuditEvent::kStart});
-  for (const PacsSettings& each : hospital_.pacs) status_[each.name].name = each.name;
+  for (const PacsSettings& each : settings_.pacs) status_[each.name].name = each.name;
   // Their jobs may have ended while no process waited for them.
   for (const Order& order :
        services_.orders.list(std::nullopt, {.state = OrderState::kMeshing}, "", kMostMeshing)) {
@@ -66,7 +67,7 @@ Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOpt
       threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
     }
     threads_.emplace_back([this](const std::stop_token& stop) { watch(stop); });
-    if (hospital_.dimse) {
+    if (settings_.dimse) {
       threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
     }
   } catch (...) {
@@ -100,10 +101,10 @@ std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest
                                       const std::string& request_digest) {
   using Kind = store::OrderSubmission::Kind;
   const store::OrderSubmission submission =
-      services_.orders.submit({.record = make_order(hospital_, orderer, request),
+      services_.orders.submit({.record = make_order(settings_, orderer, request),
                                .idempotency_key = idempotency_key,
                                .request_digest = request_digest},
-                              hospital_.most_open);
+                              settings_.most_open);
   if (submission.kind == Kind::kConflict) {
     throw Error(ErrorCode::kKeyReused, "the idempotency key was used for another request");
   }
@@ -156,7 +157,7 @@ void Orders::job_ended(const std::string& job) {
 std::vector<PacsStatus> Orders::pacs() const {
   const Lock lock(mutex_);
   std::vector<PacsStatus> all;
-  for (const PacsSettings& each : hospital_.pacs) all.push_back(status_.at(each.name));
+  for (const PacsSettings& each : settings_.pacs) all.push_back(status_.at(each.name));
   return all;
 }
 
@@ -298,16 +299,16 @@ void Orders::on_end(std::function<void(const std::string& order)> listener) {
 void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Error& error,
                        bool may_pass, seconds retry_after) {
   const Time now = options_.now();
-  const bool is_over = now - time_of(record.work.begun) >= hospital_.give_up;
+  const bool is_over = now - time_of(record.work.begun) >= settings_.give_up;
   if (!may_pass || is_over) return end(record, error);
   Order& order = record.order;
   const milliseconds delay =
-      std::max<milliseconds>(delay_after(record.work.failures, hospital_), retry_after);
+      std::max<milliseconds>(delay_after(record.work.failures, settings_), retry_after);
   ++record.work.failures;
   record.work.failed_in = std::max(record.work.failed_in, std::optional(failed));
   ++order.attempts;
   order.error = to_problem(error, "/v1/orders/" + order.id);
-  const Time next = now + std::min<milliseconds>(delay, hospital_.give_up);
+  const Time next = now + std::min<milliseconds>(delay, settings_.give_up);
   order.next_attempt = timestamp_of(next);
   services_.orders.save(record, next);
   log(record, std::string(describe(error.code()).name));

@@ -39,7 +39,7 @@ struct OrderOptions {
 class Orders {
  public:
   // Starts work on open orders.
-  Orders(const OrderServices& services, const Hospital& hospital, OrderOptions options);
+  Orders(const OrderServices& services, const HospitalSettings& settings, OrderOptions options);
 
   // Aborts running steps; the next process continues them.
   ~Orders();
@@ -114,7 +114,7 @@ class Orders {
   void log(const store::OrderRecord& record, const std::string& reason) const;
 
   const OrderServices services_;
-  const Hospital& hospital_;
+  const HospitalSettings& settings_;
   const OrderOptions options_;
   const OrderSteps steps_;
 

@@ -1,10 +1,11 @@
-// Interface to a PACS, independent of the protocol.
+// Interfaces to a PACS, independent of the protocol.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -13,7 +14,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "server/hospital/orders/hospital.h"
+#include "server/hospital/orders/settings.h"
 #include "server/store/blob_store.h"
 
 namespace isomesh::orders {
@@ -71,15 +72,11 @@ struct OutgoingObject {
   store::LocalBlob file = {};
 };
 
-// Thread safe. All methods may throw PacsFailure, and Error kCancelled if `stop` is requested.
-class Pacs {
+// A source of an order's images. Thread safe. All methods may throw PacsFailure, and Error
+// kCancelled if `stop` is requested.
+class SeriesSource {
  public:
-  virtual ~Pacs() = default;
-
-  // Series of studies since that day (DA), of that modality unless it is empty.
-  virtual std::vector<FoundSeries> find_recent(const std::string& from_day,
-                                               const std::string& modality,
-                                               const std::stop_token& stop) = 0;
+  virtual ~SeriesSource() = default;
 
   // Empty if there is no such series.
   virtual std::optional<FoundSeries> find_series(const std::string& study,
@@ -95,17 +92,37 @@ class Pacs {
   virtual std::string fetch_series(const std::string& study, const std::string& series,
                                    const std::filesystem::path& target,
                                    const std::stop_token& stop) = 0;
+};
+
+// A PACS that can be queried. As SeriesSource.
+class Archive : public SeriesSource {
+ public:
+  // Series of studies since that day (DA), of that modality unless it is empty.
+  virtual std::vector<FoundSeries> find_recent(const std::string& from_day,
+                                               const std::string& modality,
+                                               const std::stop_token& stop) = 0;
 
   // The study's Patient ID; empty if there is no such study.
   virtual std::optional<std::string> patient_of(const std::string& study,
                                                 const std::stop_token& stop) = 0;
 
-  // Empty if the PACS cannot be queried; its response to storing is then the only evidence.
-  virtual std::optional<bool> has_instance(const InstancePlace& place,
-                                           const std::stop_token& stop) = 0;
+  virtual bool has_instance(const InstancePlace& place, const std::stop_token& stop) = 0;
+};
+
+// A PACS that stores objects. As SeriesSource.
+class ObjectReceiver {
+ public:
+  virtual ~ObjectReceiver() = default;
 
   // Returns once the PACS has confirmed that it stored this object.
   virtual void store(const OutgoingObject& object, const std::stop_token& stop) = 0;
+};
+
+// The capabilities of a peer; null for those it lacks.
+struct Peer {
+  std::shared_ptr<SeriesSource> source;
+  std::shared_ptr<Archive> archive;
+  std::shared_ptr<ObjectReceiver> receiver;
 };
 
 }  // namespace isomesh::orders

@@ -34,11 +34,6 @@ std::string received_by(const std::string& title) { return std::string(kPrefix) 
 
 bool is_received(std::string_view pacs) { return pacs.starts_with(kPrefix); }
 
-std::vector<FoundSeries> Received::find_recent(const std::string&, const std::string&,
-                                               const std::stop_token&) {
-  return {};
-}
-
 std::optional<FoundSeries> Received::find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token&) {
@@ -82,26 +77,14 @@ std::string Received::fetch_series(const std::string& study, const std::string& 
   return "multipart/related; type=\"application/dicom\"; boundary=" + boundary;
 }
 
-std::optional<std::string> Received::patient_of(const std::string&, const std::stop_token&) {
-  return std::nullopt;
-}
-
-std::optional<bool> Received::has_instance(const InstancePlace&, const std::stop_token&) {
-  return std::nullopt;
-}
-
-void Received::store(const OutgoingObject&, const std::stop_token&) {
-  throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
-}
-
 // Submits an order for the held series if it needs one. Releases the held instances once an order
 // has covered all of them.
 store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
   const auto& [title, study, series] = held.series;
-  const auto route = hospital_.dimse->routes.find(title);
+  const auto route = settings_.dimse->routes.find(title);
   // Kept, because the route may be configured again.
-  if (route == hospital_.dimse->routes.end()) return store::ReceivedFate::kOpen;
-  const Rule& rule = *hospital_.find_rule(route->second);
+  if (route == settings_.dimse->routes.end()) return store::ReceivedFate::kOpen;
+  const Rule& rule = *settings_.find_rule(route->second);
   const FoundSeries found = {
       .study = study, .series = series, .modality = "", .description = "", .instances = held.known};
   store::OrderRecord record = make_order(rule, received_by(title), found);
@@ -113,7 +96,7 @@ store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
   const store::ReceivedFate fate = services_.orders.submit_received(
       {.record = record, .idempotency_key = "", .request_digest = ""},
       {.rule = rule.name, .study = study, .series = series, .instances = held.known}, held.last,
-      hospital_.most_open);
+      settings_.most_open);
   if (fate == store::ReceivedFate::kNew) {
     log(record, "");
     changed();
@@ -136,10 +119,10 @@ void Orders::receive(const std::stop_token& stop) {
       const store::Time now = options_.now();
       std::erase_if(waiting, [&](const auto& each) { return each.second <= now; });
       for (const store::HeldSeries& held : services_.received.held()) {
-        if (std::max(held.last, begun) + hospital_.settle > now || waiting.contains(held.series))
+        if (std::max(held.last, begun) + settings_.settle > now || waiting.contains(held.series))
           continue;
         // Set first, so that a series that fails also waits and does not block others.
-        waiting[held.series] = now + hospital_.poll;
+        waiting[held.series] = now + settings_.poll;
         if (look_at_received(held) == store::ReceivedFate::kDone) waiting.erase(held.series);
       }
     } catch (const std::exception& error) {

@@ -1,4 +1,4 @@
-// Received series, as a PACS that orders fetch their images from.
+// Received series, as a source of images for orders.
 #pragma once
 
 #include <string>
@@ -13,15 +13,12 @@ namespace isomesh::orders {
 std::string received_by(const std::string& title);
 bool is_received(std::string_view pacs);
 
-// The series sent to one AE title. Nothing can be stored in it. Thread safe; the stores must
-// outlive it.
-class Received : public Pacs {
+// The series sent to one AE title. Thread safe; the stores must outlive it.
+class Received : public SeriesSource {
  public:
   Received(std::string title, const store::ReceivedStore& received, const store::BlobStore& blobs)
       : title_(std::move(title)), received_(received), blobs_(blobs) {}
 
-  std::vector<FoundSeries> find_recent(const std::string& from_day, const std::string& modality,
-                                       const std::stop_token& stop) override;
   std::optional<FoundSeries> find_series(const std::string& study, const std::string& series,
                                          const std::stop_token& stop) override;
   std::vector<std::string> list_instances(const std::string& study, const std::string& series,
@@ -30,11 +27,6 @@ class Received : public Pacs {
   std::string fetch_series(const std::string& study, const std::string& series,
                            const std::filesystem::path& target,
                            const std::stop_token& stop) override;
-  std::optional<std::string> patient_of(const std::string& study,
-                                        const std::stop_token& stop) override;
-  std::optional<bool> has_instance(const InstancePlace& place,
-                                   const std::stop_token& stop) override;
-  void store(const OutgoingObject& object, const std::stop_token& stop) override;
 
  private:
   const std::string title_;

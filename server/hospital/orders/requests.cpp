@@ -13,9 +13,10 @@ namespace {
 constexpr const char* kLabel = "Surface";
 constexpr std::int64_t kSeriesNumber = 9000;
 
-const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const OrderRequest& request) {
+const Rule* rule_of(const HospitalSettings& settings, const Orderer& orderer,
+                    const OrderRequest& request) {
   if (!request.rule) return nullptr;
-  const Rule* rule = hospital.find_rule(*request.rule);
+  const Rule* rule = settings.find_rule(*request.rule);
   if (rule == nullptr) throw invalid_parameter("rule", "is not configured");
   if (!orderer.is_administrator && rule->owner != orderer.name) {
     throw Error(ErrorCode::kForbidden, "the rule belongs to another owner");
@@ -24,9 +25,9 @@ const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const Orde
 }
 
 // A request contains names of PACS, never addresses.
-const PacsSettings& pacs_of(const Hospital& hospital, const std::string& name,
+const PacsSettings& pacs_of(const HospitalSettings& settings, const std::string& name,
                             std::string_view field) {
-  const PacsSettings* pacs = hospital.find_pacs(name);
+  const PacsSettings* pacs = settings.find_pacs(name);
   if (pacs == nullptr) throw invalid_parameter(std::string(field), "is not configured");
   return *pacs;
 }
@@ -49,16 +50,16 @@ void add_sent_formats(Order& order) {
 
 }  // namespace
 
-store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
+store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& orderer,
                               const OrderRequest& request) {
-  const Rule* rule = rule_of(hospital, orderer, request);
+  const Rule* rule = rule_of(settings, orderer, request);
   store::OrderRecord record;
   Order& order = record.order;
   order.id = time_ordered_id();
   order.created = timestamp();
   order.rule = request.rule;
   order.source = request.source;
-  const PacsSettings& source = pacs_of(hospital, request.source.pacs, "source.pacs");
+  const PacsSettings& source = pacs_of(settings, request.source.pacs, "source.pacs");
   order.parameters = parse_order_parameters(rule == nullptr ? "" : rule->parameters,
                                             request.parameters.value_or(""), "parameters.");
   order.priority = request.priority.value_or(Priority::kRoutine);
@@ -72,7 +73,7 @@ store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
   }
   if (rule == nullptr) check_owner(source, orderer);
   for (const SendTarget& target : order.send) {
-    const PacsSettings& pacs = pacs_of(hospital, target.pacs, "send.pacs");
+    const PacsSettings& pacs = pacs_of(settings, target.pacs, "send.pacs");
     if (rule == nullptr || request.send) check_owner(pacs, orderer);
   }
   add_sent_formats(order);

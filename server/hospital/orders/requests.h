@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "server/hospital/orders/hospital.h"
 #include "server/hospital/orders/pacs.h"
+#include "server/hospital/orders/settings.h"
 #include "server/store/order_store.h"
 
 namespace isomesh::orders {
@@ -17,7 +17,7 @@ struct Orderer {
 
 // Makes the order of a request. Throws Error kInvalidParameter that names the field; kForbidden for
 // another owner's rule, or a PACS that excludes the orderer.
-store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
+store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& orderer,
                               const OrderRequest& request);
 
 // Makes the order of a rule for a series that its watch has found or that was received.

@@ -7,9 +7,9 @@
 #include "base/sha256.h"
 #include "proto/error.h"
 #include "proto/json.h"
-#include "server/hospital/orders/objects.h"
+#include "server/hospital/orders/make_objects.h"
 #include "server/hospital/orders/received.h"
-#include "server/jobs/library/settle_labels.h"
+#include "server/jobs/library/complete_labels.h"
 
 namespace isomesh::orders {
 namespace {
@@ -99,10 +99,23 @@ Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop
   }
 }
 
-Pacs& OrderSteps::pacs(const std::string& name) const {
-  const auto found = services_.pacs.find(name);
-  if (found != services_.pacs.end()) return *found->second;
+const Peer& OrderSteps::peer(const std::string& name) const {
+  const auto found = services_.peers.find(name);
+  if (found != services_.peers.end()) return found->second;
   throw PacsFailure(PacsFault::kUnreachable, "the PACS is no longer configured");
+}
+
+SeriesSource& OrderSteps::source(const std::string& name) const {
+  if (const auto& source = peer(name).source) return *source;
+  throw PacsFailure(PacsFault::kRefused,
+                    "meshes can only be sent to this PACS: it has no dicomweb");
+}
+
+std::optional<bool> OrderSteps::has_instance(const std::string& pacs, const InstancePlace& place,
+                                             const std::stop_token& stop) const {
+  const auto& archive = peer(pacs).archive;
+  if (!archive) return std::nullopt;
+  return archive->has_instance(place, stop);
 }
 
 Time OrderSteps::save(store::OrderRecord& record, Time next) const {
@@ -138,12 +151,12 @@ void OrderSteps::note_query(store::OrderRecord& record, bool success) const {
 Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const {
   OrderSource& source = record.order.source;
   OrderWork& work = record.work;
-  Pacs& peer = pacs(source.pacs);
+  SeriesSource& images = this->source(source.pacs);
   std::optional<FoundSeries> series;
   std::vector<std::string> listed;
   try {
-    series = peer.find_series(source.study, source.series, stop);
-    if (series) listed = peer.list_instances(source.study, source.series, stop);
+    series = images.find_series(source.study, source.series, stop);
+    if (series) listed = images.list_instances(source.study, source.series, stop);
   } catch (const Error&) {
     note_query(record, false);
     throw;
@@ -155,17 +168,17 @@ Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_tok
       throw PacsFailure(PacsFault::kRefused, "the PACS does not know the series");
     }
     return save_after(OrderState::kWaiting, record,
-                      now + hospital_.first_delay * (1 << work.looks));
+                      now + settings_.first_delay * (1 << work.looks));
   }
   work.looks = 0;
   if (listed != work.listed || !work.listed_since) {
     work.listed = listed;
     work.listed_since = timestamp_of(now);
   }
-  const Time settled = time_of(*work.listed_since) + hospital_.settle;
+  const Time settled = time_of(*work.listed_since) + settings_.settle;
   const bool is_whole = !series->instances || *series->instances == listed.size();
   if (now < settled || !is_whole) {
-    const Time poll = now + hospital_.poll;
+    const Time poll = now + settings_.poll;
     return save_after(OrderState::kWaiting, record, now < settled ? std::min(settled, poll) : poll);
   }
   source.instances = static_cast<std::uint32_t>(listed.size());
@@ -179,7 +192,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   const std::filesystem::path file = scratch.path() / "series";
   try {
     const std::string type =
-        pacs(source.pacs).fetch_series(source.study, source.series, file, stop);
+        this->source(source.pacs).fetch_series(source.study, source.series, file, stop);
     auto [volume, identity] = services_.library.add_peers(record.owner, file,
                                                           {.content_type = type,
                                                            .study = source.study,
@@ -214,7 +227,7 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   const store::Viewer viewer = record.owner;
   if (parameters.labels) {
     const Volume volume = services_.volumes.get(viewer, parameters.volume);
-    parameters = jobs::settle_labels(std::move(parameters), viewer, volume, services_.labels);
+    parameters = jobs::complete_labels(std::move(parameters), viewer, volume, services_.labels);
   }
   const store::Submission submission =
       services_.jobs.submit({.owner = record.owner,
@@ -272,12 +285,12 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     }
     std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
     for (const SendTarget& target : record.order.send) {
-      const PacsSettings* pacs = hospital_.find_pacs(target.pacs);
+      const PacsSettings* pacs = settings_.find_pacs(target.pacs);
       if (pacs != nullptr) most_bytes = std::min(most_bytes, pacs->max_send_bytes);
     }
     if (record.work.max_error_mm && !record.work.triangles) {
       const auto triangles =
-          triangles_that_fit(record, job, hospital_.station_name, most_bytes, services_.blobs);
+          triangles_that_fit(record, job, settings_.station_name, most_bytes, services_.blobs);
       if (triangles) {
         record.work.triangles = *triangles;
         record.order.job.reset();
@@ -285,7 +298,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       }
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
-    objects = make_objects(record, job, hospital_.station_name, most_bytes, made, services_.blobs);
+    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {
@@ -300,15 +313,17 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
   }
   record.order.state = OrderState::kSending;
   const Time next = save_after(OrderState::kMeshing, record, now_());
-  for (const MadeObject& object : objects) services_.blobs.settle(object.blob.key);
+  for (const MadeObject& object : objects) services_.blobs.mark_named(object.blob.key);
   return next;
 }
 
 bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderResult& result,
                                  const std::stop_token& stop) const {
   const DicomIdentity& identity = *record.work.identity;
-  const auto patient = pacs(result.pacs).patient_of(identity.study_uid, stop);
-  if (patient) return *patient == identity.patient_id;
+  if (const auto& archive = peer(result.pacs).archive) {
+    const auto patient = archive->patient_of(identity.study_uid, stop);
+    if (patient) return *patient == identity.patient_id;
+  }
   // Only the PACS of the images must know the study.
   if (result.pacs != record.order.source.pacs) return true;
   throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
@@ -337,7 +352,10 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
   const OrderResult& result = record.order.results[index];
   const DicomIdentity& identity = *record.work.identity;
   const auto blob = services_.blobs.open(record.work.blobs[index]);
-  Pacs& peer = pacs(result.pacs);
+  const auto& receiver = peer(result.pacs).receiver;
+  if (!receiver) {
+    throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
+  }
   const InstancePlace place = {.study = identity.study_uid,
                                .series = result.series_uid,
                                .instance = result.sop_instance_uid};
@@ -351,14 +369,15 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
                              .instances = 1,
                              .patient_id = identity.patient_id};
   try {
-    peer.store({.place = place,
-                .bytes = blob->size(),
-                .read = [&](std::uint64_t offset,
-                            std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
-                .file = services_.blobs.local(record.work.blobs[index])},
-               stop);
+    receiver->store(
+        {.place = place,
+         .bytes = blob->size(),
+         .read = [&](std::uint64_t offset,
+                     std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
+         .file = services_.blobs.local(record.work.blobs[index])},
+        stop);
     // A confirmed store proves nothing, so the object is queried.
-    if (peer.has_instance(place, stop) == false) {
+    if (has_instance(result.pacs, place, stop) == false) {
       throw PacsFailure(PacsFault::kNotStored,
                         "the PACS confirmed that it stored the mesh, but does not find it");
     }
@@ -377,7 +396,7 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     const InstancePlace place = {.study = record.work.identity->study_uid,
                                  .series = result.series_uid,
                                  .instance = result.sop_instance_uid};
-    if (pacs(result.pacs).has_instance(place, stop) != true) {
+    if (has_instance(result.pacs, place, stop) != true) {
       check_before_sending(record, index, stop);
       send_one(record, index, stop);
     }

@@ -3,13 +3,13 @@
 #include <chrono>
 #include <functional>
 #include <map>
-#include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
-#include "server/hospital/orders/hospital.h"
 #include "server/hospital/orders/pacs.h"
+#include "server/hospital/orders/settings.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/volume_library.h"
 #include "server/store/audit_trail.h"
@@ -22,11 +22,11 @@
 
 namespace isomesh::orders {
 
-using PacsByName = std::map<std::string, std::unique_ptr<Pacs>, std::less<>>;
+using Peers = std::map<std::string, Peer, std::less<>>;
 
 struct OrderServices {
   const store::DataFolder& folder;
-  const store::BlobStore& blobs;
+  store::BlobStore& blobs;
   const store::VolumeStore& volumes;
   store::JobStore& jobs;
   jobs::VolumeLibrary& library;
@@ -34,7 +34,7 @@ struct OrderServices {
   store::OrderStore& orders;
   store::AuditTrail& audit;
   store::ReceivedStore& received;
-  const PacsByName& pacs;  // including those that represent received series
+  const Peers& peers;  // by name: the configured PACS, and the sources of received series
 };
 
 // The order ended during a step, for example because it was cancelled.
@@ -47,8 +47,8 @@ class OrderSteps {
  public:
   using Clock = std::function<store::Time()>;
 
-  OrderSteps(const OrderServices& services, const Hospital& hospital, Clock now)
-      : services_(services), hospital_(hospital), now_(std::move(now)) {}
+  OrderSteps(const OrderServices& services, const HospitalSettings& settings, Clock now)
+      : services_(services), settings_(settings), now_(std::move(now)) {}
 
   // Makes and saves the next step of an open order; returns when the following one is due. Throws
   // PacsFailure and Error if the step failed; `record` then has the state to save. Every return to
@@ -81,10 +81,15 @@ class OrderSteps {
   store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;
   // As above, without resetting failures.
   store::Time save(store::OrderRecord& record, store::Time next) const;
-  Pacs& pacs(const std::string& name) const;
+  // Throw PacsFailure if there is no such peer, or it cannot do that.
+  const Peer& peer(const std::string& name) const;
+  SeriesSource& source(const std::string& name) const;
+  // Empty if the PACS cannot be queried; its response to storing is then the only evidence.
+  std::optional<bool> has_instance(const std::string& pacs, const InstancePlace& place,
+                                   const std::stop_token& stop) const;
 
   const OrderServices services_;
-  const Hospital& hospital_;
+  const HospitalSettings& settings_;
   const Clock now_;
 };
 

@@ -37,12 +37,12 @@ bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {
 }  // namespace
 
 void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
-  const auto peer = services_.pacs.find(*rule.watch);
-  if (peer == services_.pacs.end()) return;
+  const auto peer = services_.peers.find(*rule.watch);
+  if (peer == services_.peers.end() || !peer->second.archive) return;
   try {
     bool is_told = false;
-    const auto found = peer->second->find_recent(day_before(options_.now(), rule.match.days),
-                                                 rule.match.modality, stop);
+    const auto found = peer->second.archive->find_recent(
+        day_before(options_.now(), rule.match.days), rule.match.modality, stop);
     for (const FoundSeries& series : found) {
       if (!is_wanted(series, rule.match)) continue;
       const store::OrderRecord record = make_order(rule, *rule.watch, series);
@@ -52,7 +52,7 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
            .study = series.study,
            .series = series.series,
            .instances = series.instances.value_or(0)},
-          hospital_.most_open);
+          settings_.most_open);
       if (!is_new) continue;
       // A watch repeats its query all day; only queries that led to orders are recorded.
       if (!std::exchange(is_told, true)) {
@@ -76,7 +76,7 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
 void Orders::watch(const std::stop_token& stop) {
   store::Time next_forgetting = options_.now();
   while (!stop.stop_requested()) {
-    for (const Rule& rule : hospital_.rules) {
+    for (const Rule& rule : settings_.rules) {
       if (rule.watch && !stop.stop_requested()) look_at_rule(rule, stop);
     }
     try {
@@ -89,7 +89,7 @@ void Orders::watch(const std::stop_token& stop) {
       log_error("ended orders could not be removed and are retried: {}", error.what());
     }
     Lock lock(mutex_);
-    changed_.wait_for(lock, stop, hospital_.poll, [] { return false; });
+    changed_.wait_for(lock, stop, settings_.poll, [] { return false; });
   }
 }
 

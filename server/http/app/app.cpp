@@ -58,9 +58,9 @@ bool has_ended(const Services& services, const std::string& id) {
 
 // The reason why the service accepts no work; empty if it does.
 std::string unready_reason(const Services& services) {
-  if (!services.jobs.answers()) return "the database does not respond";
+  if (!services.jobs.responds()) return "the database does not respond";
   if (services.jobs.is_full()) return "the queue is full";
-  if (!services.blobs.answers()) return "the storage of volumes and meshes does not respond";
+  if (!services.blobs.responds()) return "the storage of volumes and meshes does not respond";
   if (!services.blobs.has_room()) return "the disk is full: nothing new is accepted";
   const bool has_waiting = services.jobs.depth(std::nullopt).waiting_for_disk > 0;
   return has_waiting ? "jobs are waiting for disk space" : "";
@@ -126,7 +126,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
       readiness([&used = services] { return unready_reason(used); }),
       connections(
           connection_options(the_options),
-          {.answer = [this](Request& request,
+          {.handle = [this](Request& request,
                             Response& response) { return answer(*this, request, response); },
            .has_ended = [this](const std::string& job) { return has_ended(services, job); },
            .on_answered =

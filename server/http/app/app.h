@@ -5,7 +5,6 @@
 #include <functional>
 #include <optional>
 
-#include "server/http/answers/event_stream.h"
 #include "server/http/app/services.h"
 #include "server/http/connections/connections.h"
 #include "server/http/guards/access.h"
@@ -14,6 +13,7 @@
 #include "server/http/requests/kept_uploads.h"
 #include "server/http/requests/response.h"
 #include "server/http/requests/router.h"
+#include "server/http/responses/event_stream.h"
 #include "server/net/fair_places.h"
 
 namespace isomesh::http {

@@ -42,18 +42,22 @@ struct ServerOptions {
   const net::TlsFiles* tls = nullptr;     // null: no TLS
 };
 
+// Give each by its name. All must outlive the server.
 struct Services {
+  // Stored data.
   const store::DataFolder& folder;
   const store::BlobStore& blobs;
   const store::VolumeStore& volumes;
   store::JobStore& jobs;
+  const store::Outbox& outbox;
+  // Work on it.
   jobs::VolumeLibrary& library;
   jobs::Histograms& histograms;
   jobs::LabelLists& labels;
   jobs::Estimator& estimator;
   store::Retention& retention;
+  // Reports to others, and access.
   Metrics& metrics;
-  const store::Outbox& outbox;
   callbacks::Callbacks& callbacks;
   const callbacks::CallbackTargets& callback_targets;
   const Tokens* tokens = nullptr;  // null: requests are not authenticated

@@ -1,4 +1,4 @@
-// A part of the service that a build can leave out: what it adds to the rest.
+// The interface of a component that a build can leave out.
 #pragma once
 
 #include <chrono>
@@ -28,14 +28,14 @@ namespace isomesh::http {
 struct App;
 
 struct WingSettings {
-  std::filesystem::path file;  // what it is configured by; empty: it is not
+  std::filesystem::path file;  // its configuration; empty: it has none
   std::uint64_t max_upload_bytes = 0;
-  std::chrono::hours keep{30 * 24};  // what it has done
+  std::chrono::hours keep{30 * 24};  // for ended work
   // The programs of this installation. Throws Error kInternal when one is missing.
   std::function<std::filesystem::path(const std::string& name)> program;
 };
 
-// What it works with, which must outlive it.
+// Dependencies of a wing, which must outlive it.
 struct WingServices {
   const store::DataFolder& folder;
   store::BlobStore& blobs;
@@ -49,7 +49,7 @@ struct WingServices {
   std::function<store::Time()> believed_now;
 };
 
-// Files by the settings that name them; a name may be empty.
+// Each file with the setting that names it; a path may be empty.
 using ConfiguredFiles = std::vector<std::pair<std::string, std::filesystem::path>>;
 
 // Thread safe where said.
@@ -57,28 +57,28 @@ class Wing {
  public:
   virtual ~Wing() = default;
 
-  // Whether it is configured. Its routes are there in any case, and say so.
+  // True if it is configured. Its routes exist in any case, and otherwise fail with that reason.
   virtual bool is_open() const = 0;
 
   virtual void add_routes(App& app) = 0;
 
-  // Whether what has that id has ended, which requests wait for; empty when the wing has nothing of
-  // that id. Thread safe.
+  // True if the work with that id has ended, so that requests need not wait for it; empty if the
+  // wing has no such work. Thread safe.
   virtual std::optional<bool> has_ended(const std::string& id) const = 0;
 
-  // Has `listener` called with the id of whatever ends, by the thread that ends it.
+  // Sets the listener for ended work, which is called on the thread that ended it.
   virtual void on_end(std::function<void(const std::string& id)> listener) = 0;
 
-  // A job has ended: the wing may wait for it. Thread safe.
+  // Tells that a job has ended; the wing may wait for it. Thread safe.
   virtual void job_ended(const std::string& job) = 0;
 
   // Thread safe.
   virtual std::vector<MeasuredFamily> measure() const = 0;
 
-  // Nothing new is accepted from outside.
+  // Accepts no new work from outside.
   virtual void begin_drain() = 0;
 
-  // Cuts off what is under way; the next process goes on with it.
+  // Aborts running work; the next process continues it.
   virtual void stop() = 0;
 };
 

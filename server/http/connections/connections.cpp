@@ -8,7 +8,7 @@
 #include <poll.h>
 
 #include "base/niceness.h"
-#include "server/http/connections/library.h"
+#include "server/http/connections/httplib_adapter.h"
 #include "server/net/address.h"
 
 namespace isomesh::http {
@@ -70,7 +70,7 @@ void Connections::open(int listening) {
       [this](net::Connection connection) {
         enqueue(std::make_shared<Exchange>(std::move(connection), options_.body, stopping_),
                 [this](Exchange& exchange) {
-                  return handlers_.answer(exchange.request, exchange.response);
+                  return handlers_.handle(exchange.request, exchange.response);
                 });
       },
       [this](std::unique_ptr<net::ByteStream> stream, const std::string& address,
@@ -104,14 +104,15 @@ void Connections::refuse_one_of_many(Exchange& exchange) {
          {ErrorCode::kUnavailable, "too many requests are in progress"});
 }
 
-void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
+void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Handle& handle) {
   const bool is_for_probes = is_probe(exchange->request);
-  if (!is_for_probes && sender_->held_bytes() > options_.most_answer_bytes) {
-    return refuse(exchange->body.take_stream(), exchange->request.remote_address,
-                  {ErrorCode::kUnavailable, "too many answers are on their way to slow receivers"});
+  if (!is_for_probes && sender_->held_bytes() > options_.most_response_bytes) {
+    return refuse(
+        exchange->body.take_stream(), exchange->request.remote_address,
+        {ErrorCode::kUnavailable, "too many responses are on their way to slow receivers"});
   }
   net::BoundedTaskQueue& queue = is_for_probes ? *probes_ : *tasks_;
-  if (queue.try_enqueue(exchange->party, [this, exchange, answer] { serve(exchange, answer); })) {
+  if (queue.try_enqueue(exchange->party, [this, exchange, handle] { serve(exchange, handle); })) {
     return;
   }
   refuse_one_of_many(*exchange);
@@ -123,12 +124,12 @@ bool Connections::is_probe(const Request& request) const {
   return std::ranges::find(options_.probes, path) != options_.probes.end();
 }
 
-void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
+void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Handle& handle) {
   if (exchange->is_abandoned(options_.client_patience)) return;
   std::optional<Continuation> continuation;
   WrittenResponse written =
-      pass_through_library(exchange->request, exchange->body, exchange->response,
-                           [&] { continuation = answer(*exchange); });
+      run_through_httplib(exchange->request, exchange->body, exchange->response,
+                          [&] { continuation = handle(*exchange); });
   if (continuation && continuation->computing_for) return compute(exchange, *continuation);
   if (continuation) return park(exchange, *continuation);
   if (handlers_.on_answered) {
@@ -166,12 +167,12 @@ void Connections::compute(const std::shared_ptr<Exchange>& exchange,
   exchange->party = *continuation.computing_for;
   const bool is_accepted = computing_->try_enqueue(
       exchange->party,
-      [this, exchange, resume = continuation.resume] { answer_by(exchange, resume); });
+      [this, exchange, resume = continuation.resume] { finish_by(exchange, resume); });
   if (!is_accepted) refuse_one_of_many(*exchange);
 }
 
 // Enters the library once more to write the response.
-void Connections::answer_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
+void Connections::finish_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
   serve(exchange, [&resume](Exchange& waited) {
     resume(waited.request, waited.response);
     return std::optional<Continuation>();
@@ -181,7 +182,7 @@ void Connections::answer_by(const std::shared_ptr<Exchange>& exchange, const Res
 // An accepted request is queued regardless of the backlog, unless the service stops.
 void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
   const bool has_turn = tasks_->enqueue_rest(
-      exchange->party, [this, exchange, resume] { answer_by(exchange, resume); });
+      exchange->party, [this, exchange, resume] { finish_by(exchange, resume); });
   if (has_turn) return;
   refuse(exchange->body.take_stream(), exchange->request.remote_address,
          {ErrorCode::kUnavailable, "the service is shutting down"});

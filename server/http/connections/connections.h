@@ -33,7 +33,7 @@ struct ConnectionOptions {
   std::size_t computing_threads = 12;
   // Bytes of responses in transit to slow receivers. Beyond it, requests are rejected until the
   // bytes are sent.
-  std::size_t most_answer_bytes = std::size_t{256} << 20;
+  std::size_t most_response_bytes = std::size_t{256} << 20;
   // Paths of health probes. They have their own thread, which no other request blocks.
   std::vector<std::string> probes = {};
   // A client that has closed its sending direction is considered lost after this time.
@@ -51,13 +51,13 @@ struct BodySizes {
 
 // Callbacks of connections. All are called concurrently.
 struct ConnectionHandlers {
-  // Answers a request. Neither it nor its continuation may throw.
-  std::function<std::optional<Continuation>(Request& request, Response& response)> answer;
+  // Handles a request. Neither it nor its continuation may throw.
+  std::function<std::optional<Continuation>(Request& request, Response& response)> handle;
   net::Parked::HasEnded has_ended;
   // Called for every answered request, before its response is sent. May be empty.
   std::function<void(const Request& request, const Response& response, const BodySizes& sizes)>
       on_answered;
-  // Called for every connection rejected without calling `answer`. May be empty.
+  // Called for every connection rejected without calling `handle`. May be empty.
   std::function<void(const std::string& address, const Error& error)> on_refused;
 };
 
@@ -88,19 +88,19 @@ class Connections {
 
  private:
   struct Exchange;
-  using Answer = std::function<std::optional<Continuation>(Exchange& exchange)>;
+  using Handle = std::function<std::optional<Continuation>(Exchange& exchange)>;
   using Resume = decltype(Continuation::resume);
 
   void refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
               const Error& error);
   void refuse_one_of_many(Exchange& exchange);
   bool is_probe(const Request& request) const;
-  void enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
-  void serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
+  void enqueue(const std::shared_ptr<Exchange>& exchange, const Handle& handle);
+  void serve(const std::shared_ptr<Exchange>& exchange, const Handle& handle);
   void park(const std::shared_ptr<Exchange>& exchange, const Continuation& continuation);
   void compute(const std::shared_ptr<Exchange>& exchange, const Continuation& continuation);
   void go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume);
-  void answer_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume);
+  void finish_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume);
 
   const ConnectionOptions options_;
   const ConnectionHandlers handlers_;

@@ -13,7 +13,7 @@
 
 #include "base/mutex.h"
 #include "proto/error.h"
-#include "server/http/requests/caller.h"
+#include "server/http/requests/request.h"
 
 namespace isomesh::http {
 

@@ -18,7 +18,6 @@
 
 namespace isomesh::http {
 
-// An answered request.
 struct AnsweredRequest {
   std::string_view method;
   std::string_view route;  // its pattern, or kNoRoute

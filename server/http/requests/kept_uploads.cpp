@@ -133,7 +133,7 @@ KeptUploads::Entries::iterator KeptUploads::found(const std::string& owner,
   return entry;
 }
 
-void KeptUploads::settle(const std::string& owner, const std::string& name,
+void KeptUploads::finish(const std::string& owner, const std::string& name,
                          const std::string& volume) {
   const Lock lock(mutex_);
   const auto entry = look_up(owner, name);

@@ -64,7 +64,7 @@ class KeptUploads {
 
   // Call after an upload was read. Deletes one that came in one request. Of a resumable upload
   // keeps only its resulting volume, or all of it for several volumes ("").
-  void settle(const std::string& owner, const std::string& name, const std::string& volume)
+  void finish(const std::string& owner, const std::string& name, const std::string& volume)
       ISOMESH_EXCLUDES(mutex_);
 
   // A missing one is not an error.

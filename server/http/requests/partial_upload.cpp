@@ -125,22 +125,22 @@ std::filesystem::file_time_type PartialUpload::written_at() const {
   return absent ? std::filesystem::last_write_time(note_path_) : time;
 }
 
-std::uint64_t PartialUpload::end_turns() {
+std::uint64_t PartialUpload::end_leases() {
   const Lock lock(mutex_);
-  ++turn_;
+  ++lease_;
   return offset();
 }
 
-std::optional<PartialTurn> PartialUpload::begin_turn(std::uint64_t offset) {
+std::optional<PartialLease> PartialUpload::begin_lease(std::uint64_t offset) {
   const Lock lock(mutex_);
-  ++turn_;
+  ++lease_;
   if (this->offset() != offset) return std::nullopt;
-  return PartialTurn{turn_, offset};
+  return PartialLease{lease_, offset};
 }
 
-void PartialUpload::tell_length(const Turn& turn, std::uint64_t length) {
+void PartialUpload::tell_length(const Lease& lease, std::uint64_t length) {
   const Lock lock(mutex_);
-  check(turn);
+  check(lease);
   if (note_.length == length) return;
   if (note_.length || length < bytes_) {
     throw invalid_parameter("Upload-Length", "differs from the length of this upload");
@@ -149,9 +149,9 @@ void PartialUpload::tell_length(const Turn& turn, std::uint64_t length) {
   write_note();
 }
 
-void PartialUpload::write(const Turn& turn, std::span<const std::byte> bytes) {
+void PartialUpload::write(const Lease& lease, std::span<const std::byte> bytes) {
   const Lock lock(mutex_);
-  check(turn);
+  check(lease);
   if (note_.length && bytes.size() > *note_.length - bytes_) {
     throw invalid_parameter("Upload-Length", "the body exceeds the upload's length");
   }
@@ -165,15 +165,15 @@ void PartialUpload::write(const Turn& turn, std::span<const std::byte> bytes) {
   bytes_ += bytes.size();
 }
 
-void PartialUpload::take_back(const Turn& turn) {
+void PartialUpload::take_back(const Lease& lease) {
   const Lock lock(mutex_);
-  check(turn);
-  cut(turn.offset);
+  check(lease);
+  cut(lease.offset);
 }
 
-void PartialUpload::complete(const Turn& turn) {
+void PartialUpload::complete(const Lease& lease) {
   const Lock lock(mutex_);
-  check(turn);
+  check(lease);
   if (bytes_ == 0) throw Error(ErrorCode::kInvalidParameter, "the body is empty");
   if (note_.length.value_or(bytes_) != bytes_) {
     throw invalid_parameter("Upload-Complete", "the upload has fewer bytes than its length");
@@ -197,7 +197,7 @@ void PartialUpload::let_go() {
   const Lock lock(mutex_);
   is_let_go_ = true;
   if (bytes_file_) bytes_file_->goes = true;
-  ++turn_;
+  ++lease_;
 }
 
 std::uint64_t PartialUpload::offset() const {
@@ -211,8 +211,8 @@ void PartialUpload::cut(std::uint64_t bytes) {
   bytes_ = bytes;
 }
 
-void PartialUpload::check(const Turn& turn) const {
-  if (turn.number != turn_) {
+void PartialUpload::check(const Lease& lease) const {
+  if (lease.number != lease_) {
     throw Error(ErrorCode::kUnavailable, "another request continues this upload");
   }
   if (note_.is_complete) {

@@ -29,7 +29,7 @@ struct PartialNote {
   bool operator==(const PartialNote&) const = default;
 };
 
-struct PartialTurn {
+struct PartialLease {
   std::uint64_t number = 0;
   std::uint64_t offset = 0;  // number of bytes when it began
 };
@@ -42,7 +42,7 @@ struct PartialTurn {
 // reported number stays true.
 class PartialUpload {
  public:
-  using Turn = PartialTurn;
+  using Lease = PartialLease;
 
   // Begins an upload. Throws Error kOutOfSpace or kInternal.
   PartialUpload(const std::filesystem::path& folder, std::string name, PartialNote note);
@@ -64,18 +64,18 @@ class PartialUpload {
   std::filesystem::file_time_type written_at() const;
 
   // Ends any lease and returns the number of bytes.
-  std::uint64_t end_turns() ISOMESH_EXCLUDES(mutex_);
+  std::uint64_t end_leases() ISOMESH_EXCLUDES(mutex_);
   // Begins a lease to append, which ends the previous one. Empty unless there are exactly `offset`
   // bytes.
-  std::optional<Turn> begin_turn(std::uint64_t offset) ISOMESH_EXCLUDES(mutex_);
+  std::optional<Lease> begin_lease(std::uint64_t offset) ISOMESH_EXCLUDES(mutex_);
 
   // All throw Error kUnavailable if another lease has begun, kInvalidParameter if the upload is
   // complete or `length` contradicts an earlier one; write() also throws as write_all does.
-  void tell_length(const Turn& turn, std::uint64_t length) ISOMESH_EXCLUDES(mutex_);
-  void write(const Turn& turn, std::span<const std::byte> bytes) ISOMESH_EXCLUDES(mutex_);
+  void tell_length(const Lease& lease, std::uint64_t length) ISOMESH_EXCLUDES(mutex_);
+  void write(const Lease& lease, std::span<const std::byte> bytes) ISOMESH_EXCLUDES(mutex_);
   // Truncates to the start of the lease.
-  void take_back(const Turn& turn) ISOMESH_EXCLUDES(mutex_);
-  void complete(const Turn& turn) ISOMESH_EXCLUDES(mutex_);
+  void take_back(const Lease& lease) ISOMESH_EXCLUDES(mutex_);
+  void complete(const Lease& lease) ISOMESH_EXCLUDES(mutex_);
 
   // Records the resulting volume and deletes the bytes.
   void become(const std::string& volume) ISOMESH_EXCLUDES(mutex_);
@@ -97,7 +97,7 @@ class PartialUpload {
 
   std::uint64_t offset() const ISOMESH_REQUIRES(mutex_);
   void cut(std::uint64_t bytes) ISOMESH_REQUIRES(mutex_);
-  void check(const Turn& turn) const ISOMESH_REQUIRES(mutex_);
+  void check(const Lease& lease) const ISOMESH_REQUIRES(mutex_);
   void write_note() const ISOMESH_REQUIRES(mutex_);
 
   const std::string name_;
@@ -108,7 +108,7 @@ class PartialUpload {
   PartialNote note_ ISOMESH_GUARDED_BY(mutex_);
   Descriptor file_ ISOMESH_GUARDED_BY(mutex_);
   std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  std::uint64_t turn_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::uint64_t lease_ ISOMESH_GUARDED_BY(mutex_) = 0;
   bool is_let_go_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 

@@ -11,11 +11,24 @@
 #include <utility>
 #include <vector>
 
-#include "server/http/requests/caller.h"
 #include "server/http/requests/trace.h"
 #include "server/net/request_head.h"
 
 namespace isomesh::http {
+
+enum class Role {
+  kUser,     // its own volumes and jobs
+  kAdmin,    // all volumes and jobs, and the metrics
+  kMonitor,  // only the metrics
+};
+
+// Without tokens every caller is an unnamed administrator.
+struct Caller {
+  std::string name;
+  Role role = Role::kAdmin;
+
+  bool operator==(const Caller&) const = default;
+};
 
 // The route of unrouted requests in logs and metrics.
 inline constexpr std::string_view kNoRoute = "none";

@@ -14,7 +14,7 @@
 
 namespace isomesh::http {
 
-// How the end of a streamed body is marked.
+// The mark of the end of a streamed body.
 enum class Framing {
   kLength,  // by Content-Length
   kChunks,  // the source writes chunks (RFC 9112, 7.1)

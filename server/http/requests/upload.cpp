@@ -182,20 +182,20 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
            is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"))};
 }
 
-void receive_part(PartialUpload& upload, const PartialTurn& turn, const store::DataFolder& folder,
+void receive_part(PartialUpload& upload, const PartialLease& lease, const store::DataFolder& folder,
                   const UploadLimits& limits, const std::atomic<bool>& stopping,
                   const Request& request) {
   refuse_encoded(request);
-  check_length(request, limits.max_bytes, turn.offset);
+  check_length(request, limits.max_bytes, lease.offset);
   check_room(folder, request);
   const std::optional<std::string> expected = sha256_of_content_digest(request);
-  const auto write = [&](std::span<const std::byte> piece) { upload.write(turn, piece); };
-  Receiver receiver(write, folder.reserve(), limits, stopping, expected.has_value(), turn.offset);
+  const auto write = [&](std::span<const std::byte> piece) { upload.write(lease, piece); };
+  Receiver receiver(write, folder.reserve(), limits, stopping, expected.has_value(), lease.offset);
   const bool complete =
       request.body->read([&](std::string_view piece) { return receiver.take(piece); });
   receiver.finish_part(*request.body, complete);
   if (expected && receiver.digest() != *expected) {
-    upload.take_back(turn);
+    upload.take_back(lease);
     throw other_digest();
   }
 }

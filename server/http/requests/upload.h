@@ -43,12 +43,12 @@ class Upload {
 };
 
 class PartialUpload;
-struct PartialTurn;
+struct PartialLease;
 
 // Appends the request's body. Received bytes stay even if the rest is missing, unless they
 // contradict Content-Digest. Throws as Upload does, except for an empty body, and as
 // PartialUpload's functions do.
-void receive_part(PartialUpload& upload, const PartialTurn& turn, const store::DataFolder& folder,
+void receive_part(PartialUpload& upload, const PartialLease& lease, const store::DataFolder& folder,
                   const UploadLimits& limits, const std::atomic<bool>& stopping,
                   const Request& request);
 

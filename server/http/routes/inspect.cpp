@@ -6,7 +6,7 @@
 #include "proto/json.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
-#include "server/jobs/library/stored_samples.h"
+#include "server/jobs/library/intact_volume.h"
 #include "server/volume/preview.h"
 #include "server/volume/slice.h"
 
@@ -55,7 +55,7 @@ void slice(App& app, const Request& request, Response& response) {
                            to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag, kForever)) return;
   const auto canonical = std::make_shared<const volume::CanonicalFile>(
-      jobs::stored_samples(app.services.blobs, volume.id).path);
+      jobs::intact_volume(app.services.blobs, volume.id).path);
   const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
   response.set_header("Accept-Ranges", "none");
   answer_pieces(request, response, "image/png",
@@ -73,7 +73,7 @@ void preview(App& app, const Request& request, Response& response) {
                            to_text(choice.window[0]) + '.' + to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag, kForever)) return;
   const auto canonical = std::make_shared<const volume::CanonicalFile>(
-      jobs::stored_samples(app.services.blobs, volume.id).path);
+      jobs::intact_volume(app.services.blobs, volume.id).path);
   const auto reduced = std::make_shared<volume::PreviewNrrd>(canonical, choice);
   const auto next = [reduced] { return std::optional<std::string>(reduced->next()); };
   response.status = 200;
@@ -99,7 +99,7 @@ void labels(App& app, const Request& request, Response& response) {
 
 void estimate(App& app, const Request& request, Response& response) {
   const JobParameters parameters =
-      settled(app, request, parse_job_parameters(request.query, VolumeIn::kQuery));
+      complete_parameters(app, request, parse_job_parameters(request.query, VolumeIn::kQuery));
   answer_json(response, 200,
               to_json(app.services.estimator.estimate(viewer_of(request), parameters)));
 }

@@ -36,7 +36,7 @@ std::optional<Continuation> submit(App& app, const Request& request, Response& r
     // The first count of the volume's labels reads all of it.
     const auto place =
         spec.parameters.labels ? place_for_upload(app, request) : net::FairPlaces::Place();
-    spec.parameters = settled(app, request, spec.parameters);
+    spec.parameters = complete_parameters(app, request, spec.parameters);
   }
   const Job job = submitted(app, spec, response);
   const bool waits = wait.count() > 0;

@@ -12,10 +12,10 @@
 #include "proto/fields.h"
 #include "proto/json.h"
 #include "server/codec/formats.h"
-#include "server/http/answers/sources.h"
 #include "server/http/app/outcomes.h"
 #include "server/http/requests/import_query.h"
 #include "server/http/requests/request_values.h"
+#include "server/http/responses/sources.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/library/label_pages.h"
 
@@ -79,7 +79,8 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   // A key belongs to one request: the same volume (by its id), the same parameters and this route
   // ("mesh").
   const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
-  return submitted(app, {owner_of(request), settled(app, request, parameters), key, digest},
+  return submitted(app,
+                   {owner_of(request), complete_parameters(app, request, parameters), key, digest},
                    response);
 }
 

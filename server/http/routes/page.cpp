@@ -1,9 +1,9 @@
-#include "server/http/answers/page.h"
+#include "server/http/responses/page.h"
 
 #include <algorithm>
 
-#include "server/http/answers/sources.h"
 #include "server/http/requests/request_values.h"
+#include "server/http/responses/sources.h"
 #include "server/http/routes/routes.h"
 
 namespace isomesh::http {

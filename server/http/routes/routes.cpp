@@ -9,7 +9,7 @@
 #include "base/text.h"
 #include "proto/json.h"
 #include "server/http/requests/upload.h"
-#include "server/jobs/library/settle_labels.h"
+#include "server/jobs/library/complete_labels.h"
 #include "server/jobs/making/crop.h"
 
 namespace isomesh::http {
@@ -26,7 +26,7 @@ void check_is_json(const Request& request) {
 
 std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
                                           const Job& job, std::chrono::milliseconds wait,
-                                          const JobAnswer& answer) {
+                                          const JobResponder& answer) {
   if (is_final(job.state) || wait.count() == 0 || app.stopping) {
     answer(request, response, job);
     return std::nullopt;
@@ -87,13 +87,14 @@ std::string json_body(App& app, const Request& request) {
   return read_text(request, kMostBodyBytes);
 }
 
-JobParameters settled(const App& app, const Request& request, JobParameters parameters) {
+JobParameters complete_parameters(const App& app, const Request& request,
+                                  JobParameters parameters) {
   if (!parameters.labels && !parameters.crop) return parameters;
   const store::Viewer viewer = viewer_of(request);
   const Volume volume = app.services.volumes.get(viewer, parameters.volume);
   if (parameters.crop) jobs::samples_in(*parameters.crop, volume.geometry, volume.dims);
   if (!parameters.labels) return parameters;
-  return jobs::settle_labels(std::move(parameters), viewer, volume, app.services.labels);
+  return jobs::complete_labels(std::move(parameters), viewer, volume, app.services.labels);
 }
 
 Job submitted(App& app, const store::JobSpec& spec, Response& response) {

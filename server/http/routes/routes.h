@@ -10,10 +10,10 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
-#include "server/http/answers/list_page.h"
-#include "server/http/answers/sources.h"
 #include "server/http/app/app.h"
 #include "server/http/requests/request_values.h"
+#include "server/http/responses/list_page.h"
+#include "server/http/responses/sources.h"
 
 namespace isomesh::http {
 
@@ -82,20 +82,20 @@ net::FairPlaces::Place place_for_upload(App& app, const Request& request);
 // the places for uploads. Throws as place_for_upload and read_text do.
 std::string json_body(App& app, const Request& request);
 
-// Completes the parameters from their volume; see jobs::settle_labels. Throws as that does, and
+// Completes the parameters from their volume; see jobs::complete_labels. Throws as that does, and
 // Error kNotFound without the volume.
-JobParameters settled(const App& app, const Request& request, JobParameters parameters);
+JobParameters complete_parameters(const App& app, const Request& request, JobParameters parameters);
 
 // Submits a job. Throws as store::job_of does, with a Retry-After in `response`.
 Job submitted(App& app, const store::JobSpec& spec, Response& response);
 
-using JobAnswer = std::function<void(const Request&, Response&, const Job&)>;
+using JobResponder = std::function<void(const Request&, Response&, const Job&)>;
 
 // Calls `answer` with the job's state when it has ended or `wait` is over: now, or by a
 // continuation.
 std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
                                           const Job& job, std::chrono::milliseconds wait,
-                                          const JobAnswer& answer);
+                                          const JobResponder& answer);
 
 struct WhichMesh {
   MeshFormat format = MeshFormat::kDrc;
@@ -113,6 +113,5 @@ void add_mesh_routes(App& app);
 void add_inspect_routes(App& app);
 void add_page_routes(App& app);
 void add_service_routes(App& app);
-void add_metrics_route(App& app);
 
 }  // namespace isomesh::http

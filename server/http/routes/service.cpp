@@ -1,3 +1,6 @@
+#include <chrono>
+#include <filesystem>
+
 #include <nlohmann/json.hpp>
 
 #include "server/http/requests/request_values.h"
@@ -6,6 +9,24 @@
 #include "server/jobs/queue/pipeline.h"
 
 namespace isomesh::http {
+namespace {
+
+Levels levels_of(const App& app) {
+  const store::QueueDepth depth = app.services.jobs.depth(std::nullopt);
+  Levels levels;
+  for (std::size_t i = 0; i < levels.queued.size(); ++i) levels.queued[i] = depth.queued[i];
+  levels.running = depth.running;
+  levels.uploads = app.uploads.taken();
+  levels.callbacks = app.services.outbox.count();
+  levels.disk_used_bytes = app.services.retention.named_bytes();
+  std::error_code unknown;  // then 0 is reported
+  const auto space = std::filesystem::space(app.services.folder.blobs(), unknown);
+  if (!unknown) levels.disk_free_bytes = space.available;
+  if (app.services.hospital != nullptr) levels.others = app.services.hospital->measure();
+  return levels;
+}
+
+}  // namespace
 
 void add_service_routes(App& app) {
   add_get(app, "/livez",
@@ -26,6 +47,10 @@ void add_service_routes(App& app) {
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {
     response.set_body(kOpenApi, "application/yaml");
+  });
+  add_get(app, "/metrics", [&app](const auto& request, auto& response) {
+    check_known(request, {});
+    response.set_body(app.metrics.text(levels_of(app)), Metrics::kMediaType);
   });
 }
 

@@ -43,7 +43,7 @@ void tell_limits(const App& app, Response& response) {
 
 // Reports the offset, which ends the lease of the present sender.
 void tell_state(const App& app, Response& response, PartialUpload& upload) {
-  response.set_header(kOffset, std::to_string(upload.end_turns()));
+  response.set_header(kOffset, std::to_string(upload.end_leases()));
   const PartialNote note = upload.note();
   response.set_header(kComplete, note.is_complete ? "?1" : "?0");
   if (note.length) response.set_header(kLength, std::to_string(*note.length));
@@ -75,12 +75,12 @@ void check_length(const App& app, std::optional<std::uint64_t> length, Response&
 }
 
 // Receives one part of the body, which may be the first and may be empty.
-void receive(App& app, const Request& request, PartialUpload& upload, const PartialTurn& turn) {
-  if (const auto length = number_in(request, kLength)) upload.tell_length(turn, *length);
+void receive(App& app, const Request& request, PartialUpload& upload, const PartialLease& lease) {
+  if (const auto length = number_in(request, kLength)) upload.tell_length(lease, *length);
   if (request.content_length && boolean_in(request, kComplete).value_or(false)) {
-    upload.tell_length(turn, turn.offset + *request.content_length);
+    upload.tell_length(lease, lease.offset + *request.content_length);
   }
-  receive_part(upload, turn, app.services.folder, app.options.upload, app.stopping, request);
+  receive_part(upload, lease, app.services.folder, app.options.upload, app.stopping, request);
 }
 
 void check_digest(const PartialUpload& upload) {
@@ -112,15 +112,15 @@ void append(App& app, const Request& request, Response& response) {
   check_length(app, number_in(request, kLength), response);
   const KeptUploads::Partial upload = upload_of(app, request);
   const auto place = place_for_upload(app, request);
-  const std::optional<PartialTurn> turn = upload->begin_turn(*offset);
-  if (!turn) return answer_other_offset(app, request, response, *upload);
-  receive(app, request, *upload, *turn);
+  const std::optional<PartialLease> lease = upload->begin_lease(*offset);
+  if (!lease) return answer_other_offset(app, request, response, *upload);
+  receive(app, request, *upload, *lease);
   if (!*is_last) {
     tell_state(app, response, *upload);
     response.status = 204;
     return;
   }
-  upload->complete(*turn);
+  upload->complete(*lease);
   response.set_header(kComplete, "?1");
   check_digest(*upload);
   Request asked = request;
@@ -166,7 +166,7 @@ void begin_upload(App& app, const Request& request, Response& response) {
                       .file_name = file_name_of(request.header("Content-Disposition")),
                       .sha256 = sha256_of_digest(request, "Repr-Digest").value_or("")});
   try {
-    receive(app, request, *upload, *upload->begin_turn(0));
+    receive(app, request, *upload, *upload->begin_lease(0));
   } catch (...) {
     // The client does not know its name.
     app.kept.let_go(owner_of(request), upload->name());

@@ -184,7 +184,7 @@ void answer_volumes(App& app, const Request& request, Response& response, const 
   const bool is_one = volumes.size() == 1 && only.volume;
   // Another volume of the archive may be requested later.
   if (only.volume && !body.name.empty() && !request.has_parameter("member")) {
-    app.kept.settle(owner_of(request), body.name, is_one ? to_json(*only.volume) : std::string());
+    app.kept.finish(owner_of(request), body.name, is_one ? to_json(*only.volume) : std::string());
   }
   if (!is_one) {
     constexpr int kMultiStatus = 207;

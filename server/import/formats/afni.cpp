@@ -1,5 +1,3 @@
-#include "server/import/formats/afni.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <span>
 
 #include "base/text.h"
+#include "server/import/formats/format_readers.h"
 
 namespace isomesh::import {
 namespace {

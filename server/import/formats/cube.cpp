@@ -1,5 +1,3 @@
-#include "server/import/formats/cube.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "base/text.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
 
 namespace isomesh::import {

@@ -1,5 +1,3 @@
-#include "server/import/formats/hdf5.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "proto/samples.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/hdf5_file.h"
 #include "server/import/formats/placing.h"
 #include "server/import/samples/transfer.h"

@@ -1,10 +1,9 @@
-#include "server/import/formats/isq.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
 
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
 #include "server/import/source/header_bytes.h"
 

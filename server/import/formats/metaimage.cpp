@@ -1,5 +1,3 @@
-#include "server/import/formats/metaimage.h"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,6 +9,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/units.h"
 

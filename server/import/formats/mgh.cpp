@@ -1,5 +1,3 @@
-#include "server/import/formats/mgh.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -7,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
 #include "server/import/source/header_bytes.h"
 

@@ -1,5 +1,3 @@
-#include "server/import/formats/mrc.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
 #include "server/import/source/header_bytes.h"
 

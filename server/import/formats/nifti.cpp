@@ -1,5 +1,3 @@
-#include "server/import/formats/nifti.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "base/text.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/nifti_extensions.h"
 #include "server/import/formats/nifti_header.h"
 #include "server/import/formats/placing.h"

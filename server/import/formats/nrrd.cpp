@@ -1,5 +1,3 @@
-#include "server/import/formats/nrrd.h"
-
 #include <algorithm>
 #include <array>
 #include <map>
@@ -11,7 +9,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
-#include "server/import/formats/nifti.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/nrrd_segments.h"
 #include "server/import/formats/nrrd_space.h"
 #include "server/import/source/reader.h"

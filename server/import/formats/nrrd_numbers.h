@@ -27,7 +27,6 @@ std::vector<double> axis_numbers(const NrrdFields& fields, std::string_view name
 std::vector<std::string_view> axis_words(const NrrdFields& fields, std::string_view name,
                                          std::size_t axes);
 
-// Removes the spaces at the front of `rest`.
 void skip_spaces(std::string_view& rest);
 
 // Removes "(x,y,z)" or "none" from the front of `rest`. Empty if there is neither.

@@ -1,5 +1,3 @@
-#include "server/import/formats/numpy.h"
-
 #include <algorithm>
 #include <cstdint>
 #include <optional>
@@ -9,6 +7,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/source/header_bytes.h"
 
 namespace isomesh::import {

@@ -1,5 +1,3 @@
-#include "server/import/formats/par.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <tuple>
 
 #include "base/text.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
 
 namespace isomesh::import {

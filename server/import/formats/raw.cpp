@@ -1,9 +1,8 @@
-#include "server/import/formats/raw.h"
-
 #include <string>
 
 #include "base/files.h"
 #include "proto/error.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/samples/transfer.h"
 
 namespace isomesh::import {

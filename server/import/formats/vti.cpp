@@ -1,5 +1,3 @@
-#include "server/import/formats/vti.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/vti_document.h"
 
 namespace isomesh::import {

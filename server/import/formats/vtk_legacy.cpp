@@ -1,5 +1,3 @@
-#include "server/import/formats/vtk_legacy.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "base/text.h"
+#include "server/import/formats/format_readers.h"
 #include "server/import/formats/vtk_arrays.h"
 
 namespace isomesh::import {

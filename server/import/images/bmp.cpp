@@ -1,11 +1,10 @@
-#include "server/import/images/bmp.h"
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
+#include "server/import/images/page.h"
 #include "server/import/source/header_bytes.h"
 #include "server/import/source/names.h"
 

@@ -1,5 +1,3 @@
-#include "server/import/images/png.h"
-
 #include <bit>
 #include <csetjmp>
 #include <cstdint>
@@ -11,6 +9,7 @@
 
 #include <png.h>
 
+#include "server/import/images/page.h"
 #include "server/import/source/header_bytes.h"
 #include "server/import/source/names.h"
 

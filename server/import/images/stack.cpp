@@ -10,9 +10,8 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/import/formats/placing.h"
-#include "server/import/images/bmp.h"
 #include "server/import/images/natural_order.h"
-#include "server/import/images/png.h"
+#include "server/import/images/page.h"
 #include "server/import/images/tiff.h"
 #include "server/import/samples/transfer.h"
 

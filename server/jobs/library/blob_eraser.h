@@ -17,8 +17,7 @@ class BlobEraser {
  public:
   // `coming` is held shared while a blob and its record are added, and exclusively while a blob is
   // erased. All arguments must outlive this object.
-  BlobEraser(const store::BlobStore& blobs, const store::VolumeStore& volumes,
-             std::shared_mutex& coming)
+  BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes, std::shared_mutex& coming)
       : blobs_(blobs),
         volumes_(volumes),
         coming_(coming),
@@ -37,7 +36,7 @@ class BlobEraser {
   void run(const std::stop_token& stop);
   void erase_now(const std::string& key);
 
-  const store::BlobStore& blobs_;
+  store::BlobStore& blobs_;
   const store::VolumeStore& volumes_;
   std::shared_mutex& coming_;
   Mutex mutex_;

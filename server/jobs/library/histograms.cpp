@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "server/jobs/library/stored_samples.h"
+#include "server/jobs/library/intact_volume.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
 
@@ -46,9 +46,9 @@ volume::ValueCounts count_values(const volume::CanonicalFile& canonical, const V
 
 Histogram Histograms::of(const store::Viewer& viewer, const Volume& volume, std::size_t bins) {
   const auto values = counts_.get({viewer, volume.id}, [&] {
-    const store::LocalBlob file = stored_samples(blobs_, volume.id);
-    return made_of_intact(blobs_, volume.id, {},
-                          [&] { return count_values(volume::CanonicalFile(file.path), volume); });
+    const store::LocalBlob file = intact_volume(blobs_, volume.id);
+    return make_from_volume(blobs_, volume.id, {},
+                            [&] { return count_values(volume::CanonicalFile(file.path), volume); });
   });
   return {volume.id, volume.range, volume::rebinned(*values, bins)};
 }

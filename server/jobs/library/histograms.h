@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "proto/types.h"
-#include "server/jobs/library/memo.h"
+#include "server/jobs/library/cache.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 #include "server/volume/histogram.h"
@@ -29,7 +29,7 @@ class Histograms {
 
  private:
   const store::BlobStore& blobs_;
-  Memo<std::pair<store::Viewer, std::string>, volume::ValueCounts> counts_{kVolumes, kMostWaiting};
+  Cache<std::pair<store::Viewer, std::string>, volume::ValueCounts> counts_{kVolumes, kMostWaiting};
 };
 
 }  // namespace isomesh::jobs

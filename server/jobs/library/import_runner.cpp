@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kEnd{2000};  // for a process to exit after it closed its socket
-constexpr std::size_t kMostAnswerBytes = std::size_t{16} << 20;
+constexpr std::size_t kMostResponseBytes = std::size_t{16} << 20;
 
 std::string while_reading(const process::ImportReport& report) {
   return report.reading.empty() ? "" : " while reading " + report.reading;
@@ -101,14 +101,14 @@ Volume ImportRunner::run(const process::ImportTask& task) {
   return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds})), task);
 }
 
-process::PeersAnswer ImportRunner::read_answer(const std::filesystem::path& file) {
+process::PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
   const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
   try {
     process::ImportReport report =
-        report_of(process::to_message(process::AnswerOrder{{file}, bounds}));
+        report_of(process::to_message(process::ResponseOrder{{file}, bounds}));
     if (report.error) throw *report.error;
-    if (!report.answer) throw_lying();
-    return *std::move(report.answer);
+    if (!report.response) throw_lying();
+    return *std::move(report.response);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
     throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS cannot be read");
@@ -134,21 +134,21 @@ process::ImportReport ImportRunner::report_of(const std::string& message) {
 
 std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
                                                           const std::string& message) {
-  using Ending = process::Heard::Ending;
-  child.tell(message);
+  using Ending = process::Output::Ending;
+  child.send_last(message);
   const auto deadline = Clock::now() + options_.bounds.time;
-  const process::Heard heard = child.listen(kMostAnswerBytes, deadline, stop_.get_token());
-  if (heard.ending == Ending::kStopped) {
+  const process::Output output = child.receive(kMostResponseBytes, deadline, stop_.get_token());
+  if (output.ending == Ending::kStopped) {
     throw Error(ErrorCode::kUnavailable, "the service is shutting down");
   }
-  process::ImportReport report = process::report_from(heard.text);
-  if (heard.ending == Ending::kTooLong) {
+  process::ImportReport report = process::report_from(output.text);
+  if (output.ending == Ending::kTooLong) {
     refuse_dead("after " + std::to_string(options_.bounds.time.count()) + " seconds", report);
   }
-  const bool is_answered = report.volume || report.answer || report.error;
-  if (heard.ending == Ending::kTooMuch || !is_answered) {
+  const bool is_answered = report.volume || report.response || report.error;
+  if (output.ending == Ending::kTooMuch || !is_answered) {
     const auto status = child.ended_within(kEnd);
-    if (heard.ending == Ending::kClosed && !report.begun) return std::nullopt;
+    if (output.ending == Ending::kClosed && !report.begun) return std::nullopt;
     prepared_.renew();
     refuse_dead(process::how_it_ended(status), report);
   }

@@ -38,7 +38,7 @@ class ImportRunner {
 
   // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
   // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
-  process::PeersAnswer read_answer(const std::filesystem::path& file);
+  process::PeersResponse read_response(const std::filesystem::path& file);
 
   // Aborts running and waiting imports, and rejects further ones.
   void stop();

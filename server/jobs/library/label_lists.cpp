@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "proto/samples.h"
-#include "server/jobs/library/stored_samples.h"
+#include "server/jobs/library/intact_volume.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
@@ -190,9 +190,9 @@ LabelValues values_of(const Volume& volume) {
 std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::Viewer& viewer,
                                                                    const Volume& volume) {
   return counts_.get({viewer, volume.id}, [&] {
-    const store::LocalBlob file = stored_samples(blobs_, volume.id);
-    return made_of_intact(blobs_, volume.id, {},
-                          [&] { return count_labels(volume::CanonicalFile(file.path), volume); });
+    const store::LocalBlob file = intact_volume(blobs_, volume.id);
+    return make_from_volume(blobs_, volume.id, {},
+                            [&] { return count_labels(volume::CanonicalFile(file.path), volume); });
   });
 }
 

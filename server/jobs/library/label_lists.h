@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "proto/types.h"
-#include "server/jobs/library/memo.h"
+#include "server/jobs/library/cache.h"
 #include "server/mesh/labels/labels.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -50,10 +50,10 @@ class LabelLists {
   using Counts = std::vector<mesh::LabelVoxels>;
 
   const store::BlobStore& blobs_;
-  Memo<std::pair<store::Viewer, std::string>, Counts> counts_{kVolumes, kMostWaiting};
+  Cache<std::pair<store::Viewer, std::string>, Counts> counts_{kVolumes, kMostWaiting};
   // The key has the record's creation time, because the same samples may be uploaded again with
   // other names.
-  Memo<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
+  Cache<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
       kLists, kMostWaiting};
 };
 

@@ -29,10 +29,10 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
 }
 
 std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& owner,
-                                                          const std::filesystem::path& answer,
+                                                          const std::filesystem::path& response,
                                                           const process::PeersSeries& series) {
   const store::ScratchFolder scratch(folder_.scratch());
-  Volume volume = import_file(answer, {.peers = series}, scratch);
+  Volume volume = import_file(response, {.peers = series}, scratch);
   if (!volume.dicom) throw Error(ErrorCode::kInternal, "images from a PACS have no DICOM identity");
   DicomIdentity identity = *volume.dicom;
   return {keep(owner, std::move(volume), scratch).first, std::move(identity)};
@@ -59,7 +59,7 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   volume.id = blob.key;
   volume.created = timestamp();
   auto [stored, is_new] = volumes_.add(owner, volume);
-  blobs_.settle(blob.key);
+  blobs_.mark_named(blob.key);
   // These describe this upload, which may differ from the one that created the record.
   stored.notes = std::move(volume.notes);
   stored.ignored = std::move(volume.ignored);

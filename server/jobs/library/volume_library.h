@@ -21,7 +21,7 @@ namespace isomesh::jobs {
 // Thread safe; its dependencies must outlive it.
 class VolumeLibrary {
  public:
-  VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
+  VolumeLibrary(const store::DataFolder& folder, store::BlobStore& blobs,
                 store::VolumeStore& volumes, store::Retention& retention,
                 const volume::SizeLimits& limits, const RunnerOptions& runner)
       : folder_(folder),
@@ -42,7 +42,7 @@ class VolumeLibrary {
   // Imports a series from a PACS response. Second: the patient, study and series according to the
   // images themselves; the record may be of an earlier upload of the same samples.
   std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
-                                             const std::filesystem::path& answer,
+                                             const std::filesystem::path& response,
                                              const process::PeersSeries& series);
 
   // Imports all volumes of an upload, each in a process of its own, one after the other. Each
@@ -78,7 +78,7 @@ class VolumeLibrary {
                                const store::ScratchFolder& scratch);
 
   const store::DataFolder& folder_;
-  const store::BlobStore& blobs_;
+  store::BlobStore& blobs_;
   store::VolumeStore& volumes_;
   store::Retention& retention_;
   const volume::SizeLimits limits_;

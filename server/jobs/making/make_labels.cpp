@@ -7,8 +7,8 @@
 
 #include "proto/samples.h"
 #include "server/codec/formats.h"
-#include "server/codec/zip/label_zip.h"
-#include "server/jobs/library/settle_labels.h"
+#include "server/codec/label_zip.h"
+#include "server/jobs/library/complete_labels.h"
 #include "server/jobs/making/certify_stage.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"

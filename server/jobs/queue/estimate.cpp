@@ -6,7 +6,7 @@
 
 #include "proto/json.h"
 #include "server/codec/formats.h"
-#include "server/jobs/library/stored_samples.h"
+#include "server/jobs/library/intact_volume.h"
 #include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/stage_times.h"
 
@@ -145,14 +145,14 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
                                 const MeshParameters& parameters, double iso) {
   const auto find = [&] {
     const std::stop_token stop = stop_.get_token();
-    const store::LocalBlob file = stored_samples(blobs_, volume.id, stop);
+    const store::LocalBlob file = intact_volume(blobs_, volume.id, stop);
     const JobOrder order = {.work = JobOrder::Work::kCount,
                             .file = file.path,
                             .volume = volume,
                             .parameters = parameters,
                             .iso = iso,
                             .memory_bytes = limits_.memory_bytes};
-    return made_of_intact(blobs_, volume.id, stop, [&] {
+    return make_from_volume(blobs_, volume.id, stop, [&] {
       const Lock lock(process_mutex_);
       return process_.count(order, stop);
     });

@@ -11,7 +11,7 @@
 #include "base/mutex.h"
 #include "proto/stages.h"
 #include "proto/types.h"
-#include "server/jobs/library/memo.h"
+#include "server/jobs/library/cache.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -99,7 +99,7 @@ class Estimator {
   std::stop_source stop_;
   Mutex process_mutex_;
   JobProcess process_ ISOMESH_GUARDED_BY(process_mutex_);  // counts one surface at a time
-  Memo<Surface, CountedSurface> counts_{kSurfaces, kMostWaiting};
+  Cache<Surface, CountedSurface> counts_{kSurfaces, kMostWaiting};
 };
 
 }  // namespace isomesh::jobs

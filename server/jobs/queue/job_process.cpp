@@ -23,7 +23,7 @@ constexpr milliseconds kGone{2000};
 // but libdraco encodes a whole stream without checking.
 constexpr milliseconds kPatience{300};
 // Longer than most lines, and large enough for efficient reading of files.
-constexpr std::size_t kHeardBytes = std::size_t{256} << 10;
+constexpr std::size_t kReceivedBytes = std::size_t{256} << 10;
 // The triangles of 65 535 labels take about 3 MB.
 constexpr std::size_t kLongestLine = std::size_t{16} << 20;
 // A process may die while idle; several in a row are a defect.
@@ -55,9 +55,10 @@ CountedSurface JobProcess::count(const JobOrder& order, const std::stop_token& s
 
 JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink> sinks,
                              const std::stop_token& stop, const Report& report) {
-  if (begin_ == end_ && heard_.size() > kHeardBytes) {  // free the memory of an unusually long line
-    heard_.resize(kHeardBytes);
-    heard_.shrink_to_fit();
+  if (begin_ == end_ &&
+      received_.size() > kReceivedBytes) {  // free the memory of an unusually long line
+    received_.resize(kReceivedBytes);
+    received_.shrink_to_fit();
     begin_ = end_ = 0;
   }
   const InputFile file(order.file);
@@ -65,7 +66,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
     start();
     Talk talk = {order, sinks, stop, report};
     try {
-      child_->say(to_line(order), file.descriptor());
+      child_->send(to_line(order), file.descriptor());
       auto end = follow(talk);
       if (!end) {
         log_warning("a prepared job process ended before its job began; another one takes over");
@@ -92,10 +93,10 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
 void JobProcess::start() {
   if (child_ && child_->has_ended()) child_.reset();  // it ended while idle, so no job caused it
   if (child_) return;
-  heard_.resize(std::max(heard_.size(), kHeardBytes));
+  received_.resize(std::max(received_.size(), kReceivedBytes));
   child_ = process::start_program(program_.file);
   begin_ = end_ = 0;
-  child_->say(to_line(program_.setup));
+  child_->send(to_line(program_.setup));
 }
 
 std::optional<JobAnswer> JobProcess::follow(Talk& talk) {
@@ -134,7 +135,7 @@ void JobProcess::pass_on(const JobPiece& piece, Talk& talk) {
   for (std::size_t left = piece.bytes; left > 0;) {
     if (begin_ == end_ && !hear(talk)) throw_ended(talk);
     const std::size_t count = std::min(left, end_ - begin_);
-    const auto bytes = std::as_bytes(std::span(heard_).subspan(begin_, count));
+    const auto bytes = std::as_bytes(std::span(received_).subspan(begin_, count));
     begin_ += count;
     left -= count;
     if (talk.failure) continue;
@@ -149,11 +150,11 @@ void JobProcess::pass_on(const JobPiece& piece, Talk& talk) {
 std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
   std::size_t looked_at = begin_;
   for (;;) {
-    const auto from = heard_.begin() + static_cast<std::ptrdiff_t>(looked_at);
-    const auto to = heard_.begin() + static_cast<std::ptrdiff_t>(end_);
+    const auto from = received_.begin() + static_cast<std::ptrdiff_t>(looked_at);
+    const auto to = received_.begin() + static_cast<std::ptrdiff_t>(end_);
     if (const auto found = std::find(from, to, '\n'); found != to) {
-      const auto length = static_cast<std::size_t>(found - heard_.begin()) - begin_;
-      const std::string_view line(heard_.data() + begin_, length);
+      const auto length = static_cast<std::size_t>(found - received_.begin()) - begin_;
+      const std::string_view line(received_.data() + begin_, length);
       begin_ += length + 1;
       return line;
     }
@@ -161,7 +162,7 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
     if (known >= kLongestLine) {
       throw Error(ErrorCode::kInternal, "A job process sent too much text.");
     }
-    if (known == heard_.size()) heard_.resize(2 * heard_.size());
+    if (known == received_.size()) received_.resize(2 * received_.size());
     if (!hear(talk)) return std::nullopt;
     looked_at = begin_ + known;
   }
@@ -169,8 +170,8 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
 
 bool JobProcess::hear(Talk& talk) {
   if (begin_ > 0) {  // only then: otherwise each piece of a long line would move the whole line
-    std::copy(heard_.begin() + static_cast<std::ptrdiff_t>(begin_),
-              heard_.begin() + static_cast<std::ptrdiff_t>(end_), heard_.begin());
+    std::copy(received_.begin() + static_cast<std::ptrdiff_t>(begin_),
+              received_.begin() + static_cast<std::ptrdiff_t>(end_), received_.begin());
     end_ -= std::exchange(begin_, 0);
   }
   for (;;) {
@@ -178,7 +179,7 @@ bool JobProcess::hear(Talk& talk) {
     pollfd waiting = {child_->socket().number(), POLLIN, 0};
     if (::poll(&waiting, 1, static_cast<int>(process::kLook.count())) <= 0) continue;
     const ssize_t count =
-        ::recv(child_->socket().number(), heard_.data() + end_, heard_.size() - end_, 0);
+        ::recv(child_->socket().number(), received_.data() + end_, received_.size() - end_, 0);
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) return false;
     end_ += static_cast<std::size_t>(count);
@@ -189,7 +190,7 @@ bool JobProcess::hear(Talk& talk) {
 void JobProcess::look_at_stop(Talk& talk) {
   if (!talk.failure && !talk.stop.stop_requested()) return;
   if (!talk.asked) {
-    child_->say(kCancelMessage);
+    child_->send(kCancelMessage);
     talk.asked = Clock::now();
   }
   if (Clock::now() - *talk.asked < kPatience) return;

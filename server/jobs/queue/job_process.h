@@ -59,7 +59,7 @@ class JobProcess {
   void pass_on(const JobProgress& progress, Talk& talk);
   // Returns nothing if the process has ended.
   std::optional<std::string_view> next_line(Talk& talk);
-  // Appends received bytes to heard_. Returns false if the process has ended.
+  // Appends received bytes to received_. Returns false if the process has ended.
   bool hear(Talk& talk);
   // If the order should stop, asks the process to; kills the process and throws if it does not stop
   // in time.
@@ -68,8 +68,8 @@ class JobProcess {
 
   const JobProgram program_;
   std::optional<process::Child> child_;
-  std::vector<char> heard_;
-  std::size_t begin_ = 0;  // start of the unread bytes in heard_
+  std::vector<char> received_;
+  std::size_t begin_ = 0;  // start of the unread bytes in received_
   std::size_t end_ = 0;
 };
 

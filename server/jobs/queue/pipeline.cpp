@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/jobs/library/stored_samples.h"
+#include "server/jobs/library/intact_volume.h"
 #include "server/jobs/making/stage_times.h"
 
 namespace isomesh::jobs {
@@ -27,11 +27,11 @@ std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume
 }  // namespace
 
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
-                            const PipelineLimits& limits, const store::BlobStore& blobs,
+                            const PipelineLimits& limits, store::BlobStore& blobs,
                             JobProcess& process, std::stop_token stop, const Report& report) {
   const auto began = Clock::now();
   report(Stage::kLoad, 0, {});
-  const store::LocalBlob file = stored_samples(blobs, volume.id, stop);
+  const store::LocalBlob file = intact_volume(blobs, volume.id, stop);
   const double checking = milliseconds_since(began);
 
   // All are committed at the end, so an unfinished job leaves no files.
@@ -58,8 +58,8 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                           .memory_bytes = limits.memory_bytes,
                           .disk_bytes = disk_for_files(blobs, volume),
                           .expected = expected_times(volume, parameters, parameters.certify)};
-  MadeMesh made = made_of_intact(blobs, volume.id, stop,
-                                 [&] { return process.make(order, sinks, stop, pass_on); });
+  MadeMesh made = make_from_volume(blobs, volume.id, stop,
+                                   [&] { return process.make(order, sinks, stop, pass_on); });
   const auto stored = Clock::now();
   PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
   for (std::size_t i = 0; i < files.size(); ++i) {

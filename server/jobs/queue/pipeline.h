@@ -30,7 +30,7 @@ inline constexpr const char* kMesherVersion = "11";
 // memory); kUnusableVolume if the stored samples are corrupt; kOutOfSpace, kInternal, and
 // ProcessEnded.
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
-                            const PipelineLimits& limits, const store::BlobStore& blobs,
+                            const PipelineLimits& limits, store::BlobStore& blobs,
                             JobProcess& process, std::stop_token stop, const Report& report);
 
 }  // namespace isomesh::jobs

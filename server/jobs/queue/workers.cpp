@@ -104,7 +104,7 @@ class Workers::Run {
 };
 
 Workers::Workers(const WorkerOptions& options, store::JobStore& jobs,
-                 const store::VolumeStore& volumes, const store::BlobStore& blobs)
+                 const store::VolumeStore& volumes, store::BlobStore& blobs)
     : options_(options), jobs_(jobs), volumes_(volumes), blobs_(blobs), alive_(options.threads) {
   try {
     for (std::size_t i = 0; i < options.threads; ++i) {

@@ -29,7 +29,7 @@ struct WorkerOptions {
 class Workers {
  public:
   Workers(const WorkerOptions& options, store::JobStore& jobs, const store::VolumeStore& volumes,
-          const store::BlobStore& blobs);
+          store::BlobStore& blobs);
 
   // Stops running jobs and puts them back into the queue. Returns once all threads have ended.
   ~Workers();
@@ -55,7 +55,7 @@ class Workers {
   const WorkerOptions options_;
   store::JobStore& jobs_;
   const store::VolumeStore& volumes_;
-  const store::BlobStore& blobs_;
+  store::BlobStore& blobs_;
   std::stop_source claims_;   // stops claiming jobs
   std::stop_source running_;  // interrupts running jobs
   Mutex alive_mutex_;

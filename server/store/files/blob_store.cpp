@@ -71,7 +71,7 @@ class FileReader : public BlobReader {
 
 class FileBlobStore::Writer : public BlobWriter {
  public:
-  explicit Writer(const FileBlobStore& store)
+  explicit Writer(FileBlobStore& store)
       : store_(store),
         path_(store.folders_.drafts / (random_hex(8) + ".blob")),
         file_(File::create(path_)) {}
@@ -102,7 +102,7 @@ class FileBlobStore::Writer : public BlobWriter {
   }
 
  private:
-  const FileBlobStore& store_;
+  FileBlobStore& store_;
   std::filesystem::path path_;
   File file_;
   Sha256 digest_;
@@ -149,11 +149,11 @@ std::uint64_t FileBlobStore::counted_bytes() const {
   return bytes;
 }
 
-bool FileBlobStore::answers() const {
+bool FileBlobStore::responds() const {
   if (!holds_) return true;
   constexpr std::chrono::seconds kForHowLong{2};
   constexpr std::chrono::seconds kPatience{5};
-  return probe_.answers(kForHowLong, kPatience, [this] {
+  return health_.passes(kForHowLong, kPatience, [this] {
     try {
       holds_->held(std::chrono::nanoseconds(0));
       return true;
@@ -176,7 +176,7 @@ std::string FileBlobStore::mark() const {
   return std::filesystem::exists(place) ? read_whole(place) : "";
 }
 
-void FileBlobStore::set_mark(const std::string& text) const {
+void FileBlobStore::set_mark(const std::string& text) {
   const ScratchFolder scratch(folders_.drafts);
   const std::filesystem::path draft = scratch.path() / kMark;
   {
@@ -208,9 +208,9 @@ std::uint64_t FileBlobStore::capacity() const {
   return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
 }
 
-std::unique_ptr<BlobWriter> FileBlobStore::begin() const { return std::make_unique<Writer>(*this); }
+std::unique_ptr<BlobWriter> FileBlobStore::begin() { return std::make_unique<Writer>(*this); }
 
-void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
+void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) {
   if (holds_) {
     copy_in(file, blob);
     return;
@@ -228,7 +228,7 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) c
 }
 
 // A shared folder is on another file system, so the file cannot be moved.
-void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob) const {
+void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob) {
   const File source = File::open(file);
   const std::unique_ptr<BlobWriter> writer = begin();
   std::vector<std::byte> block(kBlockBytes);
@@ -299,7 +299,7 @@ std::optional<std::uint64_t> FileBlobStore::size(const std::string& key) const {
   return bytes;
 }
 
-void FileBlobStore::erase(const std::string& key) const {
+void FileBlobStore::erase(const std::string& key) {
   const std::uint64_t bytes = size_of(path_of(key));
   std::error_code ignored;
   if (std::filesystem::remove(path_of(key), ignored)) room_.give(bytes);
@@ -318,7 +318,7 @@ std::filesystem::path FileBlobStore::path_of(const std::string& key) const {
 }
 
 std::string FileBlobStore::publish_as(const std::filesystem::path& path, const File& file,
-                                      const std::string& key, std::uint64_t taken) const {
+                                      const std::string& key, std::uint64_t taken) {
   // The times of written files are coarse. An exact time makes any later write within the same tick
   // change it.
   touch(path);
@@ -328,8 +328,8 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   const std::string hold = holds_ ? holds_->hold(key) : "";
   std::string traits;
   const auto stored = [&](std::uint64_t replaced) ISOMESH_REQUIRES(places_) {
-    room_.settle(taken + replaced, bytes);
-    unsettled_.note(key, hold);
+    room_.correct(taken + replaced, bytes);
+    unnamed_.note(key, hold);
     traits = traits_of(place);
   };
   // If the place is free, no surviving record can name the blob before both syncs. On most file
@@ -346,7 +346,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
     if (folders_.outlive_crashes) file.sync();
   } catch (...) {
     // The file counts until it is swept; the caller gives back the bytes that it took.
-    if (has_moved) room_.settle(0, taken);
+    if (has_moved) room_.correct(0, taken);
     throw;
   }
   if (!has_moved) {
@@ -361,7 +361,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
 
 // A folder may exist but not be on disk, if another thread has just made it or the process that
 // made it was killed. So this process syncs all of them once.
-void FileBlobStore::make_folder_for(const std::filesystem::path& place) const {
+void FileBlobStore::make_folder_for(const std::filesystem::path& place) {
   const Lock lock(folders_mutex_);
   std::error_code error;
   if (!has_folders_) {

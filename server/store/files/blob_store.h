@@ -16,8 +16,8 @@
 #include "server/store/files/files.h"
 #include "server/store/files/folder_holds.h"
 #include "server/store/files/room.h"
-#include "server/store/probe.h"
-#include "server/store/unsettled.h"
+#include "server/store/health_check.h"
+#include "server/store/unnamed_blobs.h"
 
 namespace isomesh::store {
 
@@ -36,16 +36,16 @@ class FileBlobStore : public BlobStore {
   }
 
   // For a shared folder: creates and removes a file.
-  bool answers() const override;
+  bool responds() const override;
   bool is_shared() const override { return holds_.has_value(); }
   bool is_empty() const override;
   std::string mark() const override;
-  void set_mark(const std::string& text) const override;
-  std::unique_ptr<BlobWriter> begin() const override;
+  void set_mark(const std::string& text) override;
+  std::unique_ptr<BlobWriter> begin() override;
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
-  void adopt(const std::filesystem::path& file, const Blob& blob) const override;
+  void adopt(const std::filesystem::path& file, const Blob& blob) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
   // A verified file is trusted for an hour, unless its device, inode, size or times change.
@@ -56,12 +56,12 @@ class FileBlobStore : public BlobStore {
     return std::nullopt;
   }
   std::shared_ptr<const void> hold_bytes(const std::string& key) const override;
-  void erase(const std::string& key) const override;
-  void settle(const std::string& key) const override;
-  std::vector<std::string> erase_unnamed(std::span<const std::string> keys, Steady unsettled,
-                                         const Names& names) const override;
-  Swept sweep(Steady unsettled, const Names& names) const override;
-  std::size_t empty_quarantine(Time before, const Names& names) const override;
+  void erase(const std::string& key) override;
+  void mark_named(const std::string& key) override;
+  std::vector<std::string> erase_unnamed(std::span<const std::string> keys, Steady spare_since,
+                                         const Names& names) override;
+  Swept sweep(Steady spare_since, const Names& names) override;
+  std::size_t empty_quarantine(Time before, const Names& names) override;
 
   // The keys of all blobs outside the quarantine.
   std::vector<std::string> keys() const;
@@ -83,39 +83,39 @@ class FileBlobStore : public BlobStore {
   // Publishes `path`, open as `file`, as a blob. `taken` bytes are already taken from the room.
   // Returns the properties of the published file.
   std::string publish_as(const std::filesystem::path& path, const File& file,
-                         const std::string& key, std::uint64_t taken) const;
-  void make_folder_for(const std::filesystem::path& place) const;
+                         const std::string& key, std::uint64_t taken);
+  void make_folder_for(const std::filesystem::path& place);
   // As path_of, for reading: brings the blob back from quarantine.
   std::filesystem::path found(const std::string& key) const;
-  void copy_in(const std::filesystem::path& file, const Blob& blob) const;
+  void copy_in(const std::filesystem::path& file, const Blob& blob);
   // Size of the disk that has the blobs.
   std::uint64_t disk_capacity() const;
   // For a shared folder: erases the blob unless it is held or named. Returns false if it still
   // exists.
-  bool take_out(const std::string& key, std::chrono::nanoseconds oldest_hold,
-                const Names& names) const ISOMESH_REQUIRES(places_);
+  bool take_out(const std::string& key, std::chrono::nanoseconds oldest_hold, const Names& names)
+      ISOMESH_REQUIRES(places_);
   // Moves a blob into quarantine. Returns false if another daemon has moved or erased it.
-  bool put_aside(const std::string& key) const ISOMESH_REQUIRES(places_);
+  bool put_aside(const std::string& key) ISOMESH_REQUIRES(places_);
   // For a shared folder: brings back those that were held or named meanwhile. Returns their number.
   std::size_t look_again(std::span<const std::string> keys, std::chrono::nanoseconds oldest_hold,
-                         const Names& names) const;
+                         const Names& names);
   // For a shared folder: removes files left by dead daemons, and recounts the size of all blobs.
-  void tidy_shared(std::chrono::nanoseconds oldest_hold) const;
+  void tidy_shared(std::chrono::nanoseconds oldest_hold);
   std::uint64_t counted_bytes() const;
   std::set<std::string> held(std::chrono::nanoseconds oldest) const;
 
   const BlobFolders folders_;
   Reserve& reserve_;
-  const std::optional<FolderHolds> holds_;  // only for a shared folder
-  mutable Probe probe_;
-  mutable Room room_;
+  std::optional<FolderHolds> holds_;  // only for a shared folder
+  mutable HealthCheck health_;
+  Room room_;
   // Held while a file is moved to its place or is swept, so that a sweep never erases a file that
   // was just stored again.
-  mutable Mutex places_;
-  mutable Unsettled unsettled_ ISOMESH_GUARDED_BY(places_);
-  mutable Mutex folders_mutex_;
+  Mutex places_;
+  UnnamedBlobs unnamed_ ISOMESH_GUARDED_BY(places_);
+  Mutex folders_mutex_;
   // True once all folders are on disk.
-  mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;
+  bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;
   mutable Mutex intact_mutex_;
   mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
   mutable Steady next_forgetting_ ISOMESH_GUARDED_BY(intact_mutex_);

@@ -28,10 +28,10 @@ std::shared_ptr<const void> FileBlobStore::hold_bytes(const std::string& key) co
   }
 }
 
-void FileBlobStore::settle(const std::string& key) const {
+void FileBlobStore::mark_named(const std::string& key) {
   const std::string hold = [&] {
     const Lock lock(places_);
-    return unsettled_.settle(key);
+    return unnamed_.remove(key);
   }();
   if (!hold.empty()) holds_->let_go(hold);
 }
@@ -41,16 +41,16 @@ std::set<std::string> FileBlobStore::held(std::chrono::nanoseconds oldest) const
 }
 
 std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::string> keys,
-                                                      Steady unsettled, const Names& names) const {
+                                                      Steady spare_since, const Names& names) {
   std::vector<std::string> left;
   for (const std::string& key : keys) {
     const Lock lock(places_);
     if (names(key)) continue;
-    if (unsettled_.has_since(key, unsettled)) {
+    if (unnamed_.has_since(key, spare_since)) {
       left.push_back(key);
     } else if (!holds_) {
       erase(key);
-    } else if (!take_out(key, age_of(unsettled), names)) {
+    } else if (!take_out(key, age_of(spare_since), names)) {
       left.push_back(key);
     }
   }
@@ -58,7 +58,7 @@ std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::strin
 }
 
 bool FileBlobStore::take_out(const std::string& key, std::chrono::nanoseconds oldest_hold,
-                             const Names& names) const {
+                             const Names& names) {
   if (held(oldest_hold).contains(key)) return false;
   if (!put_aside(key)) return true;
   if (look_again(std::span(&key, 1), oldest_hold, names) > 0) return false;
@@ -69,7 +69,7 @@ bool FileBlobStore::take_out(const std::string& key, std::chrono::nanoseconds ol
   return true;
 }
 
-bool FileBlobStore::put_aside(const std::string& key) const {
+bool FileBlobStore::put_aside(const std::string& key) {
   touch(path_of(key));  // records when it entered the quarantine
   try {
     move_to(path_of(key), folders_.quarantine / key);
@@ -82,8 +82,7 @@ bool FileBlobStore::put_aside(const std::string& key) const {
 }
 
 std::size_t FileBlobStore::look_again(std::span<const std::string> keys,
-                                      std::chrono::nanoseconds oldest_hold,
-                                      const Names& names) const {
+                                      std::chrono::nanoseconds oldest_hold, const Names& names) {
   if (!holds_ || keys.empty()) return 0;
   const std::set<std::string> held_now = held(oldest_hold);
   std::size_t back = 0;
@@ -96,16 +95,16 @@ std::size_t FileBlobStore::look_again(std::span<const std::string> keys,
   return back;
 }
 
-Swept FileBlobStore::sweep(Steady unsettled, const Names& names) const {
+Swept FileBlobStore::sweep(Steady spare_since, const Names& names) {
   std::vector<std::string> keys = this->keys();
   const std::size_t most = std::max(kSweptAtLeast, keys.size() / kSweptShare);
   std::erase_if(keys, names);
-  const std::set<std::string> held_by_others = held(age_of(unsettled));
+  const std::set<std::string> held_by_others = held(age_of(spare_since));
   Swept swept;
   std::vector<std::string> aside;
   for (const std::string& key : keys) {
     const Lock lock(places_);
-    if (unsettled_.has_since(key, unsettled) || names(key)) continue;
+    if (unnamed_.has_since(key, spare_since) || names(key)) continue;
     if (held_by_others.contains(key)) continue;
     if (aside.size() == most) {
       ++swept.left;
@@ -113,14 +112,14 @@ Swept FileBlobStore::sweep(Steady unsettled, const Names& names) const {
     }
     if (put_aside(key)) aside.push_back(key);
   }
-  swept.quarantined = aside.size() - look_again(aside, age_of(unsettled), names);
-  if (holds_) tidy_shared(age_of(unsettled));
+  swept.quarantined = aside.size() - look_again(aside, age_of(spare_since), names);
+  if (holds_) tidy_shared(age_of(spare_since));
   const Lock lock(places_);
-  unsettled_.forget(unsettled);
+  unnamed_.forget(spare_since);
   return swept;
 }
 
-void FileBlobStore::tidy_shared(std::chrono::nanoseconds oldest_hold) const {
+void FileBlobStore::tidy_shared(std::chrono::nanoseconds oldest_hold) {
   holds_->forget(std::max<std::chrono::nanoseconds>(oldest_hold, kLongestHold));
   std::error_code gone;
   const auto cutoff = std::filesystem::file_time_type::clock::now() - kLongestDraft;
@@ -131,7 +130,7 @@ void FileBlobStore::tidy_shared(std::chrono::nanoseconds oldest_hold) const {
   room_.recount(counted_bytes());
 }
 
-std::size_t FileBlobStore::empty_quarantine(Time before, const Names& names) const {
+std::size_t FileBlobStore::empty_quarantine(Time before, const Names& names) {
   std::size_t removed = 0;
   std::error_code gone;  // requested blobs are brought back meanwhile
   for (const auto& entry : std::filesystem::directory_iterator(folders_.quarantine, gone)) {

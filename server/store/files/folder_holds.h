@@ -19,20 +19,18 @@ class FolderHolds {
   explicit FolderHolds(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   // Returns the hold's name. Throws Error kOutOfSpace or kInternal.
-  std::string hold(const std::string& key) const;
+  std::string hold(const std::string& key);
 
-  void let_go(const std::string& name) const;
+  void let_go(const std::string& name);
 
   // The held blobs. Older holds are ignored: their daemon has died. Throws Error kInternal if the
   // folder cannot be read.
   std::set<std::string> held(std::chrono::nanoseconds oldest) const;
 
   // Removes holds older than that.
-  void forget(std::chrono::nanoseconds oldest) const;
+  void forget(std::chrono::nanoseconds oldest);
 
  private:
-  std::filesystem::file_time_type now() const;
-
   std::filesystem::path folder_;
 };
 

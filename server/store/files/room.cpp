@@ -32,7 +32,7 @@ bool Room::try_take(std::uint64_t bytes) {
   return fits;
 }
 
-void Room::settle(std::uint64_t taken, std::uint64_t bytes) {
+void Room::correct(std::uint64_t taken, std::uint64_t bytes) {
   const Lock lock(mutex_);
   used_ += bytes;
   used_ -= std::min(used_, taken);

@@ -19,7 +19,7 @@ class Room {
   void take(std::uint64_t bytes);
 
   // Replaces `taken` bytes by the `bytes` that were stored in the end.
-  void settle(std::uint64_t taken, std::uint64_t bytes);
+  void correct(std::uint64_t taken, std::uint64_t bytes);
 
   // Gives back the bytes of removed files.
   void give(std::uint64_t bytes);

@@ -15,6 +15,7 @@
 
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/store/sql/names.h"
 
 namespace isomesh::store::postgresql {
 namespace {
@@ -78,9 +79,9 @@ std::string text_of(const Parameter& parameter) {
   return {text.data(), end};
 }
 
-// Replaces ?1, ?2 by PostgreSQL's $1, $2.
-std::string with_dollars(std::string_view sql) {
-  std::string text(sql);
+// As PostgreSQL has it: $1 instead of ?1, and numbers instead of names.
+std::string in_dialect(std::string_view sql) {
+  std::string text = with_numbers(sql);
   std::ranges::replace(text, '?', '$');
   return text;
 }
@@ -94,9 +95,9 @@ T number_of(std::string_view text) {
 
 }  // namespace
 
-class Connection::Answer : public Rows::Source {
+class Connection::ResultRows : public Rows::Source {
  public:
-  explicit Answer(Result result) : result_(std::move(result)) {}
+  explicit ResultRows(Result result) : result_(std::move(result)) {}
 
   bool next() override { return ++row_ < PQntuples(result_.get()); }
   bool is_null(int column) const override { return PQgetisnull(result_.get(), row_, column) != 0; }
@@ -257,7 +258,7 @@ bool Connection::is_open() const { return !is_given_up_ && PQstatus(handle_) == 
 int Connection::socket() const { return PQsocket(handle_); }
 
 void Connection::script(const std::string& sql) {
-  checked(answer_to(PQsendQuery(handle_, sql.c_str()) == 1));
+  checked(result_of(PQsendQuery(handle_, with_numbers(sql).c_str()) == 1));
 }
 
 void Connection::wait_for(short events) {
@@ -267,7 +268,7 @@ void Connection::wait_for(short events) {
 }
 
 // Returns the last result of a query; null if the connection is lost.
-pg_result* Connection::answer_to(bool is_asked) {
+pg_result* Connection::result_of(bool is_asked) {
   if (!is_asked) return nullptr;
   for (int left = PQflush(handle_); left != 0; left = PQflush(handle_)) {
     if (left < 0) return nullptr;
@@ -299,7 +300,7 @@ std::vector<std::string> Connection::take_messages() {
 }
 
 Rows Connection::ask(std::string_view sql, std::span<const Parameter> parameters) {
-  return Rows(std::make_unique<Answer>(execute(sql, parameters)));
+  return Rows(std::make_unique<ResultRows>(execute(sql, parameters)));
 }
 
 std::size_t Connection::tell(std::string_view sql, std::span<const Parameter> parameters) {
@@ -322,7 +323,7 @@ Connection::Result Connection::execute(std::string_view sql,
     values.push_back(each.is_null ? nullptr : texts.back().c_str());
   }
   return checked(
-      answer_to(PQsendQueryPrepared(handle_, name.c_str(), static_cast<int>(values.size()),
+      result_of(PQsendQueryPrepared(handle_, name.c_str(), static_cast<int>(values.size()),
                                     values.data(), nullptr, nullptr, 0) == 1));
 }
 
@@ -334,18 +335,18 @@ const std::string& Connection::prepared(std::string_view sql,
   std::vector<Oid> types;
   for (const Parameter& each : parameters) types.push_back(type_of(each));
   const std::string name = "s" + std::to_string(names_.size());
-  checked(answer_to(PQsendPrepare(handle_, name.c_str(), with_dollars(sql).c_str(),
+  checked(result_of(PQsendPrepare(handle_, name.c_str(), in_dialect(sql).c_str(),
                                   static_cast<int>(types.size()), types.data()) == 1));
   return names_[text] = name;
 }
 
 Connection::Result Connection::checked(pg_result* result) {
-  Result answer(result);
+  Result owned(result);
   const ExecStatusType status = PQresultStatus(result);
   if (std::exchange(is_warned_, false)) {
     throw Interrupted(ErrorCode::kUnavailable, "the database's standby does not respond");
   }
-  if (status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK) return answer;
+  if (status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK) return owned;
   if (!is_open()) {
     throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }

@@ -80,10 +80,10 @@ class Connection : public SqlConnection {
     void operator()(pg_result* result) const;
   };
   using Result = std::unique_ptr<pg_result, Clear>;
-  class Answer;
+  class ResultRows;
 
   Result execute(std::string_view sql, std::span<const Parameter> parameters);
-  pg_result* answer_to(bool is_asked);
+  pg_result* result_of(bool is_asked);
   void wait_for(short events);
   Result checked(pg_result* result);
   const std::string& prepared(std::string_view sql, std::span<const Parameter> parameters);

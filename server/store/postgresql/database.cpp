@@ -56,7 +56,7 @@ Database::Database(DatabaseOptions options) : options_(std::move(options)), node
   });
 }
 
-bool Database::answers() {
+bool Database::responds() {
   try {
     const Borrowed borrowed(*this, std::chrono::steady_clock::now() + options_.patience);
     borrowed.connection().query("SELECT 1");

@@ -62,7 +62,7 @@ class Database : public SqlDatabase {
     }
   }
 
-  bool answers();
+  bool responds();
 
   const std::string& node() const { return node_; }  // a UUID, new at each start of the process
   const std::string& node_name() const { return options_.node; }

@@ -15,7 +15,7 @@ std::string name_of(const BlobStore& blobs) {
   return mark.substr(0, mark.find_first_of(" \n"));
 }
 
-void name(const BlobStore& blobs, const std::string& name) { blobs.set_mark(name + '\n'); }
+void name(BlobStore& blobs, const std::string& name) { blobs.set_mark(name + '\n'); }
 
 // The database's name; sets it to `proposed` if there is none.
 std::string name_of_database(Database& database, const std::string& proposed) {
@@ -45,7 +45,7 @@ bool has_records(Database& database) {
 
 // Gives both the same name. Daemons that start at the same time get the same one, and a start after
 // a crash completes it.
-void check(Database& database, const BlobStore& blobs, bool may_adopt) {
+void check(Database& database, BlobStore& blobs, bool may_adopt) {
   std::string mark = name_of(blobs);
   std::string proposed = random_hex(16);
   if (!blobs.is_shared() && blobs.is_empty()) {
@@ -68,19 +68,20 @@ void check(Database& database, const BlobStore& blobs, bool may_adopt) {
 
 }  // namespace
 
-Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
                    std::chrono::milliseconds tolerance)
     : Identity(
-          database, blobs, word,
+          database, blobs, overrides,
           BelievedClock::Options{.tolerance = tolerance,
                                  .wall = [&database] { return store::from_us(database.now_us()); },
                                  .name = "the clock of the database"}) {}
 
-Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
                    const BelievedClock::Options& clock)
-    : database_(database), clock_(time_to_start_with(last_seen(database), word, clock), clock) {
-  check(database, blobs, word.adopt);
-  if (word.trust_clock) trust(database, last_seen(database), clock_.now(), clock.tolerance);
+    : database_(database),
+      clock_(time_to_start_with(last_seen(database), overrides, clock), clock) {
+  check(database, blobs, overrides.adopt);
+  if (overrides.trust_clock) trust(database, last_seen(database), clock_.now(), clock.tolerance);
 }
 
 Time Identity::now() {

@@ -5,7 +5,7 @@
 
 #include "server/store/believed_clock.h"
 #include "server/store/blob_store.h"
-#include "server/store/operators_word.h"
+#include "server/store/operator_overrides.h"
 #include "server/store/postgresql/database.h"
 
 namespace isomesh::store::postgresql {
@@ -17,11 +17,11 @@ namespace isomesh::store::postgresql {
 class Identity {
  public:
   // Names both if neither has a name. Throws Error kUnavailable if they do not belong together and
-  // `word` does not allow that.
-  Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+  // `overrides` does not allow that.
+  Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
            std::chrono::milliseconds tolerance);
   // As above, with another clock for the database's time.
-  Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+  Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
            const BelievedClock::Options& clock);
 
   // The believed time, converted to this machine's clock as the interfaces of stores require.

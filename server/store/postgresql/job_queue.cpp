@@ -240,7 +240,7 @@ bool PostgresJobStore::finish(const Lease& lease, const Outcome& outcome) {
   }
   if (!end_run(lease.id, lease.fence, ending)) return false;
   if (outcome.mesh) {
-    for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.settle(blob.key);
+    for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.mark_named(blob.key);
   }
   return true;
 }
@@ -257,13 +257,13 @@ bool PostgresJobStore::put_back(const Lease& lease, std::chrono::milliseconds de
 }
 
 std::size_t PostgresJobStore::reap() {
-  const bool is_settled = has_answered_for_long();
+  const bool judges_leases = has_responded_for_long();
   Rows rows = database_.query(select_ +
                                   "WHERE (?3 <> 0 AND r.lease_until < isomesh_now()) OR r.node IN "
                                   "(SELECT id FROM nodes WHERE "
                                   "name = ?1 AND id <> ?2::uuid)",
-                              database_.node_name(), database_.node(), is_settled);
-  note_answer();
+                              database_.node_name(), database_.node(), judges_leases);
+  note_response();
   std::size_t reaped = 0;
   while (rows.next()) {
     const Row row = row_of(rows);
@@ -275,18 +275,18 @@ std::size_t PostgresJobStore::reap() {
   return reaped;
 }
 
-bool PostgresJobStore::has_answered_for_long() const {
+bool PostgresJobStore::has_responded_for_long() const {
   const Steady now = options_.now();
-  const Lock lock(answers_mutex_);
-  const bool is_gap = !answered_ || now - *answered_ > kLongestGap;
-  return options_.grace.count() == 0 || (!is_gap && now - answers_since_ >= options_.grace);
+  const Lock lock(responds_mutex_);
+  const bool is_gap = !responded_ || now - *responded_ > kLongestGap;
+  return options_.grace.count() == 0 || (!is_gap && now - responds_since_ >= options_.grace);
 }
 
-void PostgresJobStore::note_answer() {
+void PostgresJobStore::note_response() {
   const Steady now = options_.now();
-  const Lock lock(answers_mutex_);
-  if (!answered_ || now - *answered_ > kLongestGap) answers_since_ = now;
-  answered_ = now;
+  const Lock lock(responds_mutex_);
+  if (!responded_ || now - *responded_ > kLongestGap) responds_since_ = now;
+  responded_ = now;
 }
 
 // Repeats until the records of all equal jobs that end with this run were passed to the database.
@@ -343,11 +343,11 @@ Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
       database_.read([&](SqlConnection& connection) { return found(connection, viewer, id); });
   if (is_final(row.job.state)) return row.job;
   const Job ended = cancelled(row.job, row.accepted);
-  Rows answer = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_record(ended),
-                                database_.node());
-  answer.next();
-  if (answer.is_null(0)) return get(viewer, id);  // removed meanwhile
-  const auto state = static_cast<JobState>(answer.integer(0));
+  Rows after = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_record(ended),
+                               database_.node());
+  after.next();
+  if (after.is_null(0)) return get(viewer, id);  // removed meanwhile
+  const auto state = static_cast<JobState>(after.integer(0));
   if (state == JobState::kCancelled) wake_workers();
   if (state == JobState::kRunning) {
     messages_.tell({.has_work = false, .has_events = false, .cancelled = {id}});

@@ -8,22 +8,21 @@
 #include "proto/json.h"
 #include "server/store/job_rules.h"
 #include "server/store/microseconds.h"
-#include "server/store/postgresql/turn.h"
+#include "server/store/postgresql/exclusive_task.h"
 
 namespace isomesh::store::postgresql {
 
-PostgresJobStore::PostgresJobStore(Database& database, const BlobStore& blobs,
-                                   JobStoreOptions options)
+PostgresJobStore::PostgresJobStore(Database& database, BlobStore& blobs, JobStoreOptions options)
     : SqlJobStore(database, blobs, std::move(options),
                   "SELECT j.record, j.owner, j.result_key, j.accepted, j.attempts, j.fence, "
                   "j.state, j.waiting_for, r.claimed, r.stage, r.progress, r.timings FROM jobs j "
                   "LEFT JOIN runs r ON r.job = j.id "),
       database_(database),
       feed_(database),
-      messages_(database, [this](const News& news) { return hear(news); }) {}
+      messages_(database, [this](const News& news) { return on_news(news); }) {}
 
 // Returns true if other processes run jobs, so that their progress should be read.
-bool PostgresJobStore::hear(const News& news) {
+bool PostgresJobStore::on_news(const News& news) {
   {
     const Lock lock(live_mutex_);
     for (const std::string& job : news.cancelled) {
@@ -49,17 +48,18 @@ void PostgresJobStore::wake_workers() {
 
 std::optional<std::chrono::microseconds> PostgresJobStore::until_ready() const {
   Rows row = database_.query(
-      "SELECT min(not_before) - isomesh_now() FROM jobs j WHERE state = 0 AND NOT EXISTS (SELECT 1 "
+      "SELECT min(not_before) - isomesh_now() FROM jobs j WHERE state = {job.queued} AND NOT "
+      "EXISTS (SELECT 1 "
       "FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)");
   row.next();
   if (row.is_null(0)) return std::nullopt;
   return std::chrono::microseconds(row.integer(0));
 }
 
-std::shared_ptr<const void> PostgresJobStore::turn_to_remove() {
-  auto turn = std::make_shared<Turn>(database_.url(), "removing");
-  if (!turn->is_taken()) return nullptr;
-  return turn;
+std::shared_ptr<const void> PostgresJobStore::claim_removal() {
+  auto task = std::make_shared<ExclusiveTask>(database_.url(), "removing");
+  if (!task->is_ours()) return nullptr;
+  return task;
 }
 
 std::optional<Steady> PostgresJobStore::oldest_run() const {
@@ -76,7 +76,8 @@ void PostgresJobStore::forget_events(Time before) {
 std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::string& owner,
                                                                   const std::string& key) const {
   Rows row = database_.query(
-      "SELECT id, record FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = 2 ORDER BY id "
+      "SELECT id, record FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = "
+      "{job.succeeded} ORDER BY id "
       "DESC LIMIT 1",
       owner, key);
   if (!row.next()) return std::nullopt;

@@ -19,7 +19,7 @@ namespace isomesh::store::postgresql {
 class PostgresJobStore : public SqlJobStore {
  public:
   // `database` and `blobs` must outlive this object.
-  PostgresJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
+  PostgresJobStore(Database& database, BlobStore& blobs, JobStoreOptions options);
 
   Submission submit(const JobSpec& spec) override;
   std::optional<Lease> claim(const std::string& worker, std::chrono::milliseconds lease) override;
@@ -35,8 +35,8 @@ class PostgresJobStore : public SqlJobStore {
     return feed_.events(viewer, job, since, timeout);
   }
   std::uint64_t last_event() const override { return feed_.last(); }
-  bool answers() const override { return database_.answers(); }
-  std::shared_ptr<const void> turn_to_remove() override;
+  bool responds() const override { return database_.responds(); }
+  std::shared_ptr<const void> claim_removal() override;
   std::optional<Steady> oldest_run() const override;
   void forget_events(Time before) override;
 
@@ -61,17 +61,18 @@ class PostgresJobStore : public SqlJobStore {
   Job cancelled(Job job, std::int64_t accepted) const;
   bool end_run(const std::string& id, std::uint64_t fence, const Ending& ending);
   std::optional<Live> live_run(const Lease& lease) const;
-  bool hear(const News& news);
+  bool on_news(const News& news);
   // True if the database has responded for so long that every living holder has renewed its lease.
-  bool has_answered_for_long() const;
-  void note_answer();
+  bool has_responded_for_long() const;
+  void note_response();
   void wake_workers();
 
   Database& database_;
-  mutable Mutex answers_mutex_;
-  std::optional<Steady> answered_ ISOMESH_GUARDED_BY(answers_mutex_);  // the last success of reap()
+  mutable Mutex responds_mutex_;
+  std::optional<Steady> responded_
+      ISOMESH_GUARDED_BY(responds_mutex_);  // the last success of reap()
   // The end of the last outage, or the start.
-  Steady answers_since_ ISOMESH_GUARDED_BY(answers_mutex_);
+  Steady responds_since_ ISOMESH_GUARDED_BY(responds_mutex_);
   mutable EventFeed feed_;
   Messages messages_;  // last: its thread uses the other members
 };

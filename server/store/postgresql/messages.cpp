@@ -2,14 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <chrono>
-#include <cstdint>
 #include <utility>
 
 #include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 #include "base/log.h"
 #include "proto/error.h"
@@ -59,17 +55,15 @@ void add(News& news, const News& more) {
 
 }  // namespace
 
-Messages::Messages(const Database& database, Hear hear)
-    : database_(database), hear_(std::move(hear)), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-  if (wake_ < 0) throw_system_error("eventfd", errno);
+Messages::Messages(const Database& database, Listener listener)
+    : database_(database), listener_(std::move(listener)) {
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 Messages::~Messages() {
   thread_.request_stop();
-  wake();
+  wakeup_.ring();
   thread_.join();
-  ::close(wake_);
 }
 
 void Messages::tell(const News& news) {
@@ -77,13 +71,7 @@ void Messages::tell(const News& news) {
     const Lock lock(mutex_);
     add(to_tell_, news);
   }
-  wake();
-}
-
-void Messages::wake() const {
-  const std::uint64_t one = 1;
-  // Fails only if enough wake-ups are pending already.
-  if (::write(wake_, &one, sizeof one) < 0) return;
+  wakeup_.ring();
 }
 
 void Messages::run(const std::stop_token& stop) {
@@ -97,10 +85,9 @@ void Messages::run(const std::stop_token& stop) {
         log_warning("messages of other daemons cannot be received and are retried: {}",
                     error.what());
       is_told = true;
-      hear_(kAnything);
-      std::uint64_t count = 0;
-      wait_for(wake_, -1, kBetweenTries);
-      if (::read(wake_, &count, sizeof count) > 0 && !stop.stop_requested()) {
+      listener_(kAnything);
+      wait_for(wakeup_.descriptor(), -1, kBetweenTries);
+      if (wakeup_.clear() && !stop.stop_requested()) {
         std::this_thread::sleep_for(kBetweenTries);
       }
     }
@@ -111,18 +98,18 @@ void Messages::listen(const std::stop_token& stop) {
   Connection connection(database_.url());
   connection.script("LISTEN isomesh; SET synchronous_commit = off");
   using Clock = std::chrono::steady_clock;
-  bool looks = hear_(kAnything);
+  bool looks = listener_(kAnything);
   auto next_poll = Clock::now() + kBetweenPolls;
   auto next_look = Clock::now() + kBetweenLooks;
   while (!stop.stop_requested()) {
     const auto next = looks ? std::min(next_look, next_poll) : next_poll;
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next - Clock::now());
-    wait_for(connection.socket(), wake_, std::max(wait, std::chrono::milliseconds(0)));
-    std::uint64_t count = 0;
+    wait_for(connection.socket(), wakeup_.descriptor(),
+             std::max(wait, std::chrono::milliseconds(0)));
     // This process also receives its own messages.
     News news;
     connection.wait_until(Connection::Clock::now() + Connection::kPatience);
-    if (::read(wake_, &count, sizeof count) > 0) news = send(connection);
+    if (wakeup_.clear()) news = send(connection);
     add(news, read(connection.take_messages()));
     const auto now = Clock::now();
     if (now >= next_poll) {
@@ -133,7 +120,7 @@ void Messages::listen(const std::stop_token& stop) {
       next_look = now + kBetweenLooks;
       news.has_progress = true;
     }
-    if (!is_empty(news)) looks = hear_(news);
+    if (!is_empty(news)) looks = listener_(news);
   }
 }
 

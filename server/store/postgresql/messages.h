@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "base/mutex.h"
+#include "base/wakeup.h"
 #include "server/store/postgresql/database.h"
 
 namespace isomesh::store::postgresql {
@@ -19,16 +20,16 @@ struct News {
 };
 
 // Messages between nodes by NOTIFY, which spare them polling the database. They are hints only:
-// `hear` is also called every second, and after a lost connection, as if there were work and
+// `listener` is also called every second, and after a lost connection, as if there were work and
 // events. Uses one connection and one thread. Messages sent at the same time are combined, because
 // NOTIFY serialises commits. Thread safe.
 class Messages {
  public:
-  using Hear = std::function<bool(const News&)>;
+  using Listener = std::function<bool(const News&)>;
 
-  // The thread calls `hear`, which must not throw. While it returns true, it is also called every
-  // 300 ms to read progress.
-  Messages(const Database& database, Hear hear);
+  // The thread calls `listener`, which must not throw. While it returns true, it is also called
+  // every 300 ms to read progress.
+  Messages(const Database& database, Listener listener);
   ~Messages();
   Messages(const Messages&) = delete;
   Messages& operator=(const Messages&) = delete;
@@ -40,11 +41,10 @@ class Messages {
   void run(const std::stop_token& stop);
   void listen(const std::stop_token& stop);
   News send(Connection& connection);
-  void wake() const;
 
   const Database& database_;
-  const Hear hear_;
-  int wake_ = -1;
+  const Listener listener_;
+  Wakeup wakeup_;
   Mutex mutex_;
   News to_tell_ ISOMESH_GUARDED_BY(mutex_);
   std::jthread thread_;

@@ -126,7 +126,8 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
   }
   store::Database source(folder);
   // Nobody runs these jobs any more. They are queued again, here as in the copy.
-  SqliteJobStore(source, FileBlobStore(folder), {}).reap();
+  FileBlobStore blobs(folder);
+  SqliteJobStore(source, blobs, {}).reap();
   const store::Reading reading(source.writer());
   Database target({.url = url, .node = "move " + random_hex(8), .connections = 1});
   return target.ask_for(kLongestMove, [&](Connection& to, bool) {

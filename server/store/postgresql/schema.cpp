@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include "server/store/sql/turns.h"
+#include "server/store/sql/fair_queue.h"
 
 namespace isomesh::store::postgresql {
 namespace {
@@ -14,7 +14,7 @@ constexpr std::int64_t kMigrationLock = 0x69736f6d65736831;  // "isomesh1"
 // The tables of the first version, then the changes of each later one. Only append; never edit a
 // released version.
 //
-// States are the values of JobState and OrderState. Times are microseconds since 1970 by the
+// Times are microseconds since 1970 by the
 // database's clock. A job's record is its JSON in the API as submitted, and after its end as ended.
 // Columns and the row of its run have what changes in between.
 constexpr std::array kTables = {R"sql(
@@ -68,9 +68,9 @@ CREATE TABLE jobs(
   request_digest text NOT NULL,
   record text NOT NULL
 ) WITH (fillfactor = 70);
-CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0;
+CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = {job.queued};
 CREATE INDEX jobs_alike ON jobs(owner, result_key, state);
-CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < 2;
+CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < {job.final};
 CREATE INDEX jobs_by_end ON jobs(finished) WHERE finished IS NOT NULL;
 CREATE INDEX jobs_by_owner ON jobs(owner, id);
 CREATE UNIQUE INDEX jobs_by_key ON jobs(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
@@ -136,7 +136,7 @@ CREATE TABLE expired(                  -- ids of jobs and volumes that were ther
 );
 CREATE INDEX expired_by_time ON expired(at);
 
-CREATE TABLE orders(                   -- states from 4 on are final
+CREATE TABLE orders(                   -- states from {order.final} on are final
   id text COLLATE "C" PRIMARY KEY,
   owner text COLLATE "C" NOT NULL,
   state int NOT NULL,
@@ -149,7 +149,7 @@ CREATE TABLE orders(                   -- states from 4 on are final
   record text NOT NULL,                -- the JSON of the API
   work text NOT NULL                   -- what the API does not tell
 );
-CREATE INDEX orders_due ON orders(next) WHERE state < 4;
+CREATE INDEX orders_due ON orders(next) WHERE state < {order.final};
 CREATE INDEX orders_by_owner ON orders(owner, id);
 CREATE INDEX orders_by_end ON orders(finished) WHERE finished IS NOT NULL;
 CREATE UNIQUE INDEX orders_by_key ON orders(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
@@ -217,8 +217,8 @@ COMMENT ON TABLE runs IS 'leases: a row is its holder''s until somebody ends it,
                                 R"sql(
 ALTER TABLE jobs ADD COLUMN cost bigint NOT NULL DEFAULT 1000000;  -- microseconds that a run is expected to take
 DROP INDEX jobs_queue;
-CREATE INDEX jobs_by_turn ON jobs(priority, owner, seq) WHERE state = 0;
-CREATE TABLE turns(                    -- of owners' last claims; see turns.h
+CREATE INDEX jobs_by_turn ON jobs(priority, owner, seq) WHERE state = {job.queued};
+CREATE TABLE turns(                    -- of owners' last claims; see fair_queue.h
   priority int NOT NULL,
   owner text COLLATE "C" NOT NULL,
   start_tag bigint NOT NULL,
@@ -250,7 +250,8 @@ BEGIN
       VALUES(p_job, j.receiver, j.url, p_record, 0, now_us, now_us);
   END IF;
   INSERT INTO events(node, owner, job, kind, state, stage, progress)
-    VALUES(p_node, j.owner, p_job, 2, p_state, p_stage, CASE WHEN p_state = 2 THEN 1 ELSE 0 END);
+    VALUES(p_node, j.owner, p_job, {event.done}, p_state, p_stage,
+           CASE WHEN p_state = {job.succeeded} THEN 1 ELSE 0 END);
 END $$;
 
 -- p has what a row of jobs has, and
@@ -284,24 +285,24 @@ BEGIN
   PERFORM pg_advisory_xact_lock_shared(alike_lock(s.owner, s.result_key));
   IF s.reuses THEN
     -- Not to expire before this one names its blobs, too.
-    PERFORM 1 FROM jobs j WHERE j.id = s.latest AND j.state = 2 FOR KEY SHARE;
+    PERFORM 1 FROM jobs j WHERE j.id = s.latest AND j.state = {job.succeeded} FOR KEY SHARE;
     IF NOT FOUND THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
   ELSE
-    SELECT j.id INTO latest FROM jobs j WHERE j.owner = s.owner AND j.result_key = s.result_key AND j.state = 2
-      ORDER BY j.id DESC LIMIT 1;
+    SELECT j.id INTO latest FROM jobs j
+      WHERE j.owner = s.owner AND j.result_key = s.result_key AND j.state = {job.succeeded} ORDER BY j.id DESC LIMIT 1;
     IF latest IS DISTINCT FROM s.latest THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
-    SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT s.most) AS q;
+    SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = {job.queued} LIMIT s.most) AS q;
     IF n > s.most - 256 THEN           -- near the limit: one at a time, counted again
       PERFORM pg_advisory_xact_lock(hashtext('isomesh queue'), hashtext(current_schema()));
-      SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT s.most) AS q;
+      SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = {job.queued} LIMIT s.most) AS q;
       IF n >= s.most THEN RETURN QUERY SELECT 'full', NULL::text; RETURN; END IF;
     END IF;
     IF NOT s.has_share THEN RETURN QUERY SELECT 'no share', NULL::text; RETURN; END IF;
   END IF;
   INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
                    request_digest, record, cost)
-    VALUES(s.id, s.owner, 0, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url, s.idempotency_key,
-           s.request_digest, s.record, coalesce(s.cost, 1000000))  -- older daemons tell none
+    VALUES(s.id, s.owner, {job.queued}, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url,
+           s.idempotency_key, s.request_digest, s.record, coalesce(s.cost, 1000000))  -- older daemons tell none
     ON CONFLICT DO NOTHING;
   IF NOT FOUND THEN                    -- two with one key
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
@@ -310,9 +311,10 @@ BEGIN
     RETURN;
   END IF;
   IF s.reuses THEN
-    PERFORM end_job(s.id, 2, s.record, 7, NULL, s.node, s.blobs);
+    PERFORM end_job(s.id, {job.succeeded}, s.record, {stage.done}, NULL, s.node, s.blobs);
   ELSE
-    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(s.node, s.owner, s.id, 0, 0, 0, 0);
+    INSERT INTO events(node, owner, job, kind, state, stage, progress)
+      VALUES(s.node, s.owner, s.id, {event.stage}, {job.queued}, {stage.queue}, 0);
   END IF;
   RETURN QUERY SELECT 'new', s.id;
 END $$;
@@ -331,7 +333,7 @@ BEGIN
     now_us := isomesh_now();
     SELECT head.id, q.priority, q.start_tag INTO turn FROM queued_owners q CROSS JOIN LATERAL (
         SELECT j.id, j.seq FROM jobs j
-          WHERE j.state = 0 AND j.priority = q.priority AND j.owner = q.owner AND j.not_before <= now_us
+          WHERE j.state = {job.queued} AND j.priority = q.priority AND j.owner = q.owner AND j.not_before <= now_us
             AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)
           ORDER BY j.seq LIMIT 1) AS head
       ORDER BY q.priority, q.start_tag, head.seq LIMIT 1;
@@ -340,7 +342,7 @@ BEGIN
       RETURN;
     END IF;
     SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted, j.cost INTO c FROM jobs j
-      WHERE j.id = turn.id AND j.state = 0 FOR UPDATE;
+      WHERE j.id = turn.id AND j.state = {job.queued} FOR UPDATE;
     CONTINUE WHEN NOT FOUND;           -- cancelled meanwhile
     f := greatest(c.fence + 1, now_us);
     INSERT INTO runs(job, fence, owner, result_key, node, worker, claimed, lease_until)
@@ -349,8 +351,9 @@ BEGIN
     DELETE FROM turns t WHERE (t.priority, t.finish_tag) <= (turn.priority, turn.start_tag);
     INSERT INTO turns AS t VALUES(turn.priority, c.owner, turn.start_tag, turn.start_tag + c.cost)
       ON CONFLICT ON CONSTRAINT turns_pkey DO UPDATE SET start_tag = excluded.start_tag, finish_tag = excluded.finish_tag;
-    UPDATE jobs j SET state = 1, fence = f, attempts = c.attempts + 1, waiting_for = NULL WHERE j.id = c.id;
-    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, c.owner, c.id, 0, 1, 1, 0);
+    UPDATE jobs j SET state = {job.running}, fence = f, attempts = c.attempts + 1, waiting_for = NULL WHERE j.id = c.id;
+    INSERT INTO events(node, owner, job, kind, state, stage, progress)
+      VALUES(p_node, c.owner, c.id, {event.stage}, {job.running}, {stage.load}, 0);
     RETURN QUERY SELECT c.id, f, c.attempts + 1, c.owner, c.record, c.accepted, now_us;
     RETURN;
   END LOOP;
@@ -395,33 +398,34 @@ BEGIN
     RETURN;
   END IF;
   IF r.cancelling THEN
-    s.state := 4;
+    s.state := {job.cancelled};
     s.record := s.cancelled;
   END IF;
-  IF s.state = 2 THEN
+  IF s.state = {job.succeeded} THEN
     PERFORM pg_advisory_xact_lock(alike_lock(j.owner, j.result_key));
-    IF EXISTS (SELECT 1 FROM jobs a WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = 0
+    IF EXISTS (SELECT 1 FROM jobs a WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued}
                  AND a.id NOT IN (SELECT t.id FROM jsonb_to_recordset(s.alike) AS t(id text))) THEN
       RETURN QUERY SELECT 'alike', a.id, a.record, a.accepted FROM jobs a
-        WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = 0 ORDER BY a.id;
+        WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued} ORDER BY a.id;
       RETURN;
     END IF;
   END IF;
   DELETE FROM runs t WHERE t.job = s.id;
-  IF s.state = 0 THEN
-    UPDATE jobs t SET state = 0, attempts = t.attempts - CASE WHEN s.counts THEN 0 ELSE 1 END,
+  IF s.state = {job.queued} THEN
+    UPDATE jobs t SET state = {job.queued}, attempts = t.attempts - CASE WHEN s.counts THEN 0 ELSE 1 END,
                       not_before = isomesh_now() + s.delay, waiting_for = s.waiting_for, ended_by = s.fence
       WHERE t.id = s.id;
-    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(s.node, j.owner, s.id, 0, 0, 0, 0);
-  ELSIF s.state = 2 THEN
-    PERFORM end_job(s.id, 2, s.record, 7, s.fence, s.node, s.blobs);
+    INSERT INTO events(node, owner, job, kind, state, stage, progress)
+      VALUES(s.node, j.owner, s.id, {event.stage}, {job.queued}, {stage.queue}, 0);
+  ELSIF s.state = {job.succeeded} THEN
+    PERFORM end_job(s.id, {job.succeeded}, s.record, {stage.done}, s.fence, s.node, s.blobs);
     FOR other IN SELECT t.id, t.record FROM jsonb_to_recordset(s.alike) AS t(id text, record text) LOOP
-      PERFORM 1 FROM jobs a WHERE a.id = other.id AND a.state = 0 FOR UPDATE;
+      PERFORM 1 FROM jobs a WHERE a.id = other.id AND a.state = {job.queued} FOR UPDATE;
       CONTINUE WHEN NOT FOUND;         -- cancelled meanwhile
-      PERFORM end_job(other.id, 2, other.record, 7, NULL, s.node, s.blobs);
+      PERFORM end_job(other.id, {job.succeeded}, other.record, {stage.done}, NULL, s.node, s.blobs);
     END LOOP;
   ELSE
-    PERFORM end_job(s.id, s.state, s.record, 1, s.fence, s.node, '[]');
+    PERFORM end_job(s.id, s.state, s.record, {stage.load}, s.fence, s.node, '[]');
   END IF;
   RETURN QUERY SELECT 'done', NULL::text, NULL::text, 0::bigint;
 END $$;
@@ -431,11 +435,11 @@ CREATE OR REPLACE FUNCTION cancel_job(p_job text, p_record text, p_node uuid) RE
 DECLARE s int;
 BEGIN
   SELECT state INTO s FROM jobs WHERE id = p_job FOR UPDATE;
-  IF s = 0 THEN
-    PERFORM end_job(p_job, 4, p_record, 0, NULL, p_node, '[]');
-    RETURN 4;
+  IF s = {job.queued} THEN
+    PERFORM end_job(p_job, {job.cancelled}, p_record, {stage.queue}, NULL, p_node, '[]');
+    RETURN {job.cancelled};
   END IF;
-  IF s = 1 THEN UPDATE runs SET cancelling = true WHERE job = p_job; END IF;
+  IF s = {job.running} THEN UPDATE runs SET cancelling = true WHERE job = p_job; END IF;
   RETURN s;
 END $$;
 

@@ -11,7 +11,7 @@ BlobCache::BlobCache(const BlobFolders& folders, Reserve& reserve, std::uint64_t
   make_room(0);
 }
 
-std::shared_ptr<const void> BlobCache::use(const std::string& key) const {
+std::shared_ptr<const void> BlobCache::use(const std::string& key) {
   const Lock lock(mutex_);
   Copy& copy = copies_[key];
   ++copy.uses;
@@ -19,7 +19,7 @@ std::shared_ptr<const void> BlobCache::use(const std::string& key) const {
   return {this, [this, key](const void* /*cache*/) { let_go(key); }};
 }
 
-void BlobCache::let_go(const std::string& key) const {
+void BlobCache::let_go(const std::string& key) {
   const Lock lock(mutex_);
   const auto found = copies_.find(key);
   if (--found->second.uses > 0) return;
@@ -30,14 +30,14 @@ void BlobCache::let_go(const std::string& key) const {
   }
 }
 
-void BlobCache::note(const std::string& key, std::uint64_t bytes) const {
+void BlobCache::note(const std::string& key, std::uint64_t bytes) {
   const Lock lock(mutex_);
   Copy& copy = copies_[key];
   bytes_ += bytes - copy.bytes;
   copy.bytes = bytes;
 }
 
-void BlobCache::erase(const std::string& key) const {
+void BlobCache::erase(const std::string& key) {
   const Lock lock(mutex_);
   const auto found = copies_.find(key);
   if (found == copies_.end()) return;
@@ -45,23 +45,23 @@ void BlobCache::erase(const std::string& key) const {
   if (found->second.uses == 0) copies_.erase(found);
 }
 
-void BlobCache::remove(const std::string& key, Copy& copy) const {
+void BlobCache::remove(const std::string& key, Copy& copy) {
   files_.erase(key);
   bytes_ -= copy.bytes;
   copy.bytes = 0;
 }
 
-void BlobCache::make_room(std::uint64_t bytes) const {
+void BlobCache::make_room(std::uint64_t bytes) {
   const Lock lock(mutex_);
   shrink_to(most_bytes_ - std::min(most_bytes_, bytes));
 }
 
-void BlobCache::empty() const {
+void BlobCache::empty() {
   const Lock lock(mutex_);
   shrink_to(0);
 }
 
-void BlobCache::shrink_to(std::uint64_t most_bytes, const std::string& but_for) const {
+void BlobCache::shrink_to(std::uint64_t most_bytes, const std::string& but_for) {
   if (bytes_ <= most_bytes) return;
   std::vector<std::pair<std::uint64_t, std::string>> idle;
   for (const auto& [key, copy] : copies_) {
@@ -76,7 +76,7 @@ void BlobCache::shrink_to(std::uint64_t most_bytes, const std::string& but_for) 
   }
 }
 
-void BlobCache::keep_only(const std::function<bool(const std::string& key)>& stays) const {
+void BlobCache::keep_only(const std::function<bool(const std::string& key)>& stays) {
   std::vector<std::string> keys;
   {
     const Lock lock(mutex_);

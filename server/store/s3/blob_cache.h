@@ -22,24 +22,24 @@ class BlobCache {
   BlobCache(const BlobFolders& folders, Reserve& reserve, std::uint64_t most_bytes);
 
   // The copies. To add one, hold use() from before, then call note().
-  const FileBlobStore& files() const { return files_; }
+  FileBlobStore& files() { return files_; }
 
   // Marks the blob as in use until the result is released, even if there is no copy.
-  std::shared_ptr<const void> use(const std::string& key) const;
+  std::shared_ptr<const void> use(const std::string& key);
 
-  void note(const std::string& key, std::uint64_t bytes) const;
+  void note(const std::string& key, std::uint64_t bytes);
 
   // Open readers stay valid.
-  void erase(const std::string& key) const;
+  void erase(const std::string& key);
 
   // Removes unused copies until `bytes` more fit.
-  void make_room(std::uint64_t bytes) const;
+  void make_room(std::uint64_t bytes);
 
   // Removes all copies that are not in use.
-  void empty() const;
+  void empty();
 
   // Removes copies for which `stays` returns false, unless they are in use.
-  void keep_only(const std::function<bool(const std::string& key)>& stays) const;
+  void keep_only(const std::function<bool(const std::string& key)>& stays);
 
   std::uint64_t bytes() const;
 
@@ -50,17 +50,17 @@ class BlobCache {
     std::size_t uses = 0;  // current users
   };
 
-  void let_go(const std::string& key) const;
-  void shrink_to(std::uint64_t most_bytes, const std::string& but_for = {}) const
+  void let_go(const std::string& key);
+  void shrink_to(std::uint64_t most_bytes, const std::string& but_for = {})
       ISOMESH_REQUIRES(mutex_);
-  void remove(const std::string& key, Copy& copy) const ISOMESH_REQUIRES(mutex_);
+  void remove(const std::string& key, Copy& copy) ISOMESH_REQUIRES(mutex_);
 
-  const FileBlobStore files_;
+  FileBlobStore files_;
   const std::uint64_t most_bytes_;
   mutable Mutex mutex_;
-  mutable std::map<std::string, Copy> copies_ ISOMESH_GUARDED_BY(mutex_);
-  mutable std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  mutable std::uint64_t uses_ ISOMESH_GUARDED_BY(mutex_) = 0;  // counter of uses
+  std::map<std::string, Copy> copies_ ISOMESH_GUARDED_BY(mutex_);
+  std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::uint64_t uses_ ISOMESH_GUARDED_BY(mutex_) = 0;  // counter of uses
 };
 
 }  // namespace isomesh::store

@@ -13,7 +13,7 @@ namespace isomesh::store {
 
 class S3BlobStore::Writer : public BlobWriter {
  public:
-  explicit Writer(const S3BlobStore& store) : store_(store), copy_(store.cache_.files().begin()) {}
+  explicit Writer(S3BlobStore& store) : store_(store), copy_(store.cache_.files().begin()) {}
 
   void write(std::span<const std::byte> bytes) override {
     bytes_ += bytes.size();
@@ -30,7 +30,7 @@ class S3BlobStore::Writer : public BlobWriter {
   }
 
  private:
-  const S3BlobStore& store_;
+  S3BlobStore& store_;
   const std::unique_ptr<BlobWriter> copy_;
   std::uint64_t bytes_ = 0;
 };
@@ -66,17 +66,17 @@ S3BlobStore::S3BlobStore(const DataFolder& folder, S3Options options)
       client_(options_.client),
       cache_(folder.cache_folders(), folder.reserve(), options_.cache_bytes) {}
 
-bool S3BlobStore::answers() const {
+bool S3BlobStore::responds() const {
   constexpr std::chrono::seconds kForHowLong{2};
   constexpr std::chrono::seconds kPatience{5};
-  return probe_.answers(kForHowLong, kPatience, [this] { return client_.answers(); });
+  return health_.passes(kForHowLong, kPatience, [this] { return client_.responds(); });
 }
 
 bool S3BlobStore::is_empty() const { return !client_.has_any(kBlobObjects); }
 
 std::string S3BlobStore::mark() const { return client_.get_text(kMarkObject).value_or(""); }
 
-void S3BlobStore::set_mark(const std::string& text) const { client_.put_text(kMarkObject, text); }
+void S3BlobStore::set_mark(const std::string& text) { client_.put_text(kMarkObject, text); }
 
 bool S3BlobStore::has_room() const {
   if (folder_.reserve().has_room()) return true;
@@ -89,16 +89,16 @@ std::uint64_t S3BlobStore::capacity() const {
   return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
 }
 
-std::unique_ptr<BlobWriter> S3BlobStore::begin() const { return std::make_unique<Writer>(*this); }
+std::unique_ptr<BlobWriter> S3BlobStore::begin() { return std::make_unique<Writer>(*this); }
 
-void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
+void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob) {
   cache_.files().adopt(file, blob);
   store(blob);
 }
 
-void S3BlobStore::store(const Blob& blob) const {
+void S3BlobStore::store(const Blob& blob) {
   const auto in_use = cache_.use(blob.key);
-  cache_.files().settle(blob.key);       // records name the blob in the bucket, not this copy
+  cache_.files().mark_named(blob.key);   // records name the blob in the bucket, not this copy
   if (!cache_.files().size(blob.key)) {  // evicting an older copy may have removed the new one
     throw Error(ErrorCode::kUnavailable, "there is no space for a copy in the cache: try again");
   }
@@ -116,10 +116,10 @@ void S3BlobStore::store(const Blob& blob) const {
     throw;
   }
   const Lock lock(mutex_);
-  unsettled_.note(blob.key, hold);
+  unnamed_.note(blob.key, hold);
 }
 
-void S3BlobStore::put(const Blob& blob) const {
+void S3BlobStore::put(const Blob& blob) {
   const bool is_damaged = [&] {
     const Lock lock(mutex_);
     return damaged_.contains(blob.key);
@@ -132,7 +132,7 @@ void S3BlobStore::put(const Blob& blob) const {
   damaged_.erase(blob.key);
 }
 
-void S3BlobStore::wait_until_not_going(const std::string& key) const {
+void S3BlobStore::wait_until_not_going(const std::string& key) {
   constexpr std::chrono::milliseconds kPause{250};
   constexpr int kTries = 40;
   for (int n = 0; n < kTries; ++n) {
@@ -170,7 +170,7 @@ bool S3BlobStore::is_intact(const std::string& key, const std::stop_token& stop)
 // Tries twice, because another server may send the bytes the second time.
 bool S3BlobStore::fetch(const std::string& key, const std::stop_token& stop) const {
   const auto bytes = client_.size(blob_object(key));
-  if (!bytes && !client_.answers()) {  // a missing bucket also looks like a missing object
+  if (!bytes && !client_.responds()) {  // a missing bucket also looks like a missing object
     throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes does not respond");
   }
   if (!bytes) throw Error(ErrorCode::kNotFound, "the file does not exist");
@@ -189,7 +189,7 @@ bool S3BlobStore::fetch_once(const std::string& key, std::uint64_t bytes,
   const S3Sink sink = [&](std::span<const std::byte> piece) { copy->write(piece); };
   client_.get(blob_object(key), bytes, sink, stop);
   const Blob blob = copy->commit();
-  cache_.files().settle(blob.key);
+  cache_.files().mark_named(blob.key);
   if (blob.key == key) {
     cache_.note(key, blob.bytes);
     return true;

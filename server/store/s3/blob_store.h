@@ -13,10 +13,10 @@
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/files/room.h"
-#include "server/store/probe.h"
+#include "server/store/health_check.h"
 #include "server/store/s3/blob_cache.h"
 #include "server/store/s3/client.h"
-#include "server/store/unsettled.h"
+#include "server/store/unnamed_blobs.h"
 
 namespace isomesh::store {
 
@@ -49,17 +49,17 @@ class S3BlobStore : public BlobStore {
   void limit_room(std::uint64_t max_bytes, MakeRoom make) override {
     room_.limit(max_bytes, std::move(make));
   }
-  bool answers() const override;
+  bool responds() const override;
   bool is_shared() const override { return true; }
   bool is_empty() const override;
   std::string mark() const override;
-  void set_mark(const std::string& text) const override;
-  std::unique_ptr<BlobWriter> begin() const override;
+  void set_mark(const std::string& text) override;
+  std::unique_ptr<BlobWriter> begin() override;
   // About the local disk; removes copies first if it is full.
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
-  void adopt(const std::filesystem::path& file, const Blob& blob) const override;
+  void adopt(const std::filesystem::path& file, const Blob& blob) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
   // Checks the local copy as FileBlobStore does; fetches one if there is none.
@@ -69,44 +69,44 @@ class S3BlobStore : public BlobStore {
   std::shared_ptr<const void> hold_bytes(const std::string& /*key*/) const override {
     return nullptr;
   }
-  void erase(const std::string& key) const override;
-  void settle(const std::string& key) const override;
-  std::vector<std::string> erase_unnamed(std::span<const std::string> keys, Steady unsettled,
-                                         const Names& names) const override;
-  Swept sweep(Steady unsettled, const Names& names) const override;
-  std::size_t empty_quarantine(Time before, const Names& names) const override;
+  void erase(const std::string& key) override;
+  void mark_named(const std::string& key) override;
+  std::vector<std::string> erase_unnamed(std::span<const std::string> keys, Steady spare_since,
+                                         const Names& names) override;
+  Swept sweep(Steady spare_since, const Names& names) override;
+  std::size_t empty_quarantine(Time before, const Names& names) override;
 
  private:
   class Writer;
   class Fetching;
 
   // Uploads the local copy as a blob.
-  void store(const Blob& blob) const;
-  void put(const Blob& blob) const;
-  void wait_until_not_going(const std::string& key) const;
+  void store(const Blob& blob);
+  void put(const Blob& blob);
+  void wait_until_not_going(const std::string& key);
   bool fetch(const std::string& key, const std::stop_token& stop) const;
   bool fetch_once(const std::string& key, std::uint64_t bytes, const std::stop_token& stop) const;
   bool is_held(const std::string& key, std::chrono::nanoseconds oldest) const;
-  bool take_out(const std::string& key, Steady unsettled, const Names& names) const;
-  bool has_unsettled(const std::string& key, Steady since) const;
-  bool is_time_to_sweep() const;
+  bool take_out(const std::string& key, Steady spare_since, const Names& names);
+  bool is_unnamed_since(const std::string& key, Steady since) const;
+  bool is_time_to_sweep();
   // The held blobs. Removes holds that are too old.
-  std::set<std::string> tidy_holds(std::chrono::nanoseconds oldest) const;
-  void tidy_going() const;
+  std::set<std::string> tidy_holds(std::chrono::nanoseconds oldest);
+  void tidy_going();
 
   const S3Options options_;
   const DataFolder& folder_;
-  const S3Client client_;
-  const BlobCache cache_;
-  mutable Room room_;
-  mutable Probe probe_;
+  S3Client client_;
+  mutable BlobCache cache_;
+  Room room_;
+  mutable HealthCheck health_;
   mutable Mutex mutex_;
-  mutable Unsettled unsettled_ ISOMESH_GUARDED_BY(mutex_);
+  UnnamedBlobs unnamed_ ISOMESH_GUARDED_BY(mutex_);
   // Blobs in the bucket with wrong bytes.
   mutable std::set<std::string> damaged_ ISOMESH_GUARDED_BY(mutex_);
-  mutable Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
+  Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
   // As given to the last sweep; before the first one every blob counts as recent.
-  mutable Steady unsettled_since_ ISOMESH_GUARDED_BY(mutex_);
+  Steady spare_since_ ISOMESH_GUARDED_BY(mutex_);
   mutable Condition fetched_;
   mutable std::set<std::string> coming_ ISOMESH_GUARDED_BY(mutex_);
 };

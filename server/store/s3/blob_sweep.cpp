@@ -18,7 +18,7 @@ constexpr std::chrono::seconds kClockStep{1};
 
 }  // namespace
 
-void S3BlobStore::erase(const std::string& key) const {
+void S3BlobStore::erase(const std::string& key) {
   const auto bytes = client_.size(blob_object(key));
   cache_.erase(key);
   if (!bytes) return;
@@ -27,17 +27,17 @@ void S3BlobStore::erase(const std::string& key) const {
 }
 
 // A leftover hold expires.
-void S3BlobStore::settle(const std::string& key) const {
+void S3BlobStore::mark_named(const std::string& key) {
   const std::string hold = [&] {
     const Lock lock(mutex_);
-    return unsettled_.settle(key);
+    return unnamed_.remove(key);
   }();
   if (!hold.empty()) client_.try_to_erase(hold);
 }
 
-bool S3BlobStore::has_unsettled(const std::string& key, Steady since) const {
+bool S3BlobStore::is_unnamed_since(const std::string& key, Steady since) const {
   const Lock lock(mutex_);
-  return unsettled_.has_since(key, since);
+  return unnamed_.has_since(key, since);
 }
 
 bool S3BlobStore::is_held(const std::string& key, std::chrono::nanoseconds oldest) const {
@@ -48,22 +48,23 @@ bool S3BlobStore::is_held(const std::string& key, std::chrono::nanoseconds oldes
 }
 
 std::vector<std::string> S3BlobStore::erase_unnamed(std::span<const std::string> keys,
-                                                    Steady unsettled, const Names& names) const {
+                                                    Steady spare_since, const Names& names) {
   std::vector<std::string> left;
   for (const std::string& key : keys) {
     if (names(key)) continue;
-    if (has_unsettled(key, unsettled) || !take_out(key, unsettled, names)) left.push_back(key);
+    if (is_unnamed_since(key, spare_since) || !take_out(key, spare_since, names))
+      left.push_back(key);
   }
   return left;
 }
 
 // Returns false if the blob is held or named.
-bool S3BlobStore::take_out(const std::string& key, Steady unsettled, const Names& names) const {
+bool S3BlobStore::take_out(const std::string& key, Steady spare_since, const Names& names) {
   const std::string going = going_object(key);
   client_.put_text(going, "");
   std::optional<std::uint64_t> bytes;
   try {
-    if (is_held(key, age_of(unsettled)) || names(key)) {
+    if (is_held(key, age_of(spare_since)) || names(key)) {
       client_.erase(going);
       return false;
     }
@@ -82,7 +83,7 @@ bool S3BlobStore::take_out(const std::string& key, Steady unsettled, const Names
   return true;
 }
 
-bool S3BlobStore::is_time_to_sweep() const {
+bool S3BlobStore::is_time_to_sweep() {
   const Steady now = Steady::clock::now();
   const Lock lock(mutex_);
   if (now < next_sweep_) return false;
@@ -90,11 +91,11 @@ bool S3BlobStore::is_time_to_sweep() const {
   return true;
 }
 
-Swept S3BlobStore::sweep(Steady unsettled, const Names& names) const {
+Swept S3BlobStore::sweep(Steady spare_since, const Names& names) {
   if (!is_time_to_sweep()) return {};
   {
     const Lock lock(mutex_);
-    unsettled_since_ = unsettled;
+    spare_since_ = spare_since;
   }
   std::vector<std::string> keys;
   std::uint64_t bytes = 0;
@@ -108,7 +109,7 @@ Swept S3BlobStore::sweep(Steady unsettled, const Names& names) const {
     in_quarantine.insert(blob_of(object.key));
   }
   // Listed after the blobs, so every listed blob already had its hold.
-  const std::set<std::string> held = tidy_holds(age_of(unsettled));
+  const std::set<std::string> held = tidy_holds(age_of(spare_since));
   tidy_going();
   const std::size_t most = std::max(kSweptObjectsAtLeast, keys.size() / kSweptShareOfObjects);
   Swept swept;
@@ -118,7 +119,7 @@ Swept S3BlobStore::sweep(Steady unsettled, const Names& names) const {
       continue;
     }
     if (in_quarantine.contains(key) || held.contains(key)) continue;
-    if (has_unsettled(key, unsettled)) continue;
+    if (is_unnamed_since(key, spare_since)) continue;
     if (swept.quarantined == most) {
       ++swept.left;
       continue;
@@ -128,11 +129,11 @@ Swept S3BlobStore::sweep(Steady unsettled, const Names& names) const {
   }
   cache_.keep_only(names);
   const Lock lock(mutex_);
-  unsettled_.forget(unsettled);
+  unnamed_.forget(spare_since);
   return swept;
 }
 
-std::set<std::string> S3BlobStore::tidy_holds(std::chrono::nanoseconds oldest) const {
+std::set<std::string> S3BlobStore::tidy_holds(std::chrono::nanoseconds oldest) {
   std::set<std::string> held;
   const S3Listing holds = client_.list(kHoldObjects);
   for (const S3Object& hold : holds.objects) {
@@ -145,17 +146,17 @@ std::set<std::string> S3BlobStore::tidy_holds(std::chrono::nanoseconds oldest) c
   return held;
 }
 
-void S3BlobStore::tidy_going() const {
+void S3BlobStore::tidy_going() {
   const S3Listing going = client_.list(kGoingObjects);
   for (const S3Object& object : going.objects) {
     if (going.now - object.modified > kLongestGoing) client_.erase(object.key);
   }
 }
 
-std::size_t S3BlobStore::empty_quarantine(Time before, const Names& names) const {
-  const Steady unsettled = [&] {
+std::size_t S3BlobStore::empty_quarantine(Time before, const Names& names) {
+  const Steady spare_since = [&] {
     const Lock lock(mutex_);
-    return unsettled_since_;
+    return spare_since_;
   }();
   std::size_t removed = 0;
   for (const S3Object& object : client_.list(kQuarantineObjects).objects) {
@@ -163,7 +164,7 @@ std::size_t S3BlobStore::empty_quarantine(Time before, const Names& names) const
     const std::string key = blob_of(object.key);
     if (names(key)) {
       client_.erase(object.key);
-    } else if (take_out(key, unsettled, names)) {
+    } else if (take_out(key, spare_since, names)) {
       ++removed;
     }
   }

@@ -12,8 +12,8 @@
 #include "base/sha256.h"
 #include "base/text.h"
 #include "proto/error.h"
-#include "server/store/s3/answer_text.h"
 #include "server/store/s3/link.h"
+#include "server/store/s3/response_text.h"
 
 namespace isomesh::store {
 namespace {
@@ -71,21 +71,22 @@ bool is_worth_repeating(long status) {
 
 }  // namespace
 
-S3Answer S3Client::ask(const S3Request& request, const std::stop_token& stop) const {
+S3Response S3Client::ask(const S3Request& request, const std::stop_token& stop) const {
   Pauses pauses(options_.first_pause, options_.patience);
   for (int attempts = 1;; ++attempts) {
-    S3Answer answer = connections_.attempt(request, stop);
-    answer.attempts = attempts;
-    if (is_worth_repeating(answer.status)) {
+    S3Response response = connections_.attempt(request, stop);
+    response.attempts = attempts;
+    if (is_worth_repeating(response.status)) {
       pauses.wait(stop);
       continue;
     }
-    const bool is_told = answer.status == kS3NotFound || answer.status == kS3PreconditionFailed ||
-                         answer.status == kS3NotImplemented;
-    if (answer.status / 100 == 2 || is_told) return answer;
-    log_error("the storage rejected a request with status {} {}", answer.status,
-              s3_error_code(answer.text));
-    if (answer.status == kS3Forbidden) {
+    const bool is_told = response.status == kS3NotFound ||
+                         response.status == kS3PreconditionFailed ||
+                         response.status == kS3NotImplemented;
+    if (response.status / 100 == 2 || is_told) return response;
+    log_error("the storage rejected a request with status {} {}", response.status,
+              s3_error_code(response.text));
+    if (response.status == kS3Forbidden) {
       throw Error(
           ErrorCode::kUnavailable,
           "the storage of volumes and meshes denies access to this service; nothing is lost");
@@ -94,7 +95,7 @@ S3Answer S3Client::ask(const S3Request& request, const std::stop_token& stop) co
   }
 }
 
-bool S3Client::answers() const {
+bool S3Client::responds() const {
   S3Request request = listing("", "", 1);
   request.is_quick = true;
   try {
@@ -105,17 +106,17 @@ bool S3Client::answers() const {
 }
 
 std::optional<std::uint64_t> S3Client::size(const std::string& key) const {
-  const S3Answer answer = ask({.method = "HEAD", .key = key});
-  if (answer.status == kS3NotFound) return std::nullopt;
-  const auto bytes = parse_uint64(answer.header("content-length"));
-  if (answer.status != kS3Ok || !bytes) {
+  const S3Response response = ask({.method = "HEAD", .key = key});
+  if (response.status == kS3NotFound) return std::nullopt;
+  const auto bytes = parse_uint64(response.header("content-length"));
+  if (response.status != kS3Ok || !bytes) {
     throw Error(ErrorCode::kInternal, "the storage does not give the size of a file");
   }
   return bytes;
 }
 
 bool S3Client::put_file(const std::string& key, const File& file, const Blob& blob,
-                        IfThere if_there) const {
+                        IfThere if_there) {
   constexpr int kTries = 3;
   for (int n = 0; n < kTries; ++n) {
     bool is_stored = true;
@@ -124,8 +125,8 @@ bool S3Client::put_file(const std::string& key, const File& file, const Blob& bl
       is_stored = there != blob.bytes;
       if (is_stored) put_in_parts(key, file, blob);
     } else {
-      const S3Answer answer = put_at_once(key, file, blob, if_there);
-      is_stored = answer.status / 100 == 2;
+      const S3Response response = put_at_once(key, file, blob, if_there);
+      is_stored = response.status / 100 == 2;
     }
     // A successful PUT does not prove that the object is stored.
     if (size(key) == blob.bytes) return is_stored;
@@ -135,22 +136,22 @@ bool S3Client::put_file(const std::string& key, const File& file, const Blob& bl
               "the storage of volumes and meshes does not keep what is sent to it");
 }
 
-S3Answer S3Client::put_at_once(const std::string& key, const File& file, const Blob& blob,
-                               IfThere if_there) const {
+S3Response S3Client::put_at_once(const std::string& key, const File& file, const Blob& blob,
+                                 IfThere if_there) {
   S3Request request = {
       .method = "PUT", .key = key, .file = &file, .bytes = blob.bytes, .sha256 = blob.key};
   if (if_there == IfThere::kKeep && knows_conditions_) {
     request.condition = "If-None-Match: *";
-    S3Answer answer = ask(request);
-    if (answer.status != kS3NotImplemented) return answer;
+    S3Response response = ask(request);
+    if (response.status != kS3NotImplemented) return response;
     knows_conditions_ = false;
     request.condition.clear();
   }
   return ask(request);
 }
 
-void S3Client::put_in_parts(const std::string& key, const File& file, const Blob& blob) const {
-  const S3Answer begun = ask({.method = "POST", .key = key, .query = "uploads="});
+void S3Client::put_in_parts(const std::string& key, const File& file, const Blob& blob) {
+  const S3Response begun = ask({.method = "POST", .key = key, .query = "uploads="});
   const S3Text text = read_s3_text(begun.text);
   const std::string id(text.find("UploadId"));
   if (begun.status != kS3Ok || id.empty()) {
@@ -172,7 +173,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
         "</CompleteMultipartUpload>";
     // The status may be sent before the outcome is known, and a repeated request may find that the
     // upload no longer exists. The object's size then decides.
-    const S3Answer ended = ask({.method = "POST", .key = key, .query = upload, .text = whole});
+    const S3Response ended = ask({.method = "POST", .key = key, .query = upload, .text = whole});
     if (ended.status == kS3Ok && read_s3_text(ended.text).root == "CompleteMultipartUploadResult") {
       return;
     }
@@ -187,7 +188,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
 }
 
 std::string S3Client::put_part(const std::string& key, const std::string& query, const File& file,
-                               std::uint64_t begin, std::uint64_t bytes) const {
+                               std::uint64_t begin, std::uint64_t bytes) {
   Sha256 digest;
   std::vector<std::byte> block(kReadAtOnce);
   for (std::uint64_t done = 0; done < bytes;) {
@@ -198,30 +199,30 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
     digest.update(std::span<const std::byte>(block).first(count));
     done += count;
   }
-  const S3Answer answer = ask({.method = "PUT",
-                               .key = key,
-                               .query = query,
-                               .file = &file,
-                               .begin = begin,
-                               .bytes = bytes,
-                               .sha256 = to_hex(digest.finish())});
-  const std::string tag = answer.header("etag");
-  if (answer.status != kS3Ok || tag.empty() || tag.find_first_of("<>&") != tag.npos) {
+  const S3Response response = ask({.method = "PUT",
+                                   .key = key,
+                                   .query = query,
+                                   .file = &file,
+                                   .begin = begin,
+                                   .bytes = bytes,
+                                   .sha256 = to_hex(digest.finish())});
+  const std::string tag = response.header("etag");
+  if (response.status != kS3Ok || tag.empty() || tag.find_first_of("<>&") != tag.npos) {
     throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes has lost an upload");
   }
   return tag;
 }
 
-void S3Client::put_text(const std::string& key, std::string_view text) const {
+void S3Client::put_text(const std::string& key, std::string_view text) {
   if (ask({.method = "PUT", .key = key, .text = text}).status / 100 != 2) {
     throw Error(ErrorCode::kInternal, "the storage did not accept a small file");
   }
 }
 
 std::optional<std::string> S3Client::get_text(const std::string& key) const {
-  S3Answer answer = ask({.key = key});
-  if (answer.status == kS3NotFound) return std::nullopt;
-  return std::move(answer.text);
+  S3Response response = ask({.key = key});
+  if (response.status == kS3NotFound) return std::nullopt;
+  return std::move(response.text);
 }
 
 void S3Client::get(const std::string& key, std::uint64_t bytes, const S3Sink& sink,
@@ -231,25 +232,26 @@ void S3Client::get(const std::string& key, std::uint64_t bytes, const S3Sink& si
   while (done < bytes) {
     S3Request request = {.key = key, .bytes = bytes - done, .sink = &sink, .sink_begin = done};
     if (done > 0) request.condition = "Range: bytes=" + std::to_string(done) + '-';
-    const S3Answer answer = connections_.attempt(request, stop);
-    done += answer.taken;
-    if (answer.status == kS3NotFound) throw Error(ErrorCode::kNotFound, "the file does not exist");
+    const S3Response response = connections_.attempt(request, stop);
+    done += response.taken;
+    if (response.status == kS3NotFound)
+      throw Error(ErrorCode::kNotFound, "the file does not exist");
     if (done == bytes) return;
-    if (answer.status == kS3Forbidden) {
+    if (response.status == kS3Forbidden) {
       throw Error(ErrorCode::kUnavailable,
                   "the storage of volumes and meshes denies access to this service");
     }
-    if (answer.taken > 0) pauses.start_over();
+    if (response.taken > 0) pauses.start_over();
     pauses.wait(stop);
   }
 }
 
-S3Client::Erased S3Client::erase(const std::string& key) const {
+S3Client::Erased S3Client::erase(const std::string& key) {
   const auto asked = ask({.method = "DELETE", .key = key, .is_sent_once = true});
   return asked.attempts == 1 ? Erased::kAtOnce : Erased::kMaybeLater;
 }
 
-void S3Client::try_to_erase(const std::string& key) const {
+void S3Client::try_to_erase(const std::string& key) {
   try {
     connections_.attempt({.method = "DELETE", .key = key, .is_quick = true}, {});
   } catch (const Error& error) {
@@ -270,12 +272,12 @@ S3Listing S3Client::list(const std::string& beginning) const {
   S3Listing all;
   std::string last;
   for (int page = 0; page < kMostPages; ++page) {
-    const S3Answer answer = ask(listing(beginning, last, kListedAtOnce));
-    const S3Text text = read_s3_text(answer.text);
-    if (answer.status != kS3Ok || text.root != "ListBucketResult") {
+    const S3Response response = ask(listing(beginning, last, kListedAtOnce));
+    const S3Text text = read_s3_text(response.text);
+    if (response.status != kS3Ok || text.root != "ListBucketResult") {
       throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
     }
-    all.now = answer.now();
+    all.now = response.now();
     for (const auto& [parent, name, value] : text.leaves) {
       if (parent != "Contents") continue;
       if (name == "Key") {
@@ -297,9 +299,9 @@ S3Listing S3Client::list(const std::string& beginning) const {
 }
 
 bool S3Client::has_any(const std::string& beginning) const {
-  const S3Answer answer = ask(listing(beginning, "", 1));
-  const S3Text text = read_s3_text(answer.text);
-  if (answer.status != kS3Ok || text.root != "ListBucketResult") {
+  const S3Response response = ask(listing(beginning, "", 1));
+  const S3Text text = read_s3_text(response.text);
+  if (response.status != kS3Ok || text.root != "ListBucketResult") {
     throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
   }
   return !text.find("Key").empty();

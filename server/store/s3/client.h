@@ -38,14 +38,14 @@ class S3Client {
   explicit S3Client(S3ClientOptions options) : options_(std::move(options)) {}
 
   // True if the bucket can be read. One request without repetition, limited to about two seconds.
-  bool answers() const;
+  bool responds() const;
 
   // Stores the first `blob.bytes` bytes of a file; the peer verifies their SHA-256. With kKeep,
   // returns false and replaces nothing if an object of that size exists. Checks afterwards that the
   // object has that size.
-  bool put_file(const std::string& key, const File& file, const Blob& blob, IfThere if_there) const;
+  bool put_file(const std::string& key, const File& file, const Blob& blob, IfThere if_there);
 
-  void put_text(const std::string& key, std::string_view text) const;
+  void put_text(const std::string& key, std::string_view text);
   std::optional<std::string> get_text(const std::string& key) const;
 
   // Passes the object's `bytes` bytes to `sink` in order. An interrupted transfer continues where
@@ -59,10 +59,10 @@ class S3Client {
   enum class Erased { kAtOnce, kMaybeLater };
   // kMaybeLater: the object is gone, but a repeated request may arrive late and erase a new object
   // with the same key.
-  Erased erase(const std::string& key) const;
+  Erased erase(const std::string& key);
 
   // Erases without repetition or error, for objects that do no harm if they stay.
-  void try_to_erase(const std::string& key) const;
+  void try_to_erase(const std::string& key);
 
   // Lists all objects, with as many requests as necessary.
   S3Listing list(const std::string& beginning) const;
@@ -73,13 +73,13 @@ class S3Client {
   std::string link(const std::string& key, const LinkedAs& as) const;
 
  private:
-  S3Answer ask(const S3Request& request, const std::stop_token& stop = {}) const;
+  S3Response ask(const S3Request& request, const std::stop_token& stop = {}) const;
   S3Request listing(const std::string& beginning, const std::string& last, int most) const;
-  S3Answer put_at_once(const std::string& key, const File& file, const Blob& blob,
-                       IfThere if_there) const;
-  void put_in_parts(const std::string& key, const File& file, const Blob& blob) const;
+  S3Response put_at_once(const std::string& key, const File& file, const Blob& blob,
+                         IfThere if_there);
+  void put_in_parts(const std::string& key, const File& file, const Blob& blob);
   std::string put_part(const std::string& key, const std::string& query, const File& file,
-                       std::uint64_t begin, std::uint64_t bytes) const;
+                       std::uint64_t begin, std::uint64_t bytes);
 
   const S3ClientOptions options_;
   const S3Connections connections_{options_};

@@ -40,15 +40,15 @@ class Attempt {
     set_request();
   }
 
-  S3Answer perform() {
+  S3Response perform() {
     const CURLcode result = curl::Transfer(easy_, callbacks(), stop_).perform();
     if (result == CURLE_OK) {
-      curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &answer_.status);
+      curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &response_.status);
     } else {
       log_debug("the storage: {}", curl_easy_strerror(result));
-      answer_.status = 0;
+      response_.status = 0;
     }
-    return std::move(answer_);
+    return std::move(response_);
   }
 
  private:
@@ -149,8 +149,8 @@ class Attempt {
     const bool is_wanted = status == kS3Ok || status == kS3Partial;
     if (request_.sink != nullptr && is_wanted) {
       pass_on(bytes, status == kS3Partial);
-    } else if (answer_.text.size() + bytes.size() <= kLongestText) {
-      answer_.text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    } else if (response_.text.size() + bytes.size() <= kLongestText) {
+      response_.text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     } else {
       return false;
     }
@@ -166,18 +166,18 @@ class Attempt {
     bytes = bytes.subspan(static_cast<std::size_t>(skipped));
     // Bytes beyond the object's size are ignored.
     bytes = bytes.first(static_cast<std::size_t>(
-        std::min<std::uint64_t>(bytes.size(), request_.bytes - answer_.taken)));
+        std::min<std::uint64_t>(bytes.size(), request_.bytes - response_.taken)));
     if (!bytes.empty()) (*request_.sink)(bytes);
-    answer_.taken += bytes.size();
+    response_.taken += bytes.size();
   }
 
   void take_header(std::string_view line) {
     const std::size_t colon = line.find(':');
     // "100 Continue" precedes the response and has headers of its own.
-    if (line.starts_with("HTTP/")) answer_.headers.clear();
+    if (line.starts_with("HTTP/")) response_.headers.clear();
     constexpr std::size_t kMostHeaders = 100;
-    if (colon != line.npos && answer_.headers.size() < kMostHeaders) {
-      answer_.headers[lower(line.substr(0, colon))] = trimmed(line.substr(colon + 1));
+    if (colon != line.npos && response_.headers.size() < kMostHeaders) {
+      response_.headers[lower(line.substr(0, colon))] = trimmed(line.substr(colon + 1));
     }
   }
 
@@ -186,19 +186,19 @@ class Attempt {
   const std::stop_token stop_;
   CURL* const easy_;
   curl::Headers headers_;
-  S3Answer answer_;
+  S3Response response_;
   std::uint64_t sent_ = 0;
   std::uint64_t received_ = 0;
 };
 
 }  // namespace
 
-std::string S3Answer::header(const std::string& name) const {
+std::string S3Response::header(const std::string& name) const {
   const auto found = headers.find(name);
   return found == headers.end() ? "" : found->second;
 }
 
-Time S3Answer::now() const {
+Time S3Response::now() const {
   const std::time_t time = curl_getdate(header("date").c_str(), nullptr);
   return time < 0 ? std::chrono::system_clock::now() : Time(std::chrono::seconds(time));
 }
@@ -222,12 +222,12 @@ void S3Connections::give_back(curl::Easy connection) const {
   if (idle_.size() < kIdleConnections) idle_.push_back(std::move(connection));
 }
 
-S3Answer S3Connections::attempt(const S3Request& request, const std::stop_token& stop) const {
+S3Response S3Connections::attempt(const S3Request& request, const std::stop_token& stop) const {
   curl::Easy connection = take();
-  S3Answer answer = Attempt(options_, request, stop, connection.get()).perform();
+  S3Response response = Attempt(options_, request, stop, connection.get()).perform();
   // A connection with an aborted transfer may still have bytes of it.
-  if (answer.status != 0) give_back(std::move(connection));
-  return answer;
+  if (response.status != 0) give_back(std::move(connection));
+  return response;
 }
 
 }  // namespace isomesh::store

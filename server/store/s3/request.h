@@ -65,7 +65,7 @@ inline constexpr long kS3Conflict = 409;
 inline constexpr long kS3PreconditionFailed = 412;
 inline constexpr long kS3NotImplemented = 501;
 
-struct S3Answer {
+struct S3Response {
   long status = 0;                                  // 0: none, or the transfer was aborted
   std::map<std::string, std::string> headers = {};  // names in lower case
   std::string text = {};
@@ -86,7 +86,7 @@ class S3Connections {
 
   // Throws what the request's sink throws; Error kCancelled if `stop` is requested; kUnavailable if
   // the credentials cannot be read.
-  S3Answer attempt(const S3Request& request, const std::stop_token& stop) const;
+  S3Response attempt(const S3Request& request, const std::stop_token& stop) const;
 
  private:
   curl::Easy take() const;

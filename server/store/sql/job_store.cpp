@@ -39,10 +39,12 @@ std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState>
 QueueDepth SqlJobStore::depth(const Viewer& viewer) const {
   const std::string mine = viewer ? " AND owner = ?1" : " AND ?1 IS NULL";
   Rows rows = records_.query(
-      "SELECT 'queued', priority, count(*) FROM jobs WHERE state = 0" + mine +
-          " GROUP BY priority UNION ALL SELECT 'running', 0, count(*) FROM jobs WHERE state = 1" +
+      "SELECT 'queued', priority, count(*) FROM jobs WHERE state = {job.queued}" + mine +
+          " GROUP BY priority UNION ALL SELECT 'running', 0, count(*) FROM jobs WHERE state = "
+          "{job.running}" +
           mine +
-          " UNION ALL SELECT 'waiting', 0, count(*) FROM jobs WHERE state = 0 AND waiting_for IS "
+          " UNION ALL SELECT 'waiting', 0, count(*) FROM jobs WHERE state = {job.queued} AND "
+          "waiting_for IS "
           "NOT NULL AND waiting_for = ?2" +
           mine,
       viewer, WaitingFor::kDisk);
@@ -63,7 +65,7 @@ bool SqlJobStore::is_full() const {
 }
 
 bool SqlJobStore::is_full(SqlConnection& connection) const {
-  Rows row = connection.query("SELECT count(*) FROM jobs WHERE state = 0");
+  Rows row = connection.query("SELECT count(*) FROM jobs WHERE state = {job.queued}");
   row.next();
   return row.count(0) >= options_.max_queued;
 }
@@ -113,7 +115,8 @@ void SqlJobStore::throw_no_volume_of(SqlConnection& connection, const JobSpec& s
 bool SqlJobStore::has_share(SqlConnection& connection, const JobSpec& spec) const {
   if (spec.owner.empty()) return true;
   Rows row = connection.query(
-      "SELECT count(*), count(CASE WHEN owner = ?1 THEN 1 END) FROM jobs WHERE state = 0 AND (?2 = "
+      "SELECT count(*), count(CASE WHEN owner = ?1 THEN 1 END) FROM jobs WHERE state = "
+      "{job.queued} AND (?2 = "
       "0 OR priority = ?3)",
       spec.owner, spec.parameters.priority == Priority::kStat, Priority::kStat);
   row.next();

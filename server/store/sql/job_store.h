@@ -44,7 +44,7 @@ class SqlJobStore : public JobStore {
     int attempts = 0;
     std::uint64_t fence = 0;
     bool cancelling = false;
-    std::int64_t cost_us = 0;  // see turns.h
+    std::int64_t cost_us = 0;  // see fair_queue.h
   };
   // Properties of a job to be stored.
   struct Asked {
@@ -68,8 +68,7 @@ class SqlJobStore : public JobStore {
 
   // `select` reads the columns that row_of() takes, from `jobs j`. `blobs` tells whether a mesh to
   // be reused still exists. `database` and `blobs` must outlive this object.
-  SqlJobStore(SqlDatabase& database, const BlobStore& blobs, JobStoreOptions options,
-              std::string select)
+  SqlJobStore(SqlDatabase& database, BlobStore& blobs, JobStoreOptions options, std::string select)
       : blobs_(blobs),
         options_(std::move(options)),
         select_(std::move(select)),
@@ -107,7 +106,7 @@ class SqlJobStore : public JobStore {
   void wake_a_worker();
   void wake_all_workers();
 
-  const BlobStore& blobs_;
+  BlobStore& blobs_;
   const JobStoreOptions options_;
   const std::string select_;
   std::atomic<bool> refusing_ = false;
@@ -118,7 +117,7 @@ class SqlJobStore : public JobStore {
  private:
   // True if the job failed because of a damaged volume that is intact now.
   bool is_repaired(const Job& job) const;
-  // Whether the files of a job that succeeded are there and intact.
+  // True if the files of a job that succeeded are there and intact.
   bool is_whole(const Job& job) const;
 
   SqlDatabase& records_;

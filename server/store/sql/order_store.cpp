@@ -38,7 +38,7 @@ OrderRecord found(SqlConnection& connection, const Viewer& viewer, const std::st
 }
 
 std::size_t count_open(SqlConnection& connection) {
-  Rows row = connection.query("SELECT count(*) FROM orders WHERE state < 4");
+  Rows row = connection.query("SELECT count(*) FROM orders WHERE state < {order.final}");
   row.next();
   return row.count(0);
 }
@@ -197,7 +197,8 @@ std::vector<Order> SqlOrderStore::list(const Viewer& viewer, const OrderFilter& 
 
 std::vector<OrderRecord> SqlOrderStore::due(Time now, std::size_t limit) const {
   Rows rows = database_.query(
-      "SELECT owner, record, work FROM orders WHERE state < 4 AND next <= ?1 ORDER BY next LIMIT "
+      "SELECT owner, record, work FROM orders WHERE state < {order.final} AND next <= ?1 ORDER BY "
+      "next LIMIT "
       "?2",
       database_.to_us(now), limit);
   std::vector<OrderRecord> records;
@@ -207,15 +208,17 @@ std::vector<OrderRecord> SqlOrderStore::due(Time now, std::size_t limit) const {
 
 std::optional<OrderRecord> SqlOrderStore::if_due(const std::string& id, Time now) const {
   Rows rows = database_.query(
-      "SELECT owner, record, work FROM orders WHERE id = ?1 AND state < 4 AND next <= ?2", id,
-      database_.to_us(now));
+      "SELECT owner, record, work FROM orders WHERE id = ?1 AND state < {order.final} AND next <= "
+      "?2",
+      id, database_.to_us(now));
   if (!rows.next()) return std::nullopt;
   return record_of(rows);
 }
 
 std::optional<Time> SqlOrderStore::next_after(Time now) const {
-  Rows row = database_.query("SELECT min(next) FROM orders WHERE state < 4 AND next > ?1",
-                             database_.to_us(now));
+  Rows row =
+      database_.query("SELECT min(next) FROM orders WHERE state < {order.final} AND next > ?1",
+                      database_.to_us(now));
   row.next();
   if (row.is_null(0)) return std::nullopt;
   return database_.from_us(row.integer(0));
@@ -237,10 +240,10 @@ bool SqlOrderStore::save(const OrderRecord& record, Time next) {
 }
 
 void SqlOrderStore::hurry(const std::string& id) {
-  database_.run(
-      Change::kRepeatable,
-      "UPDATE orders SET next = isomesh_now() WHERE id = ?1 AND state < 4 AND next > isomesh_now()",
-      id);
+  database_.run(Change::kRepeatable,
+                "UPDATE orders SET next = isomesh_now() WHERE id = ?1 AND state < {order.final} "
+                "AND next > isomesh_now()",
+                id);
 }
 
 Order SqlOrderStore::cancel(const Viewer& viewer, const std::string& id) {
@@ -277,7 +280,7 @@ OrderCounts SqlOrderStore::counts() const {
       counts.by_state_and_rule[{static_cast<OrderState>(rows.integer(0)), rows.text(1)}] =
           rows.count(2);
     }
-    Rows oldest = connection.query("SELECT min(created) FROM orders WHERE state < 4");
+    Rows oldest = connection.query("SELECT min(created) FROM orders WHERE state < {order.final}");
     oldest.next();
     if (!oldest.is_null(0)) counts.oldest_open = from_us(oldest.integer(0));
     return counts;

@@ -1,9 +1,10 @@
 // SQL for all engines: one text for each statement, and interfaces for the differences. For stores
 // only.
 //
-// Parameters are ?1, ?2 and so on. `isomesh_now()` is the current time in the tables' form:
-// microseconds since 1970. `isomesh_kept(time)` is used for times that decide how long something is
-// kept: it is that time, or the newest certain time if the clock has gone back.
+// Parameters are ?1, ?2 and so on. Numbers of states have names, such as {job.queued}: see names.h.
+// `isomesh_now()` is the current time in the tables' form: microseconds since 1970.
+// `isomesh_kept(time)` is used for times that decide how long something is kept: it is that time,
+// or the newest certain time if the clock has gone back.
 #pragma once
 
 #include <array>

@@ -7,9 +7,9 @@
 
 namespace isomesh::store {
 
-Time time_to_start_with(Time last_seen, const OperatorsWord& word,
+Time time_to_start_with(Time last_seen, const OperatorOverrides& overrides,
                         const BelievedClock::Options& clock) {
-  return word.trust_clock ? std::max(last_seen, clock.wall()) : last_seen;
+  return overrides.trust_clock ? std::max(last_seen, clock.wall()) : last_seen;
 }
 
 void trust(SqlDatabase& database, Time last_seen, Time now, std::chrono::milliseconds tolerance) {

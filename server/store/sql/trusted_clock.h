@@ -4,14 +4,14 @@
 #include <chrono>
 
 #include "server/store/believed_clock.h"
-#include "server/store/operators_word.h"
+#include "server/store/operator_overrides.h"
 #include "server/store/sql/sql.h"
 
 namespace isomesh::store {
 
 // The start value of the believed clock: the last recorded time, or the clock's time if that is
 // later and the operator trusts it.
-Time time_to_start_with(Time last_seen, const OperatorsWord& word,
+Time time_to_start_with(Time last_seen, const OperatorOverrides& overrides,
                         const BelievedClock::Options& clock);
 
 // Adjusts records after an operator has confirmed that this much time has passed. The clock may

@@ -65,7 +65,8 @@ std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, cons
 
 void throw_if_needed(SqlConnection& connection, const Viewer& viewer, const std::string& id) {
   Rows needed = connection.query(
-      "SELECT 1 FROM jobs WHERE volume = ?1 AND (?2 IS NULL OR owner = ?2) AND state < 2 LIMIT 1",
+      "SELECT 1 FROM jobs WHERE volume = ?1 AND (?2 IS NULL OR owner = ?2) AND state < {job.final} "
+      "LIMIT 1",
       id, viewer);
   if (needed.next()) throw Error(ErrorCode::kNotReady, "unfinished jobs need this volume");
 }
@@ -200,7 +201,8 @@ std::vector<Expirable> SqlVolumeStore::unused(const ExpiryFilter& filter, std::s
       database_, RecordKind::kVolume,
       database_.query(
           "SELECT owner, id, used FROM volumes v WHERE used < ?1 AND NOT EXISTS (SELECT 1 FROM "
-          "jobs j WHERE j.volume = v.id AND j.owner = v.owner AND j.state < 2) AND (?3 IS NULL OR "
+          "jobs j WHERE j.volume = v.id AND j.owner = v.owner AND j.state < {job.final}) AND (?3 "
+          "IS NULL OR "
           "owner = ?3) ORDER BY used LIMIT ?2",
           database_.to_us(filter.before), limit, filter.owner));
 }
@@ -215,7 +217,7 @@ Expired SqlVolumeStore::expire(std::span<const Expirable> volumes, std::uint64_t
             volume.owner, volume.id, database_.to_us(volume.last_used)));
         const std::size_t removed = connection.run(
             "DELETE FROM volumes WHERE owner = ?1 AND id = ?2 AND used = ?3 AND NOT EXISTS (SELECT "
-            "1 FROM jobs WHERE volume = ?2 AND owner = ?1 AND state < 2)",
+            "1 FROM jobs WHERE volume = ?2 AND owner = ?1 AND state < {job.final})",
             volume.owner, volume.id, database_.to_us(volume.last_used));
         return removed == 0 ? std::nullopt : std::optional(std::move(blobs));
       });

@@ -6,15 +6,14 @@
 
 #include "proto/error.h"
 #include "server/store/files/files.h"
-#include "server/store/sql/turns.h"
+#include "server/store/sql/fair_queue.h"
 
 namespace isomesh::store {
 namespace {
 
 // The tables of the first version, then the changes of each later one. Only append; never edit.
 //
-// States are the values of JobState: 0 queued, 1 running, 2 succeeded, 3 failed, 4 cancelled. A
-// record is the JSON of the API; the other columns serve queries.
+// A record is the JSON of the API; the other columns serve queries.
 constexpr std::array kSteps = {R"sql(
 CREATE TABLE volumes(
   owner TEXT NOT NULL,
@@ -48,10 +47,10 @@ CREATE TABLE jobs(
   request_digest TEXT,
   record TEXT NOT NULL
 ) WITHOUT ROWID;
-CREATE INDEX jobs_queue ON jobs(priority, id) WHERE state = 0;
-CREATE INDEX jobs_running ON jobs(lease_until) WHERE state = 1;
+CREATE INDEX jobs_queue ON jobs(priority, id) WHERE state = {job.queued};
+CREATE INDEX jobs_running ON jobs(lease_until) WHERE state = {job.running};
 CREATE INDEX jobs_by_result ON jobs(owner, result_key, state);
-CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < 2;
+CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < {job.final};
 CREATE INDEX jobs_by_end ON jobs(finished) WHERE finished IS NOT NULL;
 CREATE INDEX jobs_by_owner ON jobs(owner, id);
 CREATE UNIQUE INDEX jobs_by_key ON jobs(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
@@ -96,7 +95,7 @@ CREATE INDEX callbacks_by_time ON callbacks(next);
 )sql",
                                R"sql(
 ALTER TABLE jobs ADD COLUMN waiting_for INTEGER;  -- of queued ones, see WaitingFor
-CREATE INDEX jobs_waiting ON jobs(waiting_for) WHERE state = 0 AND waiting_for IS NOT NULL;
+CREATE INDEX jobs_waiting ON jobs(waiting_for) WHERE state = {job.queued} AND waiting_for IS NOT NULL;
 
 CREATE TABLE identity(        -- one row: see Identity
   id TEXT NOT NULL,
@@ -105,7 +104,7 @@ CREATE TABLE identity(        -- one row: see Identity
 );
 )sql",
                                R"sql(
-CREATE TABLE orders(          -- states are the values of OrderState; those from 4 on are final
+CREATE TABLE orders(          -- states are the values of OrderState; those from {order.final} on are final
   id TEXT NOT NULL PRIMARY KEY,
   owner TEXT NOT NULL,
   state INTEGER NOT NULL,
@@ -118,7 +117,7 @@ CREATE TABLE orders(          -- states are the values of OrderState; those from
   record TEXT NOT NULL,       -- the JSON of the API
   work TEXT NOT NULL          -- what the API does not tell
 ) WITHOUT ROWID;
-CREATE INDEX orders_due ON orders(next) WHERE state < 4;
+CREATE INDEX orders_due ON orders(next) WHERE state < {order.final};
 CREATE INDEX orders_by_owner ON orders(owner, id);
 CREATE INDEX orders_by_end ON orders(finished) WHERE finished IS NOT NULL;
 CREATE UNIQUE INDEX orders_by_key ON orders(owner, idempotency_key)
@@ -187,8 +186,8 @@ CREATE TRIGGER audit_is_not_replaced BEFORE INSERT ON audit
                                R"sql(
 ALTER TABLE jobs ADD COLUMN cost INTEGER NOT NULL DEFAULT 1000000;  -- microseconds that a run is expected to take
 DROP INDEX jobs_queue;
-CREATE INDEX jobs_by_turn ON jobs(priority, owner, id, state) WHERE state = 0;  -- covers the look for owners
-CREATE TABLE turns(           -- of owners' last claims; see turns.h
+CREATE INDEX jobs_by_turn ON jobs(priority, owner, id, state) WHERE state = {job.queued};  -- covers the look for owners
+CREATE TABLE turns(           -- of owners' last claims; see fair_queue.h
   priority INTEGER NOT NULL,
   owner TEXT NOT NULL,
   start_tag INTEGER NOT NULL,

@@ -26,7 +26,7 @@ void EventLog::withdraw(std::size_t count) {
   changed_.notify_all();
 }
 
-void EventLog::settle(bool is_committed) {
+void EventLog::end_transaction(bool is_committed) {
   const Lock lock(mutex_);
   if (is_committed) {
     for (Event& event : reserved_) remember({std::move(event), true});

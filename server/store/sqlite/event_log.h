@@ -21,15 +21,15 @@ class EventLog {
   explicit EventLog(std::uint64_t last) : last_(last), complete_after_(last) {}
 
   // Numbers an event written by the open transaction. Neither this event nor any with a greater
-  // number is visible until settle(); otherwise a reader that continues after the greater one would
-  // miss this one. One transaction at a time.
+  // number is visible until end_transaction(); otherwise a reader that continues after the greater
+  // one would miss this one. One transaction at a time.
   std::uint64_t reserve(Event event);
 
   // Removes the last `count` events, because their part of the transaction was rolled back.
   void withdraw(std::size_t count);
 
   // Ends the transaction and wakes all readers. Discards its events unless it was committed.
-  void settle(bool is_committed);
+  void end_transaction(bool is_committed);
 
   // Adds an event that is not stored.
   void tell(Event event);
@@ -49,7 +49,7 @@ class EventLog {
   Recent recent(const Viewer& viewer, const std::string& job, std::uint64_t since,
                 std::uint64_t end) const;
 
-  // Increments with each settle() and tell().
+  // Increments with each end_transaction() and tell().
   std::uint64_t generation() const;
 
   // Waits until the generation changes, the deadline, or close().

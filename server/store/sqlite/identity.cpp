@@ -43,17 +43,17 @@ std::int64_t newest_record(Connection& connection) {
 
 }  // namespace
 
-Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
                    const BelievedClock::Options& clock)
     : database_(database),
       blobs_(blobs),
-      clock_(time_to_start_with(last_seen(database, clock), word, clock), clock) {
+      clock_(time_to_start_with(last_seen(database, clock), overrides, clock), clock) {
   const Mark records = mark_of_database();
   const Mark theirs = mark_of_blobs();
-  if (!word.adopt) check(records, theirs);
+  if (!overrides.adopt) check(records, theirs);
   const Time now = clock_.now();
   database_.know_newest(now);
-  if (word.trust_clock) trust(database_, last_seen(database, clock), now, clock.tolerance);
+  if (overrides.trust_clock) trust(database_, last_seen(database, clock), now, clock.tolerance);
   const Lock lock(mutex_);
   const bool belong_together = !records.id.empty() && records.id == theirs.id;
   mark_ = belong_together ? records : Mark{random_hex(16), 0, records.seen};

@@ -6,7 +6,7 @@
 #include "base/mutex.h"
 #include "server/store/believed_clock.h"
 #include "server/store/blob_store.h"
-#include "server/store/operators_word.h"
+#include "server/store/operator_overrides.h"
 #include "server/store/sqlite/database.h"
 
 namespace isomesh::store {
@@ -17,9 +17,9 @@ namespace isomesh::store {
 class Identity {
  public:
   // Throws Error kUnavailable if the two do not belong together, or one is older than the other,
-  // and `word` does not allow that. Assigns a new name if it does, or if there is nothing to lose
-  // yet.
-  Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+  // and `overrides` does not allow that. Assigns a new name if it does, or if there is nothing to
+  // lose yet.
+  Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
            const BelievedClock::Options& clock);
 
   // The believed time. Records it, and marks what was stored since the last mark; if the disk has
@@ -44,7 +44,7 @@ class Identity {
   void write_blobs_mark() ISOMESH_REQUIRES(mutex_);
 
   Database& database_;
-  const BlobStore& blobs_;
+  BlobStore& blobs_;
   BelievedClock clock_;
   mutable Mutex mutex_;
   Mark mark_ ISOMESH_GUARDED_BY(mutex_);

@@ -65,7 +65,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     change->run(
         "INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, not_before, "
         "attempts, fence, cancelling, idempotency_key, request_digest, record, cost) "
-        "VALUES(?, ?, 0, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?, ?)",
+        "VALUES(?, ?, {job.queued}, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?, ?)",
         row.job.id, row.owner, spec.parameters.priority, spec.parameters.volume, row.result_key,
         row.accepted, key, spec.request_digest, to_record(row.job), row.cost_us);
     if (mesh) {
@@ -85,7 +85,7 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   // If a power failure reverts a claim, the job is queued again and its worker is gone anyway.
   Change change(*this, Durability::kProcess);
   const std::int64_t now = now_us();
-  auto next = take_turn(change, now);
+  auto next = take_next(change, now);
   if (!next) {
     change.commit();
     return std::nullopt;
@@ -99,7 +99,7 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   row.job.started = timestamp();
   row.job.timing.queue = milliseconds_since(row.accepted);
   change->run(
-      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, worker = ?, "
+      "UPDATE jobs SET state = {job.running}, attempts = ?, fence = ?, claimed = ?, worker = ?, "
       "waiting_for = NULL, record = ? WHERE id = ?",
       row.attempts, row.fence, now, worker, to_record(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
@@ -118,16 +118,17 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
 }
 
-std::optional<SqliteJobStore::Row> SqliteJobStore::take_turn(Change& change,
-                                                             std::int64_t now) const {
+std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std::int64_t now) {
   std::string id;
   std::int64_t start_tag = 0;
   {
     Rows query = change->query(
         "WITH heads AS MATERIALIZED (SELECT q.priority, q.start_tag, (SELECT j.id FROM jobs j "
-        "WHERE j.state = 0 AND j.priority = q.priority AND j.owner = q.owner AND j.not_before NOT "
+        "WHERE j.state = {job.queued} AND j.priority = q.priority AND j.owner = q.owner AND "
+        "j.not_before NOT "
         "BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS (SELECT 1 FROM jobs r WHERE r.owner = j.owner "
-        "AND r.result_key = j.result_key AND r.state = 1) ORDER BY j.id LIMIT 1) AS job FROM "
+        "AND r.result_key = j.result_key AND r.state = {job.running}) ORDER BY j.id LIMIT 1) AS "
+        "job FROM "
         "queued_owners q) SELECT job, start_tag FROM heads WHERE job IS NOT NULL ORDER BY "
         "priority, start_tag, job LIMIT 1",
         now, kLongestWaitUs);
@@ -187,7 +188,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
   if (!is_held) return false;
   forget_run(lease.id, lease.fence);
   if (has_mesh) {
-    for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.settle(blob.key);
+    for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.mark_named(blob.key);
   }
   // Without a mesh, this job or an equal one may be ready again. With one, no job becomes ready.
   if (!has_mesh) wake_all_workers();
@@ -216,7 +217,7 @@ std::size_t SqliteJobStore::reap() {
     Change change(*this);
     std::vector<Row> rows;
     {
-      Rows query = change->query(select_ + "WHERE j.state = 1");
+      Rows query = change->query(select_ + "WHERE j.state = {job.running}");
       while (query.next()) rows.push_back(row_of(query));
     }
     std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
@@ -264,7 +265,7 @@ bool SqliteJobStore::is_held(const std::string& id, std::uint64_t fence) const {
          run->second.lease_until >= Steady::clock::now();
 }
 
-void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
+void SqliteJobStore::end(Change& change, Row& row, JobState state) {
   row.job.state = state;
   row.job.waiting_for.reset();
   row.job.finished = timestamp();
@@ -280,7 +281,7 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
   change.announce(row, EventKind::kDone);
 }
 
-void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) const {
+void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) {
   give_mesh(row.job, mesh);
   for (const Blob& blob : blobs_of(mesh)) {
     change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, blob.key, blob.bytes);
@@ -288,11 +289,12 @@ void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) 
   end(change, row, JobState::kSucceeded);
 }
 
-void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const {
+void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) {
   std::vector<Row> alike;
   {
-    Rows query = change->query(select_ + "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = 0",
-                               row.owner, row.result_key);
+    Rows query = change->query(
+        select_ + "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = {job.queued}", row.owner,
+        row.result_key);
     while (query.next()) alike.push_back(row_of(query));
   }
   for (Row& other : alike) {
@@ -303,20 +305,21 @@ void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSum
   }
 }
 
-void SqliteJobStore::give_back(Change& change, Row& row, std::chrono::milliseconds delay) const {
+void SqliteJobStore::give_back(Change& change, Row& row, std::chrono::milliseconds delay) {
   if (row.cancelling) return end(change, row, JobState::kCancelled);
   row.attempts -= 1;
   queue_again(change, row, delay);
 }
 
-void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const {
+void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::milliseconds delay) {
   row.job.state = JobState::kQueued;
   row.job.stage = Stage::kQueue;
   row.job.progress = 0;
   row.job.started.reset();
   row.job.timing = {};
   change->run(
-      "UPDATE jobs SET state = 0, attempts = ?, not_before = ?, waiting_for = ?, record = ? WHERE "
+      "UPDATE jobs SET state = {job.queued}, attempts = ?, not_before = ?, waiting_for = ?, record "
+      "= ? WHERE "
       "id "
       "= ?",
       row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_record(row.job),

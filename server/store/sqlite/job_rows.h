@@ -12,7 +12,7 @@ namespace isomesh::store {
 // One transaction and its events, which become visible when it ends.
 class SqliteJobStore::Change {
  public:
-  Change(const SqliteJobStore& store, Durability durability = Durability::kFull)
+  Change(SqliteJobStore& store, Durability durability = Durability::kFull)
       : log_(store.log_), transaction_(store.database_.writer(), durability) {}
   // The transaction's lock is still held, so its events are the last ones.
   ~Change() {
@@ -29,7 +29,7 @@ class SqliteJobStore::Change {
 
   void commit() {
     if (announced_ > 0) {
-      transaction_.at_end([&log = log_](bool is_committed) { log.settle(is_committed); });
+      transaction_.at_end([&log = log_](bool is_committed) { log.end_transaction(is_committed); });
     }
     transaction_.commit();
   }

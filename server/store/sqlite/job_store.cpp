@@ -30,7 +30,7 @@ std::uint64_t greatest_event(Connection& connection) {
 
 }  // namespace
 
-SqliteJobStore::SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options)
+SqliteJobStore::SqliteJobStore(Database& database, BlobStore& blobs, JobStoreOptions options)
     : SqlJobStore(database, blobs, std::move(options),
                   "SELECT j.record, j.owner, j.result_key, j.accepted, j.attempts, j.fence, "
                   "j.cancelling, j.cost FROM jobs j "),
@@ -83,8 +83,10 @@ std::vector<Event> SqliteJobStore::kept_events(const Viewer& viewer, const std::
 std::optional<std::chrono::microseconds> SqliteJobStore::until_ready() const {
   const Reading reading(database_.reader());
   Rows row = reading->query(
-      "SELECT min(not_before) - isomesh_now() FROM jobs q WHERE state = 0 AND NOT EXISTS (SELECT 1 "
-      "FROM jobs r WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = 1)");
+      "SELECT min(not_before) - isomesh_now() FROM jobs q WHERE state = {job.queued} AND NOT "
+      "EXISTS (SELECT 1 "
+      "FROM jobs r WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = "
+      "{job.running})");
   row.next();
   if (row.is_null(0)) return std::nullopt;
   return std::chrono::microseconds(row.integer(0) > kLongestWaitUs ? 0 : row.integer(0));
@@ -107,7 +109,8 @@ std::optional<MeshSummary> SqliteJobStore::mesh_like(
     SqlConnection& connection, const std::string& owner, const std::string& result_key,
     const std::optional<MeshSummary>& spoilt) const {
   Rows row = connection.query(
-      "SELECT record FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = 2 ORDER BY id DESC "
+      "SELECT record FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = {job.succeeded} "
+      "ORDER BY id DESC "
       "LIMIT 1",
       owner, result_key);
   if (!row.next()) return std::nullopt;

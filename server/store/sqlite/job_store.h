@@ -16,7 +16,7 @@ namespace isomesh::store {
 class SqliteJobStore : public SqlJobStore {
  public:
   // `database` and `blobs` must outlive this object.
-  SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
+  SqliteJobStore(Database& database, BlobStore& blobs, JobStoreOptions options);
 
   Submission submit(const JobSpec& spec) override;
   std::optional<Lease> claim(const std::string& worker, std::chrono::milliseconds lease) override;
@@ -30,9 +30,9 @@ class SqliteJobStore : public SqlJobStore {
   std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                             std::chrono::milliseconds timeout) const override;
   std::uint64_t last_event() const override { return log_.end() - 1; }
-  bool answers() const override { return true; }
+  bool responds() const override { return true; }
   // Always granted, because a data folder has one process only.
-  std::shared_ptr<const void> turn_to_remove() override { return std::make_shared<char>(); }
+  std::shared_ptr<const void> claim_removal() override { return std::make_shared<char>(); }
   std::optional<Steady> oldest_run() const override;
   void forget_events(Time before) override;
 
@@ -45,7 +45,7 @@ class SqliteJobStore : public SqlJobStore {
   void close_events() override { log_.close(); }
 
   // Selects the next job to run and charges its owner's turn.
-  std::optional<Row> take_turn(Change& change, std::int64_t now) const;
+  std::optional<Row> take_next(Change& change, std::int64_t now);
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
   // The job submitted before with the same key.
   std::optional<Submission> known(Connection& connection, const JobSpec& spec) const;
@@ -55,18 +55,18 @@ class SqliteJobStore : public SqlJobStore {
                                        const std::optional<MeshSummary>& spoilt) const;
   // The mesh of an equal job if its blobs are damaged; empty otherwise. Reads the blobs.
   std::optional<MeshSummary> spoilt_mesh_for(const JobSpec& spec) const;
-  void end(Change& change, Row& row, JobState state) const;
-  void succeed(Change& change, Row& row, const MeshSummary& mesh) const;
-  void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const;
+  void end(Change& change, Row& row, JobState state);
+  void succeed(Change& change, Row& row, const MeshSummary& mesh);
+  void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh);
   // Queues a job again without counting the attempt, or ends it as cancelled.
-  void give_back(Change& change, Row& row, std::chrono::milliseconds delay) const;
-  void queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const;
+  void give_back(Change& change, Row& row, std::chrono::milliseconds delay);
+  void queue_again(Change& change, Row& row, std::chrono::milliseconds delay);
   std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                                  std::uint64_t end) const;
   bool is_held(const std::string& id, std::uint64_t fence) const;
 
   Database& database_;
-  mutable EventLog log_;
+  EventLog log_;
 };
 
 }  // namespace isomesh::store

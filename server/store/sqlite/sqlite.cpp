@@ -10,6 +10,7 @@
 
 #include "proto/error.h"
 #include "server/store/microseconds.h"
+#include "server/store/sql/names.h"
 
 namespace isomesh::store {
 namespace {
@@ -183,7 +184,7 @@ void Connection::know_newest(const std::atomic<std::int64_t>& newest_us) {
 }
 
 void Connection::script(const char* sql) {
-  const int code = sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr);
+  const int code = sqlite3_exec(handle_, with_numbers(sql).c_str(), nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) fail(handle_, sqlite3_extended_errcode(handle_));
 }
 
@@ -261,8 +262,9 @@ std::size_t Connection::tell(std::string_view sql, std::span<const Parameter> pa
 sqlite3_stmt* Connection::prepared(std::string_view sql) {
   const auto known = statements_.find(sql);
   if (known != statements_.end()) return known->second;
+  const std::string text = with_numbers(sql);
   sqlite3_stmt* statement = nullptr;
-  const int code = sqlite3_prepare_v3(handle_, sql.data(), static_cast<int>(sql.size()),
+  const int code = sqlite3_prepare_v3(handle_, text.data(), static_cast<int>(text.size()),
                                       SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
   if (code != SQLITE_OK) fail(handle_, code);
   return statements_[std::string(sql)] = statement;

@@ -43,10 +43,13 @@ struct ForeignSurface {
 // Throws std::runtime_error with their words.
 ForeignSurface read_with_python(const std::string& bytes, MeshFormat format);
 
+// True for the formats that none of the other readers of read_exactly() reads.
+bool is_read_by_python(MeshFormat format);
+
 // The triangles of a file that rounds nothing, in its order, each as its corners' places, as a
 // reader that is not ours finds them, to the bit: assimp those of stl and ply, CGAL of obj and off,
-// lib3mf of all objects of a 3mf, usd_reader.h of usda and usdz, in LPS, and the above of the
-// others. Throws std::runtime_error with their words, and for a format that has no such reader.
+// lib3mf of all objects of a 3mf, usd_reader.h of usda and usdz, in LPS, and Python of the others.
+// Throws std::runtime_error with their words.
 std::vector<std::array<mesh::Vec3, 3>> read_exactly(const std::string& bytes, MeshFormat format);
 
 }  // namespace isomesh::test

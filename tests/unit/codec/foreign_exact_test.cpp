@@ -48,11 +48,6 @@ std::vector<PlacedTriangle> triangles_in(Space space, const mesh::Mesh& mesh) {
 
 class ExactFormat : public testing::TestWithParam<MeshFormat> {
  protected:
-  static bool needs_python() {
-    return GetParam() == MeshFormat::kVtk || GetParam() == MeshFormat::kVtp ||
-           GetParam() == MeshFormat::kGii;
-  }
-
   static void expect_exact(const mesh::Mesh& mesh) {
     for (const Space asked : {Space::kLps, Space::kRas}) {
       const Provenance provenance = in(asked);
@@ -66,7 +61,8 @@ class ExactFormat : public testing::TestWithParam<MeshFormat> {
 TEST_P(ExactFormat, HoldsTheSameFloatsAndTriangles) {
   for (const auto& [name, mesh] : test::meshes_to_encode()) {
     const bool is_one_of_few = name == "oblique" || name == "open" || name == "far";
-    if (needs_python() && !is_one_of_few) continue;  // Python takes its time to start
+    if (test::is_read_by_python(GetParam()) && !is_one_of_few)
+      continue;  // Python takes its time to start
     SCOPED_TRACE(name);
     expect_exact(mesh);
   }

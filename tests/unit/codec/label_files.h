@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/formats.h"
-#include "server/codec/zip/label_zip.h"
+#include "server/codec/label_zip.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/unit/mesh/separated.h"
 

@@ -23,12 +23,7 @@ TEST_F(ConnectionsTest, ProbesWaitForNoOtherRequest) {
 }
 
 TEST_F(ConnectionsTest, NothingIsMadeForWhoeverHasGone) {
-  ConnectionOptions one = options();
-  one.threads = 1;
-  one.client_patience = 0ms;
-  open(one);
-  hang_on(1, request("GET", "/block"));
-  ASSERT_TRUE(eventually([&] { return busy_.load(); }));
+  ASSERT_TRUE(open_with_busy_thread());
   // Both wait for the one thread, in this order.
   for (const char* path : {"/wait", "/compute-fast"}) Connection(url_).send(request("GET", path));
   const auto asked = std::async(std::launch::async, [&] { return get("/status"); });
@@ -39,12 +34,7 @@ TEST_F(ConnectionsTest, NothingIsMadeForWhoeverHasGone) {
 
 // What changes something is done, whoever waits for the answer.
 TEST_F(ConnectionsTest, WhatChangesSomethingIsDoneForWhoeverHasGone) {
-  ConnectionOptions one = options();
-  one.threads = 1;
-  one.client_patience = 0ms;
-  open(one);
-  hang_on(1, request("GET", "/block"));
-  ASSERT_TRUE(eventually([&] { return busy_.load(); }));
+  ASSERT_TRUE(open_with_busy_thread());
   Connection(url_).send(request("POST", "/do", "x"));
   go_.set_value();
   EXPECT_TRUE(eventually([&] { return runs_ == 1; }));
@@ -52,7 +42,7 @@ TEST_F(ConnectionsTest, WhatChangesSomethingIsDoneForWhoeverHasGone) {
 
 TEST_F(ConnectionsTest, AnswersOfSlowReceiversAreBounded) {
   ConnectionOptions little = options();
-  little.most_answer_bytes = std::size_t{16} << 20;
+  little.most_response_bytes = std::size_t{16} << 20;
   open(little);
   hang_on(4, request("GET", "/large"));
   EXPECT_TRUE(eventually([&] { return get("/status").status == 503; }));

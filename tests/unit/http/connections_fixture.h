@@ -110,7 +110,7 @@ class ConnectionsTest : public testing::Test {
     add_routes();
     connections_.emplace(
         options, ConnectionHandlers{
-                     .answer = [this](Request& request,
+                     .handle = [this](Request& request,
                                       Response& response) { return answer(request, response); },
                      .has_ended = [this](const auto&) { return ended_.load(); },
                      .on_answered = {},
@@ -231,6 +231,17 @@ class ConnectionsTest : public testing::Test {
   // Connections that have sent that much and nothing more.
   void hang_on(int count, const std::string& bytes, const std::string& from = {}) {
     for (int n = 0; n < count; ++n) clients_.emplace_back(url_, from).send(bytes);
+  }
+
+  // Opens with a single thread, which is busy until go_ is set, and no patience for clients that
+  // have gone. False if that fails.
+  bool open_with_busy_thread() {
+    ConnectionOptions one = options();
+    one.threads = 1;
+    one.client_patience = 0ms;
+    open(one);
+    hang_on(1, request("GET", "/block"));
+    return eventually([&] { return busy_.load(); });
   }
 
   net::Listener listener_{net::parse_address("127.0.0.1:0")};

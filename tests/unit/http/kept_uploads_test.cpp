@@ -117,7 +117,7 @@ class KeptParts : public testing::Test {
                                     std::size_t bytes = 0) {
     KeptUploads::Partial upload =
         kept.begin({.owner = owner, .query = {}, .file_name = "a.nii", .sha256 = {}});
-    upload->write(*upload->begin_turn(0), std::vector<std::byte>(bytes));
+    upload->write(*upload->begin_lease(0), std::vector<std::byte>(bytes));
     return upload;
   }
 
@@ -167,7 +167,7 @@ TEST_F(KeptParts, OfWhoHasMostBytesTheLongestIdleGivesWay) {
 TEST_F(KeptParts, AreReadToTheEndWhenTheyHaveToGo) {
   KeptUploads kept({}, folder_.path());
   const std::string name = begun(kept, "a", 10)->name();
-  kept.find_partial("a", name)->complete(*kept.find_partial("a", name)->begin_turn(10));
+  kept.find_partial("a", name)->complete(*kept.find_partial("a", name)->begin_lease(10));
   KeptUploads::Kept reader = kept.find("a", name);
   kept.let_all_go();
   EXPECT_TRUE(std::filesystem::exists(reader->path));

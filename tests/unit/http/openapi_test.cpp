@@ -31,7 +31,6 @@ class OpenApi : public testing::Test {
     add_inspect_routes(app_);
     add_page_routes(app_);
     add_service_routes(app_);
-    add_metrics_route(app_);
     hospital::add_order_routes(app_, nullptr);
   }
 
@@ -67,8 +66,19 @@ class OpenApi : public testing::Test {
   store::SqlOutbox outbox_{database_};
   const callbacks::CallbackTargets targets_{{}};
   callbacks::Callbacks callbacks_{outbox_, targets_, {}, {}};
-  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, labels_, estimator_,
-                    retention_, metrics_, outbox_, callbacks_, targets_},
+  App app_{Services{.folder = data_,
+                    .blobs = blobs_,
+                    .volumes = volumes_,
+                    .jobs = jobs_,
+                    .outbox = outbox_,
+                    .library = library_,
+                    .histograms = histograms_,
+                    .labels = labels_,
+                    .estimator = estimator_,
+                    .retention = retention_,
+                    .metrics = metrics_,
+                    .callbacks = callbacks_,
+                    .callback_targets = targets_},
            ServerOptions{}};
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
 };

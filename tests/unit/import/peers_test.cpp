@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/import/peers/answer.h"
 #include "server/import/peers/multipart.h"
+#include "server/import/peers/response.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 
@@ -87,10 +87,10 @@ TEST(Boundary, IsThatOfTheContentType) {
   }
 }
 
-process::PeersAnswer answer_of(const std::string& text) {
+process::PeersResponse answer_of(const std::string& text) {
   const test::TemporaryFolder folder;
   test::write_file(folder / "answer", text);
-  return read_answer(folder / "answer");
+  return read_response(folder / "answer");
 }
 
 TEST(Answer, OfASearchIsAListOfObjects) {

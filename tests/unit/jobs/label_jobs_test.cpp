@@ -10,9 +10,9 @@
 
 #include "base/sha256.h"
 #include "proto/json.h"
+#include "server/jobs/library/complete_labels.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/label_pages.h"
-#include "server/jobs/library/settle_labels.h"
 #include "server/jobs/queue/estimate.h"
 #include "server/jobs/queue/pipeline.h"
 #include "tests/support/errors.h"
@@ -47,7 +47,7 @@ class LabelJobsTest : public test::JobsFixture {
 
   JobParameters settled(const Volume& volume, JobParameters parameters) {
     parameters.volume = volume.id;
-    return settle_labels(std::move(parameters), "", volume, lists_);
+    return complete_labels(std::move(parameters), "", volume, lists_);
   }
 
   PipelineResult run(const Volume& volume, const JobParameters& parameters) {

@@ -53,6 +53,12 @@ class SmallTargetsTest : public test::JobsFixture {
     EXPECT_TRUE(mesh.quality.manifold && mesh.quality.oriented);
   }
 
+  void expect_whole_files(const MeshSummary& mesh) {
+    for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
+      EXPECT_EQ(triangles_in(blob(mesh.files.at(format).sha256), format), mesh.triangles);
+    }
+  }
+
   JobProcess process_{job_program()};
 };
 
@@ -73,9 +79,7 @@ TEST_F(SmallTargetsTest, OfTwoCubesAreMetDownToTwoTetrahedra) {
       EXPECT_EQ(mesh.components, 2U);
       EXPECT_EQ(mesh.quality.genus, 0);
       EXPECT_GT(mesh.volume_mm3.smoothed, 0);
-      for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
-        EXPECT_EQ(triangles_in(blob(mesh.files.at(format).sha256), format), mesh.triangles);
-      }
+      expect_whole_files(mesh);
     }
   }
 }
@@ -94,9 +98,7 @@ TEST_F(SmallTargetsTest, OfSurfacesAtTheBorderAreMetOrTold) {
       expect_met_or_told(mesh, asked);
       EXPECT_EQ(mesh.quality.closed, close);
       EXPECT_EQ(mesh.components, 2U);
-      for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
-        EXPECT_EQ(triangles_in(blob(mesh.files.at(format).sha256), format), mesh.triangles);
-      }
+      expect_whole_files(mesh);
     }
   }
 }

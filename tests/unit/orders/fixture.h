@@ -57,7 +57,7 @@ inline std::string slice_file(int slice, const std::string& patient = "PAT-1") {
 }
 
 // One series, and what was stored.
-class FakePacs : public Pacs {
+class FakePacs : public Archive, public ObjectReceiver {
  public:
   std::atomic<bool> is_down = false;
   std::atomic<bool> hangs = false;
@@ -107,8 +107,7 @@ class FakePacs : public Pacs {
     answer(stop);
     return is_merged ? "PAT-2" : "PAT-1";
   }
-  std::optional<bool> has_instance(const InstancePlace& place,
-                                   const std::stop_token& stop) override {
+  bool has_instance(const InstancePlace& place, const std::stop_token& stop) override {
     answer(stop);
     const Lock lock(mutex_);
     return stored_.contains(place.instance);
@@ -185,21 +184,29 @@ class OrdersTest : public test::JobsFixture {
       PacsSettings settings;
       settings.name = name;
       settings.dicomweb = "http://pacs.example.org";
-      hospital_.pacs.push_back(settings);
-      auto pacs = std::make_unique<FakePacs>();
+      settings_.pacs.push_back(settings);
+      const auto pacs = std::make_shared<FakePacs>();
       (name == std::string("main") ? main_ : other_) = pacs.get();
-      pacs_[name] = std::move(pacs);
+      peers_[name] = {.source = pacs, .archive = pacs, .receiver = pacs};
     }
-    hospital_.settle = seconds(0);
+    settings_.settle = seconds(0);
     begin();
   }
 
   // As a process that goes on after the last one.
   void begin() {
     orders_.reset();
-    orders_ = std::make_unique<Orders>(OrderServices{data_, blobs_, volumes_, jobs_, library_,
-                                                     labels_, store_, audit_, received_, pacs_},
-                                       hospital_,
+    orders_ = std::make_unique<Orders>(OrderServices{.folder = data_,
+                                                     .blobs = blobs_,
+                                                     .volumes = volumes_,
+                                                     .jobs = jobs_,
+                                                     .library = library_,
+                                                     .labels = labels_,
+                                                     .orders = store_,
+                                                     .audit = audit_,
+                                                     .received = received_,
+                                                     .peers = peers_},
+                                       settings_,
                                        OrderOptions{.now = [this] { return now(); }, .threads = 3});
     orders_->on_end([](const std::string&) {});
   }
@@ -238,7 +245,7 @@ class OrdersTest : public test::JobsFixture {
       ASSERT_TRUE(order.next_attempt && order.error);
       const auto pause = time_of(*order.next_attempt) - now();
       // A pause is at least half of its full length; some of it has passed by now.
-      EXPECT_GT(pause, hospital_.first_delay * (1 << (attempts - 1)) / 2 - seconds(2));
+      EXPECT_GT(pause, settings_.first_delay * (1 << (attempts - 1)) / 2 - seconds(2));
       pass(std::chrono::ceil<milliseconds>(pause));
     }
   }
@@ -279,8 +286,8 @@ class OrdersTest : public test::JobsFixture {
   }
 
   std::atomic<milliseconds> ahead_ = milliseconds(0);
-  Hospital hospital_;
-  PacsByName pacs_;
+  HospitalSettings settings_;
+  Peers peers_;
   FakePacs* main_ = nullptr;
   FakePacs* other_ = nullptr;
   jobs::LabelLists labels_{blobs_};

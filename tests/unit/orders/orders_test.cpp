@@ -63,13 +63,13 @@ TEST_F(OrdersTest, OfMoreLabelsThanAnOrderMayHaveObjectsFail) {
 class FittingOrdersTest : public OrdersTest {
  protected:
   FittingOrdersTest() {
-    hospital_.pacs.front().max_send_bytes = 20'000;
+    settings_.pacs.front().max_send_bytes = 20'000;
     Rule rule;
     rule.name = "fit";
     rule.max_error_mm = 0.5;
     rule.parameters = R"({"iso": 100})";
     rule.send = {{.pacs = "main"}};
-    hospital_.rules = {rule};
+    settings_.rules = {rule};
   }
   std::string submit_by_rule() {
     OrderRequest request;
@@ -115,11 +115,11 @@ class ReceivedOrdersTest : public OrdersTest {
     rule.name = "bone";
     rule.parameters = R"({"iso": 100})";
     rule.send = {{.pacs = "main"}};
-    hospital_.rules = {rule};
-    hospital_.settle = minutes(1);
-    hospital_.poll = seconds(1);
-    hospital_.dimse.emplace().routes = {{"BONE", "bone"}};
-    pacs_[received_by("BONE")] = std::make_unique<Received>("BONE", received_, blobs_);
+    settings_.rules = {rule};
+    settings_.settle = minutes(1);
+    settings_.poll = seconds(1);
+    settings_.dimse.emplace().routes = {{"BONE", "bone"}};
+    peers_[received_by("BONE")].source = std::make_shared<Received>("BONE", received_, blobs_);
     begin();
   }
   void receive(int from, int to, const std::string& title = "BONE") {
@@ -129,7 +129,7 @@ class ReceivedOrdersTest : public OrdersTest {
       writer->write(std::as_bytes(std::span(file)));
       const store::Blob blob = writer->commit();
       received_.add({title, kStudy, kSeries}, {instance_of(slice), blob.key, blob.bytes});
-      blobs_.settle(blob.key);
+      blobs_.mark_named(blob.key);
     }
   }
   std::vector<Order> all() const { return orders_->list(std::nullopt, {}, "", 10); }
@@ -201,10 +201,10 @@ TEST_F(ReceivedOrdersTest, WaitForTheRestOfWhatIsNotHeldAnyMore) {
 
 TEST_F(ReceivedOrdersTest, AreMadeThoughAnotherSeriesCannotBeRead) {
   orders_.reset();
-  hospital_.poll = minutes(1);
-  hospital_.dimse->routes["BROKEN"] = "bone";
-  hospital_.dimse->routes["SOUND"] = "bone";
-  pacs_[received_by("SOUND")] = std::make_unique<Received>("SOUND", received_, blobs_);
+  settings_.poll = minutes(1);
+  settings_.dimse->routes["BROKEN"] = "bone";
+  settings_.dimse->routes["SOUND"] = "bone";
+  peers_[received_by("SOUND")].source = std::make_shared<Received>("SOUND", received_, blobs_);
   begin();
   receive(0, kSlices, "BROKEN");
   receive(0, kSlices, "SOUND");

@@ -14,7 +14,7 @@ TEST(DimseMessage, OrdersComeBack) {
                                 .sop_class = "1.2",
                                 .instance = "1.3",
                                 .timeout = std::chrono::seconds(7),
-                                .answer_timeout = std::chrono::seconds(8)};
+                                .response_timeout = std::chrono::seconds(8)};
   const auto sent = std::get<DimseSending>(dimse_order_from(to_line(DimseOrder(sending))));
   EXPECT_EQ(sent.calling, sending.calling);
   EXPECT_EQ(sent.called, sending.called);
@@ -22,7 +22,7 @@ TEST(DimseMessage, OrdersComeBack) {
   EXPECT_EQ(sent.sop_class, sending.sop_class);
   EXPECT_EQ(sent.instance, sending.instance);
   EXPECT_EQ(sent.timeout, sending.timeout);
-  EXPECT_EQ(sent.answer_timeout, sending.answer_timeout);
+  EXPECT_EQ(sent.response_timeout, sending.response_timeout);
   const DimseReceiving receiving = {.called = {"BONE", "SKIN"},
                                     .calling = {"CT1"},
                                     .folder = "/data/scratch/x",
@@ -38,7 +38,7 @@ TEST(DimseMessage, OrdersComeBack) {
 
 TEST(DimseMessage, ReportsComeBack) {
   for (const DimseReport& report :
-       {DimseReport(DimseSent{DimseEnd::kAnswered, 0xA700}),
+       {DimseReport(DimseSent{DimseEnd::kResponded, 0xA700}),
         DimseReport(DimseObject{"12", "BONE", "CT1", "1.2", "1.3", "1.4"}),
         DimseReport(DimseEnded{DimseRefusal::kCalling})}) {
     EXPECT_EQ(dimse_report_from(to_line(report)), report);

@@ -53,15 +53,15 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
 }
 
 TEST(ImportMessage, AnOrderToReadAnAnswerComesAsItWent) {
-  const auto read = std::get<AnswerOrder>(
-      order_from(to_message(AnswerOrder{{"/a/b"}, {.memory_bytes = 8, .time = seconds(9)}})));
+  const auto read = std::get<ResponseOrder>(
+      order_from(to_message(ResponseOrder{{"/a/b"}, {.memory_bytes = 8, .time = seconds(9)}})));
   EXPECT_EQ(read.task.source, "/a/b");
   EXPECT_EQ(read.bounds.memory_bytes, 8U);
   EXPECT_EQ(read.bounds.time, seconds(9));
 }
 
 TEST(ImportMessage, AnAnswerComesAsItWent) {
-  PeersAnswer answer;
+  PeersResponse answer;
   answer.objects = {{.study = "1.2",
                      .series = "1.3",
                      .instance = "1.4",
@@ -71,17 +71,17 @@ TEST(ImportMessage, AnAnswerComesAsItWent) {
                      .instances = 54}};
   answer.stored = {{.instance = "1.5"}};
   answer.failed = {{.instance = "1.6", .failure = 0xA700}};
-  const ImportReport report = report_from(begun_message() + answer_message(answer));
-  ASSERT_TRUE(report.answer);
-  EXPECT_EQ(*report.answer, answer);
+  const ImportReport report = report_from(begun_message() + response_message(answer));
+  ASSERT_TRUE(report.response);
+  EXPECT_EQ(*report.response, answer);
 }
 
 // They go into addresses of further requests.
 TEST(ImportMessage, AUidThatIsNoneIsRefused) {
   for (const char* uid : {"../../x", "1.2/../3", "1..2", "1 2", "1.2?x=1"}) {
-    PeersAnswer answer;
+    PeersResponse answer;
     answer.objects = {{.series = uid}};
-    EXPECT_EQ(test::code_thrown_by([&] { report_from(answer_message(answer)); }),
+    EXPECT_EQ(test::code_thrown_by([&] { report_from(response_message(answer)); }),
               ErrorCode::kInternal)
         << uid;
   }
@@ -119,8 +119,8 @@ TEST(ImportMessage, AVolumeComesWithItsLabels) {
 TEST(ImportMessage, AReportOfAnotherFormIsRefused) {
   for (const std::string line :
        {"", "7", "[]", R"({"begun":"yes"})", R"({"reading":7})", R"({"reading":"[error] forged"})",
-        R"({"volume":{}})", R"({"volume":[]})", R"({"error":7})", R"({"answer":{"objects":[]}})",
-        R"({"answer":{"objects":[{}],"stored":[],"failed":[]}})"}) {
+        R"({"volume":{}})", R"({"volume":[]})", R"({"error":7})", R"({"response":{"objects":[]}})",
+        R"({"response":{"objects":[{}],"stored":[],"failed":[]}})"}) {
     EXPECT_EQ(test::code_thrown_by([&] { report_from(line + '\n'); }), ErrorCode::kInternal)
         << line;
   }

@@ -43,13 +43,13 @@ std::chrono::steady_clock::time_point at_once() {
 
 // What a copy says of itself when it is asked.
 std::string answer_of(const Child& child, const std::string& question = "?") {
-  child.tell(question);
-  return child.listen(4096, std::chrono::steady_clock::now() + seconds(60), {}).text;
+  child.send_last(question);
+  return child.receive(4096, std::chrono::steady_clock::now() + seconds(60), {}).text;
 }
 
 Child told_to_hang(PreparedProcesses& prepared) {
   Child child = prepared.take(soon());
-  child.tell("hang");
+  child.send_last("hang");
   return child;
 }
 
@@ -174,7 +174,7 @@ TEST(PreparedProcesses, DieWithTheirParent) {
   if (parent == 0) {
     PreparedProcesses prepared(COPIED_PROGRAM, 2);
     const Child taken = prepared.take(soon());
-    taken.tell("hang");
+    taken.send_last("hang");
     for (;;) ::pause();
   }
   ASSERT_TRUE(eventually([&] { return children_of(parent).size() == 4; }));

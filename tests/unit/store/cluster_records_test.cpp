@@ -4,8 +4,8 @@
 #include <thread>
 #include <vector>
 
+#include "server/store/postgresql/exclusive_task.h"
 #include "server/store/postgresql/identity.h"
-#include "server/store/postgresql/turn.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
 #include "tests/support/errors.h"
@@ -68,11 +68,11 @@ TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
 // --- What is not kept
 
 TEST_F(ClusterTest, OneRemovesAtATime) {
-  auto turn = one().jobs.turn_to_remove();
-  EXPECT_TRUE(turn);
-  EXPECT_FALSE(two().jobs.turn_to_remove());
-  turn.reset();
-  EXPECT_TRUE(two().jobs.turn_to_remove());
+  auto removal = one().jobs.claim_removal();
+  EXPECT_TRUE(removal);
+  EXPECT_FALSE(two().jobs.claim_removal());
+  removal.reset();
+  EXPECT_TRUE(two().jobs.claim_removal());
 }
 
 // The newest time that is known is 40 days later than the database's clock.
@@ -106,10 +106,10 @@ TEST_F(ClusterTest, AClockThatIsTrustedLetsExpireWhatWasOldBefore) {
 
 // --- Orders
 
-// Who carries them out has the turn as long as it lives, and takes orders meanwhile.
+// Who carries them out has the task as long as it lives, and takes orders meanwhile.
 TEST_F(ClusterTest, OrdersAreTakenByWhoCarriesThemOut) {
-  const Turn turn(url_, "orders");
-  ASSERT_TRUE(turn.is_taken());
+  const ExclusiveTask orders(url_, "orders");
+  ASSERT_TRUE(orders.is_ours());
   OrderSpec order;
   order.record.order.id = "an order";
   order.record.order.created = "2024-01-01T00:00:00.000Z";

@@ -295,7 +295,7 @@ TEST_F(ClusterTest, LostConnectionsAreMadeAgain) {
   EXPECT_TRUE(two().jobs.finish(lease, mesh()));
   reader.join();
   EXPECT_THAT(seen, SizeIs(1));
-  EXPECT_TRUE(one().jobs.answers());
+  EXPECT_TRUE(one().jobs.responds());
 }
 
 // It ended, and the answer was lost: the same end again, and none by anybody else.

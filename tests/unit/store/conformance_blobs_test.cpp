@@ -47,7 +47,7 @@ class Blobs : public testing::TestWithParam<NamedBlobEngine> {
   // One that a record names.
   Blob put_named(std::string_view text) {
     const Blob blob = put(text);
-    blobs_->settle(blob.key);
+    blobs_->mark_named(blob.key);
     return blob;
   }
 
@@ -201,7 +201,7 @@ TEST_P(Blobs, WhoseTheyAreIsSaidInAMark) {
 }
 
 TEST_P(Blobs, AnswerAndHaveRoom) {
-  EXPECT_TRUE(blobs_->answers());
+  EXPECT_TRUE(blobs_->responds());
   EXPECT_TRUE(blobs_->has_room());
   EXPECT_GT(blobs_->capacity(), 5U);
   EXPECT_EQ(blobs_->is_shared(), GetParam().is_shared);
@@ -285,9 +285,9 @@ TEST_P(Blobs, WhatWasNamedAndIsNotAnyMoreGoesAtOnce) {
   put("hello");
   put("hello");  // by another worker, which is about to name it
   const std::vector<std::string> keys = {kHelloKey};
-  blobs_->settle(kHelloKey);
+  blobs_->mark_named(kHelloKey);
   EXPECT_EQ(blobs_->erase_unnamed(keys, in(-kAWhile), nothing), keys);
-  blobs_->settle(kHelloKey);
+  blobs_->mark_named(kHelloKey);
   EXPECT_TRUE(blobs_->erase_unnamed(keys, in(-kAWhile), nothing).empty());
   EXPECT_EQ(blobs_->size(kHelloKey), std::nullopt);
   EXPECT_EQ(engine_->leftovers(), std::vector<std::string>());
@@ -329,7 +329,7 @@ TEST_P(SharedBlobs, WhatOneIsAboutToNameTheOtherLeaves) {
   EXPECT_EQ(other_->sweep(in(-kAWhile), nothing).quarantined, 0U);
   EXPECT_EQ(other_->erase_unnamed(keys, in(-kAWhile), nothing), keys);
   EXPECT_EQ(get(kHelloKey), "hello");
-  blobs_->settle(kHelloKey);
+  blobs_->mark_named(kHelloKey);
   EXPECT_TRUE(other_->erase_unnamed(keys, in(-kAWhile), nothing).empty());
   EXPECT_EQ(code_thrown_by([&] { engine_->open()->open(kHelloKey); }), ErrorCode::kNotFound);
 }
@@ -375,7 +375,7 @@ TEST_P(SharedBlobs, TwoSweepersAndASlowWriterLoseNothing) {
       put(*third, "hello");
       std::this_thread::sleep_for(std::chrono::milliseconds(rounds % 7));
       named = kHelloKey;
-      third->settle(kHelloKey);
+      third->mark_named(kHelloKey);
       if (third->size(kHelloKey) != 5U) ADD_FAILURE() << "lost in round " << rounds;
       named = "";  // and is garbage again
     }

@@ -51,7 +51,7 @@ TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
   const test::PowerCut power(outer.path());
   const DataFolder data(outer / "data");
   sync_folder(outer.path());
-  const FileBlobStore blobs(data);
+  FileBlobStore blobs(data);
   std::filesystem::create_directory(blobs.path_of(kHello).parent_path());
   const auto writer = blobs.begin();
   writer->write(as_span("hello"));
@@ -125,7 +125,7 @@ TEST_F(FileBlobStoreTest, ACheckEndsWhenItIsStopped) {
   put("hello");
   std::stop_source stop;
   stop.request_stop();
-  const FileBlobStore next(data_);  // which has not hashed it while it was written
+  FileBlobStore next(data_);  // which has not hashed it while it was written
   EXPECT_EQ(code_thrown_by([&] { next.is_intact(kHello, stop.get_token()); }),
             ErrorCode::kCancelled);
 }
@@ -205,7 +205,7 @@ TEST_F(Sweeping, LeavesWhatWasStoredSince) {
 // Nobody of this process is about to name it.
 TEST_F(Sweeping, WhatAnEarlierProcessLeftIsNotYoung) {
   put("hello");
-  const FileBlobStore next(data_);
+  FileBlobStore next(data_);
   EXPECT_EQ(next.sweep(in(std::chrono::hours(-1)), nothing).quarantined, 1U);
 }
 
@@ -231,17 +231,17 @@ TEST_F(SharedFolder, IsNotMade) {
 }
 
 TEST_F(SharedFolder, DoesNotAnswerOnceItIsGone) {
-  const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
+  FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
   std::filesystem::remove_all(folder_ / "shared");
-  EXPECT_FALSE(blobs.answers());
+  EXPECT_FALSE(blobs.responds());
 }
 
 TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {
-  const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
+  FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
   const auto writer = blobs.begin();
   writer->write(as_span("hello"));
   writer->commit();
-  blobs.settle(kHello);
+  blobs.mark_named(kHello);
   const auto hold = folder_ / ("shared/holds/" + std::string(kHello) + ".0123");
   test::write_file(hold, "");
   const auto nothing = [](const std::string& /*key*/) { return false; };

@@ -19,11 +19,11 @@ using testing::HasSubstr;
 class IdentityTest : public testing::Test {
  protected:
   // A start of the service, which stores a volume of those bytes, marks it and ends.
-  void live(const std::string& bytes, const OperatorsWord& word = {}) {
+  void live(const std::string& bytes, const OperatorOverrides& overrides = {}) {
     const DataFolder data(root());
     Database database(data);
-    const FileBlobStore blobs(data);
-    Identity identity(database, blobs, word, {});
+    FileBlobStore blobs(data);
+    Identity identity(database, blobs, overrides, {});
     if (!bytes.empty()) {
       const auto writer = blobs.begin();
       writer->write(test::as_span(bytes));
@@ -148,7 +148,7 @@ TEST_F(IdentityTest, RemembersTheTimeThatItHasSeen) {
   }
   const DataFolder data(root());
   Database database(data);
-  const FileBlobStore blobs(data);
+  FileBlobStore blobs(data);
   const auto now = std::chrono::system_clock::now();
   {
     Identity identity(database, blobs, {}, {});
@@ -166,11 +166,11 @@ TEST_F(IdentityTest, RemembersTheTimeThatItHasSeen) {
 // Both have nothing yet; the second would sweep what the first stores.
 TEST_F(IdentityTest, ASharedStoreIsOneDatabasesFromTheBeginning) {
   std::filesystem::create_directory(folder_ / "shared");
-  const auto start = [&](const std::string& name, const OperatorsWord& word) {
+  const auto start = [&](const std::string& name, const OperatorOverrides& overrides) {
     const DataFolder data(folder_ / name);
     Database database(data);
-    const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data.reserve());
-    Identity(database, blobs, word, {}).now();
+    FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data.reserve());
+    Identity(database, blobs, overrides, {}).now();
   };
   start("one", {});
   start("one", {});

@@ -41,7 +41,7 @@ TEST(Room, IsNeverMoreThanItsBytes) {
 TEST(Room, KeepsTheBooks) {
   Room room;
   room.take(30);
-  room.settle(10, 25);  // ten of them became 25, as the file that they replaced was not counted
+  room.correct(10, 25);  // ten of them became 25, as the file that they replaced was not counted
   EXPECT_EQ(room.used(), 45U);
   room.give(100);
   EXPECT_EQ(room.used(), 0U);

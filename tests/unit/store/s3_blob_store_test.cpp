@@ -56,7 +56,7 @@ class S3Blobs : public testing::Test {
     const auto writer = blobs_->begin();
     writer->write(as_span(text));
     std::string key = writer->commit().key;
-    blobs_->settle(key);
+    blobs_->mark_named(key);
     return key;
   }
 
@@ -110,7 +110,7 @@ TEST_F(S3Blobs, APeerThatIsDownIsUnavailableAndNothingIsStored) {
   EXPECT_EQ(code_thrown_by([&] { put("hello"); }), ErrorCode::kUnavailable);
   EXPECT_EQ(code_thrown_by([&] { blobs_->mark(); }), ErrorCode::kUnavailable);
   EXPECT_EQ(code_thrown_by([&] { blobs_->sweep({}, {}); }), ErrorCode::kUnavailable);
-  EXPECT_FALSE(blobs_->answers());
+  EXPECT_FALSE(blobs_->responds());
   peer().recover();
   EXPECT_TRUE(peer().keys().empty());
   EXPECT_EQ(get(put("hello")), "hello");
@@ -224,7 +224,7 @@ TEST_F(S3Blobs, AWrongKeyIsRefusedAndNotTold) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
   EXPECT_THAT(error->what(), Not(HasSubstr("another")));
-  EXPECT_FALSE(blobs_->answers());
+  EXPECT_FALSE(blobs_->responds());
   test::write_file(folder_ / "credentials", S3Peer::credentials());
   EXPECT_EQ(get(put("hello")), "hello") << "the file is read again";
 }

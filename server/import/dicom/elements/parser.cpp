@@ -79,7 +79,7 @@ bool is_blank(std::string_view vr) {
   return vr == "  " || vr == "??" || vr == std::string_view("\0\0", 2);
 }
 
-// How a length may be stored after a tag.
+// The ways to store a length after a tag.
 struct LengthPlace {
   unsigned skipped = 0;  // bytes before the length
   unsigned bytes = 0;

@@ -1,11 +1,10 @@
-#include "server/import/dicom/kinds/dose.h"
-
 #include <cmath>
 #include <vector>
 
 #include "base/text.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/vectors.h"
+#include "server/import/dicom/kinds/placed_frames.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {

@@ -1,5 +1,3 @@
-#include "server/import/dicom/kinds/mosaic.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -11,6 +9,7 @@
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/attributes.h"
 #include "server/import/dicom/geometry/vectors.h"
+#include "server/import/dicom/kinds/placed_frames.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {

@@ -1,5 +1,3 @@
-#include "server/import/dicom/kinds/tomogram.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/attributes.h"
 #include "server/import/dicom/geometry/vectors.h"
+#include "server/import/dicom/kinds/placed_frames.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {

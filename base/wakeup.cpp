@@ -1,0 +1,38 @@
+#include "base/wakeup.h"
+
+#include <cstdint>
+
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "base/error.h"
+
+namespace isomesh {
+namespace {
+
+int checked(int descriptor) {
+  if (descriptor < 0) throw Error(ErrorCode::kUnavailable, "no file descriptors are left");
+  return descriptor;
+}
+
+}  // namespace
+
+Wakeup::Wakeup() : event_(checked(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK))) {}
+
+Wakeup::~Wakeup() { ::close(event_); }
+
+void Wakeup::ring() {
+  const std::uint64_t one = 1;
+  // Fails only after 2^64 - 2 unread rings.
+  [[maybe_unused]] const auto written = ::write(event_, &one, sizeof one);
+}
+
+bool Wakeup::clear() {
+  std::uint64_t count = 0;
+  return ::read(event_, &count, sizeof count) > 0;
+}
+
+int new_epoll() { return checked(::epoll_create1(EPOLL_CLOEXEC)); }
+
+}  // namespace isomesh

@@ -1,0 +1,148 @@
+#include "server/codec/label_zip.h"
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "base/hex.h"
+#include "base/sha256.h"
+#include "base/text.h"
+#include "proto/error.h"
+#include "server/codec/draco/grid.h"
+#include "server/codec/formats.h"
+#include "server/codec/space.h"
+#include "server/codec/zip_writer.h"
+#include "server/mesh/labels/label_surface.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::codec {
+namespace {
+
+// Labels are encoded in parallel, in batches of about this many triangles.
+constexpr std::size_t kTrianglesAtOnce = 1'000'000;
+constexpr std::size_t kLabelsAtOnce = 256;
+
+// Names for files: without a path, valid on all systems, unique regardless of case.
+class FileNames {
+ public:
+  std::string of(const LabelSummary& label) {
+    std::string name;
+    for (const char c : title_of(label)) {
+      const bool is_plain = static_cast<unsigned char>(c) >= ' ' &&
+                            std::string_view("/\\:*?\"<>|").find(c) == std::string_view::npos;
+      name += is_plain ? c : '_';
+    }
+    name.resize(beginning(name, kMostBytes).size());
+    while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
+    if (name.starts_with('.') || name.empty() || is_device(name)) name.insert(name.begin(), '_');
+    const std::string title = name;
+    for (int more = 0; !taken_.insert(lowered(name)).second; ++more) {
+      name =
+          title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
+    }
+    return name;
+  }
+
+ private:
+  // Leaves room for the suffix and a distinguishing number.
+  static constexpr std::size_t kMostBytes = 200;
+
+  // True for names that are devices on Windows, with or without a suffix.
+  static bool is_device(const std::string& name) {
+    const std::string stem = lowered(name.substr(0, name.find('.')));
+    const bool is_numbered = (stem.starts_with("com") || stem.starts_with("lpt")) &&
+                             stem.size() == 4 && stem[3] >= '1' && stem[3] <= '9';
+    return is_numbered || stem == "con" || stem == "prn" || stem == "aux" || stem == "nul";
+  }
+
+  static std::string lowered(std::string name) {
+    for (char& c : name) {
+      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    return name;
+  }
+
+  std::set<std::string> taken_;
+};
+
+struct Encoded {
+  std::vector<std::byte> bytes;
+  std::string sha256;
+};
+
+Grid shared_grid(const mesh::Mesh& walls, const MeshParameters& parameters) {
+  const Space space = space_of(MeshFormat::kDrc, parameters);
+  const int bits = parameters.draco.position_bits;
+  return space == Space::kLps ? grid_of(walls, bits) : grid_of(copy_in_space(walls, space), bits);
+}
+
+Encoded encode_one(const mesh::Mesh& mesh, MeshFormat format, const Grid& grid,
+                   const Provenance& provenance, const mesh::Context& context) {
+  Encoded encoded;
+  Sha256 hash;
+  const Sink sink = [&](std::span<const std::byte> piece) {
+    encoded.bytes.insert(encoded.bytes.end(), piece.begin(), piece.end());
+    hash.update(piece);
+  };
+  if (format == MeshFormat::kDrc) {
+    const Space space = space_of(format, provenance.parameters);
+    const auto write = [&](const mesh::Mesh& placed) {
+      encode_drc(placed, provenance.parameters.draco, context, sink, &grid);
+    };
+    if (space == Space::kLps) {
+      write(mesh);
+    } else {
+      write(copy_in_space(mesh, space));
+    }
+  } else {
+    encode(mesh, format, provenance, context, sink);
+  }
+  encoded.sha256 = to_hex(hash.finish());
+  return encoded;
+}
+
+}  // namespace
+
+std::vector<LabelFiles> encode_labels_zip(const LabelledSurface& surface,
+                                          std::span<const MeshFormat> formats,
+                                          const Provenance& provenance,
+                                          const mesh::Context& context, const Sink& sink) {
+  const Grid grid = shared_grid(surface.walls.mesh, provenance.parameters);
+  const mesh::Context quiet = {context.stop, nullptr};
+  const std::size_t labels = surface.labels.size();
+  std::vector<LabelFiles> files(labels);
+  FileNames names;
+  ZipWriter zip(sink, ZipWriter::Compression::kStored);
+  for (std::size_t begin = 0, end = 0; begin < labels; begin = end) {
+    for (std::size_t triangles = 0;
+         end < labels && end - begin < kLabelsAtOnce && triangles < kTrianglesAtOnce; ++end) {
+      triangles += surface.triangles.of(end + 1).size();
+    }
+    std::vector<std::vector<Encoded>> encoded(end - begin);
+    mesh::parallel_for(quiet, encoded.size(), [&](std::size_t task) {
+      mesh::Mesh mesh;
+      extract_label(surface.walls, surface.triangles, begin + task + 1, mesh);
+      for (const MeshFormat format : formats) {
+        encoded[task].push_back(encode_one(mesh, format, grid, provenance, quiet));
+      }
+    });
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::string name = names.of(surface.labels[n]);
+      for (std::size_t f = 0; f < formats.size(); ++f) {
+        Encoded& file = encoded[n - begin][f];
+        const std::string suffix(to_string(formats[f]));
+        const std::uint64_t offset = zip.add(name + '.' + suffix, file.bytes);
+        files[n][formats[f]] = {.bytes = file.bytes.size(),
+                                .sha256 = std::move(file.sha256),
+                                .offset = offset,
+                                .href = {}};
+      }
+    }
+    if (context.progress) context.progress(static_cast<double>(end) / static_cast<double>(labels));
+  }
+  zip.finish();
+  return files;
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,99 @@
+// Receives series that peers send by C-STORE.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/mutex.h"
+#include "server/hospital/c_store/acceptor.h"
+#include "server/hospital/orders/settings.h"
+#include "server/net/fair_places.h"
+#include "server/net/listener.h"
+#include "server/process/dimse_message.h"
+#include "server/process/prepared.h"
+#include "server/store/audit_trail.h"
+#include "server/store/blob_store.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/received_store.h"
+
+namespace isomesh::c_store {
+
+// Throws Error kInvalidParameter, field "dimse.listen".
+net::Address listen_address(const orders::DimseSettings& settings);
+
+// Dependencies of the listener, which must outlive it.
+struct ListenerServices {
+  const store::DataFolder& folder;
+  store::BlobStore& blobs;
+  store::ReceivedStore& received;
+  store::AuditTrail& audit;
+  process::PreparedProcesses& processes;  // running isomesh-dimse
+};
+
+// Listens as soon as it is constructed. Each association has a thread, which does not parse the
+// peer's bytes, and a confined process, which does. An object is acknowledged once it is a blob on
+// disk that a record names.
+//
+// Addresses share the associations (FairPlaces). If there is no place for another one, the
+// association that has been idle longest ends, if that is long enough.
+class DimseListener {
+ public:
+  // Throws Error kInvalidParameter, or kUnavailable if it cannot listen on the address.
+  DimseListener(const ListenerServices& services, const orders::DimseSettings& settings);
+  // Ends the associations.
+  ~DimseListener() { stop(); }
+  DimseListener(const DimseListener&) = delete;
+  DimseListener& operator=(const DimseListener&) = delete;
+
+  // HOST:PORT with the actual port.
+  std::string authority() const { return listener_.authority(); }
+
+  void stop();
+
+ private:
+  struct Association {
+    Descriptor peer;
+    std::string party;
+    net::FairPlaces::Place place;
+    std::stop_source end = {};
+    std::atomic<bool> has_sent = false;    // at least one object
+    std::atomic<bool> is_storing = false;  // the peer waits for that
+    // When its process started or last stored an object; from then on the peer's next message is
+    // awaited.
+    std::atomic<std::chrono::steady_clock::time_point> told = {};
+  };
+
+  bool begin(AssociationRequest& request);
+  void make_room(const std::string& party);
+  static bool is_idle(const Association& association, std::chrono::milliseconds& idle);
+  void serve(const std::stop_token& stop);
+  std::shared_ptr<Association> next_association(const std::stop_token& stop);
+  void serve_association(Association& association);
+  process::DimseVerdict keep(const process::DimseObject& object,
+                             const std::filesystem::path& folder);
+  bool has_room(std::uint64_t more_bytes) const;
+  void note_end(const process::DimseEnded& ended);
+
+  const ListenerServices services_;
+  const orders::DimseSettings settings_;
+  const net::Listener listener_;
+  net::FairPlaces places_;
+  Mutex mutex_;
+  Condition changed_;
+  // All open associations, and those that no thread has taken yet.
+  std::vector<std::shared_ptr<Association>> open_ ISOMESH_GUARDED_BY(mutex_);
+  std::deque<std::shared_ptr<Association>> ready_ ISOMESH_GUARDED_BY(mutex_);
+  std::chrono::steady_clock::time_point next_note_ ISOMESH_GUARDED_BY(mutex_);
+  // Last: its thread and these use the other members.
+  AssociationAcceptor acceptor_;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace isomesh::c_store

@@ -1,0 +1,108 @@
+#include "server/hospital/c_store/sender.h"
+
+#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/net/connect.h"
+#include "server/process/dimse_message.h"
+
+namespace isomesh::c_store {
+namespace {
+
+using orders::PacsFailure;
+using orders::PacsFault;
+using process::DimseEnd;
+
+// A response has a few bytes. A peer may be slow as long as it makes progress.
+constexpr std::size_t kMostResponseBytes = 4096;
+constexpr std::chrono::hours kLongest{24};
+
+std::string hex_of(std::uint16_t status) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string text;
+  for (int shift = 12; shift >= 0; shift -= 4) text += kDigits[(status >> shift) & 15];
+  return text;
+}
+
+// Interprets the status of a C-STORE response (PS3.4, table B.2-1, and PS3.7, C).
+void check_stored(std::uint16_t status) {
+  const int high_byte = status >> 8;
+  const int high_nibble = status >> 12;
+  // A warning means that the object was stored.
+  constexpr int kWarning = 0xB;
+  if (status == 0 || high_nibble == kWarning) return;
+  const std::string said = "the PACS did not store the mesh; its status is " + hex_of(status);
+  constexpr int kDoesNotMatch = 0xA9;
+  constexpr int kCannotUnderstand = 0xC;
+  if (high_byte == kDoesNotMatch || high_nibble == kCannotUnderstand) {
+    throw PacsFailure(PacsFault::kRefused, said);
+  }
+  // Out of resources, or refused for a reason that an operator may remove.
+  throw PacsFailure(PacsFault::kBusy, said);
+}
+
+void check_sent(const process::DimseSent& sent) {
+  switch (sent.end) {
+    case DimseEnd::kResponded:
+      return check_stored(sent.status);
+    case DimseEnd::kRejected:
+      throw PacsFailure(PacsFault::kUnauthorized, "the PACS rejected the association");
+    case DimseEnd::kBusy:
+      throw PacsFailure(PacsFault::kBusy, "the PACS rejected the association for now");
+    case DimseEnd::kNotAccepted:
+      throw PacsFailure(PacsFault::kBusy, "the PACS does not accept Encapsulated STL");
+    case DimseEnd::kBroken:
+      throw PacsFailure(PacsFault::kUnreachable, "the PACS ended the association");
+    case DimseEnd::kTimeout:
+      throw PacsFailure(PacsFault::kTimeout, "the PACS sent nothing for too long");
+    case DimseEnd::kUnreadable:
+      break;
+  }
+  throw PacsFailure(PacsFault::kUnreadable, "the response of the PACS cannot be read");
+}
+
+process::DimseSent sent_of(const process::Output& output) {
+  using Ending = process::Output::Ending;
+  if (output.ending == Ending::kStopped) throw Error(ErrorCode::kCancelled, "stopped");
+  if (output.ending != Ending::kClosed || !output.text.ends_with('\n')) {
+    return {.end = DimseEnd::kUnreadable, .status = 0};
+  }
+  const process::DimseReport report = process::dimse_report_from(output.text);
+  if (const auto* sent = std::get_if<process::DimseSent>(&report)) return *sent;
+  return {.end = DimseEnd::kUnreadable, .status = 0};
+}
+
+Descriptor connected(const orders::PacsSettings& settings, const std::stop_token& stop) {
+  try {
+    return net::connect_to(settings.host, settings.port, settings.timeout, stop);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kUnreachable) {
+      throw PacsFailure(PacsFault::kUnreachable, "the connection to the PACS failed");
+    }
+    if (error.code() != ErrorCode::kRequestTimeout) throw;
+    throw PacsFailure(PacsFault::kTimeout, "the PACS does not respond");
+  }
+}
+
+}  // namespace
+
+void Sender::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
+  // As for DICOMweb: one more second for each 4 MiB to store.
+  constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
+  const process::DimseSending order = {
+      .calling = settings_.calling_aet,
+      .called = settings_.aet,
+      .file = object.file.path,
+      .sop_class = std::string(dicom::kEncapsulatedStlStorage),
+      .instance = object.place.instance,
+      .timeout = settings_.timeout,
+      .response_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
+  const Descriptor peer = connected(settings_, stop);
+  process::Child child = processes_.take(std::chrono::steady_clock::now() + settings_.timeout);
+  child.send(process::to_line(order), peer.number());
+  const process::Output output =
+      child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
+  const process::DimseSent sent = sent_of(output);
+  if (sent.end == DimseEnd::kUnreadable) processes_.renew();
+  check_sent(sent);
+}
+
+}  // namespace isomesh::c_store

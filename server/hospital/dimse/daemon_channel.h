@@ -1,0 +1,23 @@
+// Messages between the program and the daemon, and the connection to the peer.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "server/process/dimse_message.h"
+
+namespace isomesh::dimse {
+
+// The first line from the daemon, which also passes the peer's connection. Empty if the daemon no
+// longer needs this process.
+std::string read_order();
+
+int peer_socket();
+
+// Ends the process if the daemon has closed its socket.
+void report(std::string_view line);
+
+// The daemon's verdict on the object reported last. Ends the process as report() does.
+process::DimseVerdict read_verdict();
+
+}  // namespace isomesh::dimse

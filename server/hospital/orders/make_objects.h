@@ -1,0 +1,50 @@
+// Makes DICOM objects from a finished job's meshes.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "proto/orders.h"
+#include "proto/types.h"
+#include "server/store/blob_store.h"
+#include "server/store/order_store.h"
+
+namespace isomesh::orders {
+
+struct MadeObject {
+  std::optional<std::int64_t> label;
+  std::string series_uid;
+  std::string sop_instance_uid;
+  store::Blob blob;
+};
+
+// Limit of objects of an order, over all PACS they are sent to: its record and its JSON list them.
+inline constexpr std::size_t kMostObjects = 500;
+
+// Makes an object from each STL file of the job: the only one, or one for each label. UIDs are
+// derived from the content, so the same images with the same mesh always have the same UIDs. No
+// record names the blobs yet (BlobStore::mark_named). Throws Error kUnusableVolume for an empty
+// surface, kTooLarge if an object exceeds `most_bytes`, kOutOfSpace.
+std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
+                                     const std::string& station_name, std::uint64_t most_bytes,
+                                     std::chrono::system_clock::time_point made,
+                                     store::BlobStore& blobs);
+
+// The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
+Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);
+
+// The number of triangles with which no object exceeds `most_bytes`; empty if none does. Throws
+// Error kTooLarge if not even one triangle fits.
+std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
+                                                const std::string& station_name,
+                                                std::uint64_t most_bytes,
+                                                const store::BlobStore& blobs);
+
+// True if the blobs of the files from which objects are made are intact.
+bool can_make_objects(const Job& job, const store::BlobStore& blobs);
+
+}  // namespace isomesh::orders

@@ -1,0 +1,442 @@
+#include "server/hospital/orders/settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <sstream>
+
+// Only this file compiles the parser.
+#include <toml++/toml.h>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "proto/error.h"
+#include "server/process/dimse_message.h"
+
+namespace isomesh::orders {
+namespace {
+
+using std::chrono::seconds;
+
+[[noreturn]] void refuse(const std::string& key, const std::string& message) {
+  throw invalid_parameter(key, message);
+}
+
+// A table of the file. Keys that remain after all known ones were read are errors.
+class Section {
+ public:
+  Section(const toml::table& table, std::string name) : table_(table), name_(std::move(name)) {}
+
+  std::string key_of(std::string_view key) const {
+    return name_.empty() ? std::string(key) : name_ + '.' + std::string(key);
+  }
+
+  const toml::node* find(std::string_view key) {
+    known_.emplace(key);
+    return table_.get(key);
+  }
+
+  void read(std::string_view key, std::string& value) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto text = node->value_exact<std::string>();
+    if (!text || has_control_characters(*text)) refuse(key_of(key), "must be a string on one line");
+    value = *text;
+  }
+
+  void read(std::string_view key, std::filesystem::path& value) {
+    std::string text;
+    read(key, text);
+    if (!text.empty()) value = text;
+  }
+
+  template <class Number>
+  requires std::is_integral_v<Number>
+  void read(std::string_view key, Number& value, std::int64_t low, std::int64_t high) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto number = node->value_exact<std::int64_t>();
+    if (!number || *number < low || *number > high) {
+      refuse(key_of(key),
+             "must be a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+    }
+    value = static_cast<Number>(*number);
+  }
+
+  void read(std::string_view key, seconds& value, std::int64_t low, std::int64_t high) {
+    std::int64_t count = value.count();
+    read(key, count, low, high);
+    value = seconds(count);
+  }
+
+  // Reads a number of millimetres greater than 0.
+  void read(std::string_view key, std::optional<double>& value) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    value = node->is_number() ? node->value<double>() : std::nullopt;
+    if (!value || !std::isfinite(*value) || !(*value > 0)) {
+      refuse(key_of(key), "must be a number above 0");
+    }
+  }
+
+  void read(std::string_view key, std::vector<std::string>& values) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const toml::array* list = node->as_array();
+    if (list == nullptr) refuse(key_of(key), "must be a list of strings");
+    for (const toml::node& each : *list) {
+      const auto text = each.value_exact<std::string>();
+      if (!text) refuse(key_of(key), "must be a list of strings");
+      values.push_back(*text);
+    }
+  }
+
+  // Empty if the section is missing.
+  std::optional<Section> section(std::string_view key) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return std::nullopt;
+    const toml::table* table = node->as_table();
+    if (table == nullptr) refuse(key_of(key), "must be a table");
+    return Section(*table, key_of(key));
+  }
+
+  std::vector<Section> sections(std::string_view key) {
+    std::vector<Section> all;
+    const toml::node* node = find(key);
+    if (node == nullptr) return all;
+    const toml::array* list = node->as_array();
+    if (list == nullptr) refuse(key_of(key), "must be a list of tables");
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      const toml::table* table = list->get(i)->as_table();
+      if (table == nullptr) refuse(key_of(key), "must be a list of tables");
+      all.emplace_back(*table, key_of(key) + '[' + std::to_string(i) + ']');
+    }
+    return all;
+  }
+
+  const toml::table& table() const { return table_; }
+
+  void require(std::string_view key, const std::string& value) const {
+    if (value.empty()) refuse(key_of(key), "is required");
+  }
+
+  // Call after reading all known keys.
+  void finish() const {
+    for (const auto& [key, unused] : table_) {
+      if (!known_.contains(key.str())) refuse(key_of(key.str()), "is not a known key");
+    }
+  }
+
+ private:
+  const toml::table& table_;
+  std::string name_;
+  std::set<std::string, std::less<>> known_;
+};
+
+constexpr std::int64_t kMostSeconds = 30 * 24 * 3600;
+
+// Reads a text that becomes the value of a DICOM element with the value representation LO.
+void read_long_string(Section& section, std::string_view key, std::string& text) {
+  constexpr std::size_t kLongest = 64;
+  section.read(key, text);
+  if (text.size() > kLongest || text.find('\\') != std::string::npos) {
+    refuse(section.key_of(key), "must have at most 64 characters and no backslash");
+  }
+}
+
+void read_orders(Section section, HospitalSettings& settings) {
+  section.read("settle-seconds", settings.settle, 0, kMostSeconds);
+  section.read("poll-seconds", settings.poll, 1, kMostSeconds);
+  section.read("first-delay-seconds", settings.first_delay, 1, kMostSeconds);
+  section.read("max-open", settings.most_open, 1, 1'000'000);
+  std::int64_t hours = std::chrono::duration_cast<std::chrono::hours>(settings.give_up).count();
+  section.read("give-up-hours", hours, 1, 24 * 365);
+  settings.give_up = std::chrono::hours(hours);
+  read_long_string(section, "station-name", settings.station_name);
+  section.finish();
+}
+
+void check_name(const Section& section, const std::string& name) {
+  constexpr std::size_t kLongest = 40;
+  section.require("name", name);
+  const bool is_plain = name.size() <= kLongest && std::ranges::all_of(name, [](char c) {
+                          return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                                 (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+                        });
+  if (!is_plain) {
+    refuse(section.key_of("name"),
+           "must have at most 40 characters: letters, digits, dots, dashes and underscores");
+  }
+}
+
+void check_title(const std::string& key, const std::string& title) {
+  if (!process::is_ae_title(title)) {
+    refuse(key, "must be 1 to 16 printable ASCII characters without a backslash");
+  }
+}
+
+void read_send_by(Section& section, PacsSettings& pacs) {
+  std::string send_by = "stow";
+  section.read("send-by", send_by);
+  section.read("aet", pacs.aet);
+  section.read("calling-aet", pacs.calling_aet);
+  section.read("host", pacs.host);
+  section.read("port", pacs.port, 1, 65535);
+  if (send_by == "c-store") {
+    pacs.send_by = SendBy::kCStore;
+    for (const auto& [key, value] : {std::pair("aet", pacs.aet), std::pair("host", pacs.host)}) {
+      section.require(key, value);
+    }
+    if (pacs.port == 0) refuse(section.key_of("port"), "is required");
+    check_title(section.key_of("aet"), pacs.aet);
+    check_title(section.key_of("calling-aet"), pacs.calling_aet);
+    return;
+  }
+  if (send_by != "stow") refuse(section.key_of("send-by"), "must be \"stow\" or \"c-store\"");
+  if (!pacs.aet.empty() || !pacs.host.empty() || pacs.port != 0) {
+    refuse(section.key_of("send-by"), "must be \"c-store\" if aet, host or port is given");
+  }
+  section.require("dicomweb", pacs.dicomweb);
+}
+
+PacsSettings read_pacs(Section section) {
+  PacsSettings pacs;
+  section.read("name", pacs.name);
+  check_name(section, pacs.name);
+  section.read("dicomweb", pacs.dicomweb);
+  if (!pacs.dicomweb.empty() && !pacs.dicomweb.starts_with("http://") &&
+      !pacs.dicomweb.starts_with("https://")) {
+    refuse(section.key_of("dicomweb"), "must be an http or https URL");
+  }
+  while (pacs.dicomweb.ends_with('/')) pacs.dicomweb.pop_back();
+  section.read("user", pacs.user);
+  section.read("password-file", pacs.password_file);
+  section.read("token-file", pacs.token_file);
+  if (pacs.user.empty() != pacs.password_file.empty()) {
+    refuse(section.key_of("user"), "must be given together with password-file");
+  }
+  if (!pacs.user.empty() && !pacs.token_file.empty()) {
+    refuse(section.key_of("token-file"), "cannot be combined with user");
+  }
+  section.read("ca-file", pacs.ca_file);
+  section.read("timeout-seconds", pacs.timeout, 1, 3600);
+  section.read("transfer-syntax", pacs.transfer_syntax);
+  if (pacs.transfer_syntax != "*" && !is_uid(pacs.transfer_syntax)) {
+    refuse(section.key_of("transfer-syntax"), "must be * or the UID of a transfer syntax");
+  }
+  read_send_by(section, pacs);
+  section.read("max-send-bytes", pacs.max_send_bytes, 1, 4'294'967'294);
+  section.read("owners", pacs.owners);
+  section.finish();
+  return pacs;
+}
+
+SeriesMatch read_match(Section section) {
+  SeriesMatch match;
+  section.read("modality", match.modality);
+  section.read("series-description", match.series_description);
+  section.read("min-instances", match.min_instances, 1, 100'000);
+  section.read("days", match.days, 0, 3650);
+  section.finish();
+  return match;
+}
+
+std::vector<SendTarget> read_send(Section& rule) {
+  std::vector<SendTarget> targets;
+  for (Section section : rule.sections("send")) {
+    SendTarget target;
+    section.read("pacs", target.pacs);
+    section.require("pacs", target.pacs);
+    std::string format = "stl";
+    section.read("format", format);
+    if (format != "stl") refuse(section.key_of("format"), "must be \"stl\"");
+    section.finish();
+    targets.push_back(std::move(target));
+  }
+  return targets;
+}
+
+std::string as_json(const toml::table& table) {
+  std::ostringstream text;
+  text << toml::json_formatter(
+      table, toml::json_formatter::default_flags & ~toml::format_flags::quote_infinities_and_nans);
+  return text.str();
+}
+
+Rule read_rule(Section section) {
+  Rule rule;
+  section.read("name", rule.name);
+  check_name(section, rule.name);
+  section.read("owner", rule.owner);
+  rule.label = rule.name;
+  read_long_string(section, "label", rule.label);
+  section.read("series-number", rule.series_number, 0, std::numeric_limits<std::int32_t>::max());
+  section.read("max-error-mm", rule.max_error_mm);
+  std::string watch;
+  section.read("watch", watch);
+  if (!watch.empty()) rule.watch = watch;
+  if (auto match = section.section("match")) rule.match = read_match(std::move(*match));
+  if (auto parameters = section.section("parameters")) {
+    rule.parameters = as_json(parameters->table());
+    parse_order_parameters(rule.parameters, "", parameters->key_of(""));
+  } else {
+    refuse(section.key_of("parameters"), "is required");
+  }
+  rule.send = read_send(section);
+  if (rule.send.empty()) refuse(section.key_of("send"), "is required");
+  section.finish();
+  return rule;
+}
+
+DimseSettings read_dimse(Section section) {
+  DimseSettings dimse;
+  section.read("listen", dimse.listen);
+  section.require("listen", dimse.listen);
+  section.read("associations", dimse.associations, 1, 64);
+  section.read("idle-seconds", dimse.idle, 1, 3600);
+  constexpr std::int64_t kMostBytes = std::int64_t{1} << 50;
+  section.read("max-object-bytes", dimse.max_object_bytes, 1, kMostBytes);
+  section.read("max-held-bytes", dimse.max_held_bytes, 1, kMostBytes);
+  section.read("calling", dimse.calling);
+  for (const std::string& title : dimse.calling) check_title(section.key_of("calling"), title);
+  if (dimse.calling.empty())
+    refuse(section.key_of("calling"), "is required: without it, nobody may send");
+  auto routes = section.section("routes");
+  if (!routes || routes->table().empty()) refuse(section.key_of("routes"), "is required");
+  for (const auto& [title, unused] : routes->table()) {
+    check_title(routes->key_of(title.str()), std::string(title.str()));
+    routes->read(title.str(), dimse.routes[std::string(title.str())]);
+  }
+  section.finish();
+  return dimse;
+}
+
+std::optional<SyslogSettings> read_audit(Section section) {
+  SyslogSettings syslog;
+  std::string url;
+  section.read("syslog", url);
+  section.read("ca-file", syslog.ca_file);
+  section.read("certificate-file", syslog.certificate_file);
+  section.read("key-file", syslog.key_file);
+  section.finish();
+  section.require("syslog", url);
+  if (syslog.certificate_file.empty() != syslog.key_file.empty()) {
+    refuse(section.key_of("certificate-file"), "must be given together with key-file");
+  }
+  constexpr std::string_view kScheme = "tls://";
+  const std::size_t colon = url.rfind(':');
+  const bool has_port = colon != std::string::npos && colon >= kScheme.size();
+  const auto port =
+      has_port ? parse_uint64(url.substr(colon + 1)) : std::optional<std::uint64_t>(syslog.port);
+  if (!url.starts_with(kScheme) || !port || *port == 0 || *port > 65535) {
+    refuse(section.key_of("syslog"), "must be tls://HOST or tls://HOST:PORT");
+  }
+  syslog.port = static_cast<std::uint16_t>(*port);
+  syslog.host = url.substr(kScheme.size(), has_port ? colon - kScheme.size() : std::string::npos);
+  section.require("syslog", syslog.host);
+  return syslog;
+}
+
+// Checks that names are unique and that all references exist.
+void check_names(const HospitalSettings& settings) {
+  std::set<std::string> names;
+  for (const PacsSettings& pacs : settings.pacs) {
+    if (!names.insert(pacs.name).second)
+      refuse("pacs.name", "\"" + pacs.name + "\" is given twice");
+  }
+  std::set<std::string> rules;
+  for (const Rule& rule : settings.rules) {
+    if (!rules.insert(rule.name).second) {
+      refuse("rules.name", "\"" + rule.name + "\" is given twice");
+    }
+    std::vector<std::string> used;
+    if (rule.watch) used.push_back(*rule.watch);
+    for (const SendTarget& target : rule.send) used.push_back(target.pacs);
+    for (const std::string& name : used) {
+      if (names.contains(name)) continue;
+      refuse("rules." + rule.name, "names the PACS \"" + name + "\", which is not configured");
+    }
+    if (rule.watch && settings.find_pacs(*rule.watch)->dicomweb.empty()) {
+      refuse("rules." + rule.name + ".watch", "names a PACS without dicomweb");
+    }
+  }
+  if (!settings.dimse) return;
+  for (const auto& [title, rule] : settings.dimse->routes) {
+    if (!rules.contains(rule)) {
+      refuse("dimse.routes." + title, "names the rule \"" + rule + "\", which is not configured");
+    }
+  }
+}
+
+HospitalSettings settings_of(const toml::table& table) {
+  HospitalSettings settings;
+  Section all(table, "");
+  if (auto orders = all.section("orders")) read_orders(std::move(*orders), settings);
+  for (Section& section : all.sections("pacs")) settings.pacs.push_back(read_pacs(section));
+  for (Section& section : all.sections("rules")) settings.rules.push_back(read_rule(section));
+  if (auto dimse = all.section("dimse")) settings.dimse = read_dimse(std::move(*dimse));
+  if (auto audit = all.section("audit")) settings.syslog = read_audit(std::move(*audit));
+  all.finish();
+  if (settings.pacs.empty()) refuse("pacs", "is required: orders need a PACS");
+  check_names(settings);
+  return settings;
+}
+
+char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+}  // namespace
+
+const PacsSettings* HospitalSettings::find_pacs(std::string_view name) const {
+  const auto found = std::ranges::find(pacs, name, &PacsSettings::name);
+  return found == pacs.end() ? nullptr : &*found;
+}
+
+const Rule* HospitalSettings::find_rule(std::string_view name) const {
+  const auto found = std::ranges::find(rules, name, &Rule::name);
+  return found == rules.end() ? nullptr : &*found;
+}
+
+HospitalSettings parse_settings(std::string_view toml) {
+  try {
+    return settings_of(toml::parse(toml));
+  } catch (const toml::parse_error& error) {
+    throw Error(ErrorCode::kInvalidParameter, "the file of --hospital: line " +
+                                                  std::to_string(error.source().begin.line) + ": " +
+                                                  std::string(error.description()));
+  } catch (const Error& error) {
+    throw error.with_detail(std::string("the file of --hospital: ") + error.what());
+  }
+}
+
+HospitalSettings read_settings(const std::filesystem::path& file) {
+  const InputFile input = InputFile::chosen(file);
+  return parse_settings(input.text(0, static_cast<std::size_t>(input.size())));
+}
+
+bool matches(std::string_view pattern, std::string_view text) {
+  // The last * seen, and the end of the text it matches so far: backtracking only ever extends that
+  // match.
+  std::size_t star = std::string_view::npos;
+  std::size_t star_text = 0;
+  std::size_t p = 0;
+  std::size_t t = 0;
+  while (t < text.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      star_text = t;
+    } else if (p < pattern.size() &&
+               (pattern[p] == '?' || lower_of(pattern[p]) == lower_of(text[t]))) {
+      ++p;
+      ++t;
+    } else if (star != std::string_view::npos) {
+      p = star + 1;
+      t = ++star_text;
+    } else {
+      return false;
+    }
+  }
+  return pattern.substr(p).find_first_not_of('*') == std::string_view::npos;
+}
+
+}  // namespace isomesh::orders

@@ -1,0 +1,61 @@
+#include "server/jobs/library/complete_labels.h"
+
+#include <algorithm>
+#include <string>
+
+#include "server/mesh/labels/labels.h"
+#include "server/volume/names.h"
+
+namespace isomesh::jobs {
+namespace {
+
+template <class T>
+void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t, T>& texts) {
+  std::erase_if(
+      texts, [&](const auto& entry) { return !std::ranges::binary_search(chosen, entry.first); });
+}
+
+}  // namespace
+
+void throw_no_labels(SampleType type) {
+  throw invalid_parameter("labels", "need a volume of integers; this one has samples of type " +
+                                        std::string(to_string(type)));
+}
+
+JobParameters complete_labels(JobParameters parameters, const store::Viewer& viewer,
+                              const Volume& volume, LabelLists& lists) {
+  if (!is_integer(volume.type)) {
+    throw_no_labels(volume.type);
+  }
+  if (std::ranges::min(volume.dims) < 2) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "labels need a volume with at least two samples along each axis; this one is " +
+                    std::to_string(volume.dims[0]) + " x " + std::to_string(volume.dims[1]) +
+                    " x " + std::to_string(volume.dims[2]));
+  }
+  for (const auto& [label, values] : values_of(volume)) {
+    parameters.label_values.try_emplace(label, values);
+  }
+  for (auto& [label, name] : parameters.label_names) name = volume::normalized(name);
+  const auto counts = lists.counts(viewer, volume);
+  const auto chosen = mesh::chosen_labels(*counts, parameters);
+  std::vector<std::int64_t> labels;
+  std::ranges::transform(chosen, std::back_inserter(labels), &mesh::LabelVoxels::label);
+  for (const LabelEntry& entry : volume.labels) {
+    if (!entry.name.empty()) parameters.label_names.try_emplace(entry.label, entry.name);
+    if (entry.color) parameters.label_colors.try_emplace(entry.label, *entry.color);
+  }
+  keep_chosen(labels, parameters.label_names);
+  keep_chosen(labels, parameters.label_colors);
+  // With all labels, a value assigned to one label is no label of its own. With chosen labels, only
+  // their own values matter.
+  if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
+  const bool is_bounded =
+      parameters.smoothing == Smoothing::kLaplacian || parameters.smoothing == Smoothing::kTaubin;
+  if (is_bounded && !parameters.max_displacement_mm) {
+    parameters.max_displacement_mm = std::ranges::min(volume.geometry.spacing) / 2;
+  }
+  return parameters;
+}
+
+}  // namespace isomesh::jobs

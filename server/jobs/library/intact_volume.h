@@ -1,0 +1,35 @@
+#pragma once
+
+#include <stop_token>
+#include <string>
+
+#include "proto/error.h"
+#include "server/store/blob_store.h"
+#include "server/volume/unusable.h"
+
+namespace isomesh::jobs {
+
+// Returns a volume's file after verifying its bytes against the volume's id. A mesh made from
+// corrupted samples would not look wrong. Throws Error kUnusableVolume if the file is missing or
+// corrupt, kCancelled if `stop` is requested. Thread safe.
+inline store::LocalBlob intact_volume(const store::BlobStore& blobs, const std::string& volume,
+                                      const std::stop_token& stop = {}) {
+  if (store::is_there_and_intact(blobs, volume, stop)) return blobs.local(volume);
+  volume::throw_damaged();
+}
+
+// Runs `make`, in which a process works on a file of intact_volume(). If `make` fails with
+// kInternal, verifies the blob again and throws kUnusableVolume if it is corrupt: a file truncated
+// meanwhile kills the process or is no canonical volume any more.
+template <class Make>
+auto make_from_volume(const store::BlobStore& blobs, const std::string& volume,
+                      const std::stop_token& stop, const Make& make) {
+  try {
+    return make();
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInternal) intact_volume(blobs, volume, stop);
+    throw;
+  }
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+
+#include "base/mutex.h"
+
+namespace isomesh::store {
+
+// Checks something that may hang. Runs one check at a time, and caches its result, because many
+// threads may ask. Thread safe.
+class HealthCheck {
+ public:
+  // Returns the result of `check`, or the last one if it is younger than `valid_for` or a check is
+  // running. False if the running check takes longer than `patience`.
+  bool passes(std::chrono::milliseconds valid_for, std::chrono::milliseconds patience,
+              const std::function<bool()>& check) {
+    using Clock = std::chrono::steady_clock;
+    {
+      const Lock lock(mutex_);
+      const auto age = Clock::now() - changed_;
+      if (is_checking_) return last_ && age < patience;
+      if (age < valid_for) return last_;
+      is_checking_ = true;
+      changed_ = Clock::now();
+    }
+    const bool result = check();
+    const Lock lock(mutex_);
+    is_checking_ = false;
+    changed_ = Clock::now();
+    last_ = result;
+    return result;
+  }
+
+ private:
+  Mutex mutex_;
+  bool is_checking_ ISOMESH_GUARDED_BY(mutex_) = false;
+  bool last_ ISOMESH_GUARDED_BY(mutex_) = true;  // before the first check
+  // Begin or end of the last check.
+  std::chrono::steady_clock::time_point changed_ ISOMESH_GUARDED_BY(mutex_) = {};
+};
+
+}  // namespace isomesh::store

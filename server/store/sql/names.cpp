@@ -1,0 +1,69 @@
+#include "server/store/sql/names.h"
+
+#include <algorithm>
+#include <array>
+
+#include "base/error.h"
+#include "proto/orders.h"
+#include "proto/types.h"
+#include "server/store/job_store.h"
+
+namespace isomesh::store {
+namespace {
+
+struct Name {
+  template <class T>
+  constexpr Name(std::string_view text, T value) : name(text), number(static_cast<int>(value)) {}
+
+  std::string_view name;
+  int number;
+};
+
+constexpr std::array kNames = {
+    Name{"job.queued", JobState::kQueued},
+    Name{"job.running", JobState::kRunning},
+    Name{"job.succeeded", JobState::kSucceeded},
+    Name{"job.cancelled", JobState::kCancelled},
+    Name{"job.final", JobState::kSucceeded},      // the first of the final states
+    Name{"order.final", OrderState::kSucceeded},  // likewise
+    Name{"event.stage", EventKind::kStage},
+    Name{"event.done", EventKind::kDone},
+    Name{"stage.queue", Stage::kQueue},
+    Name{"stage.load", Stage::kLoad},
+    Name{"stage.done", Stage::kDone},
+    Name{"priority.stat", Priority::kStat},
+    Name{"priority.routine", Priority::kRoutine},
+    Name{"priority.bulk", Priority::kBulk},
+};
+
+// Databases and their indexes contain these numbers, so they stay.
+static_assert(static_cast<int>(JobState::kSucceeded) == 2);
+static_assert(static_cast<int>(JobState::kCancelled) == 4);
+static_assert(static_cast<int>(OrderState::kSucceeded) == 4);
+static_assert(static_cast<int>(OrderState::kCancelled) == 6);
+static_assert(static_cast<int>(EventKind::kDone) == 2);
+static_assert(static_cast<int>(Stage::kDone) == 7);
+static_assert(static_cast<int>(Priority::kBulk) == 2);
+
+int number_of(std::string_view name) {
+  const auto* const found = std::ranges::find(kNames, name, &Name::name);
+  if (found != kNames.end()) return found->number;
+  throw Error(ErrorCode::kInternal, "SQL has no name " + std::string(name));
+}
+
+}  // namespace
+
+std::string with_numbers(std::string_view sql) {
+  std::string text;
+  while (true) {
+    const std::size_t begin = sql.find('{');
+    text += sql.substr(0, begin);
+    if (begin == std::string_view::npos) return text;
+    const std::size_t end = sql.find('}', begin);
+    if (end == std::string_view::npos) throw Error(ErrorCode::kInternal, "SQL has an open brace");
+    text += std::to_string(number_of(sql.substr(begin + 1, end - begin - 1)));
+    sql.remove_prefix(end + 1);
+  }
+}
+
+}  // namespace isomesh::store

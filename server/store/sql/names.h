@@ -1,0 +1,13 @@
+// Names in SQL of the numbers that the tables contain, such as {job.queued}. For engines only.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace isomesh::store {
+
+// Replaces the names in a statement by their numbers, which is done when it is prepared. Throws
+// Error kInternal for an unknown name.
+std::string with_numbers(std::string_view sql);
+
+}  // namespace isomesh::store

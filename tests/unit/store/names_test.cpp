@@ -1,0 +1,24 @@
+#include "server/store/sql/names.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+
+namespace isomesh::store {
+namespace {
+
+TEST(NamesInSql, BecomeTheNumbersOfTheTables) {
+  EXPECT_EQ(with_numbers("state = {job.queued} OR state < {order.final}"),
+            "state = 0 OR state < 4");
+  EXPECT_EQ(with_numbers("SELECT ?1"), "SELECT ?1");
+  EXPECT_EQ(with_numbers("{stage.done}"), "7");
+}
+
+TEST(NamesInSql, AnUnknownOneIsAnError) {
+  for (const char* sql : {"state = {job.sleeping}", "state = {}", "state = {job.queued"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { with_numbers(sql); }), ErrorCode::kInternal) << sql;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::store
