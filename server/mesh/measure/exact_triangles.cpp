@@ -15,11 +15,11 @@ namespace {
 // Half a unit in the last place of 1, as in Shewchuk's paper.
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon() / 2;
 
-using Corners = std::array<Vec3, 3>;
+using Vertices = std::array<Vec3, 3>;
 using Axes = std::array<std::size_t, 2>;
 constexpr std::array<Axes, 3> kPlanes = {Axes{1, 2}, Axes{2, 0}, Axes{0, 1}};
 
-Corners corners_of(std::span<const Vec3> positions, const Triangle& t) {
+Vertices vertices_of(std::span<const Vec3> positions, const Triangle& t) {
   return {positions[t[0]], positions[t[1]], positions[t[2]]};
 }
 
@@ -30,7 +30,7 @@ Expansion exact_minus(const Vec3& a, const Vec3& b, std::size_t axis) {
 }
 
 // Twice the area of a triangle that is projected along an axis, in the plane of the others.
-Expansion exact_area(const Corners& t, const Axes& plane) {
+Expansion exact_area(const Vertices& t, const Axes& plane) {
   const auto [x, y] = plane;
   Expansion area = exact_minus(t[1], t[0], x) * exact_minus(t[2], t[0], y);
   area -= exact_minus(t[1], t[0], y) * exact_minus(t[2], t[0], x);
@@ -38,7 +38,7 @@ Expansion exact_area(const Corners& t, const Axes& plane) {
 }
 
 // Its sign: 1 if the corners are counter-clockwise, 0 if they are on one line.
-int turn_of(const Corners& t, const Axes& plane) {
+int turn_of(const Vertices& t, const Axes& plane) {
   const auto [x, y] = plane;
   const double left = (double{t[1][x]} - t[0][x]) * (double{t[2][y]} - t[0][y]);
   const double right = (double{t[1][y]} - t[0][y]) * (double{t[2][x]} - t[0][x]);
@@ -50,7 +50,7 @@ int turn_of(const Corners& t, const Axes& plane) {
 // On which side of a triangle's plane a point is: 1 where the normal points to, 0 on the plane.
 class Plane {
  public:
-  explicit Plane(const Corners& corners) : corners_(corners) {
+  explicit Plane(const Vertices& corners) : corners_(corners) {
     const Point u = minus(to_point(corners[1]), to_point(corners[0]));
     const Point v = minus(to_point(corners[2]), to_point(corners[0]));
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -70,7 +70,7 @@ class Plane {
   }
 
   // Of three points.
-  std::array<int, 3> sides_of(const Corners& points) const {
+  std::array<int, 3> sides_of(const Vertices& points) const {
     return {side_of(points[0]), side_of(points[1]), side_of(points[2])};
   }
 
@@ -83,13 +83,13 @@ class Plane {
     return height.sign();
   }
 
-  Corners corners_;
+  Vertices corners_;
   Point normal_ = {};
   Point terms_ = {};  // the magnitudes of what each component of the normal is the difference of
 };
 
 // A plane of two axes in which the triangle has an area; any if it is flat.
-Axes plane_for(const Corners& t) {
+Axes plane_for(const Vertices& t) {
   const auto* const found =
       std::ranges::find_if(kPlanes, [&](const Axes& plane) { return turn_of(t, plane) != 0; });
   return found == kPlanes.end() ? kPlanes[0] : *found;
@@ -121,7 +121,7 @@ bool have_one_sign(const std::array<int, 3>& signs) {
   return least * most >= 0;
 }
 
-bool meet_in_plane(const Segment& segment, const Corners& t, const Axes& plane) {
+bool meet_in_plane(const Segment& segment, const Vertices& t, const Axes& plane) {
   std::array<int, 3> turns;
   for (std::size_t i = 0; i < 3; ++i) {
     const Segment edge = {t[i], t[(i + 1) % 3]};
@@ -132,7 +132,7 @@ bool meet_in_plane(const Segment& segment, const Corners& t, const Axes& plane) 
 }
 
 // A segment whose ends are on those sides of the triangle's plane.
-bool meet(const Segment& segment, int from_side, int to_side, const Corners& t) {
+bool meet(const Segment& segment, int from_side, int to_side, const Vertices& t) {
   if (from_side * to_side > 0) return false;
   if (from_side == 0 && to_side == 0) return meet_in_plane(segment, t, plane_for(t));
   std::array<int, 3> sides;
@@ -142,7 +142,7 @@ bool meet(const Segment& segment, int from_side, int to_side, const Corners& t) 
   return have_one_sign(sides);
 }
 
-bool any_edge_meets(const Corners& edges, const std::array<int, 3>& sides, const Corners& t) {
+bool any_edge_meets(const Vertices& edges, const std::array<int, 3>& sides, const Vertices& t) {
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t next = (i + 1) % 3;
     if (meet({edges[i], edges[next]}, sides[i], sides[next], t)) return true;
@@ -154,7 +154,7 @@ bool are_apart(const std::array<int, 3>& sides) {
   return sides[0] != 0 && sides[0] == sides[1] && sides[0] == sides[2];
 }
 
-bool meet_anywhere(const Corners& a, const Corners& b) {
+bool meet_anywhere(const Vertices& a, const Vertices& b) {
   const std::array<int, 3> sides_of_b = Plane(a).sides_of(b);
   if (are_apart(sides_of_b)) return false;
   const std::array<int, 3> sides_of_a = Plane(b).sides_of(a);
@@ -164,8 +164,8 @@ bool meet_anywhere(const Corners& a, const Corners& b) {
 
 // What two triangles with one common vertex, their first, have in common beside it is a segment
 // from there, which ends on the far side of one of them; or they touch there.
-bool meet_beyond_vertex(const Corners& a, const Corners& b) {
-  const auto far_side_meets = [](const Corners& of, const Corners& t) {
+bool meet_beyond_vertex(const Vertices& a, const Vertices& b) {
+  const auto far_side_meets = [](const Vertices& of, const Vertices& t) {
     const Plane plane(t);
     return meet({of[1], of[2]}, plane.side_of(of[1]), plane.side_of(of[2]), t);
   };
@@ -174,7 +174,7 @@ bool meet_beyond_vertex(const Corners& a, const Corners& b) {
 
 // Along a common edge, their first two corners, two triangles meet nowhere else, unless one lies
 // upon the other.
-bool overlap_at_edge(const Corners& a, const Corners& b) {
+bool overlap_at_edge(const Vertices& a, const Vertices& b) {
   if (Plane(a).side_of(b[2]) != 0) return false;
   const Axes plane = plane_for(a);
   return turn_of(a, plane) == turn_of({a[0], a[1], b[2]}, plane);
@@ -193,7 +193,7 @@ Triangle shared_first(const Triangle& triangle, const Triangle& other) {
 }  // namespace
 
 bool is_flat(std::span<const Vec3> positions, const Triangle& triangle) {
-  const Corners corners = corners_of(positions, triangle);
+  const Vertices corners = vertices_of(positions, triangle);
   return std::ranges::all_of(kPlanes,
                              [&](const Axes& plane) { return turn_of(corners, plane) == 0; });
 }
@@ -202,14 +202,14 @@ bool do_intersect(std::span<const Vec3> positions, const Triangle& a, const Tria
   const auto shared = std::ranges::count_if(
       a, [&](std::uint32_t vertex) { return std::ranges::find(b, vertex) != b.end(); });
   if (shared == 3) return true;
-  if (shared == 0) return meet_anywhere(corners_of(positions, a), corners_of(positions, b));
+  if (shared == 0) return meet_anywhere(vertices_of(positions, a), vertices_of(positions, b));
   const Triangle first = shared_first(a, b);
   Triangle second = shared_first(b, a);
   if (shared == 1) {
-    return meet_beyond_vertex(corners_of(positions, first), corners_of(positions, second));
+    return meet_beyond_vertex(vertices_of(positions, first), vertices_of(positions, second));
   }
   if (second[0] != first[0]) std::swap(second[0], second[1]);
-  return overlap_at_edge(corners_of(positions, first), corners_of(positions, second));
+  return overlap_at_edge(vertices_of(positions, first), vertices_of(positions, second));
 }
 
 }  // namespace isomesh::mesh

@@ -9,7 +9,7 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kBlock = 4096;
+constexpr std::size_t kTrianglesPerBlock = 4096;
 
 struct Box {
   Point low;
@@ -75,9 +75,11 @@ std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const Triangl
 SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context) {
   const TriangleGrid grid(surface, context);
   const std::size_t triangles = surface.triangles.size();
-  std::vector<std::vector<IntersectingPair>> blocks((triangles + kBlock - 1) / kBlock);
+  std::vector<std::vector<IntersectingPair>> blocks((triangles + kTrianglesPerBlock - 1) /
+                                                    kTrianglesPerBlock);
   parallel_for(context, blocks.size(), [&](std::size_t b) {
-    blocks[b] = pairs_in(surface, grid, b * kBlock, std::min(triangles, (b + 1) * kBlock));
+    blocks[b] = pairs_in(surface, grid, b * kTrianglesPerBlock,
+                         std::min(triangles, (b + 1) * kTrianglesPerBlock));
   });
   SelfIntersections result;
   std::vector<std::uint32_t> named;
