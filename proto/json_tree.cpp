@@ -87,6 +87,12 @@ const Json& element(const Json& array, std::size_t index) {
   return array[index];
 }
 
+const Json& existing(const Json& json, std::string_view name) {
+  const Json* const found = find(json, name);
+  if (found == nullptr) throw Error(ErrorCode::kInternal, "lacks " + std::string(name));
+  return *found;
+}
+
 const Json* find(const Json& json, std::string_view name) {
   const auto found = json.find(std::string(name));
   return found == json.end() ? nullptr : &*found;

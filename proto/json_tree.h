@@ -66,6 +66,8 @@ std::string text(const Json& json);
 void check_object(const Json& json);
 std::size_t array_size(const Json& json);
 const Json& element(const Json& array, std::size_t index);
+// Throws if there is no such member.
+const Json& existing(const Json& json, std::string_view name);
 // Returns null if there is no such member or `json` is not an object.
 const Json* find(const Json& json, std::string_view name);
 void for_each_member(const Json& object,

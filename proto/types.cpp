@@ -133,12 +133,6 @@ bool is_integer(SampleType type) {
   return with_sample(type, [](auto sample) { return std::is_integral_v<decltype(sample)>; });
 }
 
-double default_lambda(Smoothing smoothing) {
-  // A third, after Taubin: larger factors move the brain's volume by more than 0.1 % in 20 passes.
-  constexpr double kTaubin = 0.33;
-  return smoothing == Smoothing::kTaubin ? kTaubin : 1;
-}
-
 bool is_color(std::string_view text) {
   return text.size() == 7 && text[0] == '#' &&
          text.find_first_not_of("0123456789abcdef", 1) == std::string_view::npos;

@@ -289,7 +289,10 @@ std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
 
 // The default relaxation factor: the fraction of the way to the mean of its neighbours that a
 // vertex moves.
-double default_lambda(Smoothing smoothing);
+constexpr double default_lambda(Smoothing smoothing) {
+  // A third, after Taubin: larger factors move the brain's volume by more than 0.1 % in 20 passes.
+  return smoothing == Smoothing::kTaubin ? 0.33 : 1;
+}
 double default_lambda(const MeshParameters& parameters);  // labels have a default of their own
 
 // Databases contain the numbers of both, so a new one comes last.

@@ -1,7 +1,7 @@
-// node generate.mjs: what the page takes over from proto/openapi.yaml, written to generated/ beside this
-// file. api.d.ts holds the types of requests and answers, parameters.ts the table of a job's parameters.
+// node generate.mjs [--types]: what the page takes over from proto/openapi.yaml, written to generated/ beside this
+// file. parameters.ts holds the table of a job's parameters. With --types, api.d.ts holds the types of requests and answers:
+// checks need them, and a build of the page does not.
 import { existsSync, mkdirSync, readFileSync, renameSync, writeFileSync } from 'node:fs';
-import openapiTS, { astToString } from 'openapi-typescript';
 import { parse } from 'yaml';
 
 const source = new URL('../../proto/openapi.yaml', import.meta.url);
@@ -81,7 +81,6 @@ function write(name, text) {
 }
 
 const made = '// Made by generate.mjs of proto/openapi.yaml.\n';
-const types = await openapiTS(source, { arrayLength: true, defaultNonNullable: false });
 const table = JSON.stringify(parametersOf(components.schemas.JobParameters), null, 2);
 const { enum: formatNames, 'x-titles': titles, 'x-suffixes': suffixes } = components.schemas.VolumeFormat;
 const volumes = JSON.stringify(
@@ -91,7 +90,6 @@ const volumes = JSON.stringify(
 );
 const whole = JSON.stringify(components.schemas.MeshFormat['x-hold-all-labels']);
 mkdirSync(folder, { recursive: true });
-write('api.d.ts', made + astToString(types));
 write(
   'parameters.ts',
   `${made}import type { Parameter } from '../src/job/table';\n\nexport const parameters: readonly Parameter[] = ${table};
@@ -102,3 +100,8 @@ export const wholeFormats: readonly string[] = ${whole};
 // The formats in which volumes are uploaded.
 export const volumeFormats: readonly { name: string; title: string; suffixes: readonly string[] }[] = ${volumes};\n`,
 );
+if (process.argv.includes('--types')) {
+  const { default: openapiTS, astToString } = await import('openapi-typescript');
+  const types = await openapiTS(source, { arrayLength: true, defaultNonNullable: false });
+  write('api.d.ts', made + astToString(types));
+}

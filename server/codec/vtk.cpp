@@ -16,7 +16,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "VTK's legacy files are big-endian");
 
 constexpr std::size_t kVertexBytes = sizeof(mesh::Vec3);
-constexpr std::size_t kFaceBytes = sizeof(std::uint32_t) + sizeof(mesh::Triangle);
+constexpr std::size_t kCellBytes = sizeof(std::uint32_t) + sizeof(mesh::Triangle);
 
 std::byte* write_turned(std::uint32_t word, std::byte* out) {
   word = __builtin_bswap32(word);
@@ -44,7 +44,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   });
   text("\nPOLYGONS " + std::to_string(faces) + ' ' + std::to_string(4 * faces) + '\n');
   for (const FaceRun& run : runs) {
-    writer.write(run.count, kFaceBytes, [&](std::size_t t, std::byte* out) {
+    writer.write(run.count, kCellBytes, [&](std::size_t t, std::byte* out) {
       out = write_turned(3, out);
       for (const std::uint32_t vertex : run.at(t)) out = write_turned(vertex, out);
       return out;

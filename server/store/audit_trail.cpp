@@ -2,14 +2,11 @@
 
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "base/sha256.h"
+#include "proto/json_tree.h"
 
 namespace isomesh::store {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct Code {
   const char* value;
@@ -41,23 +38,31 @@ void AuditChain::add(std::string_view line) {
 
 std::string audit_record(const AuditEntry& entry) {
   const Code code = code_of(entry.event);
-  Json json = {{"event", code.value},
-               {"meaning", code.meaning},
-               {"outcome", entry.success ? "success" : "failure"}};
+  JsonTree json;
+  const auto put = [&](const char* name, std::string_view text) {
+    json_values::assign(json_values::member(json.root(), name), text);
+  };
+  put("event", code.value);
+  put("meaning", code.meaning);
+  put("outcome", entry.success ? "success" : "failure");
   for (const auto& [name, text] :
        {std::pair{"order", &entry.order}, std::pair{"owner", &entry.owner},
         std::pair{"pacs", &entry.pacs}, std::pair{"direction", &entry.direction},
         std::pair{"study", &entry.study}, std::pair{"patient_id", &entry.patient_id}}) {
-    if (!text->empty()) json[name] = *text;
+    if (!text->empty()) put(name, *text);
   }
-  if (entry.event == AuditEvent::kTransferred) json["instances"] = entry.instances;
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (entry.event == AuditEvent::kTransferred) {
+    json_values::assign(json_values::member(json.root(), "instances"), entry.instances);
+  }
+  return dump(json.root());
 }
 
 std::string audit_line(std::uint64_t number, const std::string& at, const std::string& record) {
   // The record is appended after these two.
-  const Json head = {{"id", number}, {"at", at}};
-  std::string text = head.dump();
+  JsonTree head;
+  json_values::assign(json_values::member(head.root(), "id"), number);
+  json_values::assign(json_values::member(head.root(), "at"), std::string_view(at));
+  std::string text = dump(head.root());
   text.back() = ',';
   return text + record.substr(1);
 }

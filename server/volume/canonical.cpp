@@ -6,7 +6,6 @@
 #include <utility>
 
 #include <fcntl.h>
-#include <nlohmann/json.hpp>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -14,6 +13,7 @@
 #include "base/descriptor.h"
 #include "base/error.h"
 #include "proto/error.h"
+#include "proto/json_values.h"
 #include "server/volume/geometry.h"
 #include "server/volume/unusable.h"
 
@@ -29,14 +29,17 @@ std::array<double, Size> without_negative_zeros(std::array<double, Size> values)
 }
 
 std::string header_text(const CanonicalHeader& header) {
-  nlohmann::ordered_json json;
-  json["version"] = kVersion;
-  json["dims"] = header.dims;
-  json["type"] = std::string(to_string(header.type));
-  json["spacing"] = without_negative_zeros(header.geometry.spacing);
-  json["origin"] = without_negative_zeros(header.geometry.origin);
-  json["direction"] = without_negative_zeros(header.geometry.direction);
-  std::string text = json.dump();
+  JsonTree json;
+  const auto put = [&](const char* name, const auto& value) {
+    json_values::write_field(json.root(), name, value);
+  };
+  put("version", kVersion);
+  put("dims", header.dims);
+  put("type", header.type);
+  put("spacing", without_negative_zeros(header.geometry.spacing));
+  put("origin", without_negative_zeros(header.geometry.origin));
+  put("direction", without_negative_zeros(header.geometry.direction));
+  std::string text = dump(json.root());
   text.resize(kHeaderBytes - 1, ' ');
   return text + '\n';
 }
@@ -48,15 +51,16 @@ std::string header_text(const CanonicalHeader& header) {
 CanonicalHeader from_text(const std::string& text) {
   CanonicalHeader header;
   try {
-    const auto json = nlohmann::json::parse(text);
-    const auto type = from_string<SampleType>(json.at("type").get<std::string>());
-    if (!type) throw_not_canonical("unknown type");
-    header.type = *type;
-    header.dims = json.at("dims").get<std::array<std::uint32_t, 3>>();
-    header.geometry.spacing = json.at("spacing").get<std::array<double, 3>>();
-    header.geometry.origin = json.at("origin").get<std::array<double, 3>>();
-    header.geometry.direction = json.at("direction").get<std::array<double, 9>>();
-  } catch (const nlohmann::json::exception&) {
+    const JsonTree json(text);
+    const auto take = [&](const char* name, auto& value) {
+      json_values::read(json_values::existing(json.root(), name), value);
+    };
+    take("dims", header.dims);
+    take("type", header.type);
+    take("spacing", header.geometry.spacing);
+    take("origin", header.geometry.origin);
+    take("direction", header.geometry.direction);
+  } catch (const Error&) {
     throw_not_canonical("its header cannot be read");
   }
   // The comparison rejects other versions, additional members, another order, and sizes beyond 32

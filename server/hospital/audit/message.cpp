@@ -1,15 +1,14 @@
 #include "server/hospital/audit/message.h"
 
-#include <nlohmann/json.hpp>
+#include <limits>
 
 #include "base/base64.h"
 #include "base/error.h"
 #include "base/xml.h"
+#include "proto/json_tree.h"
 
 namespace isomesh::audit {
 namespace {
-
-using Entry = nlohmann::json;
 
 struct Code {
   std::string_view value;
@@ -27,9 +26,9 @@ constexpr Code kPatientNumber = {"2", "RFC-3881", "Patient Number"};
 // SOP class of a query for the instances of a series (PS3.4, C.6.2).
 constexpr std::string_view kStudyRootFind = "1.2.840.10008.5.1.4.1.2.2.1";
 
-std::string text_of(const Entry& entry, const char* name) {
-  const auto found = entry.find(name);
-  return found == entry.end() ? "" : found->get<std::string>();
+std::string text_of(const Json& entry, const char* name) {
+  const Json* const found = json_values::find(entry, name);
+  return found == nullptr ? "" : json_values::text(*found);
 }
 
 std::string attribute(std::string_view name, std::string_view value) {
@@ -58,16 +57,19 @@ std::string object(std::string_view id, std::string_view type, std::string_view 
          "</ParticipantObjectIdentification>";
 }
 
-std::string study_object(const Entry& entry) {
+std::string study_object(const Json& entry) {
   const std::string study = text_of(entry, "study");
   if (study.empty()) return "";
-  const std::string count = std::to_string(entry.value("instances", std::uint64_t{0}));
+  const Json* const instances = json_values::find(entry, "instances");
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+  const std::string count =
+      std::to_string(instances == nullptr ? 0 : json_values::whole(*instances, kMost));
   return object(study, "2", "3", kStudyUid,
                 "<ParticipantObjectDescription><SOPClass" + attribute("NumberOfInstances", count) +
                     "/></ParticipantObjectDescription>");
 }
 
-std::string patient_object(const Entry& entry) {
+std::string patient_object(const Json& entry) {
   const std::string patient = text_of(entry, "patient_id");
   return patient.empty() ? "" : object(patient, "1", "1", kPatientNumber, "");
 }
@@ -88,7 +90,7 @@ Event event_of(const std::string& code) {
     return {
         "E", {"110114", "DCM", "User Authentication"}, {"110126", "DCM", "Node Authentication"}};
   }
-  throw Error(ErrorCode::kInternal, "an entry of the audit trail has an unknown event");
+  throw Error(ErrorCode::kInternal, "has an unknown event");
 }
 
 struct Content {
@@ -96,7 +98,7 @@ struct Content {
   std::string objects = {};
 };
 
-Content content_of(const Entry& entry, const std::string& code, const AuditSource& source) {
+Content content_of(const Json& entry, const std::string& code, const AuditSource& source) {
   const std::string peer = text_of(entry, "pacs");
   const std::string owner = text_of(entry, "owner");
   const std::string asked = owner.empty() ? "" : participant(owner, true, nullptr);
@@ -124,10 +126,11 @@ Content content_of(const Entry& entry, const std::string& code, const AuditSourc
 
 std::string audit_message(std::string_view text, const AuditSource& source) {
   try {
-    const Entry entry = Entry::parse(text);
-    const std::string code = entry.at("event").get<std::string>();
+    const JsonTree tree(text);
+    const Json& entry = tree.root();
+    const std::string code = json_values::text(json_values::existing(entry, "event"));
     const Event event = event_of(code);
-    const bool is_success = entry.at("outcome") == "success";
+    const bool is_success = text_of(entry, "outcome") == "success";
     // A failure is serious only if the operation cannot continue; these operations are retried.
     const Content content = content_of(entry, code, source);
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?><AuditMessage><EventIdentification" +
@@ -140,14 +143,14 @@ std::string audit_message(std::string_view text, const AuditSource& source) {
            attribute("AuditSourceID", source.station) +
            "><AuditSourceTypeCode csd-code=\"4\"/></AuditSourceIdentification>" + content.objects +
            "</AuditMessage>";
-  } catch (const Entry::exception&) {
-    throw Error(ErrorCode::kInternal, "an entry of the audit trail is not JSON");
+  } catch (const Error& error) {
+    throw error.with_detail(std::string("an entry of the audit trail ") + error.what());
   }
 }
 
 std::string syslog_frame(std::string_view entry, const AuditSource& source) {
   // Facility 10 (security), severity 5 (notice). The byte order mark announces UTF-8.
-  const std::string time = Entry::parse(entry).at("at").get<std::string>();
+  const std::string time = text_of(JsonTree(entry).root(), "at");
   const std::string message = "<85>1 " + time + ' ' + source.host + " isomeshd " +
                               std::to_string(source.process) + " DICOM+RFC3881 - \xEF\xBB\xBF" +
                               audit_message(entry, source);

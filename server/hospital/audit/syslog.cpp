@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <string>
 
-#include <nlohmann/json.hpp>
-
 #include "base/error.h"
 #include "base/log.h"
+#include "proto/json_tree.h"
 
 namespace isomesh::audit {
 namespace {
@@ -24,7 +24,8 @@ constexpr milliseconds kLastWord{2'000};  // time to send the entry about the en
 constexpr std::size_t kMostUnmarked = 100;
 
 std::uint64_t number_of(std::string_view entry) {
-  return nlohmann::json::parse(entry).at("id").get<std::uint64_t>();
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+  return json_values::whole(json_values::existing(JsonTree(entry).root(), "id"), kMost);
 }
 
 // Returns early when `stop` is requested.

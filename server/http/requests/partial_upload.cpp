@@ -1,21 +1,20 @@
 #include "server/http/requests/partial_upload.h"
 
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <utility>
 
 #include <fcntl.h>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "base/error.h"
 #include "base/files.h"
+#include "proto/json_values.h"
 #include "server/store/files/files.h"
 
 namespace isomesh::http {
 namespace {
-
-using nlohmann::json;
 
 constexpr const char* kNoteSuffix = ".json";
 
@@ -29,33 +28,46 @@ const std::string& this_boot() {
   return boot;
 }
 
+// As the file of a note holds it.
+struct StoredNote {
+  std::string boot;
+  PartialNote note;
+  std::vector<std::array<std::string, 2>> query;
+};
+
+void visit(Is<StoredNote> auto& self, auto&& field) {
+  field("boot", self.boot);
+  field("owner", self.note.owner);
+  field("query", self.query);
+  field("file_name", self.note.file_name);
+  field("sha256", self.note.sha256);
+  field("complete", self.note.is_complete);
+  field("volume", self.note.volume);
+  field("length", self.note.length);
+}
+
 std::string text_of(const PartialNote& note) {
-  json text = {{"boot", this_boot()},   {"owner", note.owner},
-               {"query", note.query},   {"file_name", note.file_name},
-               {"sha256", note.sha256}, {"complete", note.is_complete},
-               {"volume", note.volume}, {"length", nullptr}};
-  if (note.length) text["length"] = *note.length;
-  return text.dump();
+  StoredNote stored = {.boot = this_boot(), .note = note, .query = {}};
+  for (const auto& [name, value] : note.query) stored.query.push_back({name, value});
+  return json_values::to_text(stored);
+}
+
+StoredNote stored_note(const std::string& text) {
+  try {
+    return json_values::from_text<StoredNote>(text);
+  } catch (const Error&) {
+    throw Error(ErrorCode::kGone, "its record is damaged");
+  }
 }
 
 PartialNote note_from(const std::filesystem::path& path) {
-  try {
-    const json text = json::parse(read_whole(path));
-    // Bytes not yet on disk are lost, regardless of the file's length.
-    if (this_boot().empty() || text.at("boot") != this_boot()) {
-      throw Error(ErrorCode::kGone, "the machine was restarted since");
-    }
-    PartialNote note = {.owner = text.at("owner"),
-                        .query = text.at("query").get<Parameters>(),
-                        .file_name = text.at("file_name"),
-                        .sha256 = text.at("sha256"),
-                        .is_complete = text.at("complete"),
-                        .volume = text.at("volume")};
-    if (!text.at("length").is_null()) note.length = text.at("length").get<std::uint64_t>();
-    return note;
-  } catch (const json::exception&) {
-    throw Error(ErrorCode::kGone, "its record is damaged");
+  StoredNote stored = stored_note(read_whole(path));
+  // Bytes not yet on disk are lost, regardless of the file's length.
+  if (this_boot().empty() || stored.boot != this_boot()) {
+    throw Error(ErrorCode::kGone, "the machine was restarted since");
   }
+  for (const auto& [name, value] : stored.query) stored.note.query.emplace_back(name, value);
+  return std::move(stored.note);
 }
 
 Descriptor opened(const std::filesystem::path& path, int flags) {

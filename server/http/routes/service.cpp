@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "proto/json_values.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/openapi.h"
 #include "server/http/routes/routes.h"
@@ -39,11 +40,12 @@ void add_service_routes(App& app) {
   });
   add_get(app, "/version", [&app](const auto& request, auto& response) {
     check_known(request, {});
-    const nlohmann::json version = {
-        {"version", ISOMESH_VERSION},
-        {"mesher", jobs::kMesherVersion},
-        {"orders", app.services.hospital != nullptr && app.services.hospital->is_open()}};
-    response.set_body(version.dump(), "application/json");
+    const bool takes_orders = app.services.hospital != nullptr && app.services.hospital->is_open();
+    JsonTree version;
+    json_values::write_field(version.root(), "version", std::string(ISOMESH_VERSION));
+    json_values::write_field(version.root(), "mesher", std::string(jobs::kMesherVersion));
+    json_values::write_field(version.root(), "orders", takes_orders);
+    response.set_body(dump(version.root()), "application/json");
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {
     response.set_body(kOpenApi, "application/yaml");

@@ -12,7 +12,7 @@ namespace isomesh::mesh::bound {
 namespace {
 
 constexpr int kAttempts = 5;
-constexpr std::size_t kChunk = 1 << 14;
+constexpr std::size_t kCrossedPerChunk = 1 << 14;
 constexpr double kTooNear = 1e-11;
 
 // A ray from a point of a component along x; behind the volume's last face it goes on along y, and
@@ -36,7 +36,7 @@ struct Ray {
   bool is_odd() const { return !is_too_near && (crossed & 1) != 0; }
 };
 
-constexpr std::uint32_t kNone = ~std::uint32_t{0};
+constexpr std::uint32_t kNoRay = ~std::uint32_t{0};
 
 struct Start {
   Vecd from;
@@ -50,13 +50,13 @@ class Rays {
         components_(components),
         columns_y_(field.dims.y),
         begin_(std::size_t{field.dims.y} * field.dims.z + 1, 0),
-        ray_of_(components.size(), kNone),
+        ray_of_(components.size(), kNoRay),
         last_x_(static_cast<float>(field.dims.x - 1)),
         last_y_(static_cast<float>(field.dims.y - 1)) {}
 
   void set(std::vector<Start> starts) {
     std::ranges::fill(begin_, 0);
-    std::ranges::fill(ray_of_, kNone);
+    std::ranges::fill(ray_of_, kNoRay);
     rays_.clear();
     std::ranges::sort(starts, {}, [&](const Start& start) { return column_of(start.from); });
     for (const Start& start : starts) {
@@ -91,7 +91,7 @@ class Rays {
   void cross_behind(std::span<const Edge> edges, Vecf Vertex::*side) {
     for (const auto& [a, b] : edges) {
       const std::uint32_t index = ray_of_[component_of(a)];
-      if (index == kNone || !is_behind(a) || !is_behind(b)) continue;
+      if (index == kNoRay || !is_behind(a) || !is_behind(b)) continue;
       Ray& ray = rays_[index];
       cross_edge(place(a, side), place(b, side), ray);
       for (const std::uint32_t v : {a, b}) {
@@ -166,7 +166,7 @@ std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
                         std::span<const std::uint32_t> components,
                         std::span<const std::uint32_t> left, std::mt19937& random) {
   std::vector<double> largest(components.size(), -1);
-  std::vector<std::uint32_t> triangle_of(components.size(), kNone);
+  std::vector<std::uint32_t> triangle_of(components.size(), kNoRay);
   for (std::uint32_t t = 0; t < surfaces.extracted.size(); ++t) {
     const std::uint32_t component = components[surfaces.extracted[t][0]];
     const double area = area_of(field, surfaces, surfaces.extracted[t]);
@@ -177,7 +177,7 @@ std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
   const auto share = [&] { return 0.1 + static_cast<double>(random() >> 8) / (1 << 24); };
   std::vector<Start> starts;
   for (const std::uint32_t component : left) {
-    if (triangle_of[component] == kNone) continue;  // nothing is there to be covered
+    if (triangle_of[component] == kNoRay) continue;  // nothing is there to be covered
     Vecd sum;
     double weight = 0;
     for (const std::uint32_t v : surfaces.extracted[triangle_of[component]]) {
@@ -248,12 +248,14 @@ std::vector<std::uint32_t> uncovered(const Field& field, const Surfaces& surface
   for (int attempt = 0; attempt < kAttempts && !left.empty(); ++attempt) {
     rays.set(cast(field, surfaces, components, left, random));
     const std::size_t count = surfaces.triangles.size();
-    parallel_for(context, (count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-      for (std::size_t t = chunk * kChunk; t < std::min(count, (chunk + 1) * kChunk); ++t) {
-        rays.cross(surfaces.triangles[t], &Vertex::in);
-        rays.cross(surfaces.triangles[t], &Vertex::out);
-      }
-    });
+    parallel_for(context, (count + kCrossedPerChunk - 1) / kCrossedPerChunk,
+                 [&](std::size_t chunk) {
+                   for (std::size_t t = chunk * kCrossedPerChunk;
+                        t < std::min(count, (chunk + 1) * kCrossedPerChunk); ++t) {
+                     rays.cross(surfaces.triangles[t], &Vertex::in);
+                     rays.cross(surfaces.triangles[t], &Vertex::out);
+                   }
+                 });
     rays.cross_behind(border, &Vertex::in);
     rays.cross_behind(border, &Vertex::out);
     left.clear();

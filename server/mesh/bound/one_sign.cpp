@@ -8,7 +8,7 @@
 namespace isomesh::mesh::bound {
 namespace {
 
-constexpr std::size_t kFamilies = 6;
+constexpr std::size_t kFamiliesOfPlanes = 6;
 constexpr double kSame = 1e-12;  // a point is on a plane
 
 double number_in(std::size_t family, Vecd p) {
@@ -80,7 +80,7 @@ class Cutter {
   // Whether all corners of the pieces that the families from this one on make are positive; those
   // of the polygon are.
   bool are_pieces_positive(const Polygon& polygon, std::size_t family) const {
-    if (family == kFamilies) return true;
+    if (family == kFamiliesOfPlanes) return true;
     double low = number_in(family, polygon[0]);
     double high = low;
     for (std::size_t i = 1; i < polygon.size(); ++i) {

@@ -12,7 +12,7 @@
 namespace isomesh::mesh::bound {
 namespace {
 
-constexpr std::size_t kChunk = 1 << 12;
+constexpr std::size_t kTrianglesPerChunk = 1 << 12;
 
 bool is_in_one_face(const Dims& dims, const Vertex& a, const Vertex& b) {
   const auto all_at = [&](float Vecf::*axis, float face) {
@@ -35,19 +35,21 @@ std::size_t count_unclear(const Field& field, const Surfaces& surfaces,
                           std::span<const std::uint32_t> components, const Context& context) {
   std::atomic<std::size_t> unclear = 0;
   const std::size_t count = surfaces.triangles.size();
-  parallel_for(context, (count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    for (std::size_t t = chunk * kChunk; t < std::min(count, (chunk + 1) * kChunk); ++t) {
-      const Triangle& triangle = surfaces.triangles[t];
-      const auto component = [&](std::size_t i) {
-        return components[surfaces.origins[triangle[i]]];
-      };
-      const bool is_of_one = component(0) == component(1) && component(0) == component(2);
-      if (!is_of_one || !is_clear(field, surfaces, triangle, &Vertex::in, 1) ||
-          !is_clear(field, surfaces, triangle, &Vertex::out, -1)) {
-        ++unclear;
-      }
-    }
-  });
+  parallel_for(
+      context, (count + kTrianglesPerChunk - 1) / kTrianglesPerChunk, [&](std::size_t chunk) {
+        for (std::size_t t = chunk * kTrianglesPerChunk;
+             t < std::min(count, (chunk + 1) * kTrianglesPerChunk); ++t) {
+          const Triangle& triangle = surfaces.triangles[t];
+          const auto component = [&](std::size_t i) {
+            return components[surfaces.origins[triangle[i]]];
+          };
+          const bool is_of_one = component(0) == component(1) && component(0) == component(2);
+          if (!is_of_one || !is_clear(field, surfaces, triangle, &Vertex::in, 1) ||
+              !is_clear(field, surfaces, triangle, &Vertex::out, -1)) {
+            ++unclear;
+          }
+        }
+      });
   return unclear;
 }
 

@@ -17,21 +17,21 @@ constexpr std::array<Tetrahedron, 5> kPaperFive = {
 
 using Point = std::array<int, 3>;
 
-constexpr Point position(Corner corner) { return {corner & 1, corner >> 1 & 1, corner >> 2 & 1}; }
+Point position(Corner corner) { return {corner & 1, corner >> 1 & 1, corner >> 2 & 1}; }
 
-constexpr Point operator-(const Point& a, const Point& b) {
+Point operator-(const Point& a, const Point& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-constexpr Point operator+(const Point& a, const Point& b) {
+Point operator+(const Point& a, const Point& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
 
-constexpr int dot(const Point& a, const Point& b) {
+int dot(const Point& a, const Point& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-constexpr Point cross(const Point& a, const Point& b) {
+Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
@@ -39,18 +39,18 @@ struct Edge {
   Corner inside = 0;
   Corner outside = 0;
 
-  constexpr EdgeName name() const { return edge_name(inside & outside, inside ^ outside); }
-  constexpr Point middle() const { return position(inside) + position(outside); }  // times two
+  EdgeName name() const { return edge_name(inside & outside, inside ^ outside); }
+  Point middle() const { return position(inside) + position(outside); }  // times two
 };
 
 // Adds the triangle with its normal turned to `outward`; the midpoints of the edges tell its side.
-constexpr void add_triangle(CellCase& out, Edge a, Edge b, Edge c, const Point& outward) {
+void add_triangle(CellCase& out, Edge a, Edge b, Edge c, const Point& outward) {
   const Point normal = cross(b.middle() - a.middle(), c.middle() - a.middle());
   if (dot(normal, outward) < 0) std::swap(b, c);
   out.edges[out.triangles++] = {a.name(), b.name(), c.name()};
 }
 
-constexpr void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsigned inside_corners) {
+void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsigned inside_corners) {
   std::array<Corner, 4> inside = {};
   std::array<Corner, 4> outside = {};
   std::size_t insides = 0;
@@ -84,8 +84,9 @@ constexpr void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsign
   }
 }
 
+// When the program runs: the compiler would take seconds.
 template <std::size_t N>
-constexpr CellSplit make_split(const std::array<Tetrahedron, N>& paper, Corner mirror) {
+CellSplit make_split(const std::array<Tetrahedron, N>& paper, Corner mirror) {
   CellSplit split;
   split.tetrahedra = N;
   for (std::size_t t = 0; t < N; ++t) {

@@ -10,7 +10,7 @@ namespace isomesh::mesh {
 // Whether three positions are on one line, exactly.
 bool is_flat(std::span<const Vec3> positions, const Triangle& triangle);
 
-// As self_intersections.h has it; neither of them is flat. Thread safe.
+// As self_intersections.h has it. The result means nothing if one of them is flat. Thread safe.
 bool do_intersect(std::span<const Vec3> positions, const Triangle& a, const Triangle& b);
 
 }  // namespace isomesh::mesh

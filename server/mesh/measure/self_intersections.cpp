@@ -9,7 +9,7 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kBlock = 4096;
+constexpr std::size_t kTrianglesPerBlock = 4096;
 
 struct Box {
   Point low;
@@ -42,32 +42,6 @@ struct Box {
   }
 };
 
-// By far most triangles near each other are neighbours that lie to different sides of their edge,
-// or have a corner in common and are on one side of each other's planes.
-bool are_apart(const SurfaceView& surface, const Triangle& a, const Triangle& b) {
-  const auto& [u, v, w] = a;
-  const Point from = to_point(surface.positions[u]);
-  const Point normal =
-      normal_of(from, to_point(surface.positions[v]), to_point(surface.positions[w]));
-  const double reach = std::abs(normal[0]) + std::abs(normal[1]) + std::abs(normal[2]);
-  int above = 0;
-  int below = 0;
-  int shared = 0;
-  for (const std::uint32_t vertex : b) {
-    if (vertex == u || vertex == v || vertex == w) {
-      ++shared;
-      continue;
-    }
-    const Point to = minus(to_point(surface.positions[vertex]), from);
-    const double height = dot(normal, to);
-    // More than rounding leaves of it.
-    const double margin = 1e-12 * reach * (std::abs(to[0]) + std::abs(to[1]) + std::abs(to[2]));
-    above += height > margin ? 1 : 0;
-    below += height < -margin ? 1 : 0;
-  }
-  return std::max(above, below) == 3 - shared && shared < 3;
-}
-
 // Of the triangles from `begin` to `end`, with those of higher numbers.
 std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const TriangleGrid& grid,
                                        std::size_t begin, std::size_t end) {
@@ -86,9 +60,8 @@ std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const Triangl
     for (const std::uint32_t n : near) {
       const Triangle& other = surface.triangles[n];
       const Box other_box(surface, other);
-      if (!box.meets(other_box) || are_apart(surface, triangle, other) ||
-          are_apart(surface, other, triangle) || is_flat(surface.positions, other) ||
-          !do_intersect(surface.positions, triangle, other)) {
+      if (!box.meets(other_box) || !do_intersect(surface.positions, triangle, other) ||
+          is_flat(surface.positions, other)) {
         continue;
       }
       pairs.push_back({static_cast<std::uint32_t>(t), n, box.middle_with(other_box)});
@@ -102,9 +75,11 @@ std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const Triangl
 SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context) {
   const TriangleGrid grid(surface, context);
   const std::size_t triangles = surface.triangles.size();
-  std::vector<std::vector<IntersectingPair>> blocks((triangles + kBlock - 1) / kBlock);
+  std::vector<std::vector<IntersectingPair>> blocks((triangles + kTrianglesPerBlock - 1) /
+                                                    kTrianglesPerBlock);
   parallel_for(context, blocks.size(), [&](std::size_t b) {
-    blocks[b] = pairs_in(surface, grid, b * kBlock, std::min(triangles, (b + 1) * kBlock));
+    blocks[b] = pairs_in(surface, grid, b * kTrianglesPerBlock,
+                         std::min(triangles, (b + 1) * kTrianglesPerBlock));
   });
   SelfIntersections result;
   std::vector<std::uint32_t> named;

@@ -12,7 +12,7 @@ namespace isomesh::mesh {
 namespace {
 
 // Larger slabs look at fewer layers twice, smaller ones keep more of their lists in the cache.
-constexpr std::size_t kLayersPerSlab = 4;
+constexpr std::size_t kLayersPerPart = 4;
 
 // The corners of every vertex of a run of layers, which only triangles of the same layers and of
 // the one below can name; those of vertex v are [ends[v - 1], ends[v]).
@@ -73,11 +73,11 @@ Topology check_layers(const Mesh& mesh, std::size_t first_layer, std::size_t end
 }  // namespace
 
 Topology measure_topology(const Mesh& mesh, const Context& context) {
-  const std::size_t slabs = (mesh.layers() + kLayersPerSlab - 1) / kLayersPerSlab;
+  const std::size_t slabs = (mesh.layers() + kLayersPerPart - 1) / kLayersPerPart;
   std::vector<Topology> parts(slabs);
   parallel_for(context, slabs, [&](std::size_t slab) {
-    const std::size_t first = slab * kLayersPerSlab;
-    parts[slab] = check_layers(mesh, first, std::min(mesh.layers(), first + kLayersPerSlab));
+    const std::size_t first = slab * kLayersPerPart;
+    parts[slab] = check_layers(mesh, first, std::min(mesh.layers(), first + kLayersPerPart));
   });
   Topology whole;
   for (const Topology& part : parts) {

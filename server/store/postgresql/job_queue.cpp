@@ -1,14 +1,22 @@
 // Changes of jobs, each one call of a database function; queries are in job_store.cpp.
 #include <algorithm>
 
-#include <nlohmann/json.hpp>
-
 #include "base/ids.h"
 #include "proto/json.h"
+#include "proto/json_values.h"
 #include "server/store/job_rules.h"
 #include "server/store/microseconds.h"
 #include "server/store/outbox.h"
 #include "server/store/postgresql/job_store.h"
+
+namespace isomesh::store {
+
+void visit(Is<Blob> auto& self, auto&& field) {
+  field("blob", self.key);
+  field("bytes", self.bytes);
+}
+
+}  // namespace isomesh::store
 
 namespace isomesh::store::postgresql {
 
@@ -35,19 +43,33 @@ constexpr std::chrono::milliseconds kBetweenRenewals{1000};
 constexpr std::chrono::milliseconds kLongestGap{2500};
 
 // Arguments of the database's functions.
-using Json = nlohmann::json;
+class Arguments {
+ public:
+  template <class T>
+  Arguments& put(const char* name, const T& value) {
+    json_values::write_field(tree_.root(), name, value);
+    return *this;
+  }
 
-std::string text_of(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text() const { return dump(tree_.root()); }
+
+ private:
+  JsonTree tree_;
+};
+
+// Another job that ends with a run.
+struct Alike {
+  std::string id;
+  std::string record;
+};
+
+void visit(Is<Alike> auto& self, auto&& field) {
+  field("id", self.id);
+  field("record", self.record);
 }
 
-Json blobs_told(const MeshSummary* mesh) {
-  Json blobs = Json::array();
-  if (mesh == nullptr) return blobs;
-  for (const Blob& blob : blobs_of(*mesh)) {
-    blobs.push_back({{"blob", blob.key}, {"bytes", blob.bytes}});
-  }
-  return blobs;
+std::vector<Blob> blobs_told(const MeshSummary* mesh) {
+  return mesh == nullptr ? std::vector<Blob>() : blobs_of(*mesh);
 }
 
 void end(Job& job, JobState state, std::int64_t accepted, std::int64_t now) {
@@ -88,27 +110,28 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
   }
   const bool has_room = mesh != nullptr || blobs_.has_room();
   const auto& callback = spec.parameters.callback;
-  const Json asked = {
-      {"id", job.id},
-      {"owner", spec.owner},
-      {"priority", static_cast<int>(spec.parameters.priority)},
-      {"volume", spec.parameters.volume},
-      {"result_key", key},
-      {"accepted", accepted},
-      {"receiver", callback ? Json(receiver_of(callback->url)) : Json()},
-      {"url", callback ? Json(callback->url) : Json()},
-      {"idempotency_key", spec.idempotency_key.empty() ? Json() : Json(spec.idempotency_key)},
-      {"request_digest", spec.request_digest},
-      {"record", to_record(job)},
-      {"cost", found.cost_us},
-      {"node", database_.node()},
-      {"latest", made ? Json(made->job) : Json()},
-      {"reuses", mesh != nullptr},
-      {"blobs", blobs_told(mesh)},
-      {"most", refusing_ || !has_room ? 0 : options_.max_queued},
-      {"has_share",
-       database_.read([&](SqlConnection& connection) { return has_share(connection, spec); })}};
-  Rows row = database_.query("SELECT outcome, job FROM submit_job(?1::jsonb)", text_of(asked));
+  using Text = std::optional<std::string>;
+  Arguments asked;
+  asked.put("id", job.id)
+      .put("owner", spec.owner)
+      .put("priority", static_cast<int>(spec.parameters.priority))
+      .put("volume", spec.parameters.volume)
+      .put("result_key", key)
+      .put("accepted", accepted)
+      .put("receiver", callback ? Text(receiver_of(callback->url)) : Text())
+      .put("url", callback ? Text(callback->url) : Text())
+      .put("idempotency_key", spec.idempotency_key.empty() ? Text() : Text(spec.idempotency_key))
+      .put("request_digest", spec.request_digest)
+      .put("record", to_record(job))
+      .put("cost", found.cost_us)
+      .put("node", database_.node())
+      .put("latest", made ? Text(made->job) : Text())
+      .put("reuses", mesh != nullptr)
+      .put("blobs", blobs_told(mesh))
+      .put("most", refusing_ || !has_room ? 0 : options_.max_queued)
+      .put("has_share",
+           database_.read([&](SqlConnection& connection) { return has_share(connection, spec); }));
+  Rows row = database_.query("SELECT outcome, job FROM submit_job(?1::jsonb)", asked.text());
   row.next();
   const std::string outcome = row.text(0);
   if (outcome == "new") {
@@ -291,31 +314,33 @@ void PostgresJobStore::note_response() {
 
 // Repeats until the records of all equal jobs that end with this run were passed to the database.
 bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const Ending& ending) {
-  Json asked = {
-      {"id", id},
-      {"fence", fence},
-      {"node", database_.node()},
-      {"is_again", false},
-      {"ends_others", ending.ends_others},
-      {"state", static_cast<int>(ending.state)},
-      {"record", ending.record},
-      {"delay", microseconds(ending.delay)},
-      {"waiting_for", ending.waiting_for ? Json(static_cast<int>(*ending.waiting_for)) : Json()},
-      {"counts", ending.counts},
-      {"cancelled", ending.cancelled},
-      {"blobs", blobs_told(ending.mesh)},
-      {"alike", Json::array()}};
+  using Number = std::optional<int>;
+  Arguments asked;
+  asked.put("id", id)
+      .put("fence", fence)
+      .put("node", database_.node())
+      .put("is_again", false)
+      .put("ends_others", ending.ends_others)
+      .put("state", static_cast<int>(ending.state))
+      .put("record", ending.record)
+      .put("delay", microseconds(ending.delay))
+      .put("waiting_for",
+           ending.waiting_for ? Number(static_cast<int>(*ending.waiting_for)) : Number())
+      .put("counts", ending.counts)
+      .put("cancelled", ending.cancelled)
+      .put("blobs", blobs_told(ending.mesh))
+      .put("alike", std::vector<Alike>());
   while (true) {
     Rows rows = database_.ask([&](Connection& connection, bool was_interrupted) {
-      if (was_interrupted) asked["is_again"] = true;
+      if (was_interrupted) asked.put("is_again", true);
       return connection.query("SELECT outcome, id, record, accepted FROM finish_run(?1::jsonb)",
-                              text_of(asked));
+                              asked.text());
     });
     rows.next();
     const std::string outcome = rows.text(0);
     if (outcome == "lost") return false;
     if (outcome == "done") break;
-    asked["alike"] = Json::array();
+    std::vector<Alike> alike;
     const std::int64_t now = database_.now_us();
     do {
       Job other = job_from_record(rows.text(2));
@@ -325,8 +350,9 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
       other.timing.queue = milliseconds_between(accepted, now);
       give_mesh(other, *ending.mesh);
       end(other, JobState::kSucceeded, accepted, now);
-      asked["alike"].push_back({{"id", rows.text(1)}, {"record", to_record(other)}});
+      alike.push_back({rows.text(1), to_record(other)});
     } while (rows.next());
+    asked.put("alike", alike);
   }
   forget_run(id, fence);
   // Without a mesh, this job or an equal one may be ready again. With one, no job becomes ready.

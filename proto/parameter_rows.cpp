@@ -1,0 +1,409 @@
+#include <cstdint>
+#include <limits>
+
+#include "proto/parameters.h"
+
+namespace isomesh::rows {
+namespace {
+
+constexpr double kMostUnsigned = std::numeric_limits<std::uint32_t>::max();
+constexpr double kLeastLabel = std::numeric_limits<std::int32_t>::min();
+constexpr double kMostLabel = kMostUnsigned;
+
+}  // namespace
+
+// --- ComponentFilter ---
+
+constinit const Parameter kKeep = {.name = "keep",
+                                   .title = "Keep the largest components",
+                                   .help = "Keep the N largest connected components.",
+                                   .minimum = 1,
+                                   .maximum = kMostUnsigned,
+                                   .jobs = JobKind::kAtIso,
+                                   .option = "keep-components"};
+
+constinit const Parameter kMinTriangles = {
+    .name = "min_triangles",
+    .title = "Smallest component, in triangles",
+    .help = "Drop connected components with fewer triangles than this.",
+    .minimum = 1,
+    .maximum = kMostUnsigned,
+    .jobs = JobKind::kAtIso};
+
+constinit const Parameter kNearestTo = {
+    .name = "nearest_to",
+    .title = "Keep the components nearest to",
+    .help = "Keep the connected component nearest to each of these points.",
+    .more =
+        "A point is x, y and z in millimetres (LPS). A query lists the numbers of all "
+        "points in one row. The nearest component is the one with the nearest vertex.",
+    .jobs = JobKind::kAtIso,
+    .may_be_absent = true,
+    .option = "keep-nearest-to"};
+
+// --- DracoParameters ---
+
+constinit const Parameter kPositionBits = {
+    .name = "position_bits",
+    .title = "Bits per coordinate",
+    .help = "Number of bits that Draco keeps per coordinate.",
+    .more = "The grid spans the mesh's longest side.",
+    .minimum = 8,
+    .maximum = 30};
+
+constinit const Parameter kSpeed = {
+    .name = "speed",
+    .title = "Encoding speed",
+    .help = "Draco's encoding speed; low values make smaller files and take longer.",
+    .more =
+        "0 to 4 use valence coding by libdraco: the smallest files, slow. 5 to 9 are all "
+        "the same: isomesh's own encoder, which uses several threads and takes no more "
+        "bytes than libdraco at 5. 10 uses sequential coding by libdraco: the order of "
+        "vertices and triangles is kept, at several times the bytes.",
+    .minimum = 0,
+    .maximum = 10};
+
+// --- MeshParameters ---
+
+constinit const Parameter kIso = {
+    .name = "iso",
+    .title = "Iso-value",
+    .help = "The iso-value in the volume's units, or `otsu` for Otsu's threshold.",
+    .more = "A sample is inside when its value is >= iso.",
+    .when_empty = "otsu",
+    .is_required = true,
+    .unless = "labels",
+    .jobs = JobKind::kAtIso,
+    .may_be_absent = true};
+
+constinit const Parameter kLabels = {
+    .name = "labels",
+    .title = "Labels",
+    .help = "Labels of a segmentation to mesh instead of an iso-value: their values, or `all`.",
+    .more =
+        "Each label gets a surface of its own. Neighbouring labels share the wall "
+        "between them. Values that are not listed are background. Vertices lie "
+        "half-way between two samples. Some defaults differ from those of jobs with an "
+        "iso-value: `smoothing` is `labels`. With another kind of smoothing there are 10 "
+        "passes, a lambda of 0.33, and no vertex moves farther than half the smallest "
+        "spacing.",
+    .minimum = kLeastLabel,
+    .maximum = kMostLabel,
+    .jobs = JobKind::kByLabels,
+    .may_be_absent = true};
+
+constinit const Parameter kBackground = {.name = "background",
+                                         .title = "Background value",
+                                         .help = "The value of samples without a label.",
+                                         .minimum = kLeastLabel,
+                                         .maximum = kMostLabel,
+                                         .jobs = JobKind::kByLabels,
+                                         .may_be_absent = true};
+
+constinit const Parameter kLabelNames = {
+    .name = "label_names",
+    .title = "Label names",
+    .help = "Names of the labels, by value.",
+    .more = "Labels that are not listed keep the name from the volume's file.",
+    .jobs = JobKind::kByLabels,
+    .may_be_absent = true,
+    .in_query = false,
+    .option = "label-name"};
+
+constinit const Parameter kLabelColors = {
+    .name = "label_colors",
+    .title = "Label colours",
+    .help = "Colours of the labels as #rrggbb, by value.",
+    .more =
+        "Labels that are not listed keep the colour from the volume's "
+        "file, or get one of a fixed series.",
+    .jobs = JobKind::kByLabels,
+    .may_be_absent = true,
+    .in_query = false,
+    .option = "label-color"};
+
+constinit const Parameter kLabelValues = {
+    .name = "label_values",
+    .title = "Label values",
+    .help = "The sample values of each label, for labels that have several.",
+    .more =
+        "A value may belong to several labels, which then overlap there. Labels "
+        "that are not listed keep the values from the volume's file.",
+    .minimum = kLeastLabel,
+    .maximum = kMostLabel,
+    .jobs = JobKind::kByLabels,
+    .may_be_absent = true,
+    .in_query = false,
+    .option = "label-values"};
+
+constinit const Parameter kScheme = {
+    .name = "scheme",
+    .title = "Tetrahedra per cell",
+    .help = "Number of tetrahedra per cell, or lattice.",
+    .more =
+        "6 is Kuhn's split of the primitive cubic lattice. 5 is the subdivision "
+        "of the face-centred cubic lattice: every second cell is mirrored; "
+        "the cell (0,0,0) is not. The names `kuhn` and `fcc` mean 6 and 5. `bcc` is "
+        "the body-centred cubic lattice, which has a sample in the centre of each "
+        "cell, too, the mean of its corners: 1.4 times as many triangles as 6, with "
+        "larger angles. It is not for labels.",
+    .values = {"The face-centred lattice, with fewer triangles; every second cell is "
+               "mirrored",
+               "The primitive lattice, with the same split in every cell", "The same as 5",
+               "The same as 6", "The body-centred lattice, with more triangles and larger angles"}};
+
+constinit const Parameter kInterpolation = {
+    .name = "interpolation",
+    .title = "Position of vertices",
+    .help = "Position of a vertex on the edge between two samples.",
+    .more = "`linear` interpolates the two samples; `midpoint` puts every vertex half-way.",
+    .values = {"Where the iso-value lies between the two samples",
+               "Half-way between the two samples"},
+    .jobs = JobKind::kAtIso,
+    .may_be_absent = true};
+
+constinit const Parameter kRegularize = {
+    .name = "regularize",
+    .title = "Join nearby vertices",
+    .help = "Join the vertices around a sample where that keeps the topology.",
+    .more =
+        "The surface has about a third as many triangles, with larger angles. It "
+        "keeps its connected components, its boundary and its genus. Vertices at "
+        "the volume's border stay where they are. The same holds for the own "
+        "surface of each label. False gives a vertex to each edge between two "
+        "samples that the surface crosses. At an iso-value, `max_error_mm` does "
+        "the same: its limit is measured from that surface.",
+    .may_be_absent = true};
+
+constinit const Parameter kPasses = {
+    .name = "passes",
+    .title = "Passes",
+    .help = "Number of smoothing passes.",
+    .more =
+        "Vertices on the surface's boundary stay where they are. For labels "
+        "the default is 10. `labels` smoothes once, whatever their number; "
+        "0 leaves the surface as it is extracted.",
+    .minimum = 0,
+    .maximum = 1000,
+    .by_labels = "10"};
+
+constinit const Parameter kSmoothing = {
+    .name = "smoothing",
+    .title = "Smoothing",
+    .help = "The smoothing method.",
+    .more =
+        "`laplacian`: each pass moves every vertex towards the mean of its neighbours by the "
+        "factor `lambda`; the enclosed volume shrinks. `taubin`: each pass does the same and "
+        "then moves all vertices back by the factor `mu`, where 1/lambda + 1/mu = "
+        "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume. "
+        "`angle` and `optimize` keep shape and volume and make the angles of triangles "
+        "larger: each pass moves every vertex along the extracted surface. `angle` moves it "
+        "towards the bisectors of its neighbours' angles. `optimize` moves it towards the "
+        "mean of its neighbours in the first half of the passes, and then to wherever the "
+        "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise. "
+        "`labels` is for labels alone: it takes the steps of the voxels away, keeps flat "
+        "faces, and gives each label the volume of its voxels, to a few tenths of a percent.",
+    .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
+               "Evens out the angles of triangles, and keeps shape and volume",
+               "Enlarges the smallest angles of triangles, and keeps shape and volume",
+               "For labels: no steps of voxels, and each label's own volume"},
+    .by_labels = "labels"};
+
+// Above 0.66, Taubin smoothing amplifies the highest frequencies in every pass, whatever the
+// pass-band.
+constinit const Parameter kLambda = {
+    .name = "lambda",
+    .title = "Relaxation factor (lambda)",
+    .help = "Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours.",
+    .above = 0,
+    .maximum = 1,
+    .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},
+              SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}},
+    .by_labels = "0.33"};
+
+constinit const Parameter kPassBand = {
+    .name = "pass_band",
+    .title = "Pass band",
+    .help = "For `taubin`: keep surface frequencies below this, and smooth higher ones.",
+    .more = "They range from 0 (constant) to 2 (the sign changes from each vertex to the next).",
+    .above = 0,
+    .maximum = 0.5,
+    .cases = {SmoothingCase{Smoothing::kTaubin}}};
+
+constinit const Parameter kMaxDisplacementMm = {
+    .name = "max_displacement_mm",
+    .title = "Largest displacement",
+    .help = "Smoothing moves no vertex farther than this from its extracted position.",
+    .more =
+        "In millimetres. Null means no limit; but labels that are smoothed by `laplacian` or "
+        "`taubin` move half the smallest spacing at most.",
+    .unit = "mm",
+    .minimum = 0};
+
+constinit const Parameter kClose = {
+    .name = "close",
+    .title = "Close the surface at the volume's border",
+    .help = "Cap the surface where it meets the volume's border.",
+    .more =
+        "Samples beyond the border then count as outside. The result has no "
+        "boundary. Caps lie in the border, stay flat and are not smoothed. "
+        "The rest is smoothed as if the surface were open."};
+
+constinit const Parameter kComponents = {
+    .name = "components",
+    .help = "Which connected components to keep; the others are dropped before smoothing.",
+    .more =
+        "A component must meet all members that are given: `keep` chooses among those that "
+        "are large enough. Components are ranked by their number of triangles, equal ones by "
+        "their first vertex. Without members all are kept. Labels do not allow it."};
+
+constinit const Parameter kFillCavities = {
+    .name = "fill_cavities",
+    .title = "Fill cavities",
+    .help = "Remove enclosed cavities: their walls and all connected components inside them.",
+    .more = "A cavity is enclosed if no opening leads to it.",
+    .jobs = JobKind::kAtIso,
+    .may_be_absent = true};
+
+constinit const Parameter kCrop = {
+    .name = "crop",
+    .title = "Crop to a box",
+    .help =
+        "Mesh only what lies in this box: its smallest and its largest "
+        "corner in millimetres (LPS).",
+    .more =
+        "Samples outside the box are ignored, as if the volume ended "
+        "there. If the volume's axes are oblique, the box's extents along "
+        "those axes are used. Caps close the surface: `close` is true.",
+    .may_be_absent = true};
+
+constinit const Parameter kMaxErrorMm = {
+    .name = "max_error_mm",
+    .title = "Largest error",
+    .help =
+        "The distance between each file and the extracted surface is at "
+        "most this.",
+    .more =
+        "In millimetres, in both directions. It is proven for every point "
+        "where that can be done, and measured otherwise: at all vertices "
+        "and the centres of all triangles, so other points may be farther "
+        "away. `mesh.certificate` says which, see `certify`, which is "
+        "switched on. Smoothing may use half of it. Simplification then "
+        "removes as many triangles as the rest allows, and Draco's "
+        "coordinates get as many bits as that takes.",
+    .unit = "mm",
+    .minimum = 0.001,
+    .maximum = 1000,
+    .may_be_absent = true};
+
+constinit const Parameter kTriangles = {
+    .name = "triangles",
+    .title = "Most triangles",
+    .help = "Simplify the surface to at most this many triangles.",
+    .more =
+        "If `max_error_mm` is given too, the limit that is reached first "
+        "applies; the response names it. The resulting error is measured: "
+        "see `certify`, which is switched on unless it is set to false.",
+    .minimum = 4,
+    .maximum = kMostUnsigned,
+    .may_be_absent = true};
+
+constinit const Parameter kFormats = {.name = "formats",
+                                      .title = "File formats",
+                                      .help = "The file formats to write.",
+                                      .query = "format"};
+
+constinit const Parameter kDraco = {
+    .name = "draco", .help = "Options of the `drc` format, and of the Draco streams in `glb`."};
+
+constinit const Parameter kNormals = {
+    .name = "normals",
+    .title = "Write vertex normals to GLB",
+    .help = "Write vertex normals to `glb`: means of the triangles' normals, weighted by area.",
+    .more =
+        "Where `max_error_mm` or `triangles` simplifies a surface at an iso-value, they "
+        "are the gradient of the samples instead, so facets are not seen. Without "
+        "normals, viewers shade each triangle flat or compute their own."};
+
+constinit const Parameter kDistances = {
+    .name = "distances",
+    .title = "Write vertex distances to GLB",
+    .help = "Write each vertex's distance to the extracted surface to `glb`, in millimetres.",
+    .more =
+        "The vertex attribute is `_DISTANCE_MM`; every level of detail has it. Values "
+        "are rounded to a four thousandth of the largest. The page shows them as "
+        "colours. The formats must include `glb`.",
+    .may_be_absent = true};
+
+constinit const Parameter kLods = {
+    .name = "lods",
+    .title = "Levels of detail",
+    .help =
+        "Levels of detail in `glb`, as decreasing fractions of the triangles; "
+        "the first is 1.",
+    .more =
+        "At most 8. They use the extension MSFT_lod; readers that do not know it "
+        "ignore them. The formats must include `glb`.",
+    .above = 0,
+    .maximum = 1,
+    .may_be_absent = true};
+
+constinit const Parameter kMerge = {
+    .name = "merge",
+    .title = "One primitive in GLB",
+    .help = "Write the surface to `glb` as one primitive; with labels, as one per label.",
+    .more =
+        "For programs that take each primitive for a separate object. Otherwise there is "
+        "one per hundred thousand triangles or so; they are written and read in parallel.",
+    .may_be_absent = true};
+
+constinit const Parameter kGlbCodec = {
+    .name = "glb_codec",
+    .title = "GLB compression",
+    .help = "How the surface in `glb` is compressed.",
+    .more =
+        "`draco` is KHR_draco_mesh_compression and makes smaller files. "
+        "`meshopt` is EXT_meshopt_compression and is read faster. Readers "
+        "must support the one that is used.",
+    .values = {"Smaller files", "Files that are read faster"},
+    .may_be_absent = true};
+
+constinit const Parameter kSpace = {
+    .name = "space",
+    .title = "Coordinate system",
+    .help =
+        "Directions of x and y in the files: to the patient's left and "
+        "back, or to the right and front.",
+    .more =
+        "z points to the head. `gii` is always RAS. `glb` has a node of "
+        "its own that turns Y up.",
+    .values = {"DICOM's: left, posterior, superior", "NIfTI's: right, anterior, superior"},
+    .may_be_absent = true};
+
+// --- JobParameters ---
+
+constinit const Parameter kVolume = {
+    .name = "volume", .title = "Volume", .help = "The volume's id.", .is_required = true};
+
+constinit const Parameter kPriority = {
+    .name = "priority",
+    .title = "Priority",
+    .help =
+        "Jobs start in order of priority. Within a priority, owners take turns by the "
+        "time that their jobs are expected to take, and each owner's jobs start by age.",
+    .values = {"Before all others", "After all stat jobs", "When no other job waits"}};
+
+constinit const Parameter kCertify = {
+    .name = "certify",
+    .title = "Measure the error",
+    .help =
+        "Measure how far the files are from the extracted surface, and "
+        "where they intersect themselves.",
+    .may_be_absent = true};
+
+constinit const Parameter kCallback = {.name = "callback",
+                                       .help = "URL that the server calls when the job has ended.",
+                                       .may_be_absent = true,
+                                       .in_query = false};
+
+}  // namespace isomesh::rows
