@@ -19,18 +19,19 @@ Triangle3 triangle_of(std::span<const Vec3> positions, const Triangle& t) {
   return {point_of(positions[t[0]]), point_of(positions[t[1]]), point_of(positions[t[2]])};
 }
 
-// With the shared vertices first, which keeps what a triangle is as a set.
+// Orders the corners with the shared vertices first; the triangle as a set stays the same.
 Triangle shared_first(const Triangle& triangle, const Triangle& other) {
   Triangle result = triangle;
-  // std::ranges' returns a range of a kind that clang++ 14 cannot compile with g++ 12's library.
+  // The range that std::ranges' version returns does not compile with clang++ 14 and g++ 12's
+  // library.
   std::stable_partition(result.begin(), result.end(), [&](std::uint32_t vertex) {
     return std::ranges::find(other, vertex) != other.end();
   });
   return result;
 }
 
-// What two triangles with one common vertex have in common beside it is a segment from there, which
-// ends on the far side of one of them; or they touch there.
+// Two triangles with one common vertex share a segment from there, which ends on the far side of
+// one of them, or they touch there.
 bool meet_beyond_vertex(std::span<const Vec3> positions, const Triangle& a, const Triangle& b) {
   const auto far_side = [&](const Triangle& t) {
     return Segment3(point_of(positions[t[1]]), point_of(positions[t[2]]));
@@ -39,7 +40,7 @@ bool meet_beyond_vertex(std::span<const Vec3> positions, const Triangle& a, cons
          CGAL::do_intersect(triangle_of(positions, b), far_side(a));
 }
 
-// Along a common edge two triangles meet nowhere else, unless one lies upon the other.
+// Triangles with a common edge meet nowhere else, unless one lies on the other.
 bool overlap_at_edge(std::span<const Vec3> positions, const Triangle& a, const Triangle& b) {
   const Point3 from = point_of(positions[a[0]]);
   const Point3 to = point_of(positions[a[1]]);

@@ -42,8 +42,8 @@ struct Box {
   }
 };
 
-// By far most triangles near each other are neighbours that lie to different sides of their edge,
-// or have a corner in common and are on one side of each other's planes.
+// Most triangles near each other are neighbours on different sides of their common edge, or share a
+// corner and lie on one side of each other's planes.
 bool are_apart(const SurfaceView& surface, const Triangle& a, const Triangle& b) {
   const auto& [u, v, w] = a;
   const Point from = to_point(surface.positions[u]);
@@ -60,7 +60,7 @@ bool are_apart(const SurfaceView& surface, const Triangle& a, const Triangle& b)
     }
     const Point to = minus(to_point(surface.positions[vertex]), from);
     const double height = dot(normal, to);
-    // More than rounding leaves of it.
+    // More than rounding can add.
     const double margin = 1e-12 * reach * (std::abs(to[0]) + std::abs(to[1]) + std::abs(to[2]));
     above += height > margin ? 1 : 0;
     below += height < -margin ? 1 : 0;
@@ -68,7 +68,7 @@ bool are_apart(const SurfaceView& surface, const Triangle& a, const Triangle& b)
   return std::max(above, below) == 3 - shared && shared < 3;
 }
 
-// Of the triangles from `begin` to `end`, with those of higher numbers.
+// Pairs of a triangle in [begin, end) and one of a higher number.
 std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const TriangleGrid& grid,
                                        std::size_t begin, std::size_t end) {
   std::vector<IntersectingPair> pairs;
