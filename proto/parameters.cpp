@@ -7,6 +7,39 @@
 
 namespace isomesh {
 
+const char* smoothing_methods() {
+  static const std::string text = [] {
+    std::string all;
+    for (const SmoothingRow& row : kSmoothings)
+      all += (all.empty() ? "" : " ") + std::string(row.more);
+    return all;
+  }();
+  return text.c_str();
+}
+
+Meanings smoothing_meanings() {
+  Meanings meanings = {};
+  static_assert(kSmoothings.size() <= meanings.size());
+  std::ranges::transform(kSmoothings, meanings.begin(), &SmoothingRow::meaning);
+  return meanings;
+}
+
+SmoothingCases lambda_cases() {
+  SmoothingCases cases;
+  for (const SmoothingRow& row : kSmoothings) {
+    if (row.lambda) cases.push_back({row.smoothing, row.lambda, row.most_lambda});
+  }
+  return cases;
+}
+
+SmoothingCases pass_band_cases() {
+  SmoothingCases cases;
+  for (const SmoothingRow& row : kSmoothings) {
+    if (row.has_pass_band) cases.push_back({row.smoothing});
+  }
+  return cases;
+}
+
 std::string query_name_of(const Parameter& parameter) {
   return parameter.query == nullptr ? parameter.name : parameter.query;
 }

@@ -18,6 +18,12 @@
 
 namespace isomesh {
 
+// What the table of smoothing methods says for the rows of `smoothing`, `lambda` and `pass_band`.
+const char* smoothing_methods();
+Meanings smoothing_meanings();
+SmoothingCases lambda_cases();
+SmoothingCases pass_band_cases();
+
 // True if the member is visited: readers visit every member, writers only those with a value.
 template <class T>
 bool is_told(T& /*owner*/, bool has_something) {
@@ -208,31 +214,13 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                       .maximum = 1000,
                       .by_labels = "10"},
             self.passes);
-  parameter(
-      Parameter{
-          .name = "smoothing",
-          .title = "Smoothing",
-          .help = "The smoothing method.",
-          .more =
-              "`laplacian`: each pass moves every vertex towards the mean of its neighbours by the "
-              "factor `lambda`; the enclosed volume shrinks. `taubin`: each pass does the same and "
-              "then moves all vertices back by the factor `mu`, where 1/lambda + 1/mu = "
-              "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume. "
-              "`angle` and `optimize` keep shape and volume and make the angles of triangles "
-              "larger: each pass moves every vertex along the extracted surface. `angle` moves it "
-              "towards the bisectors of its neighbours' angles. `optimize` moves it towards the "
-              "mean of its neighbours in the first half of the passes, and then to wherever the "
-              "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise. "
-              "`labels` is for labels alone: it takes the steps of the voxels away, keeps flat "
-              "faces, and gives each label the volume of its voxels, to a few tenths of a percent.",
-          .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
-                     "Evens out the angles of triangles, and keeps shape and volume",
-                     "Enlarges the smallest angles of triangles, and keeps shape and volume",
-                     "For labels: no steps of voxels, and each label's own volume"},
-          .by_labels = "labels"},
-      self.smoothing);
-  // Above 0.66, Taubin smoothing amplifies the highest frequencies in every pass, whatever the
-  // pass-band.
+  parameter(Parameter{.name = "smoothing",
+                      .title = "Smoothing",
+                      .help = "The smoothing method.",
+                      .more = smoothing_methods(),
+                      .values = smoothing_meanings(),
+                      .by_labels = "labels"},
+            self.smoothing);
   parameter(
       Parameter{
           .name = "lambda",
@@ -240,8 +228,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
           .help = "Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours.",
           .above = 0,
           .maximum = 1,
-          .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},
-                    SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}},
+          .cases = lambda_cases(),
           .by_labels = "0.33"},
       self.lambda);
   parameter(
@@ -253,7 +240,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
               "They range from 0 (constant) to 2 (the sign changes from each vertex to the next).",
           .above = 0,
           .maximum = 0.5,
-          .cases = {SmoothingCase{Smoothing::kTaubin}}},
+          .cases = pass_band_cases()},
       self.pass_band);
   parameter(
       Parameter{

@@ -20,7 +20,7 @@ void add_service_routes(App& app) {
     check_known(request, {});
     const nlohmann::json version = {
         {"version", ISOMESH_VERSION},
-        {"mesher", jobs::kMesherVersion},
+        {"mesher", jobs::mesher_version()},
         {"orders", app.services.hospital != nullptr && app.services.hospital->is_open()}};
     response.set_body(version.dump(), "application/json");
   });
