@@ -16,12 +16,18 @@ concept Enumeration = std::is_enum_v<T>;
 template <class Self, class T>
 concept Is = std::same_as<std::remove_const_t<Self>, T>;
 
-// The values that differ for one kind of smoothing.
+// The values that differ for one method of smoothing.
 struct SmoothingCase {
   Smoothing smoothing;
   std::optional<double> standard = {};
   std::optional<double> maximum = {};
 };
+
+// Methods that differ; empty if none does.
+using SmoothingCases = std::span<const SmoothingCase>;
+
+inline constexpr std::size_t kMostValues = 8;
+using Meanings = std::array<const char*, kMostValues>;
 
 enum class JobKind { kAny, kAtIso, kByLabels };
 
@@ -34,10 +40,9 @@ struct Parameter {
   std::optional<double> minimum = {};
   std::optional<double> above = {};
   std::optional<double> maximum = {};
-  const char* when_empty = nullptr;        // the word for no value, instead of JSON's null
-  std::array<const char*, 5> values = {};  // the meanings of an enumeration's values, in order
-  // Kinds of smoothing that differ; empty if none does.
-  std::array<std::optional<SmoothingCase>, 2> cases = {};
+  const char* when_empty = nullptr;  // the word for no value, instead of JSON's null
+  Meanings values = {};              // of an enumeration's values, in order
+  SmoothingCases cases = {};
   bool is_required = false;
   const char* unless = nullptr;  // a required parameter may be missing if this one is given
   JobKind jobs = JobKind::kAny;

@@ -1,5 +1,8 @@
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <string_view>
 
 #include "proto/parameters.h"
 
@@ -9,6 +12,50 @@ namespace {
 constexpr double kMostUnsigned = std::numeric_limits<std::uint32_t>::max();
 constexpr double kLeastLabel = std::numeric_limits<std::int32_t>::min();
 constexpr double kMostLabel = kMostUnsigned;
+
+// The sentences of all methods of smoothing, as one text.
+constexpr auto kMethods = [] {
+  constexpr std::size_t kLength = [] {
+    std::size_t length = 0;
+    for (const SmoothingRow& row : kSmoothings) length += std::string_view(row.more).size() + 1;
+    return length;
+  }();
+  std::array<char, kLength> text = {};
+  auto end = text.begin();
+  for (const SmoothingRow& row : kSmoothings) {
+    end = std::ranges::copy(std::string_view(row.more), end).out;
+    *end++ = ' ';
+  }
+  text.back() = '\0';
+  return text;
+}();
+
+constexpr Meanings kMethodMeanings = [] {
+  Meanings meanings = {};
+  static_assert(kSmoothings.size() <= meanings.size());
+  std::ranges::transform(kSmoothings, meanings.begin(), &SmoothingRow::meaning);
+  return meanings;
+}();
+
+// A case for each method of smoothing with that property.
+template <auto has, auto case_of>
+constexpr auto kCases = [] {
+  std::array<SmoothingCase, std::ranges::count_if(kSmoothings, has)> cases = {};
+  auto next = cases.begin();
+  for (const SmoothingRow& row : kSmoothings) {
+    if (has(row)) *next++ = case_of(row);
+  }
+  return cases;
+}();
+
+constexpr auto kLambdaCases =
+    kCases<[](const SmoothingRow& row) { return row.lambda.has_value(); },
+           [](const SmoothingRow& row) {
+             return SmoothingCase{row.smoothing, row.lambda, row.most_lambda};
+           }>;
+constexpr auto kPassBandCases =
+    kCases<[](const SmoothingRow& row) { return row.has_pass_band; },
+           [](const SmoothingRow& row) { return SmoothingCase{row.smoothing}; }>;
 
 }  // namespace
 
@@ -187,38 +234,20 @@ constinit const Parameter kPasses = {
     .maximum = 1000,
     .by_labels = "10"};
 
-constinit const Parameter kSmoothing = {
-    .name = "smoothing",
-    .title = "Smoothing",
-    .help = "The smoothing method.",
-    .more =
-        "`laplacian`: each pass moves every vertex towards the mean of its neighbours by the "
-        "factor `lambda`; the enclosed volume shrinks. `taubin`: each pass does the same and "
-        "then moves all vertices back by the factor `mu`, where 1/lambda + 1/mu = "
-        "`pass_band`. A pass is thus two steps: they remove noise and keep shape and volume. "
-        "`angle` and `optimize` keep shape and volume and make the angles of triangles "
-        "larger: each pass moves every vertex along the extracted surface. `angle` moves it "
-        "towards the bisectors of its neighbours' angles. `optimize` moves it towards the "
-        "mean of its neighbours in the first half of the passes, and then to wherever the "
-        "smallest angle becomes larger. Neither uses `lambda`, and neither removes noise. "
-        "`labels` is for labels alone: it takes the steps of the voxels away, keeps flat "
-        "faces, and gives each label the volume of its voxels, to a few tenths of a percent.",
-    .values = {"Shrinks the surface a little with every pass", "Keeps the enclosed volume",
-               "Evens out the angles of triangles, and keeps shape and volume",
-               "Enlarges the smallest angles of triangles, and keeps shape and volume",
-               "For labels: no steps of voxels, and each label's own volume"},
-    .by_labels = "labels"};
+constinit const Parameter kSmoothing = {.name = "smoothing",
+                                        .title = "Smoothing",
+                                        .help = "The smoothing method.",
+                                        .more = kMethods.data(),
+                                        .values = kMethodMeanings,
+                                        .by_labels = "labels"};
 
-// Above 0.66, Taubin smoothing amplifies the highest frequencies in every pass, whatever the
-// pass-band.
 constinit const Parameter kLambda = {
     .name = "lambda",
     .title = "Relaxation factor (lambda)",
     .help = "Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours.",
     .above = 0,
     .maximum = 1,
-    .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},
-              SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}},
+    .cases = kLambdaCases,
     .by_labels = "0.33"};
 
 constinit const Parameter kPassBand = {
@@ -228,7 +257,7 @@ constinit const Parameter kPassBand = {
     .more = "They range from 0 (constant) to 2 (the sign changes from each vertex to the next).",
     .above = 0,
     .maximum = 0.5,
-    .cases = {SmoothingCase{Smoothing::kTaubin}}};
+    .cases = kPassBandCases};
 
 constinit const Parameter kMaxDisplacementMm = {
     .name = "max_displacement_mm",

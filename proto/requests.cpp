@@ -168,13 +168,13 @@ Json values_of(const std::string& text) {
   return values;
 }
 
-// Checks the table's limits for the chosen kind of smoothing.
+// Checks the table's limits for the chosen method of smoothing.
 void check_case(const std::string& path, const Parameter& parameter, Smoothing smoothing,
                 const std::optional<double>& value, RequestReader& reader) {
-  for (const auto& entry : parameter.cases) {
-    if (!entry || entry->smoothing != smoothing || !entry->maximum) continue;
-    if (!value || *value <= *entry->maximum) continue;
-    reader.add(path, "must be at most " + number_text(*entry->maximum) + " for \"" +
+  for (const SmoothingCase& entry : parameter.cases) {
+    if (entry.smoothing != smoothing || !entry.maximum) continue;
+    if (!value || *value <= *entry.maximum) continue;
+    reader.add(path, "must be at most " + number_text(*entry.maximum) + " for \"" +
                          std::string(to_string(smoothing)) + '"');
   }
 }
@@ -194,8 +194,9 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
       refuse_if(is_wrong && json.contains(parameter.name), parameter.name,
                 "is only for jobs with labels");
     });
-    refuse_if(parameters.smoothing == Smoothing::kLabels, "smoothing",
-              "\"labels\" is only for jobs with labels");
+    refuse_if(
+        row_of(parameters.smoothing).is_for_labels_only, "smoothing",
+        '"' + std::string(to_string(parameters.smoothing)) + "\" is only for jobs with labels");
     return refuse_if(has(MeshFormat::kZip), "formats",
                      "\"zip\" holds one file per label, so it needs labels");
   }

@@ -16,6 +16,14 @@ namespace {
 template <class Enum>
 struct Names;
 
+// The enumerators of a table of rows, each with its name.
+template <class Row, std::size_t kCount, class Enum>
+constexpr auto names_from(const std::array<Row, kCount>& rows, Enum Row::*value) {
+  std::array<std::pair<Enum, std::string_view>, kCount> names;
+  for (std::size_t n = 0; n < kCount; ++n) names[n] = {rows[n].*value, rows[n].name};
+  return names;
+}
+
 template <>
 struct Names<SampleType> {
   static constexpr std::array kTable = {
@@ -46,10 +54,7 @@ struct Names<Interpolation> {
 
 template <>
 struct Names<Smoothing> {
-  static constexpr std::array kTable = {
-      std::pair{Smoothing::kLaplacian, "laplacian"}, std::pair{Smoothing::kTaubin, "taubin"},
-      std::pair{Smoothing::kAngle, "angle"}, std::pair{Smoothing::kOptimize, "optimize"},
-      std::pair{Smoothing::kLabels, "labels"}};
+  static constexpr auto kTable = names_from(kSmoothings, &SmoothingRow::smoothing);
 };
 
 const FormatRow& row_of(MeshFormat format) {
@@ -58,13 +63,7 @@ const FormatRow& row_of(MeshFormat format) {
 
 template <>
 struct Names<MeshFormat> {
-  static constexpr auto kTable = [] {
-    std::array<std::pair<MeshFormat, std::string_view>, kFormatRows.size()> names;
-    for (std::size_t n = 0; n < names.size(); ++n) {
-      names[n] = {kFormatRows[n].format, kFormatRows[n].name};
-    }
-    return names;
-  }();
+  static constexpr auto kTable = names_from(kFormatRows, &FormatRow::format);
 };
 
 template <>
@@ -96,11 +95,7 @@ struct Names<JobState> {
 
 template <>
 struct Names<Stage> {
-  static constexpr auto kTable = [] {
-    std::array<std::pair<Stage, const char*>, kStages.size()> names = {};
-    for (std::size_t i = 0; i < kStages.size(); ++i) names[i] = {kStages[i].stage, kStages[i].name};
-    return names;
-  }();
+  static constexpr auto kTable = names_from(kStages, &StageRow::stage);
 };
 
 template <>
@@ -155,12 +150,9 @@ Scheme numbered(Scheme scheme) {
 }
 
 double default_lambda(const MeshParameters& parameters) {
-  // Factor 1 keeps the steps between half-way vertices, and takes 0.5 to 1 % off the volume of
-  // labels in ten passes. Factor 1/3 evens out the steps, and takes a third of a percent.
-  constexpr double kLabels = 0.33;
-  const bool is_taken = parameters.smoothing == Smoothing::kLaplacian ||
-                        parameters.smoothing == Smoothing::kLabels;  // which has no use for it
-  return parameters.labels && is_taken ? kLabels : default_lambda(parameters.smoothing);
+  const SmoothingRow& row = row_of(parameters.smoothing);
+  const double usual = row.lambda.value_or(1);
+  return parameters.labels ? row.lambda_by_labels.value_or(usual) : usual;
 }
 
 JobParameters label_parameters(LabelChoice labels) {

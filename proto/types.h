@@ -14,6 +14,7 @@
 #include "proto/labels.h"
 #include "proto/mesh_summary.h"
 #include "proto/notes.h"
+#include "proto/smoothing.h"
 
 namespace isomesh {
 
@@ -185,7 +186,6 @@ Scheme numbered(Scheme scheme);
 // False where it is a name, although it may stand for a number.
 constexpr bool is_number(Scheme scheme) { return scheme <= Scheme::kSix; }
 enum class Interpolation { kLinear, kMidpoint };
-enum class Smoothing { kLaplacian, kTaubin, kAngle, kOptimize, kLabels };
 enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
@@ -287,13 +287,8 @@ std::vector<MeshFormat> files_of(const MeshParameters& parameters);
 // The formats of the files in a ZIP of labels, in order.
 std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
 
-// The default relaxation factor: the fraction of the way to the mean of its neighbours that a
-// vertex moves.
-constexpr double default_lambda(Smoothing smoothing) {
-  // A third, after Taubin: larger factors move the brain's volume by more than 0.1 % in 20 passes.
-  return smoothing == Smoothing::kTaubin ? 0.33 : 1;
-}
-double default_lambda(const MeshParameters& parameters);  // labels have a default of their own
+// The default relaxation factor (smoothing.h).
+double default_lambda(const MeshParameters& parameters);
 
 // Databases contain the numbers of both, so a new one comes last.
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };

@@ -29,7 +29,7 @@ namespace {
 
 store::JobStoreOptions job_options(const Options& options) {
   store::JobStoreOptions result = options.jobs;
-  result.mesher_version = jobs::kMesherVersion;
+  result.mesher_version = jobs::mesher_version();
   result.expected_ms = jobs::expected_ms;
   return result;
 }

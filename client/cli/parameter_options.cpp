@@ -31,10 +31,10 @@ std::string default_of(const Parameter& parameter, const T& standard) {
     return number_text(standard);
   } else {
     std::string defaults;
-    for (const auto& entry : parameter.cases) {
-      if (!entry || !entry->standard) continue;
-      defaults += (defaults.empty() ? "" : ", ") + number_text(*entry->standard) + " for " +
-                  std::string(to_string(entry->smoothing));
+    for (const SmoothingCase& entry : parameter.cases) {
+      if (!entry.standard) continue;
+      defaults += (defaults.empty() ? "" : ", ") + number_text(*entry.standard) + " for " +
+                  std::string(to_string(entry.smoothing));
     }
     return defaults;
   }

@@ -103,11 +103,11 @@ std::string schema_name_of(const Parameter& parameter) {
 // "Null: 1 for `laplacian`, 0.33 for `taubin`, which takes at most 0.66."
 std::string cases_in_words(const Parameter& parameter) {
   std::string text;
-  for (const auto& entry : parameter.cases) {
-    if (!entry || !entry->standard) continue;
-    text += (text.empty() ? " Null: " : ", ") + number_text(*entry->standard) + " for `" +
-            std::string(to_string(entry->smoothing)) + '`';
-    if (entry->maximum) text += ", which takes at most " + number_text(*entry->maximum);
+  for (const SmoothingCase& entry : parameter.cases) {
+    if (!entry.standard) continue;
+    text += (text.empty() ? " Null: " : ", ") + number_text(*entry.standard) + " for `" +
+            std::string(to_string(entry.smoothing)) + '`';
+    if (entry.maximum) text += ", which takes at most " + number_text(*entry.maximum);
   }
   return text.empty() ? "" : text + '.';
 }
@@ -124,14 +124,13 @@ void write_bounds(Yaml& yaml, const Parameter& parameter) {
 }
 
 void write_cases(Yaml& yaml, const Parameter& parameter) {
-  if (!parameter.cases.front()) return;
+  if (parameter.cases.empty()) return;
   yaml.under("x-by-smoothing", [&] {
-    for (const auto& entry : parameter.cases) {
-      if (!entry) continue;
+    for (const SmoothingCase& entry : parameter.cases) {
       std::vector<std::string> says;
-      if (entry->standard) says.push_back("default: " + number_text(*entry->standard));
-      if (entry->maximum) says.push_back("maximum: " + number_text(*entry->maximum));
-      yaml.line(std::string(to_string(entry->smoothing)) + ": " + in_braces(says));
+      if (entry.standard) says.push_back("default: " + number_text(*entry.standard));
+      if (entry.maximum) says.push_back("maximum: " + number_text(*entry.maximum));
+      yaml.line(std::string(to_string(entry.smoothing)) + ": " + in_braces(says));
     }
   });
 }

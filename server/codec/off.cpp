@@ -8,7 +8,7 @@
 namespace isomesh::codec {
 namespace {
 
-constexpr std::size_t kMostVertexBytes = 3 * (kMostFloatBytes + 1);
+constexpr std::size_t kMostVertexLineBytes = 3 * (kMostFloatBytes + 1);
 constexpr std::size_t kMostFaceBytes = 2 + 3 * (kMostIndexBytes + 1);
 
 template <class Number>
@@ -33,7 +33,7 @@ void encode_off(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context&
                              std::to_string(mesh.triangles.size()) + " 0\n";
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
-  writer.write(mesh.positions.size(), kMostVertexBytes, [&](std::size_t v, std::byte* out) {
+  writer.write(mesh.positions.size(), kMostVertexLineBytes, [&](std::size_t v, std::byte* out) {
     const auto& [x, y, z] = in_space(mesh.positions[v], frame.space);
     return reinterpret_cast<std::byte*>(write_numbers(x, y, z, reinterpret_cast<char*>(out)));
   });

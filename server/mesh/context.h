@@ -18,6 +18,12 @@ struct Context {
   void throw_if_stopped() const {
     if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "the job was cancelled");
   }
+
+  // For the part [from, to] of the work.
+  Context part(double from, double to) const {
+    if (!progress) return *this;
+    return {stop, [whole = progress, from, to](double done) { whole(from + (to - from) * done); }};
+  }
 };
 
 }  // namespace isomesh::mesh

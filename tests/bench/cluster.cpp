@@ -226,7 +226,7 @@ Finding measure_takeover(Postgres& postgres, const std::filesystem::path& progra
 
 // A process's stores, in this one.
 struct Node {
-  Node(const std::string& url, const std::string& name, const store::BlobStore& blobs,
+  Node(const std::string& url, const std::string& name, store::BlobStore& blobs,
        std::size_t connections)
       : database({.url = url, .node = name, .connections = connections}),
         volumes(database),

@@ -23,14 +23,12 @@ constexpr std::size_t kProbes = 400'000;
 
 // A job's default for labels: no vertex leaves its half of the smallest spacing.
 mesh::SmoothOptions laplacian(const Samples& samples) {
-  return {.passes = 10, .max_displacement_mm = std::ranges::min(samples.geometry.spacing) / 2};
+  mesh::SmoothOptions options = smooth_options(10, Smoothing::kLaplacian);
+  options.max_displacement_mm = std::ranges::min(samples.geometry.spacing) / 2;
+  return options;
 }
 
-mesh::SmoothOptions taubin() {
-  constexpr double kLambda = 0.33;
-  constexpr double kPassBand = 0.1;
-  return {.passes = 20, .lambda = kLambda, .mu = mesh::taubin_mu(kLambda, kPassBand)};
-}
+mesh::SmoothOptions taubin() { return smooth_options(20, Smoothing::kTaubin); }
 
 // Collects what is found about one segmentation.
 class LabelComparison {

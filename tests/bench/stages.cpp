@@ -6,6 +6,7 @@
 
 #include "server/codec/formats.h"
 #include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/stage_times.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/measure/measure.h"
@@ -83,20 +84,21 @@ void Stages::extract() {
   });
 }
 
+mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing) {
+  MeshParameters parameters;
+  parameters.passes = passes;
+  parameters.smoothing = smoothing;
+  return jobs::smooth_options(parameters);
+}
+
 void Stages::smooth(int passes, Smoothing smoothing) {
-  mesh::SmoothOptions options = {.passes = passes, .lambda = default_lambda(smoothing)};
-  if (smoothing == Smoothing::kTaubin) {
-    options.mu = mesh::taubin_mu(options.lambda, JobParameters{}.pass_band);
-  }
-  if (smoothing == Smoothing::kAngle) options.way = mesh::SmoothingWay::kAngle;
-  if (smoothing == Smoothing::kOptimize) options.way = mesh::SmoothingWay::kOptimize;
-  mesh::smooth(options, {}, mesh_);
+  mesh::smooth(smooth_options(passes, smoothing), {}, mesh_);
 }
 
 std::uint64_t Stages::smoothing_memory(int passes) const {
   return visit_samples(samples_, [&](const auto* data) {
     const auto count = mesh::count_surface(lattice_of(samples_, data), options_of(surface_), {});
-    return mesh::smoothing_memory({.passes = passes}, size_of(count));
+    return mesh::smoothing_memory(smooth_options(passes, Smoothing::kLaplacian), size_of(count));
   });
 }
 

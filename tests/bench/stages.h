@@ -11,6 +11,7 @@
 #include "proto/types.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {
@@ -63,6 +64,9 @@ struct JobFigures {
 
 // Threads that the stages run on, 1 at least. Not while one runs.
 void set_threads(int threads);
+
+// As a job that asks for the method has them.
+mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing);
 
 // One volume's way through the stages, in memory that is kept from run to run as a worker of the
 // daemon keeps it. Extract comes first; the others take whatever mesh there is. Not thread safe.

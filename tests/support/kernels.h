@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "proto/types.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/parallel.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::test {
@@ -25,6 +27,23 @@ mesh::Mesh extracted(const SampleVolume<T>& volume, const mesh::ExtractOptions& 
   mesh::Mesh mesh;
   extract_into(mesh, volume, options);
   return mesh;
+}
+
+// Passes of steps to the mean of the neighbours, or away from it, by these weights.
+inline std::vector<mesh::Step> means(int passes, const std::vector<double>& weights) {
+  std::vector<mesh::Step> steps;
+  for (int pass = 0; pass < passes; ++pass) {
+    for (const double weight : weights) steps.push_back({mesh::Move::kMean, weight});
+  }
+  return steps;
+}
+
+// The steps of that many passes of a method by its default weights.
+inline mesh::SmoothOptions method_options(Smoothing smoothing, int passes) {
+  const mesh::SmoothingMethod& method = mesh::method_of(smoothing);
+  const mesh::Relaxation relaxation = {row_of(smoothing).lambda.value_or(1),
+                                       MeshParameters{}.pass_band};
+  return {.steps = method.steps(passes, relaxation), .at_curves = method.at_curves};
 }
 
 // A mesh of one layer.

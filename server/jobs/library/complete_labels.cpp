@@ -4,6 +4,7 @@
 #include <string>
 
 #include "server/mesh/labels/labels.h"
+#include "server/mesh/smooth/methods.h"
 #include "server/volume/names.h"
 
 namespace isomesh::jobs {
@@ -50,9 +51,8 @@ JobParameters complete_labels(JobParameters parameters, const store::Viewer& vie
   // With all labels, a value assigned to one label is no label of its own. With chosen labels, only
   // their own values matter.
   if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
-  const bool is_bounded =
-      parameters.smoothing == Smoothing::kLaplacian || parameters.smoothing == Smoothing::kTaubin;
-  if (is_bounded && !parameters.max_displacement_mm) {
+  const bool is_unbounded = mesh::method_of(parameters.smoothing).is_unbounded();
+  if (is_unbounded && !parameters.max_displacement_mm) {
     parameters.max_displacement_mm = std::ranges::min(volume.geometry.spacing) / 2;
   }
   return parameters;

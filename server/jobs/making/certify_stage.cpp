@@ -15,7 +15,7 @@
 namespace isomesh::jobs {
 namespace {
 
-// What other programs find in the file of that format, or in all labels' files of it.
+// Decodes the file of this format, or all labels' files of it, as other programs do.
 codec::DecodedSurface decoded(const KeptFiles& files, MeshFormat format,
                               const MeshParameters& parameters,
                               const std::vector<LabelSummary>& labels,
@@ -68,6 +68,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   if (!request.certify) return;
   const MeshParameters& parameters = request.parameters;
   progress.enter(Stage::kCertify);
+  const mesh::Context stage = progress.context();
   const std::vector<MeshFormat> formats = measured_formats(parameters);
   const double part = 1.0 / static_cast<double>(formats.size() + 1);
   if (!summary.certificate) {
@@ -82,7 +83,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
     const double begin = part * static_cast<double>(i);
     const mesh::Certificate measured =
         mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
-                      progress.context(begin, begin + part));
+                      stage.part(begin, begin + part));
     if (i > 0 && measured.max_mm() <= certificate.found_mm) continue;
     certificate.file = formats[i];
     certificate.found_mm = measured.max_mm();
@@ -100,7 +101,7 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
     certificate.budget_mm = budget_of(parameters, mesh, summary);
   }
   summary.quality.self_intersections =
-      summary_of(find_self_intersections(mesh, progress.context(1 - part, 1)));
+      summary_of(find_self_intersections(mesh, stage.part(1 - part, 1)));
 }
 
 }  // namespace isomesh::jobs

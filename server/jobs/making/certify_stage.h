@@ -1,4 +1,4 @@
-// How far a job's files are from the surface that was extracted; private to this folder.
+// The distance of a job's files from the extracted surface; private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace isomesh::jobs {
 
-// The bytes of a job's files that round coordinates, which pass through on their way to where they
-// go, kept if they are to be measured. Not thread safe, but for different files.
+// Keeps the bytes of files that round coordinates, while they pass through, if they are to be
+// measured. Thread safe for different files.
 class KeptFiles {
  public:
   KeptFiles(const MeshRequest& request, std::span<const codec::Sink> sinks);
@@ -28,11 +28,10 @@ class KeptFiles {
   std::vector<codec::Sink> sinks_;
 };
 
-// Where the job asks for it: measures against the surface as it was extracted, both ways, what
-// other programs decode from each file that rounds coordinates, and, once for all other files,
-// which hold it exactly, the mesh. Looks for triangles of the mesh that intersect. `summary` has
-// the labels' files. Throws Error kInternal where a file is not what was encoded, or is farther
-// than max_error_mm, and kCancelled.
+// If the job asks for it: measures the distances from the extracted surface, both ways, of each
+// file that rounds coordinates, as other programs decode it; and of the mesh, once for all exact
+// files. Looks for triangles that intersect. `summary` has the labels' files. Throws Error
+// kInternal if a file is not what was encoded or is farther than max_error_mm, and kCancelled.
 void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
                    const KeptFiles& files, Progress& progress, const mesh::Mesh& mesh,
                    MeshSummary& summary);

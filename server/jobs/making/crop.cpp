@@ -12,7 +12,7 @@
 namespace isomesh::jobs {
 namespace {
 
-// A sample on a face of the box is in it, whatever its coordinates are rounded to.
+// A sample on a face of the box is in it, however its coordinates are rounded.
 constexpr double kTolerance = 1e-6;  // of a spacing
 
 // "from (0, 0, 0) to (10, 20, 30) mm": the smallest box along the axes of space that holds all

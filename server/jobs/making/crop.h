@@ -1,4 +1,4 @@
-// The part of a volume that a job is of.
+// The part of a volume that a job uses.
 #pragma once
 
 #include <array>
@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "proto/types.h"
-#include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/sample_array.h"
 #include "server/mesh/buffer.h"
 
 namespace isomesh::jobs {
@@ -21,14 +21,14 @@ struct SampleRange {
   }
 };
 
-// The samples in the box; of a volume that lies askew those between the box's extents along its
-// axes. Throws Error kInvalidParameter, field "crop", when there are fewer than two along an axis,
-// and so no surface.
+// The samples in the box; for an oblique volume those between the box's extents along its axes.
+// Throws Error kInvalidParameter, field "crop", if there are fewer than two along an axis, and so
+// no surface.
 SampleRange samples_in(const Box& box, const Geometry& geometry,
                        const std::array<std::uint32_t, 3>& dims);
 
-// A volume, or the part of it that the parameters crop it to as a volume of its own, which is a
-// copy. `samples` must outlive it. Throws as samples_in.
+// A volume, or a copy of the part that the parameters crop it to, as a volume of its own. `samples`
+// must outlive it. Throws as samples_in.
 class CroppedSamples {
  public:
   CroppedSamples(const SampleArray& samples, const MeshParameters& parameters);

@@ -13,7 +13,7 @@
 namespace isomesh::jobs {
 namespace {
 
-// More for smoothing leaves simplification too little, less leaves it steps that have to stay.
+// With more for smoothing, simplification gets too little; with less, steps of voxels remain.
 constexpr double kSmoothingShare = 0.5;
 constexpr double kQuantisationShare = 0.1;
 constexpr int kMostBits = 30;  // of Draco

@@ -1,4 +1,4 @@
-// How the error that a job may have is shared out.
+// The shares of a job's error.
 #pragma once
 
 #include <vector>
@@ -8,25 +8,24 @@
 
 namespace isomesh::jobs {
 
-// Of a job with `max_error_mm`: smoothing may take half, rounding coordinates a tenth, and
-// simplification what those leave.
+// With `max_error_mm`, smoothing may use half, rounding coordinates a tenth, and simplification the
+// rest.
 
-// How far smoothing may move a vertex; infinite where nothing bounds it.
+// The farthest that smoothing may move a vertex; infinite if nothing limits it.
 double most_displacement(const MeshParameters& parameters);
 
-// The parameters with as many bits for Draco's coordinates as the error takes, and at least those
-// that were asked for. Throws Error kInvalidParameter, field "max_error_mm", when Draco has too
-// few.
+// The parameters with enough bits for Draco's coordinates to keep the error, and at least those of
+// the request. Throws Error kInvalidParameter, field "max_error_mm", if Draco has too few.
 MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh& mesh);
 
 // The most that rounding to the files' coordinates moves a point of the mesh, in millimetres: half
-// the diagonal of a cell of Draco's grid, and what single precision cannot tell. Also after
-// vertices were moved by `moved_mm`, which makes the grid larger.
+// the diagonal of a cell of Draco's grid, and the resolution of single precision. Also after
+// vertices were moved by `moved_mm`, which enlarges the grid.
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
                        double moved_mm = 0);
 
-// The formats whose surface a certificate measures, in the files' order: each that rounds
-// coordinates, and the first of the others, which all hold the mesh itself.
+// The formats that a certificate measures, in the files' order: each that rounds coordinates, and
+// the first of the exact ones, which all hold the mesh itself.
 std::vector<MeshFormat> measured_formats(const MeshParameters& parameters);
 
 }  // namespace isomesh::jobs

@@ -8,7 +8,10 @@ using process::ReadLine;
 
 constexpr JobOrder::Work last_of(JobOrder::Work /*value*/) { return JobOrder::Work::kCount; }
 
-void visit(Is<JobSetup> auto& self, auto&& field) { field("threads", self.threads); }
+void visit(Is<JobSetup> auto& self, auto&& field) {
+  field("threads", self.threads);
+  field("backend", self.backend);
+}
 
 void visit(Is<JobOrder> auto& self, auto&& field) {
   field("work", self.work);

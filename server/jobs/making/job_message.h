@@ -1,7 +1,7 @@
-// What the daemon and a process that makes meshes for it tell each other over a socket, in lines of
-// JSON. The daemon sends one set-up, then orders, one after the other, and may ask to cancel the
-// one that is under way. The process answers an order with progress, first of all, with the bytes
-// of the files as they are made, and with one end.
+// The messages between the daemon and a job process, as lines of JSON over a socket. The daemon
+// sends one set-up and then orders, one after the other, and may cancel the current one. The
+// process answers an order first with progress, then with the bytes of the files as they are made,
+// and with one end.
 #pragma once
 
 #include <cstddef>
@@ -19,9 +19,10 @@
 
 namespace isomesh::jobs {
 
-// What holds for all orders of a process.
+// Holds for all orders of a process.
 struct JobSetup {
-  int threads = 1;  // of the kernels
+  int threads = 1;                       // of the kernels
+  std::string backend{kDefaultBackend};  // by its name
 };
 
 struct JobOrder {
@@ -31,12 +32,12 @@ struct JobOrder {
   };
 
   Work work = Work::kMesh;
-  // Of the volume: canonical, and found intact. The process gets it open, with the first bytes of
-  // the line, and not its path.
+  // The volume's canonical file, found intact. The process receives it open, with the first bytes
+  // of the line, and not its path.
   std::filesystem::path file;
   Volume volume;  // its id and notes
   MeshParameters parameters;
-  double iso = 0;  // whatever the parameters say of it
+  double iso = 0;  // resolved; the parameters may name none
   bool certify = false;
   std::uint64_t memory_bytes = 0;
   std::uint64_t disk_bytes = 0;  // of all files together
@@ -49,7 +50,7 @@ struct JobProgress {
   Timing timing;  // of the stages that have ended
 };
 
-// Tells that so many bytes follow the line, which are the next ones of a file.
+// So many bytes follow the line; they are the next ones of a file.
 struct JobPiece {
   std::size_t file = 0;  // of files_of(parameters); behind the last: the file of the labels
   std::size_t bytes = 0;
@@ -65,12 +66,12 @@ using JobAnswer = std::variant<JobProgress, JobPiece, MadeMesh, CountedSurface, 
 
 inline constexpr std::string_view kCancelMessage = "{\"cancel\":true}\n";
 
-// Each is one line with its break. The readers throw Error kInternal for a line of another form.
+// Each is one line with its line break. The readers throw Error kInternal for any other line.
 std::string to_line(const JobSetup& setup);
 std::string to_line(const JobOrder& order);
 std::string to_line(const JobAnswer& answer);
 JobSetup setup_from(std::string_view line);
-// Empty when the line asks to cancel.
+// Empty if the line asks to cancel.
 std::optional<JobOrder> order_from(std::string_view line);
 JobAnswer answer_from(std::string_view line);
 

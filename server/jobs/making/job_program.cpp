@@ -1,6 +1,5 @@
 // isomesh-job: makes the meshes of one worker, one after the other, in memory that stays mapped. It
-// reads the volumes that it is given open and writes nothing: what it makes goes to the daemon over
-// the socket.
+// reads volumes that it receives open and writes no file: results go to the daemon over the socket.
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -38,18 +37,19 @@ namespace {
 using namespace isomesh;
 using namespace isomesh::jobs;
 
-// What is kept between jobs: enough for a surface of some twenty million triangles, and a share of
-// what a job may take.
+// The memory that is kept between jobs: enough for a surface of some twenty million triangles, but
+// at most this fraction of what a job may use.
 constexpr std::uint64_t kMostKeptBytes = std::uint64_t{1} << 30;
 constexpr std::uint64_t kKeptShare = 4;
-// Beside what a job takes: for the C library, and for the stacks and the like of each thread.
+// Beside a job's memory: for the C library, and for each thread's stack and the like.
 constexpr std::uint64_t kHeadroomBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kThreadBytes = std::uint64_t{16} << 20;
 constexpr std::chrono::milliseconds kBetweenReports{20};
-// Of 64^3 samples; jobs side by side keep the processors busy.
+// The bytes of 64^3 samples. So small a job uses one thread; jobs side by side keep the processors
+// busy.
 constexpr std::uint64_t kFewSampleBytes = std::uint64_t{1} << 18;
 
-// The socket's other end. Lines and pieces come whole, from whichever thread. Thread safe.
+// The daemon's end of the socket. Lines and pieces are sent whole, from any thread. Thread safe.
 class Speaker {
  public:
   void say(const JobAnswer& answer, std::span<const std::byte> piece = {}) {
@@ -72,8 +72,8 @@ class Speaker {
   Mutex mutex_;
 };
 
-// The lines that come, and the files with them. At the end of the other side, so with the daemon
-// however that ends, the process ends. Not thread safe.
+// The received lines and their files. When the other side ends, so with the daemon in any case, the
+// process ends. Not thread safe.
 class Lines {
  public:
   std::string next() {
@@ -92,7 +92,7 @@ class Lines {
     }
   }
 
-  // The file that came last, once.
+  // The last received file, once.
   Descriptor take_file() { return std::move(file_); }
 
  private:
@@ -100,13 +100,23 @@ class Lines {
   Descriptor file_;
 };
 
-// An order and the volume that it is of.
+// An order and its volume.
 struct Task {
   JobOrder order;
   Descriptor file;
 };
 
-// What the thread that reads has for the one that works. Thread safe.
+MeshRequest request_of(const JobOrder& order, const JobSetup& setup) {
+  return {.volume = order.volume,
+          .parameters = order.parameters,
+          .iso = order.iso,
+          .certify = order.certify,
+          .memory_bytes = order.memory_bytes,
+          .disk_bytes = order.disk_bytes,
+          .backend = backend_of(setup.backend)};
+}
+
+// Passes orders from the reading thread to the working thread. Thread safe.
 class Desk {
  public:
   void put(Task task) {
@@ -134,7 +144,7 @@ class Desk {
   std::stop_source stop_ ISOMESH_GUARDED_BY(mutex_);
 };
 
-// Tells how far a job is: each stage, and within one a few times a second. Thread safe.
+// Reports each stage, and the progress within a stage a few times a second. Thread safe.
 class Reporter {
  public:
   explicit Reporter(Speaker& speaker) : speaker_(speaker) {}
@@ -176,7 +186,8 @@ void send_many_labels(Speaker& speaker, std::size_t file, MeshSummary& summary) 
   summary.labels.clear();
 }
 
-MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+MadeMesh make(Task task, const JobSetup& setup, const std::stop_token& stop, Speaker& speaker,
+              Workspace& workspace) {
   const JobOrder& order = task.order;
   Reporter reporter(speaker);
   const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
@@ -193,12 +204,7 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
   MadeMesh made;
-  const MeshRequest request = {.volume = order.volume,
-                               .parameters = order.parameters,
-                               .iso = order.iso,
-                               .certify = order.certify,
-                               .memory_bytes = order.memory_bytes,
-                               .disk_bytes = order.disk_bytes};
+  const MeshRequest request = request_of(order, setup);
   const CroppedSamples cropped(array_of(canonical), order.parameters);
   const SampleArray& samples = cropped.array();
   made.summary = order.parameters.labels
@@ -210,27 +216,30 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   return made;
 }
 
-CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
+CountedSurface count(Task task, const JobSetup& setup, const std::stop_token& stop,
+                     Speaker& speaker) {
   speaker.say(JobProgress{});  // it has begun
   const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
   const MeshParameters& parameters = task.order.parameters;
   const CroppedSamples cropped(array_of(canonical), parameters);
   const SampleArray& samples = cropped.array();
   if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
-  return {count_surface(samples, parameters, task.order.iso, {stop, nullptr})};
+  return count_surface(samples, request_of(task.order, setup), {stop, nullptr});
 }
 
 struct Ending {
   JobAnswer answer;
-  bool is_last = false;  // what the process has been through is not to be trusted with another job
+  bool is_last = false;  // after such an error the process must not run another job
 };
 
 // Every exception becomes a message here, because nothing else leaves this process.
-Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+Ending work(Task task, const JobSetup& setup, const std::stop_token& stop, Speaker& speaker,
+            Workspace& workspace) {
   const std::uint64_t memory_bytes = task.order.memory_bytes;
   try {
-    if (task.order.work == JobOrder::Work::kCount) return {count(std::move(task), stop, speaker)};
-    return {make(std::move(task), stop, speaker, workspace)};
+    const bool is_count = task.order.work == JobOrder::Work::kCount;
+    if (is_count) return {count(std::move(task), setup, stop, speaker)};
+    return {make(std::move(task), setup, stop, speaker, workspace)};
   } catch (const Error& error) {
     return {error};
   } catch (const std::bad_alloc&) {
@@ -259,7 +268,7 @@ void read_orders(Lines& lines, Desk& desk) {
 }  // namespace
 
 #if defined(__SANITIZE_THREAD__)
-// What the sanitizer finds is read by nobody here, so it has to end the process.
+// Nobody here reads the sanitizer's reports, so they have to end the process.
 extern "C" const char* __tsan_default_options();  // NOLINT: the name that it looks for
 
 const char* __tsan_default_options() { return "halt_on_error=1"; }
@@ -283,7 +292,7 @@ int main() {
     auto [task, stop] = desk.take();
     const std::uint64_t memory_bytes = task.order.memory_bytes;
     memory.set(memory_bytes + headroom);
-    const Ending ending = work(std::move(task), stop, speaker, workspace);
+    const Ending ending = work(std::move(task), setup, stop, speaker, workspace);
     if (!ending.is_last) workspace.trim(std::min(kMostKeptBytes, memory_bytes / kKeptShare));
     speaker.say(ending.answer);
     if (ending.is_last) std::_Exit(EXIT_SUCCESS);

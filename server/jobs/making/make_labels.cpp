@@ -20,8 +20,8 @@
 namespace isomesh::jobs {
 namespace {
 
-// Calls use(a sample of the type) and returns what that returns. Throws Error kInvalidParameter for
-// the two types that are no integers.
+// Calls use(a sample of the type) and returns its result. Throws Error kInvalidParameter for the
+// two types that are no integers.
 template <class Use>
 auto with_label(SampleType type, const Use& use) {
   using Result = decltype(use(std::uint8_t{}));
@@ -53,9 +53,10 @@ mesh::SurfaceCount separate(const SampleArray& samples, const mesh::SeparateOpti
                             mesh::SeparatingSurface& walls) {
   return with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
-    mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
+    const mesh::Context context = progress.context();
+    mesh::SurfaceCount count = count_walls(lattice, options, context.part(0.2, 0.4));
     check_memory(size_of(count), lattice.dims.samples(), request);
-    extract_walls(lattice, options, count, progress.context(0.4, 1), walls);
+    extract_walls(lattice, options, count, context.part(0.4, 1), walls);
     return count;
   });
 }
@@ -97,7 +98,7 @@ LabelSummary summary_of(const mesh::LabelVoxels& voxels, const mesh::LabelMeasur
           .volume_mm3 = measure.extent.volume_mm3};
 }
 
-// What holds for the own surfaces of all labels.
+// Sets what holds for the own surfaces of all labels.
 void set_quality(const std::vector<mesh::LabelMeasure>& measures, MeshSummary& summary) {
   MeshQuality& quality = summary.quality;
   quality.manifold = true;
@@ -165,7 +166,7 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   MeshSummary summary;
   progress.enter(Stage::kExtract);
   const auto labels =
-      mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
+      mesh::chosen_labels(count_values(samples, progress.context().part(0, 0.2)), parameters);
   const mesh::SeparateOptions options = separate_options(labels, parameters);
   const mesh::SurfaceCount count = separate(samples, options, request, progress, walls);
   if (!is_simplified(parameters)) check_disk(walls.mesh, request);

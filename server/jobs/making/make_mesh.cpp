@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "proto/samples.h"
 #include "proto/stages.h"
 #include "server/codec/formats.h"
 #include "server/jobs/making/certify_stage.h"
@@ -22,20 +21,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-template <class T>
-void extract_as(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
-                mesh::Mesh& mesh) {
-  const mesh::Lattice<T> lattice = lattice_of<T>(samples);
-  const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
-  const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
-  check_memory(size_of(count), lattice.dims.samples(), request);
-  extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
-}
-
 void extract(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
              mesh::Mesh& mesh) {
-  with_sample(samples.type,
-              [&](auto sample) { extract_as<decltype(sample)>(samples, request, progress, mesh); });
+  const auto& [x, y, z] = samples.dims;
+  const std::uint64_t count = mesh::Dims{x, y, z}.samples();
+  const Backend::Admit check = [&](const mesh::SurfaceSize& size) {
+    check_memory(size, count, request);
+  };
+  request.backend.extract(samples, extract_options(request.parameters, request.iso), check,
+                          progress.context(), mesh);
 }
 
 void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
@@ -53,8 +47,8 @@ bool shows_topology(const MeshParameters& parameters) {
   });
 }
 
-// Encodes every format and measures the mesh, all side by side: few of them have work for every
-// thread all the time. The topology is measured where no encoder shows it.
+// Encodes every format and measures the mesh, all in parallel, because few of these tasks keep all
+// threads busy. Measures the topology only if no encoder reports it.
 void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
                         const ExtractedSurface& extracted, const Progress& progress,
                         const mesh::Mesh& mesh, MeshSummary& summary) {
@@ -79,7 +73,7 @@ void encode_and_measure(const codec::Provenance& provenance, std::span<const cod
   set_topology(found != shown.end() ? **found : measure_topology(mesh, progress.quiet()), summary);
 }
 
-// What the parameters do not keep of the surface's parts.
+// Removes the components and cavities that the parameters drop.
 void leave_out_parts(const MeshParameters& parameters, const Progress& progress, mesh::Mesh& mesh,
                      MeshSummary::Dropped& dropped) {
   const auto add = [&](const mesh::Dropped& more) {
@@ -116,12 +110,10 @@ void Progress::end_stage() {
       std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
 }
 
-mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
-                                double iso, const mesh::Context& context) {
-  return with_sample(samples.type, [&](auto sample) {
-    return size_of(count_surface(lattice_of<decltype(sample)>(samples),
-                                 extract_options(parameters, iso), context));
-  });
+CountedSurface count_surface(const SampleArray& samples, const MeshRequest& request,
+                             const mesh::Context& context) {
+  return {
+      request.backend.count(samples, extract_options(request.parameters, request.iso), context)};
 }
 
 void Workspace::trim(std::size_t budget_bytes) {

@@ -1,4 +1,4 @@
-// What a job does between the samples of its volume and the bytes of its files, without disks.
+// Makes a mesh: from the samples of a volume to the bytes of the files, without disks.
 #pragma once
 
 #include <array>
@@ -14,34 +14,34 @@
 
 #include "proto/types.h"
 #include "server/codec/encode.h"
+#include "server/jobs/making/backend.h"
+#include "server/jobs/making/sample_array.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::jobs {
 
-// Called as a job goes on, from several threads, with the share of the whole job that is done and
+// Called during a job, from several threads, with the fraction of the whole job that is done and
 // the milliseconds of the stages that have ended.
 using Report = std::function<void(Stage stage, double progress, const Timing& timing)>;
 
-// Follows a job through its stages: times each, reports its progress, passes cancellation on.
+// Follows a job through its stages: times each, reports progress, passes cancellation on.
 class Progress {
  public:
   // A stage's share of the job is its share of the expected times; 0 if none is expected.
   Progress(std::stop_token stop, const Report& report, const Timing& expected);
 
-  // Ends the stage before and starts this one.
+  // Ends the previous stage and starts this one.
   void enter(Stage stage);
   void end_stage();
 
-  // The context of the part [from, to] of the present stage.
-  mesh::Context context(double from = 0, double to = 1) const {
-    return {stop_, [this, from, to](double done) {
-              report_(stage_, done_before_ + share_ * (from + (to - from) * done), timing_);
-            }};
+  // For the present stage.
+  mesh::Context context() const {
+    return {stop_, [this](double done) { report_(stage_, done_before_ + share_ * done, timing_); }};
   }
 
-  // One that cancels but does not report.
+  // Cancels but does not report.
   mesh::Context quiet() const { return {stop_, nullptr}; }
 
   const Timing& timing() const { return timing_; }
@@ -58,56 +58,49 @@ class Progress {
   std::chrono::steady_clock::time_point began_;
 };
 
-// The memory that jobs are made in, kept from one to the next so that its pages are mapped already.
-// Not thread safe.
+// The memory in which jobs are made, kept between jobs so that its pages stay mapped. Not thread
+// safe.
 struct Workspace {
   mesh::Mesh mesh;                // of jobs at an iso-value
   mesh::SeparatingSurface walls;  // of jobs by labels
 
-  // Gives memory back when it exceeds `budget_bytes`: one giant job must not keep it for ever.
+  // Frees the memory if it exceeds `budget_bytes`, so that one giant job does not keep it.
   void trim(std::size_t budget_bytes);
 };
 
-// A volume in memory, as Volume describes it.
-struct SampleArray {
-  SampleType type = SampleType::kUint8;
-  std::array<std::uint32_t, 3> dims = {0, 0, 0};
-  Geometry geometry;
-  const std::byte* bytes = nullptr;
-};
-
-// What a mesh is to be made of and what it may take.
+// The input of a mesh, and the resources it may use.
 struct MeshRequest {
   const Volume& volume;  // its id and notes, for the files to name
   const MeshParameters& parameters;
-  double iso;  // whatever the parameters say of it
+  double iso;  // resolved; the parameters may name none
   bool certify;
   std::uint64_t memory_bytes;
-  // Of all files together; the disk may hold other things now, but never more than that.
+  // For all files together, if the disk held nothing else.
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
+  const Backend& backend = backend_of(kDefaultBackend);
 
   // The same with other parameters, which must outlive it.
   MeshRequest with(const MeshParameters& others) const {
-    return {volume, others, iso, certify, memory_bytes, disk_bytes};
+    return {volume, others, iso, certify, memory_bytes, disk_bytes, backend};
   }
 };
 
-// How large a surface would be.
+// The size of a surface that is not made yet.
 struct CountedSurface {
   mesh::SurfaceSize size;
   std::vector<Estimate::Label> labels = {};  // of a job by labels
 };
 
-// How large the surface is, before the filter of components. Throws Error kCancelled.
-mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
-                                double iso, const mesh::Context& context);
+// The size of the surface before the filter of components. Throws Error kCancelled.
+CountedSurface count_surface(const SampleArray& samples, const MeshRequest& request,
+                             const mesh::Context& context);
 
-// Extracts, smooths, simplifies, encodes, measures and certifies; `sinks` has one for each of the
-// parameters' formats, in their order. The files of the summary are empty. `mesh` is worked in, and
-// left as it was encoded. `progress` enters the stages; the caller ends the last one, when the
-// bytes are where they belong. The parameters have no labels: see make_labels.h. Throws Error
-// kCancelled, kTooLarge with the estimate when the job would take more than it may (told before
-// memory is taken) or than the disk could ever hold, and kInternal.
+// Extracts, smooths, simplifies, encodes, measures and certifies. `sinks` has one sink for each of
+// the parameters' formats, in their order. The files of the summary are empty. `mesh` is working
+// memory; afterwards it holds the mesh as it was encoded. `progress` enters the stages; the caller
+// ends the last one, after storing the bytes. The parameters have no labels: see make_labels.h.
+// Throws Error kCancelled, kInternal, and kTooLarge with the estimate if the job would exceed its
+// memory (before it takes memory) or the size of the disk.
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh);
 

@@ -17,7 +17,7 @@ std::uint64_t memory_of_machine() {
          static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// The number that a file begins with; none where there is no such file, and for "max".
+// The number at the start of a file; empty if there is no such file, and for "max".
 std::optional<std::uint64_t> number_in(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::string text;
@@ -28,8 +28,8 @@ std::optional<std::uint64_t> number_in(const std::filesystem::path& file) {
   return number;
 }
 
-// The least that a group or one above it allows. What is told of groups may begin above the folder
-// that a container sees, so the folder itself is always looked at.
+// The least limit of a group or one above it. Paths of groups may begin above the folder that a
+// container sees, so the folder itself is always looked at.
 std::uint64_t least_limit(const std::filesystem::path& folder, const std::string& group,
                           const char* name) {
   std::uint64_t least = number_in(folder / name).value_or(memory_of_machine());
@@ -63,7 +63,7 @@ std::uint64_t usable_memory(const std::filesystem::path& root) {
 }
 
 void keep_freed_memory() {
-  constexpr int kLargestBlockBytes = 32 << 20;  // the most that the C library allows
+  constexpr int kLargestBlockBytes = 32 << 20;  // the largest that the C library allows
   constexpr int kKeptBytes = 256 << 20;
   ::mallopt(M_MMAP_THRESHOLD, kLargestBlockBytes);
   ::mallopt(M_TRIM_THRESHOLD, kKeptBytes);

@@ -17,19 +17,18 @@ std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
   return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle);
 }
 
-// What labels take beside their walls: whose sides the triangles are, which triangles are whose,
-// and, at worst, all labels' own surfaces at once. A triangle is in two of them at most.
+// The memory of labels beside their walls: the sides of the triangles, the lists of each label's
+// triangles and, at worst, all labels' own surfaces at once. A triangle is in two of them at most.
 std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
   return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
          2 * mesh_bytes(surface);
 }
 
-// What simplifying and certifying take, one after the other, beside what the job has anyway: the
-// surface as it was extracted, grids of triangles, and files that round coordinates, as bytes and
-// as what they decode to.
+// The memory of simplifying and certifying, one after the other, beside the rest: the extracted
+// surface, grids of triangles, and files that round coordinates, both as bytes and decoded.
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t samples,
                           const MeshParameters& parameters, bool certify) {
-  // What simplify.h, bound.h and triangle_grid.h say that they take, and a little more.
+  // From simplify.h, bound.h and triangle_grid.h, and a little more.
   constexpr std::uint64_t kSimplifyBytesPerTriangle = 200;
   constexpr std::uint64_t kProveBytesPerTriangle = 260;
   constexpr std::uint64_t kGridsPerTriangle = 130;
@@ -47,7 +46,7 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
   double files = 0;
   for (const MeshFormat format : files_of(parameters)) {
     if (!codec::rounds(format, parameters)) continue;
-    files += 2 * codec::describe(format).bytes(surface, parameters);  // a vector that grows
+    files += 2 * codec::describe(format).bytes(surface, parameters);  // a growing vector
   }
   const std::uint64_t certifying = static_cast<std::uint64_t>(files) +
                                    (files > 0 ? 3 * mesh_bytes(surface) : 0) +
@@ -55,7 +54,7 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
   return mesh_bytes(surface) + std::max({simplifying, certifying, grid});
 }
 
-// What the files take at least.
+// The least size of the files.
 std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
   double bytes = 0;
   for (const MeshFormat format : files_of(parameters)) {
@@ -67,36 +66,21 @@ std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParam
 
 }  // namespace
 
-mesh::SmoothingWay way_of(Smoothing smoothing) {
-  switch (smoothing) {
-    case Smoothing::kAngle:
-      return mesh::SmoothingWay::kAngle;
-    case Smoothing::kOptimize:
-      return mesh::SmoothingWay::kOptimize;
-    case Smoothing::kLaplacian:
-    case Smoothing::kTaubin:
-    case Smoothing::kLabels:  // not by smooth()
-      break;
-  }
-  return mesh::SmoothingWay::kMean;
-}
-
 bool is_regularized(const MeshParameters& parameters) {
   return parameters.regularize && (parameters.labels || !parameters.max_error_mm);
 }
 
 bool removes_stairs(const MeshParameters& parameters) {
-  return parameters.smoothing == Smoothing::kLabels && parameters.passes > 0;
+  return mesh::method_of(parameters.smoothing).removes_stairs() && parameters.passes > 0;
 }
 
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
-  const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
-  const double lambda = parameters.lambda.value_or(default_lambda(parameters));
-  return {.passes = parameters.passes,
-          .lambda = lambda,
-          .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
-          .max_displacement_mm = most_displacement(parameters),
-          .way = way_of(parameters.smoothing)};
+  const mesh::SmoothingMethod& method = mesh::method_of(parameters.smoothing);
+  const mesh::Relaxation relaxation = {parameters.lambda.value_or(default_lambda(parameters)),
+                                       parameters.pass_band};
+  return {.steps = method.steps(parameters.passes, relaxation),
+          .at_curves = method.at_curves,
+          .max_displacement_mm = most_displacement(parameters)};
 }
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,

@@ -1,4 +1,4 @@
-// What making a mesh takes, as it follows from the size of its surface.
+// The memory and disk space of making a mesh, from the size of its surface.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +10,27 @@
 
 namespace isomesh::jobs {
 
-// True if crossings are joined while the surface is extracted. A largest error is measured from the
-// surface at an iso-value as it is without.
+// True if crossings are joined during extraction. With a largest error at an iso-value they are
+// not, because it is measured from the surface of all crossings.
 bool is_regularized(const MeshParameters& parameters);
 
 // True if labels are smoothed by remove_stairs (server/mesh/stairs).
 bool removes_stairs(const MeshParameters& parameters);
 
-// For every other kind of smoothing.
+// For all other methods of smoothing.
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 
-// How much memory a job with a surface of that size, of so many samples, takes at its peak, beside
-// its mapped volume: mesh, smoothing, encoders. An upper estimate.
-// Simplifying and certifying take the most, where the job does so.
+// An upper estimate of a job's peak memory beside its mapped volume: mesh, smoothing, encoders,
+// simplifying and certifying. For a surface of that size in a volume of so many samples.
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                               const MeshParameters& parameters, bool certify);
 
-// Throws Error kTooLarge with the estimate when that is more than is allowed.
+// Throws Error kTooLarge with the estimate if that exceeds the limit.
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                   const MeshRequest& request);
 
-// Throws Error kTooLarge when the files of a mesh could never have room. STL's size is known; of
-// the others', which are guesses, half counts. To be asked of the mesh as it is written.
+// Throws Error kTooLarge if the disk could never hold the files of the mesh. The size of STL is
+// exact; of the guesses for other formats half counts. Call it with the mesh that is written.
 void check_disk(const mesh::Mesh& mesh, const MeshRequest& request);
 
 }  // namespace isomesh::jobs

@@ -18,8 +18,8 @@
 namespace isomesh::jobs {
 namespace {
 
-// Of the smallest spacing, how far from a cap's plane the vertices next to it are held: in the
-// plane itself their triangles would lie upon the cap's.
+// The distance, as a fraction of the smallest spacing, that vertices keep from a cap's plane. In
+// the plane itself their triangles would lie on the cap's.
 constexpr double kBesideCaps = 1e-3;
 
 void set_final(const mesh::Shapes& shapes, MeshQuality& quality) {
@@ -27,13 +27,13 @@ void set_final(const mesh::Shapes& shapes, MeshQuality& quality) {
   quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
 }
 
-// Where the caps of a closed surface are, vertices stay on their side of them. Steps towards the
-// mean cannot lead beyond them.
+// The half spaces between the caps of a closed surface. Only steps away from the mean could leave
+// them.
 std::vector<mesh::HalfSpace> sides_of_caps(const SampleArray& samples,
                                            const MeshParameters& parameters,
                                            const mesh::SmoothOptions& options) {
-  if (!parameters.close || options.mu == 0) return {};
-  // Labels are capped where their voxels end (separate.h).
+  if (!parameters.close || !options.goes_outwards()) return {};
+  // Labels are capped at the faces of their voxels (separate.h).
   const double wider = parameters.labels ? 0.5 : 0;
   const auto to_space = mesh::lattice_to_space(samples.geometry);
   auto box = mesh::box_around(to_space, {samples.dims[0], samples.dims[1], samples.dims[2]}, wider);
@@ -49,8 +49,8 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
 }
 
-// Why the job's error is measured and not proven, if so: the proof follows the surface that the
-// samples define, whole.
+// The reason if the job's error is measured and not proven; null otherwise. The proof covers the
+// whole surface that the samples define.
 const char* why_measured(const MeshParameters& parameters) {
   if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
   if (numbered(parameters.scheme) != Scheme::kSix) return "The proof is for scheme 6.";
@@ -59,7 +59,7 @@ const char* why_measured(const MeshParameters& parameters) {
   return nullptr;
 }
 
-// False where nothing can be proven; the mesh is as it was then. The certificate says which.
+// False if nothing can be proven; then the mesh is unchanged, and the certificate says why.
 bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
                            const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
@@ -137,8 +137,10 @@ void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progre
                   mesh::Mesh& mesh, MeshSummary& summary) {
   mesh::SmoothOptions options = smooth_options(request.parameters);
   options.within = sides_of_caps(samples, request.parameters, options);
-  smooth_stage([&](const mesh::Context& context) { return smooth(options, context, mesh); },
-               progress, mesh, summary);
+  const auto smooth = [&](const mesh::Context& context) {
+    return request.backend.smooth(options, context, mesh);
+  };
+  smooth_stage(smooth, progress, mesh, summary);
 }
 
 void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& mesh,

@@ -1,5 +1,4 @@
-// What the stages of a job at an iso-value and of one by labels have in common; private to this
-// folder.
+// The common stages of jobs at an iso-value and by labels; private to this folder.
 #pragma once
 
 #include <atomic>
@@ -11,6 +10,7 @@
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/sample_array.h"
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
 #include "server/mesh/labels/separate.h"
@@ -23,19 +23,12 @@
 
 namespace isomesh::jobs {
 
-// Whether the job asks for fewer triangles.
+// True if the job asks for fewer triangles.
 bool is_simplified(const MeshParameters& parameters);
-
-template <class T>
-mesh::Lattice<T> lattice_of(const SampleArray& samples) {
-  return {reinterpret_cast<const T*>(samples.bytes),
-          {samples.dims[0], samples.dims[1], samples.dims[2]},
-          mesh::lattice_to_space(samples.geometry)};
-}
 
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso);
 
-// The surface as it was extracted, for what is measured from it later. Empty where nothing is.
+// A copy of the extracted surface, if something is measured from it later; otherwise empty.
 struct ExtractedSurface {
   std::vector<mesh::Vec3> positions;
   std::vector<mesh::Triangle> triangles;
@@ -45,42 +38,40 @@ struct ExtractedSurface {
   mesh::SurfaceView view() const { return {positions, triangles}; }
 };
 
-// For files that hold distances: where the surface as it was extracted is, if any does.
+// The extracted surface for files that hold distances; empty if none does.
 std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& parameters,
                                                      const ExtractedSurface& extracted,
                                                      const Progress& progress);
 
-// Smooths the mesh, and says in the summary what that did and how good its triangles were before.
-// Those after are set too, in case nothing is to be smoothed.
+// Smooths the mesh. Writes the effect and the quality of the triangles before into the summary, and
+// the same quality as the final one in case no other stage changes it.
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary);
 
-// The same with another way to smooth the mesh.
+// Uses another function for smoothing.
 using Smooth = std::function<mesh::SmoothingEffect(const mesh::Context&)>;
 void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& mesh,
                   MeshSummary& summary);
 
-// Where the parameters ask for it, leaves fewer triangles, and says in the summary how many there
-// were and what has become of the surface. `walls` are whose mesh it is, if any. The parameters'
-// bits are those that the files' coordinates will have. The distance is proven for every point
-// where it can be (bound.h), and measured otherwise.
+// Simplifies the mesh if the parameters ask for it, and writes the result into the summary. `walls`
+// is the owner of the mesh, if it has one. The parameters have the bits of the files' coordinates.
+// The distance is proven for every point if possible (bound.h), and measured otherwise.
 void simplify_stage(const SampleArray& samples, const MeshRequest& request,
                     const ExtractedSurface& extracted, Progress& progress, mesh::Mesh& mesh,
                     mesh::SeparatingSurface* walls, MeshSummary& summary);
 
-// How good the triangles are after smoothing and simplification; nothing to measure where there was
-// neither.
+// Measures the triangles after smoothing and simplification, unless there was neither.
 void measure_final_shapes(const MeshParameters& parameters, const Progress& progress,
                           const mesh::Mesh& mesh, MeshQuality& quality);
 
-// Says how large the mesh is.
+// Writes the size of the mesh into the summary.
 void set_size(const mesh::Mesh& mesh, MeshSummary& summary);
 
-// Sets what follows from the other members: the genus, and whether volumes mean something.
+// Sets what follows from other members: the genus, and whether volumes are meaningful.
 void conclude_quality(MeshSummary& summary);
 
-// The progress of several that go on side by side, each an equal share of a stage. Outlives its
-// contexts. Thread safe.
+// The progress of parallel tasks, each an equal part of a stage. Must outlive its contexts. Thread
+// safe.
 class SharedProgress {
  public:
   SharedProgress(const Progress& progress, std::size_t parts)

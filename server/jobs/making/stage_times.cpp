@@ -6,6 +6,7 @@
 #include "proto/stages.h"
 #include "server/codec/formats.h"
 #include "server/jobs/making/error_budget.h"
+#include "server/mesh/smooth/methods.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -17,10 +18,6 @@ constexpr double kMillisecondsPerJob = 1;
 constexpr double kLoadPerSample = 1.3e-6;
 constexpr double kExtractPerSample = 1.0e-6;
 constexpr double kExtractPerTriangle = 1.6e-5;
-constexpr double kConnectivityPerTriangle = 1.0e-5;
-constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
-constexpr double kEnlargePerTriangleAndPass = 6.0e-5;  // of angles
-constexpr double kRemoveStairsPerTriangle = 1.4e-3;
 constexpr double kMeasurePerTriangle = 3.0e-5;
 constexpr double kSimplifyPerTriangle = 5.0e-4;
 constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
@@ -36,13 +33,9 @@ double extract_ms(const SurfaceSize& surface, std::uint64_t samples) {
 
 double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   if (parameters.passes == 0) return 0;
-  const bool enlarges =
-      parameters.smoothing == Smoothing::kAngle || parameters.smoothing == Smoothing::kOptimize;
-  if (parameters.smoothing == Smoothing::kLabels) {
-    return as_double(surface.triangles) * kRemoveStairsPerTriangle;
-  }
-  const double pass = enlarges ? kEnlargePerTriangleAndPass : kSmoothPerTriangleAndPass;
-  return as_double(surface.triangles) * (kConnectivityPerTriangle + pass * parameters.passes);
+  const mesh::SmoothingMethod& method = mesh::method_of(parameters.smoothing);
+  return as_double(surface.triangles) *
+         (method.ms_per_triangle + method.ms_per_triangle_and_pass * parameters.passes);
 }
 
 double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
@@ -57,7 +50,7 @@ double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
   return measured * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
 }
 
-// Formats are written side by side, so the slowest counts whole and the others by half.
+// Formats are written in parallel, so the slowest counts fully and the others by half.
 double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   double slowest = kMeasurePerTriangle;
   double sum = kMeasurePerTriangle;
@@ -70,10 +63,10 @@ double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   return as_double(surface.triangles) * (slowest + (sum - slowest) / 2 + levels);
 }
 
-// The size of a surface that is not extracted yet. A guess.
+// A guess of a surface's size before it is extracted.
 SurfaceSize typical_surface(double samples) {
-  // Surfaces grow with the square of a volume's length, its samples with the cube. A noisy head and
-  // a smooth body of CT have 135 and 20 times that many triangles.
+  // A surface grows with the square of the volume's length, and the samples with the cube. The
+  // factor is 135 for a noisy head and 20 for a smooth body of CT.
   constexpr double kTypical = 50;
   const double triangles = kTypical * std::pow(samples, 2.0 / 3);
   return {static_cast<std::uint64_t>(triangles), static_cast<std::uint64_t>(triangles / 2)};
@@ -94,8 +87,8 @@ Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written, std
 }
 
 double share_within(double error_mm, double spacing_mm) {
-  // A curve through what was seen on heads of 1 mm.
-  constexpr double kHalf = 0.06;  // of the spacing, the error that leaves half of the triangles
+  // A fit to heads with 1 mm voxels.
+  constexpr double kHalf = 0.06;  // the error that leaves half of the triangles, in spacings
   constexpr double kSteepness = 1.16;
   return 1 / (1 + std::pow(error_mm / spacing_mm / kHalf, kSteepness));
 }

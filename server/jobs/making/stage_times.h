@@ -1,5 +1,5 @@
-// How long the stages of a job take: the one model behind estimates, progress, and the turns that
-// owners take in the queue. All functions are thread safe.
+// The time of a job's stages: the one model behind estimates, progress, and the owners' turns in
+// the queue. All functions are thread safe.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@
 
 namespace isomesh::jobs {
 
-// The times of all stages that the job has, in milliseconds, without the queue: first guesses from
-// a 7.1 million voxel head of five million triangles on two cores. `extracted` and `written` are
-// the surface before and after simplification.
+// The times of all stages of the job but the queue, in milliseconds. First guesses come from a head
+// of 7.1 million voxels and five million triangles on two cores. `extracted` and `written` are the
+// sizes before and after simplification.
 Timing stage_times(const mesh::SurfaceSize& extracted, const mesh::SurfaceSize& written,
                    std::uint64_t samples, const MeshParameters& parameters, bool certify);
 
-// The share of the triangles that simplification leaves within an error. A guess.
+// The fraction of the triangles that simplification leaves within an error. A guess.
 double share_within(double error_mm, double spacing_mm);
 
-// The size that simplification leaves. A guess; `correction` multiplies the share within an error.
+// The size after simplification. A guess; `correction` multiplies the fraction within an error.
 mesh::SurfaceSize simplified_surface(const mesh::SurfaceSize& extracted,
                                      const MeshParameters& parameters, double spacing_mm,
                                      double correction = 1);

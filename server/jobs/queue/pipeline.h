@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <stop_token>
+#include <string>
+#include <string_view>
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
@@ -23,6 +25,10 @@ struct PipelineLimits {
 
 // Increment whenever the same volume and parameters would give different bytes than before.
 inline constexpr const char* kMesherVersion = "11";
+
+// What stands for the mesher in the key of a result: its version, and the name of the back end
+// unless that is the default.
+std::string mesher_version(std::string_view backend = kDefaultBackend);
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the
 // results. The same volume and parameters give the same bytes. Throws Error kCancelled if `stop` is

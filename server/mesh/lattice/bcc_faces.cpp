@@ -44,7 +44,7 @@ class FaceBuilder {
     return std::span(kBccBorderTetrahedra).first(2);
   }
 
-  // The lattice's point that a point of the tables stands for.
+  // The lattice point that a point of the tables stands for.
   unsigned real(unsigned point) const { return point == 0 && side_ == BccSide::kLow ? 1 : point; }
 
   Place place(unsigned point) const {

@@ -2,19 +2,18 @@
 // centres of the cells, and what the surface looks like around a face of a cell.
 //
 // A centre has the mean of its cell's eight samples. Two centres whose cells share a face, and two
-// samples that share an edge of that face, are a tetrahedron: four around each face. At a face in
-// the border of the volume there is one centre only; the face's square is cut from its low to its
-// high corner, as the six-way split cuts it, and each half is a tetrahedron with the centre.
+// samples that share an edge of that face, form a tetrahedron: four around each face. A face in the
+// border of the volume has one centre only. Its square is cut from its low to its high corner, as
+// in the six-way split, and each half forms a tetrahedron with the centre.
 //
-// Each sample has a record, which is that of the cell whose corner 0 it is, too. Its edges are
-// slots:
+// Each sample has a record, shared with the cell whose corner 0 it is. Its edges are slots:
 //  *  0-7:  from the cell's centre to its corner 0..7 (tetrahedra.h);
 //  *  8-10: from the sample to the next one along x, y, z;
 //  * 11-13: from the centre to the next one along x, y, z;
 //  * 14-16: the diagonal of the square whose corner 0 is the sample, normal to x, y, z, where the
 //           square is not between two centres.
-// A cell that has a phantom among its corners (border.h) has no centre. It is split into six, and
-// slot 0 is its diagonal.
+// A cell with a phantom among its corners (border.h) has no centre. It is split into six, and slot
+// 0 is its diagonal.
 #pragma once
 
 #include <array>
@@ -40,12 +39,12 @@ constexpr unsigned bcc_direction_of(unsigned slot) {
   return slot < kBccCentreSlot ? 1U << (slot - kBccAxisSlot) : 7U ^ 1U << (slot - kBccDiagonalSlot);
 }
 
-// The records that a face names. `lower` and `upper` are the cells below and above it; the upper
-// cell's record is that of the face's corner 0. `second` and `third` come next to that along the
-// two axes after the face's normal, in the cyclic order x, y, z.
+// The records that a face names. `lower` and `upper` are the cells below and above it; the record
+// of the upper cell is also that of the face's corner 0. `second` and `third` are the next ones
+// along the two axes after the face's normal, in the cyclic order x, y, z.
 enum class BccRecord : std::uint8_t { kLower, kUpper, kSecond, kThird };
 
-// A face's surface crosses so many of its 13 edges at most, and most often not more than eight.
+// The most of a face's 13 edges that its surface crosses; usually not more than eight.
 inline constexpr std::size_t kBccMostEdges = 9;
 inline constexpr std::size_t kBccOftenEdges = 8;
 
@@ -55,7 +54,7 @@ struct BccEdge {
 };
 
 // The surface around a face in one case: the edges that it crosses, and its triangles, whose
-// corners are places in `edges`. Places that are not used repeat the first. Triangles are wound
+// corners are places in `edges`. Unused places repeat the first. Triangles are wound
 // counter-clockwise seen from outside in a right-handed lattice, clockwise in a left-handed one.
 struct BccFaceCase {
   std::uint8_t edge_count = 0;
@@ -65,7 +64,7 @@ struct BccFaceCase {
 };
 
 // A case is a set of inside points: bit 0 the lower cell's centre, bit 1 the upper one's, bits 2-5
-// the face's corners in cyclic order. At the border the centre that is missing has no meaning.
+// the face's corners in cyclic order. At the border the missing centre has no meaning.
 struct BccFace {
   std::array<BccFaceCase, 64> cases = {};
 };
@@ -80,7 +79,7 @@ enum class BccSide : std::uint8_t {
 using BccTetrahedra = std::array<std::array<std::uint8_t, 4>, 4>;
 inline constexpr BccTetrahedra kBccInnerTetrahedra = {
     {{0, 1, 2, 3}, {0, 1, 3, 4}, {0, 1, 4, 5}, {0, 1, 5, 2}}};
-// The first two are tetrahedra; point 0 stands for the only centre.
+// At the border only the first two are tetrahedra, and point 0 stands for the only centre.
 inline constexpr BccTetrahedra kBccBorderTetrahedra = {{{0, 2, 3, 4}, {0, 2, 4, 5}}};
 
 // The offsets of a face's corners from its corner 0, as corners of a cell.

@@ -7,8 +7,8 @@
 namespace isomesh::mesh {
 namespace {
 
-// How much farther than the least way the surface keeps from the samples of the border: vertices of
-// the cap have their places between, at half and, where they give way, at an eighth.
+// The surface keeps this many times the least distance from the border's samples. Vertices of the
+// cap lie in between, at half of it and, where they give way, at an eighth.
 constexpr double kContourWays = 8;
 constexpr double kWayWithinCap = 0.2;
 constexpr double kMostLeastWay = 0.25 / kContourWays;
@@ -57,7 +57,7 @@ BorderVertex BorderPlacement<T>::place(const BorderSample& cell, const EdgeEnds&
   const double share = (vertex.on_border ? contour_ : interior_).share(value(from), value(to));
   const auto number = [](std::int64_t whole) { return static_cast<double>(whole); };
   for (std::size_t i = 0; i < 3; ++i) {
-    // The same operations in the same order as where no border is near, for the same bits.
+    // The same operations in the same order as away from the border, for the same bits.
     const auto offset = [&](const Offset& corner) {
       return map.step_x[i] * number(corner[0]) + map.step_y[i] * number(corner[1]) +
              map.step_z[i] * number(corner[2]);
@@ -89,7 +89,7 @@ bool BorderPlacement<T>::is_inside(const Sample& sample) const {
   return value(sample) >= smallest_;
 }
 
-// Towards which side the sample's neighbour along the axis is a phantom; 0 where none is.
+// The side of the sample's phantom neighbour along the axis; 0 if there is none.
 template <class T>
 std::int64_t BorderPlacement<T>::outward(const Sample& sample, std::size_t axis) const {
   if (sample[axis] == 0) return -1;
@@ -122,7 +122,7 @@ bool BorderPlacement<T>::all_around_is_inside(const Sample& sample) const {
   return true;
 }
 
-// Whether the split of the cells has an edge there, as tetrahedra.h tells.
+// True if the split of the cells has an edge there (tetrahedra.h).
 template <class T>
 bool BorderPlacement<T>::has_edge(const Sample& from, const Offset& offset) const {
   if (five_) {
@@ -133,14 +133,12 @@ bool BorderPlacement<T>::has_edge(const Sample& from, const Offset& offset) cons
 }
 
 // The edge from `inside` to a phantom lies in the face of the box across `axis`. Its vertex would
-// coincide with those of the other edges from `inside` to phantoms, beyond other faces (border.h).
-// One of them stays on the face, and this says whether this one moves off it. The one that stays is
-//  * on an edge of the box: the vertex to the phantom beyond both faces; where the split has no
-//  such
-//    edge, the one beyond the face of the smaller axis;
-//  * on a corner of the box: the vertex to the phantom beyond all three faces; else the one beyond
-//  x
-//    and one of the others; else the one beyond x.
+// coincide with those of the other edges from `inside` to phantoms beyond other faces (border.h).
+// One vertex stays on the face; this decides if this vertex moves off it. The one that stays is
+//  * on an edge of the box: the vertex to the phantom beyond both faces or, if the split has no
+//    such edge, beyond the face of the smaller axis;
+//  * on a corner of the box: the vertex to the phantom beyond all three faces, or beyond x and one
+//    of the others, or beyond x.
 template <class T>
 bool BorderPlacement<T>::gives_way(const Sample& inside, const Offset& to_phantom,
                                    std::size_t axis) const {
@@ -148,7 +146,7 @@ bool BorderPlacement<T>::gives_way(const Sample& inside, const Offset& to_phanto
   beyond_both[axis] = outward(inside, axis);
   if (has_edge(inside, beyond_both)) return true;
 
-  std::array<bool, 3> leaves = {};  // the faces beyond which the phantom is
+  std::array<bool, 3> leaves = {};  // the faces that the phantom is beyond
   for (std::size_t a = 0; a < 3; ++a) {
     leaves[a] = to_phantom[a] != 0 && to_phantom[a] == outward(inside, a);
   }

@@ -1,19 +1,18 @@
-// Where the vertices of a closed surface lie that are on the border of the volume; private to this
-// folder.
+// Vertices of a closed surface on the border of the volume; private to this folder.
 //
-// A surface is closed by marching on through one more layer of samples around the volume, phantoms
-// that are outside. An edge from an inside sample `a` to a phantom is crossed, and its vertex is
-// one of the cap. A phantom has no value, and caps lie on the border, so it stands for the border
-// sample `b` next to it, and the vertex lies on the way from `a` to `b`:
+// A surface is closed by one more layer of samples around the volume, phantoms that are outside. An
+// edge from an inside sample `a` to a phantom is crossed, and its vertex belongs to the cap. A
+// phantom has no value, and caps lie on the border. So the phantom stands for the border sample `b`
+// next to it, and the vertex lies between `a` and `b`:
 //  * at `a` where they are the same;
 //  * half-way where `b` is inside. The cap is then the middle section of the prisms between two
 //    triangulations of the border, and every triangle of it has an area;
 //  * half-way to the surface where `b` is outside, so that cap and surface meet in the surface's
 //    vertices alone.
 // At the edges and corners of the volume's box several vertices would coincide: those to the
-// phantoms beyond one face, beyond the other and beyond both. One stays, so that the box is exact,
-// and the others give way along the faces: by a fifth of the spacing where all around is inside,
-// and by the least that single precision resolves where the surface may be near.
+// phantoms beyond one face, beyond the other and beyond both. One stays, so the box is exact. The
+// others give way along the faces: by a fifth of the spacing if all around is inside, and by the
+// least that single precision resolves where the surface may be near.
 #pragma once
 
 #include <array>
@@ -25,7 +24,7 @@
 
 namespace isomesh::mesh {
 
-// In the lattice's own numbers; phantoms are at -1 and at the numbers of samples.
+// In lattice indices; phantoms are at -1 and at the number of samples.
 using BorderSample = std::array<std::int64_t, 3>;
 
 // A vertex near the border of the volume.

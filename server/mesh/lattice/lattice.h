@@ -1,4 +1,4 @@
-// A volume as the kernels see it: samples on a lattice, and the map from lattice to space.
+// Samples on a lattice, and the map from lattice to space.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct Dims {
   bool has_cells() const { return x > 1 && y > 1 && z > 1; }
 };
 
-// From a sample to the one at the corner 0..7 of the cell that begins there, in x-fastest order.
+// The offset from a sample to corner 0..7 of its cell, in x-fastest order.
 inline std::ptrdiff_t sample_offset(const Dims& dims, unsigned corner) {
   const std::ptrdiff_t row = dims.x;
   return (corner & 1) + (corner >> 1 & 1) * row +
@@ -39,8 +39,7 @@ struct LatticeToSpace {
 
 LatticeToSpace lattice_to_space(const Geometry& geometry);
 
-// Where the point is among the samples: the numbers i, j and k, which need not be whole. The steps
-// are not in one plane.
+// The fractional indices i, j and k of a point. The steps must not be in one plane.
 std::array<double, 3> index_of(const LatticeToSpace& to_space, const std::array<double, 3>& point);
 
 // Samples in x-fastest order, dims.samples() of them, finite. Does not own them.

@@ -44,8 +44,8 @@ double plane_distance(const LatticeToSpace& to_space) {
 }  // namespace
 
 double Placement::nearest_share(const Dims& dims, const LatticeToSpace& to_space) {
-  // Along a coordinate axis one unit in the last place survives any rounding; oblique steps change
-  // all coordinates by a part of it, and take four.
+  // Along a coordinate axis, one unit in the last place survives any rounding. Oblique steps change
+  // each coordinate by a part of it, and need four.
   const double units = is_axis_aligned(to_space) ? 1 : 4;
   const double resolved =
       largest_coordinate(dims, to_space) * std::numeric_limits<float>::epsilon();

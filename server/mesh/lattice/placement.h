@@ -1,4 +1,4 @@
-// Where a vertex on a lattice edge lies; private to this folder.
+// The position of a vertex on a lattice edge; private to this folder.
 #pragma once
 
 #include <algorithm>
@@ -25,14 +25,14 @@ class Placement {
         midpoint_(options.interpolation == Interpolation::kMidpoint),
         nearest_(nearest_share(dims, to_space)) {}
 
-  // One that keeps another distance from the samples; see nearest_share.
+  // Keeps another distance from the samples; see nearest_share.
   Placement(const ExtractOptions& options, double nearest)
       : iso_(options.iso),
         midpoint_(options.interpolation == Interpolation::kMidpoint),
         nearest_(nearest) {}
 
-  // The share of the way from a sample of value `from` to one of value `to`, between which the
-  // iso-value lies.
+  // The fraction of the way from a sample of value `from` to one of value `to`. The iso-value lies
+  // between them.
   template <class T>
   double share(T from_sample, T to_sample) const {
     if (midpoint_) return 0.5;
@@ -50,7 +50,7 @@ class Placement {
 
   // A vertex on a sample that equals the iso-value would coincide with those on the sample's other
   // edges, and their triangles would have no area. So every vertex keeps a distance from the
-  // samples that single precision still resolves. This is that distance as a share of an edge.
+  // samples that single precision resolves. This is that distance as a fraction of an edge.
   static double nearest_share(const Dims& dims, const LatticeToSpace& to_space);
 
  private:

@@ -1,5 +1,5 @@
-// Rows of samples and of cells, 64 at a time: what the walk over an iso-value's signs and the one
-// over labels have in common. Compiled once for each instruction set, see slabs.cpp.
+// Rows of samples and cells, 64 at a time: shared by the walks over an iso-value's signs and over
+// labels. Compiled once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_ROWS_INL_H_
 #undef ISOMESH_ROWS_INL_H_
@@ -29,7 +29,7 @@ using Word = std::uint64_t;  // 64 samples of a row, the lowest bit the smallest
 inline constexpr unsigned kWordBits = 64;
 inline constexpr Word kEvenX = 0x5555555555555555;
 
-// How many words a row of so many samples has.
+// The number of words of a row of this many samples.
 inline std::size_t words_of(std::uint32_t samples) {
   return (std::size_t{samples} + kWordBits - 1) / kWordBits;
 }
@@ -71,7 +71,7 @@ inline std::array<std::uint8_t, kWordBits> transpose(const std::array<Word, 8>& 
   return bytes;
 }
 
-// For each set of directions its members in order.
+// The members of each set of directions, in order.
 inline constexpr auto kMembers = [] {
   std::array<std::array<std::uint8_t, 8>, 256> members = {};
   for (unsigned set = 0; set < 256; ++set) {
@@ -85,15 +85,14 @@ inline constexpr auto kMembers = [] {
   return members;
 }();
 
-// How many vertices a word's samples own, and how many triangles its cells have.
+// The number of vertices that a word's samples own, and of triangles of its cells.
 struct WordCount {
   unsigned vertices = 0;
   unsigned triangles = 0;
 };
 
-// Which edges the samples of a row own, and which of its cells there are. Beyond the lattice's
-// upper borders there are no rows; the last ones stand for them, and what depends on them is left
-// out.
+// The edges that the samples of a row own, and its cells. Beyond the upper borders of the lattice
+// the last rows stand for those that are missing, and everything that depends on them is masked.
 class RowShape {
  public:
   // `even` are the samples of even parity in a word of the row.
@@ -105,7 +104,7 @@ class RowShape {
         even_(even),
         odd_((even & 1) != 0 ? 0 : 1) {}
 
-  // The set (bit d: direction d) of edges that the row's samples own, but for the sample of the
+  // The set (bit d: direction d) of edges that the row's samples own, except for the sample of the
   // largest x, which owns no edge with a part along x.
   unsigned existing() const {
     constexpr unsigned kAll = 0b11111110;
@@ -139,15 +138,15 @@ class RowShape {
     return begin >= last_x_ ? 0 : (Word{1} << (last_x_ - begin)) - 1;
   }
 
-  // The samples that exist, given has_next(w): beyond the last x there are none at all.
+  // The samples that exist, given has_next(w); beyond the last x there are none.
   Word samples(std::size_t w, Word next_x) const {
     return next_x << 1 | (w == 0 ? 1 : has_next(w - 1) >> 63);
   }
 
   Word cells(std::size_t w) const { return has_y_ && has_z_ ? has_next(w) : 0; }
 
-  // What `compare(a, b)` says of the corners at the first and the second end of the edges of a
-  // direction, each sample's own.
+  // The result of `compare(a, b)` for the corners at the first and the second end of the edges of a
+  // direction, for each sample's own edge.
   template <class Compare>
   HWY_INLINE Word between_ends(unsigned direction, Compare compare) const {
     const Word edges = compare(0U, direction);
@@ -157,8 +156,8 @@ class RowShape {
     return (edges & even_) | (compare(low, direction ^ low) & ~even_);
   }
 
-  // Word d: the samples whose edge of direction d exists and is crossed; word 0 is zero.
-  // `differ(a, b)`: the cells whose corners a and b are on two sides.
+  // Word d: the samples whose edge of direction d exists and is crossed; word 0 is zero. `differ(a,
+  // b)` returns the cells whose corners a and b are on different sides.
   template <class Differ>
   HWY_INLINE std::array<Word, 8> edges_where(std::size_t w, Differ differ) const {
     const Word next_x = has_next(w);
@@ -197,14 +196,14 @@ HWY_INLINE Double4 space_offset(const LatticeToSpace& map, unsigned corner) {
          lanes(map.step_z) * (corner >> 2);
 }
 
-// Where the edge that a vertex lies on begins and how it runs, in millimetres, as seen from the
-// sample that owns it. A vertex that lies on none has a line of its own, half-way on which it is.
+// The edge of a vertex: where it begins and its direction, in millimetres, relative to the sample
+// that owns it. A vertex on no edge has a line of its own, and is half-way along it.
 struct EdgeFrame {
   Double4 start = {};
   Double4 run = {};
 };
 
-// For each edge of a cell, where its vertex's index lies from corner 0's first place on.
+// The place of each edge's vertex index, relative to corner 0's first one.
 using EdgeOffsets = std::array<std::ptrdiff_t, 64>;
 
 // Another task may set flags in the same word.
@@ -213,7 +212,7 @@ inline void set_flag(std::vector<std::uint64_t>& flags, std::size_t vertex) {
       .fetch_or(Word{1} << (vertex % kFlagBits), std::memory_order_relaxed);
 }
 
-// Writes the triangles of one case of the tables. Returns where the next one goes.
+// Writes the triangles of one case of the tables. Returns the end of what was written.
 HWY_INLINE Triangle* write_case(const CellCase& cell, const std::uint32_t* places,
                                 const EdgeOffsets& offsets, Triangle* out) {
   for (std::size_t t = 0; t < cell.triangles; ++t) {
@@ -223,10 +222,10 @@ HWY_INLINE Triangle* write_case(const CellCase& cell, const std::uint32_t* place
   return out;
 }
 
-// The same without triangles of which two corners are one vertex. Nothing is written from `end` on.
+// Leaves out triangles with a repeated vertex. Writes nothing from `end` on.
 HWY_INLINE Triangle* write_kept(const CellCase& cell, const std::uint32_t* places,
                                 const EdgeOffsets& offsets, const Triangle* end, Triangle* out) {
-  // One more than is kept may be written. No branch tells which those are: none could be foreseen.
+  // Writes one triangle more than it keeps, instead of a branch that no processor could predict.
   const auto keep = [&](Triangle* to) {
     for (std::size_t t = 0; t < cell.triangles; ++t) {
       const auto& [first, second, third] = cell.edges[t];

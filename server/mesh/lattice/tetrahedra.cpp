@@ -43,7 +43,7 @@ struct Edge {
   Point middle() const { return position(inside) + position(outside); }  // times two
 };
 
-// Adds the triangle with its normal turned to `outward`; the midpoints of the edges tell its side.
+// Adds the triangle with its normal towards `outward`; the midpoints of the edges tell the side.
 void add_triangle(CellCase& out, Edge a, Edge b, Edge c, const Point& outward) {
   const Point normal = cross(b.middle() - a.middle(), c.middle() - a.middle());
   if (dot(normal, outward) < 0) std::swap(b, c);
@@ -55,7 +55,7 @@ void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsigned inside_
   std::array<Corner, 4> outside = {};
   std::size_t insides = 0;
   std::size_t outsides = 0;
-  Point outward = {0, 0, 0};  // from the inside corners to the outside ones, each pair once
+  Point outward = {0, 0, 0};  // from inside corners to outside ones, each pair once
   for (const Corner corner : corners) {
     if ((inside_corners >> corner & 1) != 0) {
       inside[insides++] = corner;

@@ -1,4 +1,4 @@
-// How a cell is split into tetrahedra, and what the surface looks like in each of its 256 cases.
+// Splits of a cell into tetrahedra, and the surface in each of a cell's 256 cases.
 //
 // A corner of a cell is a number 0..7 whose bits are its offsets along x, y and z. So is the
 // direction 1..7 of an edge. The edge of direction d that belongs to a sample lies in the cell
@@ -20,7 +20,7 @@ namespace isomesh::mesh {
 
 inline constexpr std::size_t kMostTriangles = 12;  // two in each of six tetrahedra
 
-// Names an edge of a cell: the corner whose sample owns it, times 8, plus its direction.
+// Identifies an edge of a cell: eight times the corner whose sample owns it, plus its direction.
 using EdgeName = std::uint8_t;
 
 constexpr EdgeName edge_name(unsigned owner, unsigned direction) {
@@ -40,23 +40,23 @@ struct EdgeEnds {
   std::uint8_t to = 0;
 };
 
-// One way of splitting a cell.
+// One split of a cell.
 struct CellSplit {
   std::array<std::array<std::uint8_t, 4>, 6> corners = {};  // of each tetrahedron
   std::size_t tetrahedra = 0;
   std::array<CellCase, 256> cases = {};
-  // Of the edges that corner 0 owns, by direction: the corners that each joins, and for each case
-  // the set (bit d: direction d) of those that the surface crosses.
+  // The edges that corner 0 owns, by direction: the corners that each joins, and for each case the
+  // set (bit d: direction d) of those that the surface crosses.
   std::array<EdgeEnds, 8> ends = {};
   std::array<std::uint8_t, 256> crossed = {};
 };
 
-// The surface in one tetrahedron of a cell alone, of whose corners those in the set `inside` (bit
-// c: corner c) are inside.
+// The surface in a single tetrahedron of a cell. The set `inside` (bit c: corner c) has its inside
+// corners.
 CellCase tetrahedron_case(const std::array<std::uint8_t, 4>& corners, unsigned inside);
 
-// The split of a cell whose corner 0 has even or odd i+j+k; with six tetrahedra they are the same.
-// On the body-centred lattice: the six-way split of the cells that have no centre (bcc_faces.h).
+// The split of a cell whose corner 0 has even or odd i+j+k; equal for six tetrahedra. On the
+// body-centred lattice: the six-way split of cells without a centre (bcc_faces.h).
 const CellSplit& cell_split(Scheme scheme, bool odd);
 
 }  // namespace isomesh::mesh

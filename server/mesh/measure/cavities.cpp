@@ -11,9 +11,9 @@
 namespace isomesh::mesh {
 namespace {
 
-// A number for an edge from one vertex to another; the other way it is the negative one, modulo
-// 2^64. So over all edges of a component's triangles the sum is zero where each edge is run through
-// as often one way as the other, and else but for a chance of 2^-64 it is not.
+// A number for each directed edge; the opposite direction has the negative number, modulo 2^64.
+// Over the edges of a component's triangles the sum is 0 if each edge is used equally often in both
+// directions. Otherwise it is 0 with a probability of 2^-64.
 std::uint64_t edge_number(std::uint32_t from, std::uint32_t to) {
   std::uint64_t mixed = (std::uint64_t{std::min(from, to)} << 32 | std::max(from, to)) + 1;
   // The finaliser of splitmix64 (G. L. Steele et al., OOPSLA 2014).
@@ -24,8 +24,8 @@ std::uint64_t edge_number(std::uint32_t from, std::uint32_t to) {
 }
 
 struct Shell {
-  std::uint64_t open_edges = 0;  // see edge_number
-  double volume_mm3 = 0;         // of a closed one; the sum of tetrahedra to `apex`
+  std::uint64_t open_edges = 0;  // the sum of edge_number
+  double volume_mm3 = 0;         // of a closed component; the sum of tetrahedra to `apex`
   Point apex = {0, 0, 0};
   std::uint32_t first_triangle = TriangleGrid::kNone;
 };
@@ -48,7 +48,7 @@ std::vector<Shell> shells_of(const Components& components, const Mesh& mesh) {
   return shells;
 }
 
-// A point of the triangle that lies on no plane of the lattice's vertices, but for a chance.
+// A point of the triangle that almost certainly lies in no lattice plane of the vertices.
 Point point_in(const Mesh& mesh, const Triangle& triangle) {
   constexpr std::array<double, 3> kWeights = {0.2718281828, 0.3141592654, 0.4140125518};
   Point point = {0, 0, 0};
@@ -60,13 +60,13 @@ Point point_in(const Mesh& mesh, const Triangle& triangle) {
   return point;
 }
 
-// Twice the area of the triangle (a, b, point) in the plane of y and z.
+// Twice the area of the triangle (a, b, point) in the yz-plane.
 double area_at(const Point& a, const Point& b, const Point& point) {
   return (b[1] - a[1]) * (point[2] - a[2]) - (b[2] - a[2]) * (point[1] - a[1]);
 }
 
-// How often the ray from the point towards larger x runs out of the walls, less how often it runs
-// into them: 0 where the point is in no cavity.
+// How often the ray from the point in +x leaves the walls minus how often it enters them; 0 if the
+// point is in no cavity.
 int crossings(const Point& point, const TriangleGrid& walls, double end_x,
               std::vector<std::uint32_t>& near) {
   near.clear();

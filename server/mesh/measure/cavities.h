@@ -7,12 +7,12 @@
 
 namespace isomesh::mesh {
 
-// Leaves out the walls of all cavities, and what floats in them, in place: of a closed surface the
-// outermost shells are left, and what was hollow is solid. A cavity's wall is a closed component
-// that encloses a negative volume; components with a boundary stay. `mesh` is oriented, and does
-// not run through itself. Vertices and triangles keep their order and their layers. Takes some 40
-// bytes for each triangle of such walls. The same for any number of threads. Throws Error
-// kUnusableVolume where a position is not a finite number, kTooLarge as TriangleGrid, and
+// Removes the walls of all cavities, and what floats in them, in place. Of a closed surface the
+// outermost shells remain, so what was hollow becomes solid. A cavity's wall is a closed component
+// that encloses a negative volume; components with a boundary stay. `mesh` must be oriented and
+// must not intersect itself. Vertices and triangles keep their order and their layers. Takes some
+// 40 bytes for each triangle of such walls. The result does not depend on the number of threads.
+// Throws Error kUnusableVolume for a position that is not finite, kTooLarge as TriangleGrid, and
 // kCancelled, before anything is changed.
 Dropped fill_cavities(const Context& context, Mesh& mesh);
 

@@ -9,8 +9,9 @@
 namespace isomesh::mesh {
 namespace {
 
-// Points that follow each other are near each other, so each is a guess for the next; a block
-// begins without one. Its size is fixed, for sums that are the same on any number of threads.
+// Consecutive points are near each other, so each result is the guess for the next point. Each
+// block starts without a guess and has a fixed size, so sums do not depend on the number of
+// threads.
 constexpr std::size_t kBlock = 2048;
 
 constexpr double kPercentile = 0.99;
@@ -21,7 +22,7 @@ struct Sums {
   float max = 0;
 };
 
-// The points of a surface by number: its vertices, then the centres of its triangles.
+// The points of a surface in order: its vertices, then the centres of its triangles.
 class Points {
  public:
   explicit Points(const SurfaceView& surface) : surface_(surface) {}
@@ -118,7 +119,7 @@ DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to
 }
 
 Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context) {
-  // Each direction is half of the work, whatever it takes.
+  // Each direction counts as half of the work.
   const auto half = [&](double begin) {
     Context part = {context.stop, nullptr};
     if (context.progress) {

@@ -1,4 +1,4 @@
-// How far two surfaces are from each other: the certificate of a mesh.
+// Distances between two surfaces: the certificate of a mesh.
 #pragma once
 
 #include <algorithm>
@@ -11,19 +11,20 @@
 
 namespace isomesh::mesh {
 
-// Of each vertex, in the order of the positions, in millimetres; infinite where the other surface
-// has no triangles. Same for any number of threads. Throws Error kUnusableVolume where a position
-// is not a finite number, and kCancelled.
+// The distance of each vertex in millimetres, in the order of the positions; infinite if the other
+// surface has no triangles. Does not depend on the number of threads. Throws Error kUnusableVolume
+// for a position that is not finite, and kCancelled.
 void measure_vertex_distances(const SurfaceView& from, const TriangleGrid& to,
                               const Context& context, Buffer<float>& distances);
 
-// Without points all zero; where the other surface has no triangles, the distances are infinite and
-// the histogram is zero. Takes 4 bytes a point. Same for any number of threads. Throws as above.
+// All zero without points. If the other surface has no triangles, the distances are infinite and
+// the histogram is zero. Takes 4 bytes a point. Does not depend on the number of threads. Throws as
+// above.
 DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to,
                                  const Context& context);
 
-// Both ways: what has been left out shows from the reference's side alone, what has been added from
-// the mesh's.
+// Both directions: what is missing shows only from the reference, what was added only from the
+// mesh.
 struct Certificate {
   DistanceSummary from_mesh;
   DistanceSummary from_reference;
@@ -33,8 +34,8 @@ struct Certificate {
   bool operator==(const Certificate&) const = default;
 };
 
-// Takes what the larger surface's grid takes (triangle_grid.h) and 4 bytes a point. Same for any
-// number of threads. Throws as above, and kTooLarge.
+// Takes the memory of the larger surface's grid (triangle_grid.h) and 4 bytes a point. Does not
+// depend on the number of threads. Throws as above, and kTooLarge.
 Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context);
 
 }  // namespace isomesh::mesh

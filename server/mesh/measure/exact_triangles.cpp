@@ -180,10 +180,11 @@ bool overlap_at_edge(const Vertices& a, const Vertices& b) {
   return turn_of(a, plane) == turn_of({a[0], a[1], b[2]}, plane);
 }
 
-// With the shared vertices first, which keeps what a triangle is as a set.
+// Orders the corners with the shared vertices first; the triangle as a set stays the same.
 Triangle shared_first(const Triangle& triangle, const Triangle& other) {
   Triangle result = triangle;
-  // std::ranges' returns a range of a kind that clang++ 14 cannot compile with g++ 12's library.
+  // The range that std::ranges' version returns does not compile with clang++ 14 and g++ 12's
+  // library.
   std::stable_partition(result.begin(), result.end(), [&](std::uint32_t vertex) {
     return std::ranges::find(other, vertex) != other.end();
   });

@@ -1,4 +1,4 @@
-// Whether two triangles of a surface intersect, decided exactly; private to this folder.
+// Exact intersection of two triangles of a surface; private to this folder.
 #pragma once
 
 #include <span>
@@ -7,10 +7,10 @@
 
 namespace isomesh::mesh {
 
-// Whether three positions are on one line, exactly.
+// True if three positions are on one line, exactly.
 bool is_flat(std::span<const Vec3> positions, const Triangle& triangle);
 
-// As self_intersections.h has it. The result means nothing if one of them is flat. Thread safe.
+// As defined in self_intersections.h. The result means nothing if one of them is flat. Thread safe.
 bool do_intersect(std::span<const Vec3> positions, const Triangle& a, const Triangle& b);
 
 }  // namespace isomesh::mesh

@@ -1,6 +1,5 @@
-// Area, enclosed volume and bounds of a layer, summed up as its triangles and vertices are met;
-// private to this folder. Everything that measures does it through here and layer by layer, so that
-// the same mesh always has the same figures.
+// Area, enclosed volume and bounds of a layer; private to this folder. All measurements use it,
+// layer by layer, so the same mesh always has the same figures.
 #pragma once
 
 #include <array>
@@ -66,7 +65,7 @@ class LayerExtent {
     for (; t + 1 < triangles.size(); t += 2) add_two(triangles[t], triangles[t + 1]);
     if (t < triangles.size()) {
       const std::uint32_t any = triangles[t][0];
-      add_two(triangles[t], {any, any, any});  // which has no area
+      add_two(triangles[t], {any, any, any});  // a filler without area
     }
     area_ += (areas[0] + areas[1]) / 2;
     volume_ += (volumes[0] + volumes[1]) / 6;
@@ -77,7 +76,7 @@ class LayerExtent {
     high_ = position > high_ ? position : high_;
   }
 
-  // Adds another layer's sums; to be called in the order of the layers.
+  // Adds the sums of another layer. The caller adds layers in order.
   void add(const LayerExtent& other) {
     area_ += other.area_;
     volume_ += other.volume_;

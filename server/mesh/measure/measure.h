@@ -1,4 +1,4 @@
-// How large a mesh is.
+// The size of a mesh.
 #pragma once
 
 #include <array>

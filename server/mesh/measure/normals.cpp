@@ -8,12 +8,12 @@
 namespace isomesh::mesh {
 namespace {
 
-// The triangles of one more layer are looked at twice.
+// Each run looks at the triangles of one more layer.
 constexpr std::size_t kLayersPerSlab = 16;
 
 Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
-// As long as twice the triangle's area.
+// Its length is twice the triangle's area.
 Vec3 normal_of(const Mesh& mesh, const Triangle& triangle) {
   const Vec3& corner = mesh.positions[triangle[0]];
   const Vec3 u = mesh.positions[triangle[1]] - corner;
@@ -25,15 +25,15 @@ Vec3 unit(const Vec3& v) {
   const double x = v[0];
   const double y = v[1];
   const double z = v[2];
-  // What single precision holds has squares that double precision holds.
+  // Squares of single-precision numbers fit into double precision.
   const double length = std::sqrt(x * x + y * y + z * z);
   if (length == 0) return {0, 0, 1};
   return {static_cast<float>(x / length), static_cast<float>(y / length),
           static_cast<float>(z / length)};
 }
 
-// Of the vertices of these layers, which only triangles of the same layers and of the one below can
-// name.
+// Writes the normals of these layers' vertices, which only triangles of the same layers and of the
+// one below name.
 void write_normals(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer,
                    Vec3* normals) {
   const std::size_t begin = mesh.layer_vertices[first_layer];

@@ -7,9 +7,9 @@
 
 namespace isomesh::mesh {
 
-// Writes the unit normal of each vertex: mesh.normals, or the mean of its triangles' normals
-// weighted by their areas, which point outside; (0, 0, 1) where that has no direction. The result
-// does not depend on the number of threads. `normals`' memory is reused. Throws Error kCancelled.
+// Writes the unit normal of each vertex: mesh.normals, or the mean of its triangles' outward
+// normals weighted by their areas, or (0, 0, 1) if that mean has no direction. The result does not
+// depend on the number of threads. The memory of `normals` is reused. Throws Error kCancelled.
 void vertex_normals(const Mesh& mesh, const Context& context, Buffer<Vec3>& normals);
 
 }  // namespace isomesh::mesh

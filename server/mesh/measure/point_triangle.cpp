@@ -6,12 +6,12 @@
 namespace isomesh::mesh {
 namespace {
 
-// Of the squared sine between two edges, from which on their normal is a direction.
+// The least squared sine between two edges at which their normal has a direction.
 constexpr double kLeastShape = 1e-20;
 
 double squared(const Point& p) { return dot(p, p); }
 
-// From the origin to the segment between two points, which may be one.
+// From the origin to the segment between two points, which may be equal.
 double to_segment(const Point& a, const Point& b) {
   const Point ab = minus(b, a);
   const double length = squared(ab);
@@ -27,8 +27,8 @@ double squared_distance(const Point& point, const Corners& triangle) {
   const Point c = minus(triangle[2], point);
   const Point ab = minus(triangle[1], triangle[0]);
   const Point ac = minus(triangle[2], triangle[0]);
-  // The plane's parts in which a corner, an edge or the side is nearest, after C. Ericson,
-  // "Real-Time Collision Detection", 2005, 5.1.5.
+  // The regions of the plane by the nearest corner, edge or side: C. Ericson, "Real-Time Collision
+  // Detection", 2005, 5.1.5.
   const double d1 = -dot(ab, a);
   const double d2 = -dot(ac, a);
   if (d1 <= 0 && d2 <= 0) return squared(a);
@@ -50,7 +50,7 @@ double squared_distance(const Point& point, const Corners& triangle) {
   if (vc <= 0 && d1 > 0 && d3 < 0) return to_segment(a, b);
   if (vb <= 0 && d2 > 0 && d6 < 0) return to_segment(a, c);
   if (va <= 0 && d4 > d3 && d5 > d6) return to_segment(b, c);
-  // Which edge is nearest is not clear where the triangle is as good as a line.
+  // For a triangle that is almost a line, the regions do not tell the nearest edge.
   return std::min({to_segment(a, b), to_segment(a, c), to_segment(b, c)});
 }
 

@@ -42,7 +42,7 @@ struct Box {
   }
 };
 
-// Of the triangles from `begin` to `end`, with those of higher numbers.
+// Pairs of a triangle in [begin, end) and one of a higher number.
 std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const TriangleGrid& grid,
                                        std::size_t begin, std::size_t end) {
   std::vector<IntersectingPair> pairs;

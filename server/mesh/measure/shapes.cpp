@@ -1,7 +1,7 @@
-// Like slabs.cpp, the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE is compiled once
-// for each instruction set. Triangles are taken in blocks of separate arrays, over which the
-// compiler makes the loops wide; a block's sums have a fixed order, so the numbers do not depend on
-// how wide.
+// As in slabs.cpp, the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE is compiled once
+// for each instruction set. Triangles are loaded in blocks of separate arrays, so the compiler
+// vectorises the loops. The sums of a block have a fixed order, so results do not depend on the
+// vector width.
 #include "server/mesh/measure/shapes.h"
 
 #include <algorithm>
@@ -23,18 +23,18 @@ namespace isomesh::mesh {
 
 constexpr std::size_t kBlock = 256;
 
-// Blocks of triangles in the mesh's order, of which every step-th is measured from the first on.
+// Blocks of triangles in the mesh's order; every step-th block is measured, from the first on.
 struct MeasuredBlocks {
   std::size_t begin = 0;
   std::size_t end = 0;
   std::size_t step = 1;
 };
 
-// Of a run of triangles.
+// The measures of a run of triangles.
 struct ShapeSums {
   std::size_t triangles = 0;
 
-  // One quantity's; the sum in parts that are added independently of each other.
+  // Sums of one quantity. Independent partial sums can be added at the same time.
   struct Sums {
     static constexpr std::size_t kParts = 8;
 
@@ -67,8 +67,8 @@ struct Values {
   alignas(64) Lanes smallest_angle_deg;
 };
 
-// Loading a position as four lanes reads four bytes past it: the next one's, or what Buffer keeps
-// behind the last.
+// Loading a position as four lanes reads four bytes of the next one; Buffer has such bytes after
+// the last one.
 using Float4 = float __attribute__((vector_size(16)));
 
 HWY_INLINE Float4 load(const Vec3& position) {
@@ -77,7 +77,7 @@ HWY_INLINE Float4 load(const Vec3& position) {
   return lanes;
 }
 
-// Four vectors to four of each coordinate.
+// Transposes four vectors into four of each coordinate.
 HWY_INLINE void store_transposed(const std::array<Float4, 4>& rows, std::size_t at,
                                  std::array<Lanes, 3>& out) {
   const Float4 low01 = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5);
@@ -92,7 +92,7 @@ HWY_INLINE void store_transposed(const std::array<Float4, 4>& rows, std::size_t 
   }
 }
 
-// Four at a time; places behind the last are filled with its sides.
+// Four triangles at a time; the places after the last one are filled with its sides.
 void load_sides(const Mesh& mesh, std::size_t begin, std::size_t count, Sides& sides) {
   for (std::size_t i = 0; i < count; i += 4) {
     std::array<Float4, 4> u;
@@ -111,7 +111,7 @@ void load_sides(const Mesh& mesh, std::size_t begin, std::size_t count, Sides& s
 HWY_INLINE float least(float a, float b) { return a < b ? a : b; }
 HWY_INLINE float most(float a, float b) { return a > b ? a : b; }
 
-// Of a sine from 0 to 1; the polynomial is that of Cephes' asinf.
+// The arcsine of 0 to 1, by the polynomial of Cephes' asinf.
 HWY_INLINE float arc_sine(float sine) {
   const bool steep = sine > 0.5F;
   const float square = steep ? (1 - sine) * 0.5F : sine * sine;
@@ -126,7 +126,7 @@ HWY_INLINE float arc_sine(float sine) {
   return steep ? 1.57079633F - 2 * p : p;
 }
 
-// With the longest side as the unit, so that no product of lengths is too small for a float.
+// Lengths are relative to the longest side, so no product is too small for a float.
 void measure_block(const Sides& sides, Values& values) {
   constexpr float kDegrees = 57.2957795F;
   for (std::size_t i = 0; i < kBlock; ++i) {
@@ -160,8 +160,8 @@ void measure_block(const Sides& sides, Values& values) {
     const float sum = a + b + c;
     const float product = a * b * c * sum;
     const float scale = product > 0 ? 1 / product : 0;
-    // r = 2 A / sum and R = abc / (4 A) with A = |n| / 2; and |n| = sin(angle) times the two sides
-    // next to the angle, which for the smallest are the two longer ones.
+    // r = 2 A / sum and R = abc / (4 A) with A = |n| / 2. |n| = sin(angle) times the two sides at
+    // the angle. The smallest angle lies between the two longer sides.
     values.aspect_ratio[i] = least(4 * nn * scale, 1);
     const float sine = least(std::sqrt(nn) * least(least(a, b), c) * sum * scale, 1);
     values.smallest_angle_deg[i] = least(arc_sine(sine) * kDegrees, 60);
@@ -178,7 +178,7 @@ void add_values(const Lanes& values, std::size_t count, float per_bin, ShapeSums
   for (std::size_t i = 0; i < count; ++i) sums.min = least(values[i], sums.min);
   alignas(64) std::array<std::int32_t, kBlock> bins;
   for (std::size_t i = 0; i < kBlock; ++i) bins[i] = static_cast<std::int32_t>(values[i] * per_bin);
-  // In turns, because a count that was just written is slow to read.
+  // Alternates between counters, because a count that was just written is slow to read.
   constexpr std::int32_t kLast = Distribution::kBins - 1;
   for (std::size_t i = 0; i < count; ++i) {
     ++sums.bins[i & 1][static_cast<std::size_t>(std::min(bins[i], kLast))];

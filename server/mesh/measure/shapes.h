@@ -1,4 +1,4 @@
-// How good the triangles of a mesh are.
+// The quality of a mesh's triangles.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,12 @@
 
 namespace isomesh::mesh {
 
-// Up to so many triangles all are measured. Of more every n-th run of 256 in their order, about
-// half as many triangles: a mean or a share gains next to nothing by more, which would take as long
-// as extraction. The histograms' sums say how many were measured.
+// Up to this many triangles, all are measured. Of more, every n-th run of 256 triangles is
+// measured, about half as many triangles in total: more would hardly change a mean and take as long
+// as extraction. The sums of the histograms tell how many were measured.
 inline constexpr std::size_t kMostMeasuredTriangles = std::size_t{1} << 20;
 
-// For each measured triangle, in single precision:
+// The measures of a triangle, in single precision:
 //  * its radius ratio, twice the radius of the inscribed circle over that of the circumscribed one:
 //    1 when it is equilateral, 0 when it is flat (P. P. Pébay, T. J. Baker, "Analysis of triangle
 //    quality measures", Math. Comp. 72, 2003);
@@ -24,7 +24,7 @@ struct Shapes {
   Distribution smallest_angle_deg;  // bins of 3 degrees
 };
 
-// The same for any number of threads and on every processor. Throws Error kCancelled.
+// Does not depend on the number of threads or the processor. Throws Error kCancelled.
 Shapes measure_shapes(const Mesh& mesh, const Context& context);
 
 }  // namespace isomesh::mesh

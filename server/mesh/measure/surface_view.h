@@ -1,4 +1,4 @@
-// A surface as arrays, wherever it comes from.
+// A surface as arrays.
 #pragma once
 
 #include <span>
@@ -7,13 +7,13 @@
 
 namespace isomesh::mesh {
 
-// Triangles as indices of positions in millimetres: in no order, open or closed, manifold or not.
+// Triangles as indices of positions in millimetres, in any order; open or closed, manifold or not.
 // Owns nothing.
 struct SurfaceView {
   SurfaceView() = default;
   SurfaceView(std::span<const Vec3> its_positions, std::span<const Triangle> its_triangles)
       : positions(its_positions), triangles(its_triangles) {}
-  SurfaceView(const Mesh& mesh)  // NOLINT: a mesh is one
+  SurfaceView(const Mesh& mesh)  // NOLINT: an implicit conversion
       : positions(mesh.positions.span()), triangles(mesh.triangles.span()) {}
 
   std::span<const Vec3> positions;

@@ -16,19 +16,19 @@ constexpr std::uint32_t kWordSide = 4;  // cells of a word along each axis
 constexpr std::uint32_t kWordCells = 64;
 constexpr std::uint32_t kMostSlabs = 32;
 
-// Of the root of the mean square of the edges: larger cells have more triangles to look at, of
-// smaller ones there are more to look into.
+// The side of a cell relative to the root mean square of the edges. In larger cells there are more
+// triangles to look at; of smaller ones more cells.
 constexpr double kCellSide = 1.0;
 
-// Of a cell's side, how far is looked at first: as far as a point mostly is that lies near.
+// The first search radius, as a share of a cell's side: most points lie this near.
 constexpr double kFirstReach = 0.2;
 
-// Cells that surfaces leave empty are paid for by bits alone, but there may be many.
+// Empty cells cost only bits, but there may be many.
 constexpr std::uint64_t kMostCellsPerTriangle = 256;
 constexpr std::uint64_t kMostCells = std::uint64_t{1} << 32;
 constexpr std::uint32_t kMostCellsPerAxis = 1 << 16;
 
-// What is summed up of a run of triangles to choose the cells by.
+// The sums over a run of triangles that the cell size follows from.
 struct Bounds {
   Point low = {INFINITY, INFINITY, INFINITY};
   Point high = {-INFINITY, -INFINITY, -INFINITY};
@@ -95,7 +95,7 @@ constexpr std::array<AxisBits, 3> kAxisBits = [] {
   return table;
 }();
 
-// How far outside the bounds a point is along the axis where it is farthest.
+// How far outside the bounds a point is, along the axis where it is farthest.
 double outside_by(const Point& point, const Point& low, const Point& high) {
   double most = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -178,7 +178,7 @@ TriangleGrid::StepRange TriangleGrid::box_of(const Corners& corners) const {
   return {steps_of(low), steps_of(high)};
 }
 
-// Calls put(cell, box) for the cells that the triangle may reach of these layers of cells.
+// Calls put(cell, box) for the cells of these layers that the triangle may reach.
 template <class Put>
 void TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t first_layer,
                              std::uint32_t last_layer, Put put) const {
@@ -213,7 +213,7 @@ void TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t first_layer,
 
 void TriangleGrid::fill_slabs(const Context& context) {
   const std::size_t triangles = surface_.triangles.size();
-  // Which layers of words each triangle reaches: a slab looks at those of all.
+  // The layers of words that each triangle reaches; a slab looks at all triangles.
   std::vector<std::array<std::uint16_t, 2>> layers(triangles);
   parallel_for(context, (triangles + kTrianglesPerTask - 1) / kTrianglesPerTask,
                [&](std::size_t task) {
@@ -275,7 +275,7 @@ void TriangleGrid::fill_slab(std::uint32_t slab, std::span<const Placed> entries
     const std::uint64_t lower = (std::uint64_t{1} << entry.bit % kWordCells) - 1;
     return before_[word] + static_cast<std::uint32_t>(std::popcount(level.bits[word] & lower));
   };
-  // Shifted by one: while the lists are filled, a begin is where its list goes on.
+  // Shifted by one: while the lists are filled, a begin is where its list continues.
   Slab& filled = slabs_[slab];
   filled.begins.assign(cells + 2, 0);
   for (const Placed& entry : entries) ++filled.begins[cell_of_entry(entry) + 2];
@@ -320,7 +320,7 @@ std::uint64_t TriangleGrid::bits_within(const CellRange& range, const Cell& word
     const std::int64_t first = std::int64_t{word[axis]} * kWordSide;
     const std::int64_t low = std::int64_t{range.low[axis] >> shift} - first;
     const std::int64_t high = std::int64_t{range.high[axis] >> shift} - first;
-    // What has shrunk since may have left the word behind.
+    // The range may have shrunk since, and no longer contain the word.
     if (low >= kWordSide || high < 0) return 0;
     bits &= kAxisBits[axis][static_cast<std::size_t>(std::max<std::int64_t>(low, 0))]
                      [static_cast<std::size_t>(std::min<std::int64_t>(high, kWordSide - 1))];
@@ -380,7 +380,7 @@ void TriangleGrid::look_at(std::uint32_t triangle, Search& search) const {
 }
 
 void TriangleGrid::look_within(double radius_mm, Search& search) const {
-  // More than rounding takes.
+  // More than rounding can add.
   constexpr double kMargin = 1 + 1e-9;
   constexpr double kStepMargin = 1e-9;
   const Point& point = search.point;
@@ -417,7 +417,7 @@ TriangleGrid::Nearest TriangleGrid::nearest(const Point& point, std::uint32_t gu
   Search search = {point, 0, {}, {}};
   search.seen.fill(kNone);
   if (guess != kNone) look_at(guess, search);
-  // What is known may be far off: then too many cells would be looked into.
+  // A distant guess would cause a search of too many cells.
   double radius = outside_by(point, low_, high_) + kFirstReach * side_mm_;
   for (; search.nearest.squared_mm > radius * radius; radius *= 2) {
     look_within(radius, search);

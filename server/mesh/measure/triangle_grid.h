@@ -1,4 +1,4 @@
-// The triangles of a surface by where they are: the one nearest to a point, those near a box.
+// A spatial index of a surface's triangles: the nearest one to a point, those near a box.
 #pragma once
 
 #include <algorithm>
@@ -16,11 +16,10 @@
 
 namespace isomesh::mesh {
 
-// Cubic cells of about an edge's length, each with the triangles that may reach into it. Which
-// cells have any is told by bits, 4 x 4 x 4 of them in a word, and which words have any by words
-// above them, so empty space costs next to nothing. Takes some 40 bytes a triangle, and twice that
-// while it is made. The view's arrays must outlive it. Immutable, so safe to read from several
-// threads.
+// Cubic cells of about an edge's length, each with the triangles that may reach into it. Words of 4
+// x 4 x 4 bits tell which cells have any, and further levels tell which words have any, so empty
+// space costs almost nothing. Takes some 40 bytes a triangle, twice as many while it is built. The
+// view's arrays must outlive it. Immutable, so safe to read from several threads.
 class TriangleGrid {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -30,21 +29,20 @@ class TriangleGrid {
     double squared_mm = std::numeric_limits<double>::infinity();
   };
 
-  // The same for any number of threads. Throws Error kUnusableVolume where a position that a
-  // triangle names is not a finite number, kTooLarge where 32 bits cannot number the triangles, and
-  // kCancelled.
+  // Does not depend on the number of threads. Throws Error kUnusableVolume if a triangle names a
+  // position that is not finite, kTooLarge if 32 bits cannot number the triangles, and kCancelled.
   TriangleGrid(const SurfaceView& surface, const Context& context);
 
-  // The triangle nearest to the point, which is finite; of several one of them. kNone and infinity
-  // where there are no triangles. A guess that is near makes it faster; kNone is no guess.
+  // The triangle nearest to the finite point; one of them if several are. Returns kNone and
+  // infinity if there are no triangles. A near `guess` makes it faster; kNone is no guess.
   Nearest nearest(const Point& point, std::uint32_t guess) const;
 
-  // A triangle that is no farther than that, whichever is found first: much faster where the guess
-  // is one. kNone and infinity where there is none. Of a finite point and distance.
+  // Returns the first triangle found within the finite distance; much faster if it is the guess.
+  // Returns kNone and infinity if there is none.
   Nearest within(const Point& point, double squared_mm, std::uint32_t guess) const;
 
-  // Calls visit(triangle) for all triangles that reach into the box, some of them several times,
-  // and for some others near it.
+  // Calls visit(triangle) for all triangles that reach into the box; for some several times, and
+  // for some others near it.
   template <class Visit>
   void visit_near(const Point& low, const Point& high, Visit visit) const {
     if (levels_.empty()) return;
@@ -67,7 +65,8 @@ class TriangleGrid {
     Cell low;
     Cell high;  // the last one
   };
-  // Words, x fastest. A bit is a cell in the lowest level, in others a word of the level below.
+  // Words, x fastest. A bit stands for a cell in the lowest level, and for a word of the level
+  // below in the others.
   struct Level {
     Cell words = {1, 1, 1};
     std::vector<std::uint64_t> bits;
@@ -76,22 +75,22 @@ class TriangleGrid {
       return (std::size_t{word[2]} * words[1] + word[1]) * words[0] + word[0];
     }
   };
-  // Sixteenths of a cell, by which boxes are compared; cells are whole ones.
+  // In sixteenths of a cell, for comparing boxes.
   using Steps = std::array<std::uint32_t, 3>;
   struct StepRange {
     Steps low;
     Steps high;  // the last one
   };
   static constexpr std::uint32_t kCellSteps = 16;
-  // A box within a cell is six fields of four bits and a spare one: where it begins along each
-  // axis, and how far from the cell's end it ends.
+  // A box within a cell has six fields of four bits and a spare bit: for each axis where it begins,
+  // and how far before the cell's end it ends.
   static constexpr std::uint32_t kFieldBits = 5;
   static constexpr std::uint32_t kSpareBits = 0b10000'10000'10000'10000'10000'10000;
   struct Entry {
     std::uint32_t triangle;
     std::uint32_t box;
   };
-  // Some layers of words: the entries of their cells one cell after the other.
+  // Some layers of words; the entries of their cells follow each other.
   struct Slab {
     std::vector<std::uint32_t> begins;  // cells + 1
     std::vector<Entry> entries;
@@ -109,7 +108,7 @@ class TriangleGrid {
     return static_cast<std::uint32_t>(std::clamp<std::int32_t>(from_begin, 0, kCellSteps - 1));
   }
   static std::uint32_t box_in(const StepRange& box, const Cell& cell);
-  // What the fields of boxes are compared with: where the box ends, and where it begins.
+  // The operands for comparing boxes: where the box ends, and where it begins.
   static std::uint32_t reach_in(const StepRange& box, const Cell& cell) {
     return box_in({box.high, box.low}, cell);
   }
@@ -135,19 +134,18 @@ class TriangleGrid {
   static std::uint64_t bits_xored(std::uint64_t word, unsigned number);
   std::span<const Entry> entries_at(const Cell& word, std::size_t index, unsigned bit) const;
   double squared_distance_to(const Cell& cell, const Point& point) const;
-  // One point's; remembers some triangles that it has looked at, which several cells have.
+  // A search for one point; remembers triangles that it has looked at, because cells share them.
   struct Search {
     Point point;
-    double enough_squared_mm;  // what need not be nearer
+    double enough_squared_mm;  // no need to find a nearer one
     Nearest nearest;
     std::array<std::uint32_t, 64> seen;
   };
   void look_at(std::uint32_t triangle, Search& search) const;
-  // At all that may be nearer than what is known, and within the radius.
+  // Looks at all cells within the radius that may have something nearer than what is known.
   void look_within(double radius_mm, Search& search) const;
 
-  // The cells near the middle of the range come first, by and large. `range` may shrink while cells
-  // are visited.
+  // Visits the cells near the middle of the range first, roughly. `range` may shrink meanwhile.
   template <class Visit>
   void descend(std::size_t level, const Cell& word, const CellRange& range, Visit& visit) const {
     const std::size_t index = levels_[level].index(word);

@@ -357,13 +357,12 @@ void optimize(const FanMoves& moves, Fan& fan) {
   }
 }
 
-void move_fans_at_once(const FanMoves& moves, FanMove move,
-                       std::span<const std::uint32_t> vertices) {
+void move_fans_at_once(const FanMoves& moves, Move move, std::span<const std::uint32_t> vertices) {
   Fan fan;
-  if (move != FanMove::kOptimize) {
+  if (move != Move::kLargestAngle) {
     for (std::size_t begin = 0; begin < vertices.size(); begin += kLanes) {
       gather_fan(moves, vertices.subspan(begin, std::min(kLanes, vertices.size() - begin)), fan);
-      slide(moves, fan, move == FanMove::kMean ? towards_mean(fan) : towards_bisectors(fan));
+      slide(moves, fan, move == Move::kTangentialMean ? towards_mean(fan) : towards_bisectors(fan));
     }
     return;
   }
@@ -395,7 +394,7 @@ namespace isomesh::mesh {
 
 HWY_EXPORT(move_fans_at_once);
 
-void move_fans(const FanMoves& moves, FanMove move, std::span<const std::uint32_t> vertices) {
+void move_fans(const FanMoves& moves, Move move, std::span<const std::uint32_t> vertices) {
   HWY_DYNAMIC_DISPATCH(move_fans_at_once)(moves, move, vertices);
 }
 

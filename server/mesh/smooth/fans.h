@@ -1,12 +1,12 @@
-// Moves of vertices that raise the angles around them, several vertices at a time; compiled for
-// several instruction sets of which the best is chosen when the program runs; private to this
-// folder.
+// Moves of vertices along the surface that raise angles, several vertices at a time; private to
+// this folder. Compiled for several instruction sets; the best one is chosen at run time.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
 #include "server/mesh/mesh.h"
+#include "server/mesh/smooth/methods.h"
 #include "server/mesh/smooth/rings.h"
 
 namespace isomesh::mesh {
@@ -16,14 +16,12 @@ struct FanMoves {
   const Rings& rings;
   const Vec3* extracted;   // where the vertices were before the first pass
   Vec3* positions;         // where they are
-  std::uint32_t* home;     // of each, the vertex whose extracted triangles it lies on
+  std::uint32_t* home;     // for each, the vertex whose extracted triangles it lies on
   float max_displacement;  // from the extracted position
 };
 
-enum class FanMove { kMean, kAngle, kOptimize };
-
-// Moves the vertices, which have rings and of which no two are neighbours. Thread safe as long as
-// none of them or of their neighbours is moved meanwhile.
-void move_fans(const FanMoves& moves, FanMove move, std::span<const std::uint32_t> vertices);
+// Moves the vertices, which have rings and of which no two are neighbours. Thread safe if no other
+// thread moves them or their neighbours meanwhile.
+void move_fans(const FanMoves& moves, Move move, std::span<const std::uint32_t> vertices);
 
 }  // namespace isomesh::mesh

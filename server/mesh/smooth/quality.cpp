@@ -49,10 +49,10 @@ class QualitySmoother {
   }
 
   void run() {
-    for (int pass = 0; pass < options_.passes; ++pass) {
+    for (const Step& step : options_.steps) {
       for (const std::size_t parity : {0, 1}) {
         parallel_for(quiet_, (slabs_.size() + 1 - parity) / 2, [&](std::size_t i) {
-          move(slabs_[2 * i + parity], move_of(pass));
+          move(slabs_[2 * i + parity], step.move);
           report_slab();
         });
       }
@@ -87,7 +87,7 @@ class QualitySmoother {
     return rings_.has_ring(vertex) && !mesh_.is_on_border(vertex) && !mesh_.is_on_line(vertex);
   }
 
-  // Each vertex takes the first colour that no earlier neighbour in the slab has.
+  // Gives each vertex the first colour that no earlier neighbour in the slab has.
   void color(std::size_t slab) {
     const std::uint64_t first = first_vertex(slab);
     const std::uint64_t end = first_vertex(slab + 1);
@@ -117,13 +117,8 @@ class QualitySmoother {
     }
   }
 
-  FanMove move_of(int pass) const {
-    if (options_.way == SmoothingWay::kAngle) return FanMove::kAngle;
-    return pass < options_.passes / 2 ? FanMove::kMean : FanMove::kOptimize;
-  }
-
-  void move(const ColoredSlab& slab, FanMove move) {
-    // In single precision a distance may come out a little too small.
+  void move(const ColoredSlab& slab, Move move) {
+    // A distance in single precision may be slightly too small.
     constexpr double kSurely = 1 - 1e-6;
     const FanMoves moves = {
         .rings = rings_,
@@ -140,7 +135,7 @@ class QualitySmoother {
   void report_slab() {
     if (!context_.progress) return;
     const std::size_t done = slabs_done_.fetch_add(1, std::memory_order_relaxed) + 1;
-    const std::size_t all = slabs_.size() * static_cast<std::size_t>(options_.passes);
+    const std::size_t all = slabs_.size() * options_.steps.size();
     context_.progress(static_cast<double>(done) / static_cast<double>(all));
   }
 

@@ -15,7 +15,7 @@ struct Spokes {
   std::uint32_t previous = 0;
 };
 
-// The runs of triangles that name vertices of a layer: its own, and those of the layer below.
+// The triangles that name vertices of a layer: its own, and those of the layer below.
 std::span<const Triangle> triangles_at(const Mesh& mesh, std::size_t layer) {
   return mesh.triangles_of(layer == 0 ? 0 : layer - 1, layer + 1);
 }
@@ -25,7 +25,7 @@ void visit_corners(const Mesh& mesh, std::size_t layer, Visit visit) {
   const std::uint64_t first = mesh.layer_vertices[layer];
   const std::uint64_t count = mesh.layer_vertices[layer + 1] - first;
   for (const auto& [a, b, c] : triangles_at(mesh, layer)) {
-    // A vertex before the first wraps around.
+    // A vertex before the first one wraps around.
     if (a - first < count) visit(a - first, Spokes{b, c});
     if (b - first < count) visit(b - first, Spokes{c, a});
     if (c - first < count) visit(c - first, Spokes{a, b});
@@ -52,7 +52,7 @@ Rings::Rings(const Mesh& mesh, const Context& context) {
   count_.resize_for_overwrite(mesh.positions.size());
   neighbors_.resize_for_overwrite(3 * mesh.triangles.size());
 
-  // How many triangles each vertex has, then where those of each layer's vertices begin.
+  // The number of triangles of each vertex; then where those of each layer's vertices begin.
   std::vector<std::uint64_t> layer_begin(layers + 1, 0);
   parallel_for(context, layers, [&](std::size_t layer) {
     std::uint64_t* counts = begin_.data() + mesh.layer_vertices[layer];

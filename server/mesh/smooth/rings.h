@@ -1,5 +1,4 @@
-// The neighbours of every vertex in the order in which its triangles follow each other; private to
-// this folder.
+// The neighbours of every vertex in the order of its triangles; private to this folder.
 #pragma once
 
 #include <cstddef>

@@ -13,28 +13,24 @@
 namespace isomesh::mesh {
 namespace {
 
-// More steps at once save little: what each walk costs anew is about one step.
+// More steps at once save little: each walk costs about one step in addition.
 constexpr std::size_t kUsualSteps = 6;
 
-std::size_t steps_of(const SmoothOptions& options) {
-  return static_cast<std::size_t>(options.passes) * (options.mu == 0 ? 1 : 2);
-}
-
-// How the work is cut up: a number of rounds of almost equally many steps, in each of which every
-// slab is one task.
+// The partition of the work: rounds of almost equally many steps; in a round every slab is one
+// task.
 struct Plan {
   std::size_t slabs = 1;
   std::size_t rounds = 1;
   std::uint64_t bytes = 0;
 
-  // Steps before the round begins.
+  // The number of steps before the round.
   std::size_t first_step(std::size_t round, std::size_t steps) const {
     return steps * round / rounds;
   }
 };
 
-// Slabs cost the steps around their cuts twice: as few as keep the threads busy, and on a deep
-// volume twice that, so that they end together.
+// The steps around a slab's cuts are made twice. So there are just enough slabs to keep the threads
+// busy, and twice as many on a deep volume, so that all threads end at about the same time.
 std::size_t count_slabs(std::size_t layers) {
   constexpr std::size_t kFewestLayers = 16;
   constexpr std::size_t kManyLayers = 64;
@@ -43,10 +39,10 @@ std::size_t count_slabs(std::size_t layers) {
                    std::min(2 * threads, layers / kManyLayers)});
 }
 
-// Many steps in one round need many layers at a time, more rounds a copy of all positions, to know
-// at the end how far they moved: whichever is less.
+// Many steps in one round need many layers at a time. More rounds need a copy of all positions, for
+// the displacements at the end. Chooses the one that takes less memory.
 Plan plan_for(const SmoothOptions& options, const SurfaceSize& size) {
-  const std::size_t steps = steps_of(options);
+  const std::size_t steps = options.steps.size();
   Plan plan = {.slabs = count_slabs(size.layers)};
   const auto bytes_with = [&](std::size_t steps_at_once) {
     const auto at_once = std::min(plan.slabs, static_cast<std::size_t>(thread_count()));
@@ -63,7 +59,9 @@ Plan plan_for(const SmoothOptions& options, const SurfaceSize& size) {
   return plan;
 }
 
-// Cuts the layers into runs of about as many vertices.
+bool takes_means(const SmoothOptions& options) { return options.steps.front().move == Move::kMean; }
+
+// Cuts the layers into runs of about equally many vertices.
 std::vector<LayerRange> cut_slabs(const Mesh& mesh, std::size_t slabs) {
   std::vector<LayerRange> result;
   LayerRange slab;
@@ -103,10 +101,7 @@ class Smoother {
         before_(mesh.layers()),
         after_(mesh.layers()),
         displacements_(mesh.layers()) {
-    for (std::size_t step = 0; step < steps_of(options); ++step) {
-      const bool is_second = options.mu != 0 && step % 2 == 1;
-      shares_.push_back(static_cast<float>(is_second ? options.mu : options.lambda));
-    }
+    for (const Step& step : options.steps) shares_.push_back(static_cast<float>(step.weight));
   }
 
   SmoothingEffect run() {
@@ -131,6 +126,7 @@ class Smoother {
     const bool is_last = number + 1 == plan_.rounds;
     const Round round = {.mesh = mesh_,
                          .shares = std::span(shares_).subspan(first, last - first),
+                         .at_curves = options_.at_curves,
                          .max_displacement_mm = options_.max_displacement_mm,
                          .within = options_.within,
                          .extracted = plan_.rounds > 1 ? extracted_.data() : nullptr,
@@ -153,7 +149,7 @@ class Smoother {
       parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { measure_seam(i, after_); });
   }
 
-  // Of the triangles that name vertices of this slab and of the next.
+  // Measures the triangles that name vertices of this slab and of the next.
   void measure_seam(std::size_t slab, std::vector<LayerExtent>& extents) {
     const auto layer = static_cast<std::size_t>(slabs_[slab].end) - 1;
     if (layer + 1 < mesh_.layers()) add_triangles(mesh_, layer, extents[layer]);
@@ -186,7 +182,7 @@ class Smoother {
   const Plan plan_;
   const std::vector<LayerRange> slabs_;
   std::vector<float> shares_;
-  Buffer<Vec3> extracted_;  // of several rounds
+  Buffer<Vec3> extracted_;  // only for several rounds
   std::vector<LayerExtent> before_;
   std::vector<LayerExtent> after_;
   std::vector<LayerDisplacement> displacements_;
@@ -195,7 +191,9 @@ class Smoother {
 
 }  // namespace
 
-double taubin_mu(double lambda, double pass_band) { return 1 / (pass_band - 1 / lambda); }
+bool SmoothOptions::goes_outwards() const {
+  return std::ranges::any_of(steps, [](const Step& step) { return step.weight < 0; });
+}
 
 std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& dims, double wider) {
   const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
@@ -205,7 +203,7 @@ std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& di
     Point normal = cross(steps[(axis + 1) % 3], steps[(axis + 2) % 3]);
     const double length = std::sqrt(dot(normal, normal));
     for (double& coordinate : normal) coordinate /= length;
-    const double step = dot(normal, steps[axis]);  // negative of a left-handed lattice
+    const double step = dot(normal, steps[axis]);  // negative for a left-handed lattice
     const double first = dot(normal, to_space.origin) - wider * step;
     const double last = first + (counts[axis] - 1 + 2 * wider) * step;
     box.push_back({normal, std::max(first, last)});
@@ -216,17 +214,17 @@ std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& di
 }
 
 SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh) {
-  if (steps_of(options) == 0 || mesh.positions.size() == 0) {
+  if (options.steps.empty() || mesh.positions.size() == 0) {
     const Extent extent = measure_extent(mesh, context);
     return {.before = extent, .after = extent};
   }
-  if (options.way != SmoothingWay::kMean) return smooth_by_quality(options, context, mesh);
-  return Smoother(options, context, mesh).run();
+  return takes_means(options) ? Smoother(options, context, mesh).run()
+                              : smooth_by_quality(options, context, mesh);
 }
 
 std::uint64_t smoothing_memory(const SmoothOptions& options, const SurfaceSize& size) {
-  if (steps_of(options) == 0 || size.vertices == 0) return 0;
-  return options.way == SmoothingWay::kMean ? plan_for(options, size).bytes : quality_memory(size);
+  if (options.steps.empty() || size.vertices == 0) return 0;
+  return takes_means(options) ? plan_for(options, size).bytes : quality_memory(size);
 }
 
 }  // namespace isomesh::mesh

@@ -12,11 +12,13 @@
 namespace isomesh::mesh {
 namespace {
 
-// A step reads three layers of the step before, and the one that it completes takes the place of
-// the first of them.
+// A step reads three layers of the previous step. The layer that it completes replaces the first of
+// them.
 constexpr std::size_t kRingLayers = 3;
+// The layers whose triangles are being listed.
+constexpr std::size_t kLayersOfFans = 2;
 
-// Where a position lies in every ring, in units of 8 bytes: what a processor scales by itself.
+// The place of a position in every ring, in units of 8 bytes, which processors scale by themselves.
 using Place = std::uint32_t;
 constexpr Place kPlacesPerPosition = sizeof(Float4) / 8;
 
@@ -25,75 +27,62 @@ Float4 at(const Float4* ring, Place place) {
                                           std::size_t{place} * 8);
 }
 
-// One more neighbour of a vertex that has many.
+// A further neighbour of a vertex that has many.
 struct MoreNeighbor {
-  std::uint32_t vertex = 0;  // counted from the layer's first
+  std::uint32_t vertex = 0;  // relative to the layer's first
   Place place = 0;
 };
 
 constexpr std::uint32_t kNoVertex = UINT32_MAX;  // ends a list
 
-// A vertex and its neighbours, as the triangles around it name them one after the other.
-class Neighbors {
+// A vertex's neighbours, in the order in which its triangles name them.
+struct Neighbors {
+  // Turns the sum of the neighbours into their mean; 0 for a vertex that stays where it is.
+  float weight = 0;
+  // The first neighbours, then the place of zero.
+  std::array<Place, kUsualNeighbors> places;
+
+  explicit Neighbors(Place of_zero) { places.fill(of_zero); }
+};
+
+// The triangles around a vertex, while they are listed.
+class Fan {
  public:
-  explicit Neighbors(Place of_zero) { neighbors_.fill(of_zero); }
-
-  // A triangle's next and previous corner. False when there is no place left for the neighbour.
-  bool add(std::uint32_t next, std::uint32_t previous, Place next_place) {
-    const auto count = static_cast<std::size_t>(fan_ & (kOne - 1));
-    fan_ += (std::int64_t{next} - previous) * kOne + 1;
-    if (count >= kUsualNeighbors) return false;
-    neighbors_[count] = next_place;
-    return true;
+  // Adds a triangle by its next and its previous corner. Returns the number of triangles before.
+  std::size_t add(std::uint32_t next, std::uint32_t previous) {
+    const auto count = static_cast<std::size_t>(sum_ & (kOne - 1));
+    sum_ += (std::int64_t{next} - previous) * kOne + 1;
+    return count;
   }
-
-  // The two neighbours along a line where walls meet.
-  void set_line(Place one, Place other) {
-    neighbors_[0] = one;
-    neighbors_[1] = other;
-    fan_ = 2;
-  }
-
-  // True for a vertex on a line.
-  bool has_line() const { return fan_ == 2; }
 
   // In an oriented manifold the triangles name each neighbour once as the next corner and once as
   // the previous one, and the sum of the differences is zero, unless the vertex lies on the
   // boundary: then its first neighbour is never a next one and its last never a previous one.
-  bool is_on_boundary() const { return fan_ <= 0 || fan_ >= kOne; }
-  float one_over_count() const { return 1 / static_cast<float>(fan_); }
-
-  // What makes a mean of the sum of the neighbours; 0 for a vertex that is to stay where it is.
-  void set_weight(float weight) { weight_ = weight; }
-  float weight() const { return weight_; }
-
-  // The first neighbours, and then the place of zero.
-  const std::array<Place, kUsualNeighbors>& neighbors() const { return neighbors_; }
+  bool is_on_boundary() const { return sum_ <= 0 || sum_ >= kOne; }
+  float one_over_count() const { return 1 / static_cast<float>(sum_); }
 
  private:
   static constexpr std::int64_t kOne = 1 << 16;
-  union {
-    std::int64_t fan_ = 0;  // 2^16 times the sum of next minus previous corners, plus their number
-    float weight_;          // once that is known
-  };
-  std::array<Place, kUsualNeighbors> neighbors_;
+  std::int64_t sum_ = 0;  // 2^16 times the sum of next minus previous corners, plus their number
 };
 
 // A layer's vertices while their neighbours are listed.
 struct LayerLinks {
-  std::uint32_t first = 0;      // vertex
-  Place first_place = 0;        // in every ring
-  std::size_t first_index = 0;  // in the array of links
+  std::uint32_t first = 0;  // vertex
+  Place first_place = 0;    // in every ring
+  Neighbors* neighbors = nullptr;
+  Fan* fans = nullptr;
   std::vector<MoreNeighbor>* more = nullptr;
-  std::vector<MoreNeighbor>* on_line = nullptr;  // of vertices on lines, once for each triangle
+  // Neighbours along junction curves, of vertices on them, once for each triangle.
+  std::vector<MoreNeighbor>* on_line = nullptr;
 };
 
 // Lists, for the vertices of two layers, the corners that follow them in the triangles that name
-// both layers' vertices; for those on a line where walls meet, `is_on_line`, the corners that are
-// on it too, whichever side they are of. The differences below are modulo 2^32 and 2^64.
+// both layers' vertices. For vertices on a junction curve, `is_on_line`, it lists all corners on
+// the curve instead. The differences below are modulo 2^32.
 template <bool kHasLines, class IsOnLine>
 void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
-                   const LayerLinks& upper, IsOnLine is_on_line, Neighbors* links) {
+                   const LayerLinks& upper, IsOnLine is_on_line) {
   const Place upper_shift = upper.first_place - upper.first * kPlacesPerPosition;
   const Place lower_shift = lower.first_place - lower.first * kPlacesPerPosition;
   const auto place_of = [&](std::uint32_t vertex) {
@@ -101,22 +90,22 @@ void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
   };
   const auto add = [&](std::uint32_t vertex, std::uint32_t next, std::uint32_t previous,
                        Place next_place) {
-    const bool is_upper = vertex >= upper.first;
-    const std::size_t index =
-        vertex + (is_upper ? upper.first_index - upper.first : lower.first_index - lower.first);
+    const LayerLinks& layer = vertex >= upper.first ? upper : lower;
+    const std::uint32_t index = vertex - layer.first;
     if constexpr (kHasLines) {
       if (is_on_line(vertex)) {
         for (const std::uint32_t other : {next, previous}) {
-          if (!is_on_line(other)) continue;
-          const LayerLinks& layer = is_upper ? upper : lower;
-          layer.on_line->push_back({vertex - layer.first, place_of(other)});
+          if (is_on_line(other)) layer.on_line->push_back({index, place_of(other)});
         }
         return;
       }
     }
-    if (links[index].add(next, previous, next_place)) return;
-    const LayerLinks& layer = is_upper ? upper : lower;
-    layer.more->push_back({vertex - layer.first, next_place});
+    const std::size_t count = layer.fans[index].add(next, previous);
+    if (count < kUsualNeighbors) {
+      layer.neighbors[index].places[count] = next_place;
+    } else {
+      layer.more->push_back({index, next_place});
+    }
   };
   for (const auto& [a, b, c] : triangles) {
     const Place place_a = place_of(a);
@@ -138,8 +127,8 @@ double distance(const Vec3& a, const Vec3& b) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
-// The point on the way from `origin` to `position` that is `limit` away from it. Rounded towards
-// the origin in each coordinate, so that it is not farther by a rounding error.
+// The point between `origin` and `position` at the distance `limit` from the origin. Each
+// coordinate is rounded towards the origin, so rounding never makes it farther.
 Float4 pulled_back(const Vec3& origin, Float4 position, double limit) {
   std::array<double, 3> way;
   double squares = 0;
@@ -180,6 +169,7 @@ class Sweep {
     }
     moved_.resize_for_overwrite(width_);
     links_.resize((steps_ + 1) * width_, Neighbors(place_of_zero()));
+    fans_.resize(kLayersOfFans * width_);
     more_.resize(steps_ + 1);
     on_line_.resize(steps_ + 1);
   }
@@ -200,7 +190,7 @@ class Sweep {
   }
 
  private:
-  // The layers that a step moves; those of step 0 are what the first one starts from.
+  // The layers that a step moves. Those of step 0 are the ones that the first step reads.
   LayerRange covered(std::size_t step) const { return with_halo(round_, slab_, steps_ - step); }
 
   std::size_t vertices(std::ptrdiff_t layer) const {
@@ -216,6 +206,7 @@ class Sweep {
   Neighbors* links(std::ptrdiff_t layer) {
     return links_.data() + turn(layer, steps_ + 1) * width_;
   }
+  Fan* fans(std::ptrdiff_t layer) { return fans_.data() + turn(layer, kLayersOfFans) * width_; }
   std::vector<MoreNeighbor>& more_neighbors(std::ptrdiff_t layer) {
     return more_[turn(layer, steps_ + 1)];
   }
@@ -223,7 +214,8 @@ class Sweep {
     return {
         .first = static_cast<std::uint32_t>(round_.first_vertex(layer)),
         .first_place = static_cast<Place>(turn(layer, kRingLayers) * width_ * kPlacesPerPosition),
-        .first_index = static_cast<std::size_t>(links(layer) - links_.data()),
+        .neighbors = links(layer),
+        .fans = fans(layer),
         .more = &more_neighbors(layer),
         .on_line = &on_line_[turn(layer, steps_ + 1)]};
   }
@@ -231,7 +223,7 @@ class Sweep {
     return static_cast<Place>(kRingLayers * width_ * kPlacesPerPosition);
   }
 
-  // Where the layer's vertices are before the round. For the slab's own until their last step.
+  // The layer's positions before the round; valid for the slab's own layers until their last step.
   const Vec3* unmoved(std::ptrdiff_t layer) const {
     const std::uint64_t first = round_.first_vertex(layer);
     if (slab_.contains(layer)) return round_.mesh.positions.data() + first;
@@ -257,7 +249,7 @@ class Sweep {
     measure(layer, round_.before);
   }
 
-  // Measures the slab's triangles whose vertices are all there once the layer's are.
+  // Measures the triangles of the slab that are complete once the layer is.
   void measure(std::ptrdiff_t layer, LayerExtent* extents) {
     if (slab_.contains(layer - 1)) add_triangles(round_.mesh, layer - 1, extents[layer - 1]);
     if (layer + 1 == round_.layers()) add_triangles(round_.mesh, layer, extents[layer]);
@@ -265,11 +257,12 @@ class Sweep {
 
   void begin_links(std::ptrdiff_t layer) {
     std::fill_n(links(layer), vertices(layer), Neighbors(place_of_zero()));
+    std::fill_n(fans(layer), vertices(layer), Fan());
     more_neighbors(layer).clear();
     on_line_[turn(layer, steps_ + 1)].clear();
   }
 
-  // Adds the layer's triangles to the lists of neighbours; those of its vertices are complete then.
+  // Adds the layer's triangles to the neighbours of its vertices, which completes them.
   void link(std::ptrdiff_t layer) {
     if (layer >= covered(1).end) return;
     const bool is_last = layer + 1 == round_.layers();
@@ -281,9 +274,9 @@ class Sweep {
     const auto triangles = round_.mesh.triangles_of(layer, layer + 1);
     const auto is_on_line = [&](std::uint32_t v) { return round_.mesh.is_on_line(v); };
     if (round_.mesh.on_line.empty()) {
-      add_neighbors<false>(triangles, layer_links(layer), upper, is_on_line, links_.data());
+      add_neighbors<false>(triangles, layer_links(layer), upper, is_on_line);
     } else {
-      add_neighbors<true>(triangles, layer_links(layer), upper, is_on_line, links_.data());
+      add_neighbors<true>(triangles, layer_links(layer), upper, is_on_line);
     }
     weigh(layer);
     auto& more = more_neighbors(layer);
@@ -291,10 +284,10 @@ class Sweep {
     more.push_back({kNoVertex, 0});
   }
 
-  // Three walls meet along a line, so three triangles name each neighbour along it. Two name one
-  // across a wall. Sets the neighbours of vertices that have two along lines; where a line ends or
-  // lines meet there are not two.
-  void find_lines(std::ptrdiff_t layer) {
+  // Lets vertices with two neighbours along a junction curve move between them. Ends and junctions
+  // of curves do not have two. Three walls meet along a curve, so three triangles name a neighbour
+  // along it; two name one across a wall.
+  void free_along_lines(std::ptrdiff_t layer) {
     auto& found = on_line_[turn(layer, steps_ + 1)];
     const auto key = [](const MoreNeighbor& n) { return std::pair(n.vertex, n.place); };
     std::ranges::sort(found, {}, key);
@@ -309,22 +302,27 @@ class Sweep {
         if (count < along.size()) along[count] = found[begin].place;
         ++count;
       }
-      if (count == along.size()) links(layer)[vertex].set_line(along[0], along[1]);
+      if (count != along.size() || is_on_border(layer, vertex)) continue;
+      Neighbors& link = links(layer)[vertex];
+      std::ranges::copy(along, link.places.begin());
+      link.weight = 1.0F / along.size();
     }
   }
 
-  // Decides which of the layer's vertices stay where they are.
+  bool is_on_border(std::ptrdiff_t layer, std::size_t vertex) const {
+    return round_.mesh.is_on_border(round_.first_vertex(layer) + vertex);
+  }
+
+  // Sets the weights of the layer's neighbours. Vertices on a junction curve have an empty fan.
   void weigh(std::ptrdiff_t layer) {
-    find_lines(layer);
     Neighbors* link = links(layer);
-    const std::uint64_t first = round_.first_vertex(layer);
+    const Fan* fan = fans(layer);
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
-      const bool is_held =
-          round_.mesh.is_on_line(first + v) ? !link[v].has_line() : link[v].is_on_boundary();
-      const bool is_fixed = is_held || round_.mesh.is_on_border(first + v);
-      link[v].set_weight(is_fixed ? 0 : link[v].one_over_count());
+      const bool is_fixed = fan[v].is_on_boundary() || is_on_border(layer, v);
+      link[v].weight = is_fixed ? 0 : fan[v].one_over_count();
     }
+    if (round_.at_curves == AtCurves::kAlong) free_along_lines(layer);
   }
 
   void advance(std::size_t step, std::ptrdiff_t layer) {
@@ -348,11 +346,11 @@ class Sweep {
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
       Float4 sum = {};
-      for (const Place place : link[v].neighbors()) sum += at(ring, place);
+      for (const Place place : link[v].places) sum += at(ring, place);
       for (; more->vertex == v; ++more) sum += at(ring, more->place);
-      const Float4 mean = sum * link[v].weight();
+      const Float4 mean = sum * link[v].weight;
       const Float4 moved = share == 1 ? mean : from[v] + (mean - from[v]) * share;
-      to[v] = link[v].weight() == 0 ? from[v] : moved;
+      to[v] = link[v].weight == 0 ? from[v] : moved;
     }
   }
 
@@ -360,7 +358,7 @@ class Sweep {
     const Neighbors* link = links(layer);
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
-      if (link[v].weight() == 0) continue;
+      if (link[v].weight == 0) continue;
       for (const HalfSpace& half : round_.within) {
         const double outside = half.normal[0] * to[v][0] + half.normal[1] * to[v][1] +
                                half.normal[2] * to[v][2] - half.offset;
@@ -383,7 +381,7 @@ class Sweep {
     }
   }
 
-  // Writes the layer's last positions of the round, and measures them if it is the last round.
+  // Writes the layer's positions after the round, and measures them in the last round.
   void finish(std::ptrdiff_t layer) {
     const std::size_t count = vertices(layer);
     const Vec3* origin = extracted(layer);  // may be `to`: read before written
@@ -416,6 +414,7 @@ class Sweep {
   std::vector<Buffer<Float4>> rings_;  // positions before each step
   Buffer<Float4> moved_;               // the positions of one layer after the last step
   std::vector<Neighbors> links_;
+  std::vector<Fan> fans_;
   std::vector<std::vector<MoreNeighbor>> more_;  // in the order of the vertices
   std::vector<std::vector<MoreNeighbor>> on_line_;
 };
@@ -434,7 +433,8 @@ void sweep(const Round& round, const LayerRange& slab, const LayerCopy& below,
 }
 
 std::uint64_t sweep_bytes_per_vertex(std::size_t steps) {
-  return (kRingLayers * steps + 1) * sizeof(Float4) + (steps + 1) * sizeof(Neighbors);
+  return (kRingLayers * steps + 1) * sizeof(Float4) + (steps + 1) * sizeof(Neighbors) +
+         kLayersOfFans * sizeof(Fan);
 }
 
 }  // namespace isomesh::mesh

@@ -13,7 +13,7 @@
 
 namespace isomesh::mesh {
 
-// Layers [begin, end). Signed, so that layers before the first may be spoken of.
+// Layers [begin, end); signed, because layers before the first occur.
 struct LayerRange {
   std::ptrdiff_t begin = 0;
   std::ptrdiff_t end = 0;
@@ -33,16 +33,17 @@ struct LayerDisplacement {
   double largest = 0;
 };
 
-// What all slabs of a round of steps share.
+// The shared data of all slabs of a round.
 struct Round {
   Mesh& mesh;
   std::span<const float> shares;  // of the way to the mean of the neighbours: one for each step
+  AtCurves at_curves;
   double max_displacement_mm;
-  std::span<const HalfSpace> within;  // that free vertices stay in
-  // Where the vertices were extracted; null: where the round finds them.
+  std::span<const HalfSpace> within;  // free vertices stay within them
+  // The extracted positions; null if those before the round are.
   const Vec3* extracted;
-  // By layer, to be added to: null where the round is not the first or not the last. Triangles that
-  // name vertices of two slabs are left out.
+  // Sums by layer; null except in the first and the last round. Triangles that name vertices of two
+  // slabs are left out.
   LayerExtent* before;
   LayerExtent* after;
   LayerDisplacement* displacements;
@@ -52,22 +53,21 @@ struct Round {
   std::uint64_t first_vertex(std::ptrdiff_t layer) const { return mesh.layer_vertices[layer]; }
 };
 
-// The slab and the layers around it that a sweep has to move too: one less on either side with each
-// step.
+// The layers that a sweep has to move for a slab: one fewer on either side with each step.
 LayerRange with_halo(const Round& round, const LayerRange& slab, std::size_t steps);
 
 // Moves the vertices of the slab's layers by all steps of the round. `below` and `above` are copies
 // of the other layers of with_halo(round, slab, steps), which other slabs write meanwhile.
-// `on_layer` is called when one of the slab's layers is done, and may throw. Thread safe for
-// different slabs.
+// `on_layer` is called after each of the slab's layers, and may throw. Thread safe for different
+// slabs.
 void sweep(const Round& round, const LayerRange& slab, const LayerCopy& below,
            const LayerCopy& above, const std::function<void()>& on_layer);
 
-// An upper bound of what a sweep of that many steps takes, in bytes for each vertex of the largest
-// layer, on a mesh of at most kUsualNeighbors neighbours a vertex.
+// An upper bound of the memory of a sweep of this many steps, in bytes for each vertex of the
+// largest layer, if no vertex has more than kUsualNeighbors neighbours.
 std::uint64_t sweep_bytes_per_vertex(std::size_t steps);
 
-// Vertices with more are served too, though not as fast.
+// More neighbours are possible, but slower.
 inline constexpr std::size_t kUsualNeighbors = 8;
 
 }  // namespace isomesh::mesh

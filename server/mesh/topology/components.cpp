@@ -16,19 +16,19 @@ namespace {
 constexpr std::size_t kLayersPerSlab = 16;
 
 // Disjoint sets of vertices as a forest: every vertex points to a smaller one of its set, the
-// smallest to itself. Different threads may work on vertices that no set has in common.
+// smallest to itself. Threads may work at the same time on vertices that have no set in common.
 class Forest {
  public:
-  // The memory is the caller's, one number a vertex.
+  // The caller owns the memory: one number a vertex.
   explicit Forest(std::span<std::uint32_t> parents) : parents_(parents) {}
 
-  // Each of the vertices [begin, end) becomes a set of its own.
+  // Makes each of the vertices [begin, end) a set of its own.
   void begin_sets(std::uint64_t begin, std::uint64_t end) {
     const auto sets = parents_.subspan(begin, end - begin);
     std::iota(sets.begin(), sets.end(), static_cast<std::uint32_t>(begin));
   }
 
-  // Makes one set of each triangle's corners; returns how many sets fewer there are then.
+  // Joins the corners of each triangle. Returns how many sets disappear.
   std::uint64_t join(std::span<const Triangle> triangles) {
     std::uint64_t joined = 0;
     for (const auto& [a, b, c] : triangles) {
@@ -56,13 +56,13 @@ class Forest {
   std::span<std::uint32_t> parents_;
 };
 
-// Makes `parents` the forest of the mesh's components. Returns how many there are.
+// Makes `parents` the forest of the mesh's components. Returns their number.
 std::uint64_t join_vertices(const Mesh& mesh, const Context& context,
                             std::span<std::uint32_t> parents) {
   Forest forest(parents);
   const std::size_t layers = mesh.layers();
   const std::size_t slabs = (layers + kLayersPerSlab - 1) / kLayersPerSlab;
-  // First the triangles that name no vertex of the next slab, slabs side by side; then the others.
+  // Triangles within a slab come first, slabs in parallel; triangles between slabs follow.
   std::vector<std::uint64_t> joined(slabs);
   parallel_for(context, slabs, [&](std::size_t slab) {
     const std::size_t begin = slab * kLayersPerSlab;
@@ -79,7 +79,7 @@ std::uint64_t join_vertices(const Mesh& mesh, const Context& context,
   return components;
 }
 
-// The vertex nearest to each place, of several the first; none where there are no vertices.
+// The vertex nearest to each place, of several the first; none if there are no vertices.
 std::vector<std::uint32_t> nearest_vertices(std::span<const std::array<double, 3>> places,
                                             const Context& context, const Mesh& mesh) {
   constexpr std::size_t kPerTask = 1 << 16;
@@ -114,7 +114,7 @@ std::vector<std::uint32_t> nearest_vertices(std::span<const std::array<double, 3
   return vertices;
 }
 
-// Which of the candidates stay.
+// The candidates that stay.
 std::vector<bool> kept_by(const ComponentFilter& filter, const std::vector<bool>& is_candidate,
                           const std::vector<std::uint64_t>& triangles) {
   std::vector<std::uint32_t> order(triangles.size());
@@ -173,7 +173,7 @@ void find_components(const Mesh& mesh, const Context& context, Components& compo
   components.of_vertex.resize_for_overwrite(mesh.positions.size());
   const std::span<std::uint32_t> numbers = components.of_vertex.span();
   join_vertices(mesh, context, numbers);
-  // A parent is smaller, so it has become its component's number already.
+  // A parent is smaller, so it already has its component's number.
   components.count = 0;
   for (std::uint32_t v = 0; v < numbers.size(); ++v) {
     numbers[v] = numbers[v] == v ? components.count++ : numbers[numbers[v]];

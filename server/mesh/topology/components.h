@@ -1,4 +1,4 @@
-// The parts of a surface that do not touch, and leaving out the small ones.
+// Connected components of a surface, and removal of small ones.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,18 @@
 
 namespace isomesh::mesh {
 
-// The component of each vertex; components are numbered from 0 on in the order of their first
-// vertices. Two vertices are of one component when triangles connect them.
+// The component of each vertex, numbered in the order of their first vertices. Two vertices belong
+// to one component if triangles connect them.
 struct Components {
   Buffer<std::uint32_t> of_vertex;
   std::uint32_t count = 0;
 };
 
-// The same for any number of threads. `components`' memory is reused. Throws Error kCancelled.
+// Does not depend on the number of threads. The memory of `components` is reused. Throws Error
+// kCancelled.
 void find_components(const Mesh& mesh, const Context& context, Components& components);
 
-// As many as find_components finds. Throws Error kCancelled.
+// The number of components. Throws Error kCancelled.
 std::uint64_t count_components(const Mesh& mesh, const Context& context);
 
 struct Dropped {
@@ -29,18 +30,18 @@ struct Dropped {
   std::uint64_t triangles = 0;
 };
 
-// How many triangles each component has.
+// The number of triangles of each component.
 std::vector<std::uint64_t> triangles_of(const Components& components, const Mesh& mesh);
 
-// Leaves out the components that are not kept, in place. Vertices and triangles keep their order
-// and their layers. `components` are the mesh's, and indeterminate then.
+// Removes all other components in place. Vertices and triangles keep their order and their layers.
+// `components` must be the mesh's, and is indeterminate afterwards.
 Dropped leave_out(const std::vector<bool>& kept, const std::vector<std::uint64_t>& triangles,
                   Components& components, Mesh& mesh);
 
-// Leaves only the components that the filter keeps, in place: those of the vertices nearest to
-// `filter.nearest_to`, if that is not empty; of these those of at least `filter.min_triangles`, and
-// of these the `filter.keep` with the most triangles, of equal ones the first. Vertices and
-// triangles keep their order and their layers. The same for any number of threads. Throws Error
+// Keeps only the components that the filter selects, in place: those of the vertices nearest to
+// `filter.nearest_to`, if it is not empty; of these, those of at least `filter.min_triangles`; of
+// these, the `filter.keep` with the most triangles, of equal ones the first. Vertices and triangles
+// keep their order and their layers. Does not depend on the number of threads. Throws Error
 // kCancelled before anything is changed.
 Dropped keep_components(const ComponentFilter& filter, const Context& context, Mesh& mesh);
 

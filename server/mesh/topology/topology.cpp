@@ -11,11 +11,11 @@
 namespace isomesh::mesh {
 namespace {
 
-// Larger slabs look at fewer layers twice, smaller ones keep more of their lists in the cache.
+// Larger slabs look at fewer layers twice; the lists of smaller ones fit into the cache.
 constexpr std::size_t kLayersPerPart = 4;
 
 // The corners of every vertex of a run of layers, which only triangles of the same layers and of
-// the one below can name; those of vertex v are [ends[v - 1], ends[v]).
+// the one below name. Those of vertex v are [ends[v - 1], ends[v]).
 class CornerLists {
  public:
   CornerLists(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer)
@@ -23,7 +23,7 @@ class CornerLists {
         size_(mesh.layer_vertices[end_layer] - begin_),
         ends_(size_ + 1, 0) {
     const auto triangles = mesh.triangles_of(first_layer == 0 ? 0 : first_layer - 1, end_layer);
-    // Shifted by one: while the lists are filled, an end is where its list goes on.
+    // Shifted by one: while the lists are filled, an end is where its list continues.
     for (const Triangle& triangle : triangles) {
       for (const std::uint32_t vertex : triangle) {
         if (contains(vertex)) ++ends_[vertex - begin_ + 1];

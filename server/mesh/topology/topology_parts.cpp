@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kWordBits = 64;
 
-// The vertices that are inner in no part, numbered as they come.
+// The vertices that are inner in no part, numbered in the order of their first use.
 class RimVertices {
  public:
   explicit RimVertices(std::size_t vertices)
@@ -22,7 +22,7 @@ class RimVertices {
     if (vertices % kWordBits != 0) open_.back() = (std::uint64_t{1} << vertices % kWordBits) - 1;
   }
 
-  // False where one of them is inner in an earlier part.
+  // False if one of them is inner in an earlier part.
   bool take_inner(const PartTopology& part) {
     std::uint64_t twice = 0;
     for (std::size_t i = 0; i < part.inner.size(); ++i) {
@@ -33,7 +33,7 @@ class RimVertices {
     return twice == 0;
   }
 
-  // After all parts.
+  // Call after all parts.
   void number() {
     for (std::size_t word = 0; word < open_.size(); ++word) {
       before_[word + 1] = before_[word] + static_cast<std::uint32_t>(std::popcount(open_[word]));
@@ -56,12 +56,12 @@ class RimVertices {
   std::vector<std::uint32_t> before_;
 };
 
-// The corners of all parts, listed for each vertex of the rim. False where a vertex is inner in
+// The corners of all parts, listed for each vertex of the rim. False if a vertex is inner in
 // another part.
 class RimCorners {
  public:
   bool fill(const RimVertices& vertices, std::span<const PartTopology> parts) {
-    // Shifted by one: while the lists are filled, an end is where its list goes on.
+    // Shifted by one: while the lists are filled, an end is where its list continues.
     ends_.assign(vertices.size() + 1, 0);
     for (const PartTopology& part : parts) {
       for (const PartTopology::RimCorner& corner : part.rim) {
@@ -90,7 +90,7 @@ class RimCorners {
   std::vector<Corner> corners_;
 };
 
-// The components of all parts, joined where a vertex has several.
+// The components of all parts, joined at vertices that have several.
 class RimComponents {
  public:
   RimComponents(const RimVertices& vertices, std::span<const PartTopology> parts)
@@ -102,7 +102,7 @@ class RimComponents {
       count_ += part.components;
       for (const auto& [vertex, component] : part.rim_components) {
         const std::uint32_t n = vertices.number_of(vertex);
-        if (n == kNone) continue;  // noticed by its corners
+        if (n == kNone) continue;  // its corners reveal it
         join(n, base + component);
       }
     }
@@ -155,7 +155,7 @@ std::optional<Topology> join_topology(const Mesh& mesh, std::span<const PartTopo
   for (std::size_t n = 0; n < vertices.size(); ++n) {
     const std::span<const Corner> around = corners.of(n);
     if (around.empty()) {
-      ++topology.components;  // a vertex that no triangle names
+      ++topology.components;  // a vertex without triangles
       continue;
     }
     if (!components.is_known(n)) return std::nullopt;

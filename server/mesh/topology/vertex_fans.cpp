@@ -6,8 +6,7 @@
 namespace isomesh::mesh {
 namespace {
 
-// How often a neighbour is next and previous, and the smallest neighbour that its fan connects it
-// with.
+// How often a neighbour is next and previous, and the smallest neighbour in its fan.
 struct Neighbor {
   std::uint32_t vertex;
   std::uint32_t next = 0;
@@ -35,7 +34,7 @@ void check_vertex(std::span<const Corner> corners, Topology& topology) {
     const auto previous = find(corner.previous);
     ++next->next;
     ++previous->previous;
-    if (next == previous) topology.manifold = false;  // the triangle names a vertex twice
+    if (next == previous) topology.manifold = false;  // a triangle names a vertex twice
     const std::size_t joined = std::min(next->fan, previous->fan);
     const std::size_t other = std::max(next->fan, previous->fan);
     for (Neighbor& neighbor : neighbors) {
@@ -45,7 +44,7 @@ void check_vertex(std::span<const Corner> corners, Topology& topology) {
   for (const Neighbor& neighbor : neighbors) {
     if (neighbor.next + neighbor.previous > 2 || neighbor.fan != 0) topology.manifold = false;
     if (neighbor.next > 1 || neighbor.previous > 1) topology.oriented = false;
-    // From the end that the edge runs from; the other end does not count it.
+    // Counted at the vertex where the edge begins, and not at its end.
     if (neighbor.next == 1 && neighbor.previous == 0) ++topology.boundary_edges;
   }
 }

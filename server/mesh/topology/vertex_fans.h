@@ -1,4 +1,4 @@
-// Whether the triangles around a vertex are as a manifold has them; private to this folder.
+// Checks the triangles around a vertex for being a manifold; private to this folder.
 #pragma once
 
 #include <array>
@@ -10,33 +10,32 @@
 
 namespace isomesh::mesh {
 
-// What a triangle looks like from one of its corners: it runs on to `next` and comes from
-// `previous`.
+// A triangle as seen from one of its corners: it continues to `next` and comes from `previous`.
 struct Corner {
   std::uint32_t next;
   std::uint32_t previous;
 };
 
-// Walks around vertices whose corners follow each other in one closed fan, as nearly all do.
+// Walks around vertices whose corners are one closed fan, as almost all are.
 class FanWalk {
  public:
-  // True when the corners are one closed fan in which every neighbour is next once and previous
-  // once. False also where that was not to be found out at once.
+  // True if the corners are one closed fan in which every neighbour is next once and previous once.
+  // May be false if that takes longer to find out.
   bool is_closed(std::span<const Corner> corners) {
     const std::size_t count = corners.size();
     if (count < 3 || count > kMostCorners) return false;
     for (std::size_t i = 0; i < count; ++i) {
       by_previous_[slot(corners[i].previous)] = static_cast<std::uint8_t>(i);
     }
-    // Which corner follows each, found for all independently of each other: four bits a corner.
+    // The successor of each corner, found for all independently: four bits a corner.
     std::uint64_t following = 0;
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t found = by_previous_[slot(corners[i].next)];
       if (found >= count || corners[found].previous != corners[i].next) return false;
       following |= std::uint64_t{found} << (kBits * i);
     }
-    // A walk that first comes back to where it began after as many steps as there are corners has
-    // been at each once.
+    // A walk that first returns to its start after as many steps as there are corners has visited
+    // each once.
     std::size_t at = 0;
     for (std::size_t step = 1; step < count; ++step) {
       at = following >> (kBits * at) & (kMostCorners - 1);
@@ -52,12 +51,12 @@ class FanWalk {
 
   static std::size_t slot(std::uint32_t vertex) { return vertex % kSlots; }
 
-  // A corner for some neighbours by what their numbers leave; what it says is always checked.
+  // A corner for some neighbours, by a hash of their numbers; always checked before use.
   std::array<std::uint8_t, kSlots> by_previous_ = {};
 };
 
-// Adds to `topology` what the corners of one vertex say of its edges and its fans, by the
-// definitions one by one. A boundary edge is counted at the vertex that it runs from.
+// Adds to `topology` the edges and fans of one vertex, by definition. A boundary edge is counted at
+// the vertex where it begins.
 void check_vertex(std::span<const Corner> corners, Topology& topology);
 
 }  // namespace isomesh::mesh

@@ -225,7 +225,7 @@ TEST(Volumes, AreLookedAtBeforeAJob) {
   parameters.draco.speed = 3;
   parameters.components.keep = 2;
   EXPECT_EQ(client.estimate(parameters).triangles, 11U);
-  parameters.lambda = default_lambda(parameters.smoothing);  // what a request that names none means
+  parameters.lambda = default_lambda(parameters);  // what a request that names none means
   EXPECT_EQ(parse_job_parameters({asked.begin(), asked.end()}, VolumeIn::kQuery), parameters);
 }
 

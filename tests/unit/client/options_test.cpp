@@ -220,8 +220,7 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   for (std::string word; stream >> word;) words += (words.empty() ? "" : " ") + word;
   for (const std::string text :
        {"Number of tetrahedra per cell, or lattice (5, 6, fcc, kuhn or bcc; default: 6)",
-        "(laplacian, taubin, angle, optimize or labels; default: laplacian, "
-        "labels with --labels)",
+        "(laplacian, ", "default: laplacian, labels with --labels)",
         "keeps the topology (default) --no-regularize Switch off --regularize",
         "(from 0 to 1000; default: 5, 10 with --labels)",
         "default: 1 for laplacian, 0.33 for taubin, ", "default: 0.1)", "position, in mm",

@@ -14,6 +14,7 @@
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/errors.h"
+#include "tests/support/kernels.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/glb_container.h"
 #include "tests/unit/codec/label_files.h"
@@ -38,7 +39,7 @@ Provenance with_distances() {
 class Distances : public testing::Test {
  protected:
   Distances() : extracted_(test::several_blocks()), smoothed_(test::several_blocks()) {
-    smooth({.passes = 20}, {}, smoothed_);
+    smooth({.steps = test::means(20, {1})}, {}, smoothed_);
   }
 
   std::string encoded(const Provenance& provenance) const {

@@ -12,6 +12,7 @@
 #include "server/codec/formats.h"
 #include "server/codec/label_zip.h"
 #include "server/mesh/smooth/smooth.h"
+#include "tests/support/kernels.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::test {
@@ -28,7 +29,7 @@ class LabelFilesTest : public testing::Test {
     const auto volume = mesh::label_cells(kLabels, {30, 26, 28}, 12, 401);
     mesh::separate_into(walls_, volume,
                         {mesh::consecutive<std::int64_t>(1, kLabels), Scheme::kSix, true});
-    smooth({.passes = 4, .lambda = 0.5}, {}, walls_.mesh);
+    smooth({.steps = test::means(4, {0.5})}, {}, walls_.mesh);
     triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
     for (const mesh::LabelMeasure& measure : measure_labels(walls_, *triangles_, {})) {
       const auto label = static_cast<std::int64_t>(labels_.size() + 1);

@@ -7,6 +7,7 @@
 
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/smooth/smooth.h"
+#include "tests/support/kernels.h"
 
 namespace isomesh::test {
 namespace {
@@ -66,7 +67,7 @@ mesh::Mesh noise_surface(Bytes& bytes) {
   mesh::Mesh mesh;
   mesh::extract_surface(lattice, extraction, mesh::count_surface(lattice, extraction, {}), {},
                         mesh);
-  if ((options & 4U) != 0) mesh::smooth({.passes = 2}, {}, mesh);
+  if ((options & 4U) != 0) mesh::smooth({.steps = test::means(2, {1})}, {}, mesh);
   return mesh;
 }
 

@@ -41,7 +41,7 @@ std::string file_of(const std::vector<LabelSummary>& labels) {
 
 class LabelPagesTest : public test::JobsFixture {
  protected:
-  Job job_with(const std::string& file, std::size_t count) const {
+  Job job_with(const std::string& file, std::size_t count) {
     const auto writer = blobs_.begin();
     writer->write(std::as_bytes(std::span(file)));
     const store::Blob blob = writer->commit();
@@ -53,7 +53,7 @@ class LabelPagesTest : public test::JobsFixture {
   }
 
   // Reads all of the list.
-  std::vector<LabelSummary> all_of(const Job& job) const {
+  std::vector<LabelSummary> all_of(const Job& job) {
     const JobLabels labels(job, blobs_);
     std::vector<LabelSummary> all;
     std::vector<LabelSummary> page = labels.after(std::nullopt);
@@ -64,7 +64,7 @@ class LabelPagesTest : public test::JobsFixture {
     return all;
   }
 
-  std::optional<ErrorCode> code_of(const std::string& file, std::size_t count) const {
+  std::optional<ErrorCode> code_of(const std::string& file, std::size_t count) {
     const Job job = job_with(file, count);
     return code_thrown_by([&] { all_of(job); });
   }

@@ -317,7 +317,7 @@ TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsUnusable) {
 
 TEST_F(PipelineTest, AVolumeWhoseSamplesAreCutBeforeTheyAreReadIsUnusable) {
   const Volume volume = add_sphere();
-  const test::CutBlobs cut(data_);
+  test::CutBlobs cut(data_);
   EXPECT_EQ(test::code_thrown_by([&] {
               run_pipeline(volume, parameters_of(volume, 0), {}, cut, process_, {}, kQuiet);
             }),

@@ -150,7 +150,7 @@ TEST(BoundTest, ProvesWhatWasSmoothedBefore) {
   const auto volume = test::sample<float>(test::gyroid(9), {14, 13, 12});
   const Mesh plain = test::extracted(volume, {});
   Mesh mesh = test::extracted(volume, {});
-  smooth({.passes = 5, .max_displacement_mm = 0.1}, {}, mesh);
+  smooth({.steps = test::means(5, {1}), .max_displacement_mm = 0.1}, {}, mesh);
   const auto bound = simplified(volume, {}, {.max_error_mm = 0.2, .is_smoothed = true}, mesh);
   ASSERT_TRUE(bound);
   EXPECT_LE(test::largest_distance(soup_of(mesh), soup_of(plain), 1000, 1), 0.2);

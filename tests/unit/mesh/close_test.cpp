@@ -244,9 +244,11 @@ TEST(Close, DoesNotChangeWhatIsNotOnTheBorder) {
       on_boundary[b] = true;
     }
     const std::vector<Vec3> caps = places_on_border(closed);
-    const SmoothOptions taubin = {.passes = 2, .lambda = 0.33, .mu = taubin_mu(0.33, 0.1)};
-    for (const SmoothOptions& smoothing : {SmoothOptions{.passes = 0}, {.passes = 3}, taubin}) {
-      SCOPED_TRACE(testing::Message() << smoothing.passes << " passes, mu " << smoothing.mu);
+    for (const auto& [passes, weights] : {std::pair<int, std::vector<double>>{0, {}},
+                                          {3, {1}},
+                                          {2, {0.33, taubin_mu(0.33, 0.1)}}}) {
+      SCOPED_TRACE(testing::Message() << passes << " passes of " << weights.size() << " steps");
+      const SmoothOptions smoothing = {test::means(passes, weights)};
       for (Mesh* const mesh : {&open, &closed}) smooth(smoothing, {}, *mesh);
       std::vector<Vec3> inner_of_open;
       for (std::size_t v = 0; v < open.positions.size(); ++v) {

@@ -124,7 +124,7 @@ TEST(LabelVolumes, AreThatOfTheirUnionAndAboutThatOfTheVoxels) {
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
     SeparatingSurface surface = separated(volume, {labels, scheme, true});
     for (const int passes : {0, 10}) {
-      smooth({.passes = passes, .max_displacement_mm = 0.5}, {}, surface.mesh);
+      smooth({.steps = test::means(passes, {1}), .max_displacement_mm = 0.5}, {}, surface.mesh);
       const auto measures = measure_labels(surface, LabelTriangles(surface), {});
       double sum = 0;
       double voxels = 0;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <stop_token>
 #include <utility>
 #include <vector>
 
@@ -13,7 +12,6 @@
 
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/smooth/smooth.h"
-#include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
@@ -22,6 +20,7 @@ namespace isomesh::mesh {
 namespace {
 
 using test::copy_of;
+using test::method_options;
 using test::Point;
 
 Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -61,15 +60,12 @@ Mesh ball(double radius, Scheme scheme, bool regularize) {
       {.scheme = scheme, .regularize = regularize});
 }
 
-Mesh noise(bool regularize, bool close) {
-  return test::extracted(test::noise<std::uint8_t>({0, 1, 2, 3}, {40, 19, 34}, 31),
-                         {.iso = 2, .close = close, .regularize = regularize});
-}
+SmoothOptions options_of(Smoothing method) { return method_options(method, 5); }
 
 struct Ball {
   Scheme scheme;
   bool regularize;
-  SmoothingWay way;
+  Smoothing method;
   double hundredth_deg;  // that 99 of 100 triangles have at least
   double least_deg;
 };
@@ -77,10 +73,10 @@ struct Ball {
 class QualityOfBalls : public testing::TestWithParam<Ball> {};
 
 TEST_P(QualityOfBalls, GrowsAndLeavesTheSurfaceWhereItIs) {
-  const auto [scheme, regularize, way, hundredth_deg, least_deg] = GetParam();
+  const auto [scheme, regularize, method, hundredth_deg, least_deg] = GetParam();
   const Mesh extracted = ball(27.3, scheme, regularize);
   Mesh mesh = copy_of(extracted);
-  const SmoothingEffect effect = smooth({.way = way}, {}, mesh);
+  const SmoothingEffect effect = smooth(options_of(method), {}, mesh);
   const std::vector<double> angles = smallest_angles(mesh);
   EXPECT_GE(angles[angles.size() / 100], hundredth_deg);
   EXPECT_GE(angles.front(), least_deg);
@@ -95,93 +91,15 @@ TEST_P(QualityOfBalls, GrowsAndLeavesTheSurfaceWhereItIs) {
 }
 
 // As extracted with six tetrahedra, one in a hundred triangles has less than one degree.
-INSTANTIATE_TEST_SUITE_P(
-    Schemes, QualityOfBalls,
-    testing::Values(Ball{Scheme::kSix, false, SmoothingWay::kAngle, 18, 0},
-                    Ball{Scheme::kSix, false, SmoothingWay::kOptimize, 20, 16},
-                    Ball{Scheme::kSix, true, SmoothingWay::kAngle, 26, 23},
-                    Ball{Scheme::kSix, true, SmoothingWay::kOptimize, 25, 24},
-                    Ball{Scheme::kFive, false, SmoothingWay::kAngle, 32, 20},
-                    Ball{Scheme::kFive, false, SmoothingWay::kOptimize, 28, 24},
-                    Ball{Scheme::kFive, true, SmoothingWay::kAngle, 25, 23},
-                    Ball{Scheme::kFive, true, SmoothingWay::kOptimize, 25, 24}));
-
-class Quality : public testing::TestWithParam<SmoothingWay> {};
-
-TEST_P(Quality, LeavesBoundariesAndCapsWhereTheyAre) {
-  for (const bool close : {false, true}) {
-    const Mesh before = noise(true, close);
-    Mesh mesh = copy_of(before);
-    smooth({.way = GetParam()}, {}, mesh);
-    std::size_t moved = 0;
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-      if (mesh.is_on_border(v)) {
-        ASSERT_EQ(mesh.positions[v], before.positions[v]);
-      }
-      moved += mesh.positions[v] != before.positions[v] ? 1 : 0;
-    }
-    EXPECT_GT(moved, mesh.positions.size() / 2);
-    for (const auto& [from, to] : test::topology_of(test::surface_of(before)).boundary_edges) {
-      ASSERT_EQ(mesh.positions[from], before.positions[from]);
-      ASSERT_EQ(mesh.positions[to], before.positions[to]);
-    }
-    EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
-  }
-}
-
-TEST_P(Quality, GivesTheSameBytesOnAnyNumberOfThreads) {
-  const Mesh before = noise(false, false);
-  Mesh single = copy_of(before);
-  {
-    const test::ThreadCount one(1);
-    smooth({.way = GetParam()}, {}, single);
-  }
-  for (const int threads : {2, 3, 16}) {
-    SCOPED_TRACE(threads);
-    const test::ThreadCount several(threads);
-    Mesh mesh = copy_of(before);
-    smooth({.way = GetParam()}, {}, mesh);
-    EXPECT_TRUE(test::same_bytes(mesh, single));
-  }
-}
-
-TEST_P(Quality, MovesNoVertexFartherThanIsAllowed) {
-  const Mesh before = noise(false, false);
-  for (const double most : {0.0, 0.05, 0.3}) {
-    Mesh mesh = copy_of(before);
-    const SmoothingEffect effect =
-        smooth({.max_displacement_mm = most, .way = GetParam()}, {}, mesh);
-    double largest = 0;
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-      largest =
-          std::max(largest, length(minus(point(mesh.positions[v]), point(before.positions[v]))));
-    }
-    EXPECT_LE(largest, most);
-    EXPECT_EQ(effect.max_displacement_mm, largest);
-    EXPECT_GE(largest, most / 2);
-  }
-}
-
-TEST_P(Quality, TakesEmptyMeshesAndNoPasses) {
-  Mesh empty = test::mesh_of({}, {});
-  EXPECT_EQ(smooth({.way = GetParam()}, {}, empty).max_displacement_mm, 0);
-  const Mesh before = ball(5.2, Scheme::kSix, false);
-  Mesh mesh = copy_of(before);
-  smooth({.passes = 0, .way = GetParam()}, {}, mesh);
-  EXPECT_TRUE(test::same_bytes(mesh, before));
-}
-
-TEST_P(Quality, StopsWhenTheJobIsCancelled) {
-  Mesh mesh = ball(5.2, Scheme::kSix, false);
-  std::stop_source stop;
-  stop.request_stop();
-  const Context context = {.stop = stop.get_token(), .progress = {}};
-  EXPECT_EQ(test::code_thrown_by([&] { smooth({.way = GetParam()}, context, mesh); }),
-            ErrorCode::kCancelled);
-}
-
-INSTANTIATE_TEST_SUITE_P(Ways, Quality,
-                         testing::Values(SmoothingWay::kAngle, SmoothingWay::kOptimize));
+INSTANTIATE_TEST_SUITE_P(Schemes, QualityOfBalls,
+                         testing::Values(Ball{Scheme::kSix, false, Smoothing::kAngle, 18, 0},
+                                         Ball{Scheme::kSix, false, Smoothing::kOptimize, 20, 16},
+                                         Ball{Scheme::kSix, true, Smoothing::kAngle, 26, 23},
+                                         Ball{Scheme::kSix, true, Smoothing::kOptimize, 25, 24},
+                                         Ball{Scheme::kFive, false, Smoothing::kAngle, 32, 20},
+                                         Ball{Scheme::kFive, false, Smoothing::kOptimize, 28, 24},
+                                         Ball{Scheme::kFive, true, Smoothing::kAngle, 25, 23},
+                                         Ball{Scheme::kFive, true, Smoothing::kOptimize, 25, 24}));
 
 // One pass of `angle`, one vertex after the other in double precision, with the extracted surface
 // searched as a whole.
@@ -322,7 +240,7 @@ TEST(QualityByAngle, MovesVerticesAsTheNaiveWayDoes) {
     Mesh mesh = ball(6.3, Scheme::kSix, regularize);
     const Mesh before = copy_of(mesh);
     const std::vector<Point> expected = NaivePass(before).run();
-    smooth({.passes = 1, .way = SmoothingWay::kAngle}, {}, mesh);
+    smooth(method_options(Smoothing::kAngle, 1), {}, mesh);
     std::size_t moved = 0;
     std::size_t different = 0;  // a comparison that rounding turns changes what comes after it
     for (std::size_t v = 0; v < expected.size(); ++v) {

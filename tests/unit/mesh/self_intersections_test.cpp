@@ -26,13 +26,17 @@ std::uint64_t pairs_of(const std::vector<Vec3>& positions, const std::vector<Tri
 // Small whole coordinates, with which 64 bits compute all exactly.
 using Whole = std::array<std::int64_t, 3>;
 
-Whole minus(const Whole& a, const Whole& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Whole whole_minus(const Whole& a, const Whole& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
 
-Whole cross(const Whole& a, const Whole& b) {
+Whole whole_cross(const Whole& a, const Whole& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-std::int64_t dot(const Whole& a, const Whole& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+std::int64_t whole_dot(const Whole& a, const Whole& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 using WholeTriangle = std::array<Whole, 3>;
 
@@ -42,20 +46,23 @@ bool plainly_meet(const WholeTriangle& a, const WholeTriangle& b) {
   std::vector<Whole> axes;
   std::vector<Whole> normals;
   for (const WholeTriangle& t : {a, b}) {
-    normals.push_back(cross(minus(t[1], t[0]), minus(t[2], t[0])));
+    normals.push_back(whole_cross(whole_minus(t[1], t[0]), whole_minus(t[2], t[0])));
     for (std::size_t i = 0; i < 3; ++i) {
-      axes.push_back(cross(normals.back(), minus(t[(i + 1) % 3], t[i])));
+      axes.push_back(whole_cross(normals.back(), whole_minus(t[(i + 1) % 3], t[i])));
     }
   }
   axes.insert(axes.end(), normals.begin(), normals.end());
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
-      axes.push_back(cross(minus(a[(i + 1) % 3], a[i]), minus(b[(j + 1) % 3], b[j])));
+      axes.push_back(
+          whole_cross(whole_minus(a[(i + 1) % 3], a[i]), whole_minus(b[(j + 1) % 3], b[j])));
     }
   }
   return std::ranges::none_of(axes, [&](const Whole& axis) {
-    const auto [a_low, a_high] = std::minmax({dot(axis, a[0]), dot(axis, a[1]), dot(axis, a[2])});
-    const auto [b_low, b_high] = std::minmax({dot(axis, b[0]), dot(axis, b[1]), dot(axis, b[2])});
+    const auto [a_low, a_high] =
+        std::minmax({whole_dot(axis, a[0]), whole_dot(axis, a[1]), whole_dot(axis, a[2])});
+    const auto [b_low, b_high] =
+        std::minmax({whole_dot(axis, b[0]), whole_dot(axis, b[1]), whole_dot(axis, b[2])});
     return a_high < b_low || b_high < a_low;
   });
 }
@@ -73,7 +80,7 @@ TEST(SelfIntersections, AreThoseThatAllPairsHave) {
       for (Whole& corner : t) {
         for (std::size_t axis = 0; axis < 3; ++axis) corner[axis] = from[axis] + place(random) % 7;
       }
-      if (cross(minus(t[1], t[0]), minus(t[2], t[0])) == Whole{0, 0, 0}) continue;
+      if (whole_cross(whole_minus(t[1], t[0]), whole_minus(t[2], t[0])) == Whole{0, 0, 0}) continue;
       const auto first = static_cast<std::uint32_t>(positions.size());
       for (const Whole& corner : t) {
         positions.push_back({static_cast<float>(corner[0]), static_cast<float>(corner[1]),

@@ -25,7 +25,7 @@ namespace {
 Mesh handles(bool close) {
   Mesh mesh = test::extracted(test::sample<float>(test::gyroid(17), {30, 29, 33}),
                               {0, Scheme::kSix, Interpolation::kLinear, close});
-  smooth({.passes = 3}, {}, mesh);
+  smooth({.steps = test::means(3, {1})}, {}, mesh);
   return mesh;
 }
 
@@ -35,7 +35,7 @@ Mesh noisy_handles() {
   const auto noise = test::noise_between<float>(-0.4, 0.4, volume.dims, 11);
   for (std::size_t n = 0; n < volume.samples.size(); ++n) volume.samples[n] += noise.samples[n];
   Mesh mesh = test::extracted(volume, {0, Scheme::kSix, Interpolation::kLinear, true});
-  smooth({.passes = 3}, {}, mesh);
+  smooth({.steps = test::means(3, {1})}, {}, mesh);
   return mesh;
 }
 
@@ -49,7 +49,7 @@ Mesh half_ball(bool close) {
 Mesh noise() {
   Mesh mesh = test::extracted(test::noise<std::uint8_t>({0, 1, 2, 3}, {26, 25, 24}, 7),
                               {1.5, Scheme::kSix, Interpolation::kLinear, true});
-  smooth({.passes = 2}, {}, mesh);
+  smooth({.steps = test::means(2, {1})}, {}, mesh);
   return mesh;
 }
 
@@ -314,7 +314,7 @@ TEST(Simplify, KeepsWithinTheErrorOfWhereTheVerticesWere) {
   const ExtractOptions options = {0, Scheme::kSix, Interpolation::kMidpoint, false};
   const Mesh extracted = test::extracted(ball, options);
   Mesh mesh = test::extracted(ball, options);
-  smooth({.passes = 5, .max_displacement_mm = kError / 2}, {}, mesh);
+  smooth({.steps = test::means(5, {1}), .max_displacement_mm = kError / 2}, {}, mesh);
   simplify({.max_error_mm = kError, .before = extracted.positions.span()}, {}, mesh);
   EXPECT_LT(mesh.triangles.size(), extracted.triangles.size() / 2);
   const double from_extracted = certify(mesh, extracted, {}).max_mm();

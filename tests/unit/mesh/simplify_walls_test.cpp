@@ -18,7 +18,7 @@ namespace {
 // Cells of labels, smoothed.
 SeparatingSurface smooth_cells(std::size_t count, const SeparateOptions& options) {
   SeparatingSurface surface = separated(label_cells(count, {44, 40, 42}, 9, 31), options);
-  smooth({.passes = 5, .lambda = 0.5}, {}, surface.mesh);
+  smooth({.steps = test::means(5, {0.5})}, {}, surface.mesh);
   return surface;
 }
 

@@ -16,6 +16,7 @@ namespace isomesh::mesh {
 namespace {
 
 using test::copy_of;
+using test::means;
 using test::Surface;
 
 struct NamedMesh {
@@ -61,13 +62,9 @@ Mesh smoothed(const Mesh& mesh, const SmoothOptions& options) {
   return result;
 }
 
-// Both steps of every pass, the naive way.
 Surface naively_smoothed(const Mesh& mesh, const SmoothOptions& options) {
   std::vector<double> shares;
-  for (int pass = 0; pass < options.passes; ++pass) {
-    shares.push_back(options.lambda);
-    if (options.mu != 0) shares.push_back(options.mu);
-  }
+  for (const Step& step : options.steps) shares.push_back(step.weight);
   return test::naively_smoothed(test::surface_of(mesh), shares);
 }
 
@@ -91,7 +88,8 @@ TEST_P(Smooth, MovesVerticesAsTheNaiveWayDoes) {
     const Surface expected = naively_smoothed(mesh, GetParam());
     EXPECT_EQ(result.triangles, expected.triangles);
     // A few roundings of a coordinate of about a hundred for each pass.
-    EXPECT_LT(largest_distance(result, expected), 3e-5 * (1 + GetParam().passes));
+    EXPECT_LT(largest_distance(result, expected),
+              3e-5 * static_cast<double>(1 + GetParam().steps.size()));
   }
 }
 
@@ -121,21 +119,23 @@ TEST_P(Smooth, GivesTheSameBytesOnAnyNumberOfThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Passes, Smooth,
-                         testing::Values(SmoothOptions{1, 1}, SmoothOptions{2, 1},
-                                         SmoothOptions{5, 1}, SmoothOptions{1, 0.3},
-                                         SmoothOptions{4, 0.5}, SmoothOptions{20, 0.9},
-                                         SmoothOptions{1, 0.33, -0.34},
-                                         SmoothOptions{11, 0.6, -0.64}));
+                         testing::Values(SmoothOptions{means(1, {1})}, SmoothOptions{means(2, {1})},
+                                         SmoothOptions{means(5, {1})},
+                                         SmoothOptions{means(1, {0.3})},
+                                         SmoothOptions{means(4, {0.5})},
+                                         SmoothOptions{means(20, {0.9})},
+                                         SmoothOptions{means(1, {0.33, -0.34})},
+                                         SmoothOptions{means(11, {0.6, -0.64})}));
 
 TEST(SmoothNothing, WithNoPassesLeavesTheBytes) {
   for (const auto& [name, mesh] : meshes()) {
     SCOPED_TRACE(name);
-    EXPECT_TRUE(test::same_bytes(smoothed(mesh, {0, 1}), mesh));
+    EXPECT_TRUE(test::same_bytes(smoothed(mesh, {}), mesh));
   }
 }
 
 TEST(SmoothNothing, LeavesAnEmptyMeshEmpty) {
-  EXPECT_EQ(smoothed(Mesh{}, {5, 1}).positions.size(), 0U);
+  EXPECT_EQ(smoothed(Mesh{}, {means(5, {1})}).positions.size(), 0U);
 }
 
 TEST(SmoothNothing, MovesNoVertexOfAMeshThatIsAllBoundary) {
@@ -143,7 +143,7 @@ TEST(SmoothNothing, MovesNoVertexOfAMeshThatIsAllBoundary) {
   const Mesh mesh =
       test::extracted(test::checkerboard<std::uint8_t>(0, 9, {2, 2, 2}), {5, Scheme::kFive});
   ASSERT_EQ(mesh.positions.size(), 12U);
-  EXPECT_TRUE(test::same_bytes(smoothed(mesh, {3, 1}), mesh));
+  EXPECT_TRUE(test::same_bytes(smoothed(mesh, {means(3, {1})}), mesh));
 }
 
 // The expected positions are written out by hand: a pyramid over a square whose border is fixed.
@@ -158,11 +158,11 @@ TEST(SmoothByHand, MovesTheOneFreeVertexByItsShare) {
   mesh.layer_vertices = {0, 5};
   mesh.layer_triangles = {0, 4};
 
-  const Mesh whole = smoothed(mesh, {1, 1});
+  const Mesh whole = smoothed(mesh, {means(1, {1})});
   EXPECT_EQ(whole.positions[4], (Vec3{2, 2, 0}));
-  const Mesh half = smoothed(mesh, {1, 0.5});
+  const Mesh half = smoothed(mesh, {means(1, {0.5})});
   EXPECT_EQ(half.positions[4], (Vec3{1.5F, 1.5F, 4}));
-  const Mesh twice = smoothed(mesh, {2, 0.5});
+  const Mesh twice = smoothed(mesh, {means(2, {0.5})});
   EXPECT_EQ(twice.positions[4], (Vec3{1.75F, 1.75F, 2}));
   for (std::size_t v = 0; v < 4; ++v) EXPECT_EQ(twice.positions[v], corners[v]);
 }
@@ -170,7 +170,7 @@ TEST(SmoothByHand, MovesTheOneFreeVertexByItsShare) {
 TEST(SmoothShape, ShrinksABallAndItsSurface) {
   const Mesh mesh = closed_ball();
   const auto before = test::extent_of(test::surface_of(mesh));
-  const auto after = test::extent_of(test::surface_of(smoothed(mesh, {10, 1})));
+  const auto after = test::extent_of(test::surface_of(smoothed(mesh, {means(10, {1})})));
   EXPECT_LT(after.area, before.area);
   EXPECT_LT(after.volume, before.volume);
   EXPECT_GT(after.volume, 0.8 * before.volume);
@@ -184,7 +184,7 @@ Mesh deep_noise() {
 
 TEST(SmoothDeepVolume, IsTheSameInOneRoundAndInSeveral) {
   const Mesh mesh = deep_noise();
-  const SmoothOptions options = {14, 0.7};
+  const SmoothOptions options = {means(14, {0.7})};
   Mesh single;
   {
     const test::ThreadCount one(1);
@@ -213,7 +213,7 @@ TEST(SmoothByHand, AVertexMayHaveManyNeighbours) {
   mesh.positions[kSides] = {0, 0, 0};
   mesh.layer_vertices = {0, 13, kSides + 1};
   mesh.layer_triangles = {0, kSides, kSides};
-  const Mesh moved = smoothed(mesh, {1, 1});
+  const Mesh moved = smoothed(mesh, {means(1, {1})});
   EXPECT_FLOAT_EQ(moved.positions[kSides][0], static_cast<float>(sum / kSides));
   EXPECT_FLOAT_EQ(moved.positions[kSides][1], 1);
   EXPECT_FLOAT_EQ(moved.positions[kSides][2], 2);
@@ -224,7 +224,8 @@ TEST(SmoothByHand, AVertexMayHaveManyNeighbours) {
 TEST(SmoothShape, APlaneStaysAPlane) {
   const test::Point normal = {2.0 / 7, 3.0 / 7, 6.0 / 7};
   const Mesh mesh = test::extracted(test::sample<float>(test::plane(normal, 9), {20, 18, 16}), {});
-  for (const SmoothOptions& options : {SmoothOptions{10, 1}, SmoothOptions{10, 0.33, -0.34}}) {
+  for (const SmoothOptions& options :
+       {SmoothOptions{means(10, {1})}, SmoothOptions{means(10, {0.33, -0.34})}}) {
     const Mesh moved = smoothed(mesh, options);
     double farthest = 0;
     for (const Vec3& p : moved.positions) {
@@ -247,16 +248,14 @@ TEST(SmoothTaubin, KeepsTheVolumeThatLaplacianPassesTakeAway) {
   const auto drift = [&](const SmoothOptions& options) {
     return std::abs(test::extent_of(test::surface_of(smoothed(mesh, options))).volume / before - 1);
   };
-  EXPECT_GT(drift({20, 1}), 0.05);
-  EXPECT_LT(drift({20, 0.33, taubin_mu(0.33, 0.1)}), 0.002);
+  EXPECT_GT(drift({means(20, {1})}), 0.05);
+  EXPECT_LT(drift({means(20, {0.33, taubin_mu(0.33, 0.1)})}), 0.002);
 }
 
 TEST(SmoothTaubin, KeepsTheVolumeOfTheBrainToATenthOfAPercent) {
   Mesh mesh = test::extracted(test::read_nifti_samples(test::kBrainFile),
                               {60, Scheme::kSix, Interpolation::kLinear});
-  const double lambda = default_lambda(isomesh::Smoothing::kTaubin);
-  const SmoothingEffect effect =
-      smooth({20, lambda, taubin_mu(lambda, JobParameters{}.pass_band)}, {}, mesh);
+  const SmoothingEffect effect = smooth(test::method_options(Smoothing::kTaubin, 20), {}, mesh);
   EXPECT_NEAR(effect.after.volume_mm3 / effect.before.volume_mm3, 1, 0.001);
   EXPECT_LT(effect.after.area_mm2, 0.95 * effect.before.area_mm2);
 }
@@ -277,7 +276,7 @@ class SmoothEffect : public testing::TestWithParam<int> {};
 TEST_P(SmoothEffect, IsWhatMeasuringTheMeshesBeforeAndAfterSays) {
   const test::ThreadCount threads(GetParam());
   for (const SmoothOptions& options :
-       {SmoothOptions{0}, SmoothOptions{3}, SmoothOptions{9, 0.33, -0.34}}) {
+       {SmoothOptions{}, SmoothOptions{means(3, {1})}, SmoothOptions{means(9, {0.33, -0.34})}}) {
     for (const auto& [name, before] : meshes()) {
       SCOPED_TRACE(name);
       Mesh after = copy_of(before);
@@ -304,7 +303,8 @@ class SmoothWithin : public testing::TestWithParam<double> {};
 
 TEST_P(SmoothWithin, MovesNoVertexFarther) {
   const double limit = GetParam();
-  for (const SmoothOptions& unlimited : {SmoothOptions{5, 1}, SmoothOptions{14, 0.6, -0.64}}) {
+  for (const SmoothOptions& unlimited :
+       {SmoothOptions{means(5, {1})}, SmoothOptions{means(14, {0.6, -0.64})}}) {
     for (const auto& [name, before] : meshes()) {
       SCOPED_TRACE(name);
       SmoothOptions options = unlimited;
@@ -330,7 +330,7 @@ INSTANTIATE_TEST_SUITE_P(Limits, SmoothWithin, testing::Values(0.0, 1e-3, 0.05, 
 
 TEST(SmoothWithin, AFarLimitChangesNothing) {
   const Mesh mesh = open_noise();
-  SmoothOptions options = {5, 1};
+  SmoothOptions options = {means(5, {1})};
   const Mesh free = smoothed(mesh, options);
   options.max_displacement_mm = 100;
   EXPECT_TRUE(test::same_bytes(smoothed(mesh, options), free));
@@ -343,8 +343,7 @@ TEST(SmoothWithin, KeepsClosedSurfacesOnTheirSideOfTheCaps) {
     const ExtractOptions closed = {0, Scheme::kSix, Interpolation::kLinear, true};
     const auto farthest_out = [&](const std::vector<HalfSpace>& within) {
       Mesh mesh = test::extracted(volume, closed);
-      smooth({.passes = 20, .lambda = 0.33, .mu = taubin_mu(0.33, 0.1), .within = within}, {},
-             mesh);
+      smooth({.steps = means(20, {0.33, taubin_mu(0.33, 0.1)}), .within = within}, {}, mesh);
       double farthest = -std::numeric_limits<double>::infinity();
       for (const HalfSpace& half : box_around(volume.lattice().to_space, volume.dims, 0)) {
         for (const Vec3& p : mesh.positions) {
@@ -367,16 +366,17 @@ TEST(SmoothMemory, IsAFewLayersWhenTheVolumeIsDeep) {
         .vertices = layers * vertices_each, .layers = layers, .largest_layer = vertices_each};
   };
   const SurfaceSize deep = size(1024, 1000);
-  const std::uint64_t five = smoothing_memory({5, 1}, deep);
-  EXPECT_EQ(five, smoothing_memory({5, 1}, size(512, 1000)));
+  const std::uint64_t five = smoothing_memory({means(5, {1})}, deep);
+  EXPECT_EQ(five, smoothing_memory({means(5, {1})}, size(512, 1000)));
   EXPECT_LT(five, 2000 * deep.largest_layer);
   // Twenty at once, rather than a copy of everything.
-  EXPECT_LT(smoothing_memory({20, 1}, deep), deep.vertices * sizeof(Vec3));
+  EXPECT_LT(smoothing_memory({means(20, {1})}, deep), deep.vertices * sizeof(Vec3));
   // On a shallow one never much more than that copy.
   const SurfaceSize shallow = size(100, 1000);
-  EXPECT_LT(smoothing_memory({500, 1}, shallow), shallow.vertices * sizeof(Vec3) + 2'500'000);
-  EXPECT_EQ(smoothing_memory({0, 1}, deep), 0U);
-  EXPECT_EQ(smoothing_memory({5, 1}, {}), 0U);
+  EXPECT_LT(smoothing_memory({means(500, {1})}, shallow),
+            shallow.vertices * sizeof(Vec3) + 2'500'000);
+  EXPECT_EQ(smoothing_memory({}, deep), 0U);
+  EXPECT_EQ(smoothing_memory({means(5, {1})}, {}), 0U);
 }
 
 TEST(SmoothCancellation, BeforeTheStartEndsIt) {
@@ -384,8 +384,9 @@ TEST(SmoothCancellation, BeforeTheStartEndsIt) {
   std::stop_source source;
   source.request_stop();
   const Context stopped{source.get_token(), {}};
-  EXPECT_EQ(test::code_thrown_by([&] { smooth({5, 1}, stopped, mesh); }), ErrorCode::kCancelled);
-  EXPECT_EQ(test::code_thrown_by([&] { smooth({0, 1}, stopped, mesh); }), ErrorCode::kCancelled);
+  EXPECT_EQ(test::code_thrown_by([&] { smooth({means(5, {1})}, stopped, mesh); }),
+            ErrorCode::kCancelled);
+  EXPECT_EQ(test::code_thrown_by([&] { smooth({}, stopped, mesh); }), ErrorCode::kCancelled);
 }
 
 TEST(SmoothCancellation, OnTheWayEndsIt) {
@@ -397,9 +398,7 @@ TEST(SmoothCancellation, OnTheWayEndsIt) {
                                ++reports;
                                source.request_stop();
                              }};
-  EXPECT_EQ(test::code_thrown_by([&] {
-              smooth({1000, 1}, stops_itself, mesh);
-            }),
+  EXPECT_EQ(test::code_thrown_by([&] { smooth({means(1000, {1})}, stops_itself, mesh); }),
             ErrorCode::kCancelled);
   EXPECT_EQ(reports, 1);
 }
@@ -409,7 +408,7 @@ TEST(SmoothProgress, RisesToOne) {
   const test::ThreadCount one(1);
   std::vector<double> reports;
   const Context context{{}, [&](double share) { reports.push_back(share); }};
-  smooth({20, 1}, context, mesh);
+  smooth({means(20, {1})}, context, mesh);
   ASSERT_GE(reports.size(), mesh.layers());
   EXPECT_GE(reports.front(), 0);
   EXPECT_TRUE(std::is_sorted(reports.begin(), reports.end()));

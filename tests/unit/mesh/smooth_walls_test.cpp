@@ -17,6 +17,7 @@
 namespace isomesh::mesh {
 namespace {
 
+using test::means;
 using test::Point;
 
 struct NamedWalls {
@@ -67,15 +68,6 @@ std::vector<std::vector<std::uint32_t>> wall_neighbors(const SeparatingSurface& 
   return all;
 }
 
-std::vector<double> shares_of(const SmoothOptions& options) {
-  std::vector<double> shares;
-  for (int pass = 0; pass < options.passes; ++pass) {
-    shares.push_back(options.lambda);
-    if (options.mu != 0) shares.push_back(options.mu);
-  }
-  return shares;
-}
-
 std::vector<Point> points_of(const Mesh& mesh) { return test::surface_of(mesh).points; }
 
 std::vector<Point> naively_smoothed(const SeparatingSurface& surface,
@@ -83,7 +75,7 @@ std::vector<Point> naively_smoothed(const SeparatingSurface& surface,
   const auto neighbors = wall_neighbors(surface);
   const std::vector<Point> extracted = points_of(surface.mesh);
   std::vector<Point> points = extracted;
-  for (const double share : shares_of(options)) {
+  for (const Step& step : options.steps) {
     const std::vector<Point> last = points;
     for (std::size_t v = 0; v < points.size(); ++v) {
       if (neighbors[v].empty()) continue;
@@ -93,7 +85,7 @@ std::vector<Point> naively_smoothed(const SeparatingSurface& surface,
           mean[axis] += last[n][axis] / static_cast<double>(neighbors[v].size());
         }
       }
-      Point moved = test::between(last[v], mean, share);
+      Point moved = test::between(last[v], mean, step.weight);
       const double way = test::length(test::minus(moved, extracted[v]));
       if (way > options.max_displacement_mm) {
         moved = test::between(extracted[v], moved, options.max_displacement_mm / way);
@@ -108,8 +100,6 @@ void smooth_walls(const SmoothOptions& options, SeparatingSurface& surface) {
   smooth(options, {}, surface.mesh);
 }
 
-constexpr double kFree = std::numeric_limits<double>::infinity();
-
 class SmoothWalls : public testing::TestWithParam<SmoothOptions> {};
 
 TEST_P(SmoothWalls, MovesVerticesAsTheNaiveWayDoes) {
@@ -123,7 +113,8 @@ TEST_P(SmoothWalls, MovesVerticesAsTheNaiveWayDoes) {
     const std::vector<Point> points = points_of(surface.mesh);
     std::size_t moved_on_lines = 0;
     for (std::size_t v = 0; v < points.size(); ++v) {
-      ASSERT_LT(test::length(test::minus(points[v], expected[v])), 1e-4 * (1 + GetParam().passes))
+      ASSERT_LT(test::length(test::minus(points[v], expected[v])),
+                1e-4 * static_cast<double>(1 + GetParam().steps.size()))
           << "vertex " << v << (surface.mesh.is_on_line(v) ? " on a line" : "");
       if (surface.mesh.is_on_line(v) && points[v] != before[v]) ++moved_on_lines;
     }
@@ -187,12 +178,12 @@ TEST_P(SmoothWalls, LeavesWallsShared) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Passes, SmoothWalls,
-                         testing::Values(SmoothOptions{1, 1}, SmoothOptions{5, 0.6},
-                                         SmoothOptions{10, 1, 0, 0.5},
-                                         SmoothOptions{9, 0.33, -0.34},
-                                         SmoothOptions{14, 0.6, -0.64, kFree},
-                                         SmoothOptions{3, 0.6, -0.64, 0.05}));
+INSTANTIATE_TEST_SUITE_P(
+    Passes, SmoothWalls,
+    testing::Values(SmoothOptions{means(1, {1})}, SmoothOptions{means(5, {0.6})},
+                    SmoothOptions{.steps = means(10, {1}), .max_displacement_mm = 0.5},
+                    SmoothOptions{means(9, {0.33, -0.34})}, SmoothOptions{means(14, {0.6, -0.64})},
+                    SmoothOptions{.steps = means(3, {0.6, -0.64}), .max_displacement_mm = 0.05}));
 
 TEST(SmoothWallsWithin, MovesNoVertexFarther) {
   for (auto& [name, surface] : walls()) {
@@ -200,7 +191,7 @@ TEST(SmoothWallsWithin, MovesNoVertexFarther) {
     const std::vector<Point> before = points_of(surface.mesh);
     const double limit = 0.2;
     const SmoothingEffect effect =
-        smooth({.passes = 10, .max_displacement_mm = limit}, {}, surface.mesh);
+        smooth({.steps = means(10, {1}), .max_displacement_mm = limit}, {}, surface.mesh);
     const std::vector<Point> after = points_of(surface.mesh);
     double largest = 0;
     for (std::size_t v = 0; v < before.size(); ++v) {
@@ -238,7 +229,9 @@ TEST(SmoothWallsBorder, ClosingDoesNotChangeTheRest) {
   const auto volume = label_cells(12, {40, 21, 30}, 12, 107);
   const auto labels = consecutive<std::int64_t>(1, 12);
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
-    for (const SmoothOptions& options : {SmoothOptions{7, 1}, SmoothOptions{5, 0.6, -0.64, 0.2}}) {
+    for (const SmoothOptions& options :
+         {SmoothOptions{means(7, {1})},
+          SmoothOptions{.steps = means(5, {0.6, -0.64}), .max_displacement_mm = 0.2}}) {
       const auto open = inner_smoothed(volume, {labels, scheme, false}, options);
       EXPECT_GT(open.size(), 1000U);
       EXPECT_EQ(inner_smoothed(volume, {labels, scheme, true}, options), open);
@@ -251,19 +244,38 @@ TEST(SmoothWallsShape, TwoLabelsAreSmoothedAsAnIsosurfaceIs) {
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
     Mesh mesh = test::extracted(volume, {1, scheme, Interpolation::kMidpoint});
     SeparatingSurface surface = separated(volume, {{1}, scheme});
-    smooth({.passes = 7, .lambda = 0.7}, {}, mesh);
-    smooth({.passes = 7, .lambda = 0.7}, {}, surface.mesh);
+    smooth({means(7, {0.7})}, {}, mesh);
+    smooth({means(7, {0.7})}, {}, surface.mesh);
     EXPECT_TRUE(test::same_bytes(surface.mesh, mesh));
   }
 }
 
+TEST(SmoothWalls, MeansLeaveJunctionCurvesWhereTheyAreIfAsked) {
+  for (auto& [name, surface] : walls()) {
+    SCOPED_TRACE(name);
+    Mesh& mesh = surface.mesh;
+    const std::vector<Vec3> before(mesh.positions.begin(), mesh.positions.end());
+    smooth({.steps = means(3, {1}), .at_curves = AtCurves::kStay}, {}, mesh);
+    std::size_t moved = 0;
+    for (std::size_t v = 0; v < before.size(); ++v) {
+      if (mesh.is_on_line(v)) {
+        ASSERT_EQ(mesh.positions[v], before[v]);
+      }
+      moved += mesh.positions[v] != before[v] ? 1 : 0;
+    }
+    EXPECT_GT(moved, 0);
+  }
+}
+
 TEST(SmoothWalls, LargerAnglesLeaveJunctionCurvesWhereTheyAre) {
-  for (const SmoothingWay way : {SmoothingWay::kAngle, SmoothingWay::kOptimize}) {
+  for (const Smoothing method : {Smoothing::kAngle, Smoothing::kOptimize}) {
     for (auto& [name, surface] : walls()) {
       SCOPED_TRACE(name);
       Mesh& mesh = surface.mesh;
       const std::vector<Vec3> before(mesh.positions.begin(), mesh.positions.end());
-      const SmoothingEffect effect = smooth({.max_displacement_mm = 0.5, .way = way}, {}, mesh);
+      SmoothOptions options = test::method_options(method, 5);
+      options.max_displacement_mm = 0.5;
+      const SmoothingEffect effect = smooth(options, {}, mesh);
       std::size_t moved = 0;
       for (std::size_t v = 0; v < before.size(); ++v) {
         if (mesh.is_on_line(v) || mesh.is_on_border(v)) {

@@ -54,8 +54,7 @@ TEST(JobBody, MayNameLabelsInPlaceOfAnIso) {
   EXPECT_TRUE(expected.regularize);
   EXPECT_EQ(of_labels("[7, 3, 7, -1]").labels->values, (std::vector<std::int64_t>{-1, 3, 7}));
   EXPECT_EQ(of_labels(R"("all", "passes": 2, "smoothing": "taubin")").passes, 2);
-  EXPECT_EQ(of_labels(R"("all", "smoothing": "taubin")").lambda,
-            default_lambda(Smoothing::kTaubin));
+  EXPECT_EQ(of_labels(R"("all", "smoothing": "taubin")").lambda, row_of(Smoothing::kTaubin).lambda);
   EXPECT_EQ(of_labels(R"("all", "label_colors": {"3": "#AAbb00"})").label_colors.at(3), "#aabb00");
   EXPECT_EQ(of_labels(R"("all", "label_values": {"3": [9, 4, 9]})").label_values,
             (LabelValues{{3, {4, 9}}}));
@@ -173,7 +172,7 @@ TEST(JobBody, OtsuStandsForAnIso) {
 
 TEST(JobBody, WithoutALambdaTheSmoothingHasItsOwn) {
   EXPECT_EQ(parsed("").lambda, 1);
-  EXPECT_EQ(parsed(R"("smoothing": "taubin")").lambda, default_lambda(Smoothing::kTaubin));
+  EXPECT_EQ(parsed(R"("smoothing": "taubin")").lambda, row_of(Smoothing::kTaubin).lambda);
   EXPECT_EQ(parsed(R"("smoothing": "taubin", "lambda": null)").lambda, 0.33);
   EXPECT_EQ(parsed(R"("lambda": null)").lambda, 1);
 }

@@ -131,20 +131,19 @@ TEST(Parameters, BoundsAreThoseOfTheTable) {
 
 TEST(Parameters, CasesAreThoseOfTheTable) {
   for_every_parameter([&](const std::string& path, const Parameter& parameter, const auto&) {
-    for (const auto& entry : parameter.cases) {
-      if (!entry) continue;
-      json body = body_with("smoothing", std::string(to_string(entry->smoothing)));
-      if (entry->standard) {
+    for (const SmoothingCase& entry : parameter.cases) {
+      json body = body_with("smoothing", std::string(to_string(entry.smoothing)));
+      if (entry.standard) {
         const json all = json::parse(to_json(parse_job_parameters(body.dump())));
-        EXPECT_EQ(all[path], *entry->standard) << path;
+        EXPECT_EQ(all[path], *entry.standard) << path;
       }
-      if (entry->maximum) {
-        body[path] = *entry->maximum;
+      if (entry.maximum) {
+        body[path] = *entry.maximum;
         EXPECT_NO_THROW(parse_job_parameters(body.dump())) << path;
-        body[path] = *entry->maximum + 1e-6;
+        body[path] = *entry.maximum + 1e-6;
         const auto error = test::thrown_by([&] { parse_job_parameters(body.dump()); });
         ASSERT_TRUE(error) << path;
-        EXPECT_THAT(error->what(), HasSubstr("must be at most " + number_text(*entry->maximum)));
+        EXPECT_THAT(error->what(), HasSubstr("must be at most " + number_text(*entry.maximum)));
       }
     }
   });

@@ -44,7 +44,7 @@ class SetClock {
 
 // A process, but that it shares this one's memory.
 struct Node {
-  Node(const std::string& url, const std::string& name, const BlobStore& shared,
+  Node(const std::string& url, const std::string& name, BlobStore& shared,
        JobStoreOptions options = {.grace = milliseconds(0)})
       : database({.url = url, .node = name}),
         volumes(database),

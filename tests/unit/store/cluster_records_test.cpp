@@ -138,7 +138,7 @@ TEST_F(ClusterTest, OneReceiverIsToldNoMoreAtATimeByAllNodes) {
 // --- Databases and blobs
 
 // Whether a daemon of that database starts with those blobs.
-bool belong(Database& database, const BlobStore& blobs, bool adopt = false) {
+bool belong(Database& database, BlobStore& blobs, bool adopt = false) {
   const auto code =
       code_thrown_by([&] { Identity(database, blobs, {.adopt = adopt}, seconds(1)); });
   EXPECT_EQ(code.value_or(ErrorCode::kUnavailable), ErrorCode::kUnavailable);
@@ -161,9 +161,11 @@ TEST_F(ClusterTest, BlobsOfOneDaemonAloneAreNotThoseOfASecond) {
   Database database({.url = Postgres::shared().new_place(), .node = "x"});
   const DataFolder mine(files_ / "mine");
   const DataFolder others(files_ / "others");
-  EXPECT_TRUE(belong(database, FileBlobStore(mine)));
-  EXPECT_FALSE(belong(database, FileBlobStore(others)));
-  EXPECT_TRUE(belong(database, FileBlobStore(mine)));
+  FileBlobStore my_blobs(mine);
+  FileBlobStore other_blobs(others);
+  EXPECT_TRUE(belong(database, my_blobs));
+  EXPECT_FALSE(belong(database, other_blobs));
+  EXPECT_TRUE(belong(database, my_blobs));
 }
 
 // The store's URL is wrong, or nothing is mounted there.

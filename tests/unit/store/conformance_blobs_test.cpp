@@ -37,7 +37,7 @@ class Blobs : public testing::TestWithParam<NamedBlobEngine> {
     blobs_ = engine_->open();
   }
 
-  static Blob put(const BlobStore& blobs, std::string_view text) {
+  static Blob put(BlobStore& blobs, std::string_view text) {
     const auto writer = blobs.begin();
     writer->write(as_span(text));
     return writer->commit();

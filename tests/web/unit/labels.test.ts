@@ -86,7 +86,7 @@ describe('a job by labels', () => {
       'label 7',
     ]);
     expect(inWords(all)).toBe('6 tetrahedra, without steps');
-    expect(inWords({ ...all, smoothing: 'taubin' })).toBe('6 tetrahedra, 10 passes (Taubin)');
+    expect(inWords({ ...all, smoothing: 'taubin' })).toBe('6 tetrahedra, 10 passes (taubin)');
     const jobs = [defaults, all].map((parameters) => ({ parameters }) as Parameters<typeof titlesOf>[0][0]);
     expect(titlesOf(jobs)).toEqual(['iso 60, 5 passes, laplacian', 'all labels, 10 passes, labels']);
   });

@@ -1031,12 +1031,12 @@ class JobOptions(TypedDict, total=False):
         same and then moves all vertices back by the factor mu, where 1/lambda + 1/mu =
         pass_band. A pass is thus two steps: they remove noise and keep shape and volume. angle
         and optimize keep shape and volume and make the angles of triangles larger: each pass
-        moves every vertex along the extracted surface. angle moves it towards the bisectors of
-        its neighbours' angles. optimize moves it towards the mean of its neighbours in the
-        first half of the passes, and then to wherever the smallest angle becomes larger.
-        Neither uses lambda, and neither removes noise. labels is for labels alone: it takes the
-        steps of the voxels away, keeps flat faces, and gives each label the volume of its
-        voxels, to a few tenths of a percent.
+        moves every vertex along the extracted surface. Neither uses lambda, and neither removes
+        noise. angle moves it towards the bisectors of its neighbours' angles. optimize moves it
+        towards the mean of its neighbours in the first half of the passes, and then to wherever
+        the smallest angle becomes larger. labels is for labels alone: it takes the steps of the
+        voxels away, keeps flat faces, and gives each label the volume of its voxels, to a few
+        tenths of a percent.
 
     lambda_
         Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours. Null: 1

@@ -179,15 +179,13 @@ export function schemeInWords({ scheme }: Pick<JobParameters, 'scheme'>): string
   return lattices[scheme];
 }
 
-const smoothingInWords = { laplacian: 'Laplacian', taubin: 'Taubin', angle: 'by angles', optimize: 'optimised', labels: 'as labels' };
-
 // In a few words, for titles: 6 tetrahedra, linear, 5 passes.
 export function inWords(job: JobParameters): string {
   if (job.smoothing === 'labels') {
     return `${schemeInWords(job)}, ${job.passes > 0 ? 'without steps' : 'not smoothed'}${job.close ? ', closed' : ''}`;
   }
   const passes = job.passes === 1 ? '1 pass' : `${job.passes} passes`;
-  const smoothing = job.smoothing !== 'laplacian' && job.passes > 0 ? ` (${smoothingInWords[job.smoothing]})` : '';
+  const smoothing = job.smoothing !== 'laplacian' && job.passes > 0 ? ` (${job.smoothing})` : '';
   const closed = job.close ? ', closed' : '';
   const placed = isByLabels(job) ? '' : `, ${job.interpolation}`;
   return `${schemeInWords(job)}${placed}, ${passes}${smoothing}${closed}`;

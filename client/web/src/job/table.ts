@@ -61,7 +61,7 @@ export function parameterOf(name: string): Parameter {
   return found;
 }
 
-function valuesOf<T extends string>(name: string): readonly T[] {
+export function valuesOf<T extends string>(name: string): readonly T[] {
   return (parameterOf(name).values ?? []) as readonly T[];
 }
 

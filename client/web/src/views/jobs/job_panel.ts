@@ -3,7 +3,7 @@ import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
 import { isSameJob, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
-import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn } from '../../job/table';
+import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNames, formatNumber, formatValue } from '../../ui/format';
@@ -200,14 +200,8 @@ export const comparisons: readonly Comparison[] = [
   { title: 'the three lattices', variants: [{ scheme: 6 }, { scheme: 5 }, { scheme: 'bcc' }] },
   { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
   {
-    title: 'all kinds of smoothing',
-    variants: [
-      { smoothing: 'laplacian' },
-      { smoothing: 'taubin' },
-      { smoothing: 'angle' },
-      { smoothing: 'optimize' },
-      { smoothing: 'labels' },
-    ],
+    title: 'all methods of smoothing',
+    variants: valuesOf<JobParameters['smoothing']>('smoothing').map((smoothing) => ({ smoothing })),
   },
 ];
 
