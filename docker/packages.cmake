@@ -10,10 +10,10 @@ macro(isomesh_find debian name)
   endif()
 endmacro()
 
-# isomesh_find_module(DEBIAN PREFIX MODULE): a module of pkg-config's, as PkgConfig::PREFIX.
-macro(isomesh_find_module debian prefix module)
+# isomesh_find_module(DEBIAN PREFIX MODULE...): the first of pkg-config's modules that there is, as PkgConfig::PREFIX.
+macro(isomesh_find_module debian prefix)
   if(PKG_CONFIG_FOUND)
-    pkg_check_modules(${prefix} QUIET IMPORTED_TARGET ${module})
+    pkg_search_module(${prefix} QUIET IMPORTED_TARGET ${ARGN})
   endif()
   if(NOT ${prefix}_FOUND)
     list(APPEND isomesh_missing ${debian})
@@ -81,7 +81,8 @@ if(ISOMESH_DAEMON)
   isomesh_find(libmeshoptimizer-dev meshoptimizer)
   isomesh_find_module(libpq-dev libpq libpq)
   isomesh_find_module(liblz4-dev lz4 liblz4)
-  isomesh_find_module(libhdf5-dev hdf5 hdf5)
+  # Debian's `hdf5` is the MPI build where that is installed, too.
+  isomesh_find_module(libhdf5-dev hdf5 hdf5-serial hdf5)
   isomesh_find_module(libarchive-dev archive libarchive)
   isomesh_find_module(libseccomp-dev seccomp libseccomp)
   isomesh_find_module(libutf8proc-dev utf8proc libutf8proc)

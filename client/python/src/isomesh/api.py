@@ -23,9 +23,6 @@ MeshBytes = str
 JobState = Literal['queued', 'running', 'succeeded', 'failed', 'cancelled']
 
 
-Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
-
-
 Vector = Union['Sequence[float]']
 
 
@@ -523,6 +520,9 @@ class JobList(TypedDict):
     jobs: Sequence[Job]
     #: The cursor of the next page. Null on the last page.
     next: Optional[str]
+
+
+Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
 
 
 class Timing(TypedDict):
