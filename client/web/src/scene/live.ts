@@ -24,6 +24,7 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import { blockSize, firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
+import { verticalAngle } from './camera';
 import { compile } from './compile';
 import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import type { Look } from '../volume/looks';
@@ -32,7 +33,6 @@ import { Painting, type Picture } from './painting';
 import { onTap } from './tap';
 import { firstOffset, fitted } from './views';
 
-const verticalAngle = 30;
 // How long a frame may take while something moves, and at rest, in milliseconds. A change in the middle of a frame is
 // drawn after it, so that half a frame's time comes on top.
 const movingTime = 33;
@@ -394,7 +394,7 @@ export class LiveSurface {
       target.scissorTest = true;
       target.scissor.set(0, edge(step), width, edge(step + 1) - edge(step));
     };
-    return { width, height, steps, begin };
+    return { width, height, isEnlarged: width < this.canvas.width, steps, begin };
   }
 
   private scaleFor(pixels: number, kind: 'moving' | 'resting'): number {
