@@ -1,7 +1,6 @@
 // How long frames take, and what follows from it.
 
 const slowFrame = 33; // milliseconds
-const keptFrames = 120;
 const stepTime = 60;
 const mostSteps = 64;
 const longestRest = 500;
@@ -42,8 +41,6 @@ interface DrawnFrame {
 }
 
 export class FrameBudget {
-  // Durations of the last frames while the surface was moving, for measurements.
-  readonly moving: number[] = [];
   private cost = 0;
   // The cost of frames that show all triangles.
   private wholeCost = 0;
@@ -72,9 +69,6 @@ export class FrameBudget {
     if (!isCoarse) this.wholeCost = mean(this.wholeCost);
     if (isMoving && isCoarse) this.judge(isNext ? now - this.lastEnd : took);
     this.lastEnd = now;
-    if (!isMoving) return;
-    this.moving.push(took);
-    if (this.moving.length > keptFrames) this.moving.shift();
   }
 
   private judge(pace: number): void {
@@ -89,6 +83,12 @@ export class FrameBudget {
     } else if (mean < quickPace && this.place - 1 > this.tooMuch) {
       this.place -= 1;
     }
+  }
+
+  // Counts a frame that was drawn while it moved, of a coarse copy or, where that is null, of all.
+  note(dataset: DOMStringMap, triangles: number | null): void {
+    dataset.frames = String(Number(dataset.frames ?? 0) + 1);
+    dataset.effort = triangles === null ? 'all' : `${triangles} triangles, ${this.effort.sharpness} of the pixels along each side`;
   }
 
   // How many steps a frame of all triangles is drawn in, so that a change never waits for all of it.

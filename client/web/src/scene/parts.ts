@@ -111,6 +111,7 @@ export class Parts {
   // Coarse copies of all looks, for each level; and the level that is drawn.
   private copies: { geometry: BufferGeometry; triangles: number }[][] = [];
   private level = 0;
+  private known: PartFinder | null = null;
   private isCoarse = false;
   private isWhole = false;
   private readonly shader = new DistanceShader();
@@ -176,9 +177,10 @@ export class Parts {
     return this.blocks.filter(({ isLevel }) => !isLevel);
   }
 
-  // Finds which of its triangles belong together.
-  finder(): PartFinder {
-    return new PartFinder(this.finest.map(({ made }) => made));
+  // Finds which of its triangles belong together. To be asked for once all is there.
+  get finder(): PartFinder {
+    this.known ??= new PartFinder(this.finest.map(({ made }) => made));
+    return this.known;
   }
 
   // Those of the finest blocks that can be drawn.

@@ -33,7 +33,7 @@ export class Surface {
   readonly rulers: Rulers;
   readonly cut: Cut;
   private readonly cross: Cross;
-  readonly budget = new FrameBudget();
+  private readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
   // More blocks can be drawn.
   onShown: (() => void) | null = null;
@@ -57,7 +57,6 @@ export class Surface {
     [-1, -1, -1],
     [1, 1, 1],
   ];
-  private finder: PartFinder | null = null;
   private scheduled = 0;
   private settling = 0;
   private isMoving = false;
@@ -196,8 +195,7 @@ export class Surface {
 
   // Which triangles belong together. To be asked for once all is there.
   get partFinder(): PartFinder {
-    this.finder ??= this.parts.finder();
-    return this.finder;
+    return this.parts.finder;
   }
 
   setStyle(style: SurfaceStyle): void {
@@ -291,13 +289,11 @@ export class Surface {
   }
 
   turn(azimuth: number, elevation: number): void {
-    const { offset, target } = this.place;
-    this.nudge({ offset: turned(offset, azimuth, elevation), target });
+    this.nudge({ ...this.place, offset: turned(this.place.offset, azimuth, elevation) });
   }
 
   zoom(factor: number): void {
-    const { offset, target } = this.place;
-    this.nudge({ offset: [offset[0] * factor, offset[1] * factor, offset[2] * factor], target });
+    this.nudge({ ...this.place, offset: this.place.offset.map((value) => value * factor) as Vec3 });
   }
 
   // Both in parts of the view's height.
@@ -371,7 +367,8 @@ export class Surface {
     if (budget.isSlow) this.copies.want();
     if (isMoving && budget.isSlow) this.setCoarse(true);
     if (this.isCoarse) this.parts.setLevel(this.levels.indexOf(budget.effort.triangles));
-    if (isMoving) this.host.dataset.frames = String(Number(this.host.dataset.frames ?? 0) + 1);
+    // For measurements.
+    if (isMoving) budget.note(this.host.dataset, this.isCoarse ? this.parts.trianglesMoving : null);
     if (this.uploading.isEmpty && !this.isStale) for (const resolve of this.onAllShown.splice(0)) resolve();
     this.noteStill();
   }

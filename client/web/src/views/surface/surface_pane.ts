@@ -192,11 +192,6 @@ export class SurfacePane {
     this.announcement.textContent = viewTitles[view];
   }
 
-  // Frame times while it moved, for measurements.
-  get frameTimes(): readonly number[] {
-    return this.surface?.budget.moving ?? [];
-  }
-
   private say(text: string, ...more: Node[]): void {
     this.bar.parentElement?.remove();
     this.view.append(h('div', { class: 'overlay message' }, h('p', {}, text), ...more));
