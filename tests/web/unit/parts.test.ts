@@ -2,7 +2,8 @@ import { describe, expect, it } from 'vitest';
 import { Mesh, MeshPhongMaterial, Plane, Ray, Scene, Vector3, type BufferGeometry, type Side } from 'three';
 import { prepare, type Block } from '@/mesh/blocks';
 import { merged, type Coarse } from '@/mesh/coarse';
-import { defaultStyle, Parts } from '@/scene/parts';
+import { Parts } from '@/scene/parts';
+import { defaultStyle } from '@/scene/style';
 import { wholeRay } from '@/scene/pick';
 import type { Waiting } from '@/scene/uploading';
 

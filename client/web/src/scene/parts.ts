@@ -22,17 +22,8 @@ import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
 import { firstMet, type Interval } from './pick';
+import { defaultStyle, type SurfaceStyle } from './style';
 import type { Uploading } from './uploading';
-
-export interface SurfaceStyle {
-  shading: 'smooth' | 'flat';
-  wireframe: boolean;
-  opacity: number;
-  // Colours tell the vertices' distances, where the file has them.
-  distance: boolean;
-}
-
-export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1, distance: false };
 
 export interface Hit {
   at: number; // along the ray
