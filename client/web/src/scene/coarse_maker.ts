@@ -1,6 +1,7 @@
 // Has coarse copies made, beside the page, of a surface that comes block by block; once they are wanted.
 import type { Coarse } from '../mesh/coarse';
 import type { CoarseAnswer, CoarseRequest } from '../mesh/coarse.worker';
+import { buffersIn } from '../mesh/transfer';
 
 // While blocks come, copies are made anew when there are so many times as many triangles as in the last ones.
 const growth = 1.5;
@@ -51,8 +52,7 @@ export class CoarseMaker {
     this.made = this.come;
     const parts = this.waiting.splice(0);
     this.worker ??= this.start();
-    const buffers = parts.flatMap(({ coarse }) => Object.values(coarse).map(({ buffer }) => buffer));
-    this.worker.postMessage({ parts, most: this.most } satisfies CoarseRequest, buffers);
+    this.worker.postMessage({ parts, most: this.most } satisfies CoarseRequest, buffersIn(parts));
   }
 
   private start(): Worker {
