@@ -62,7 +62,7 @@ class Forwards {
 async function opened(file: Blob): Promise<Forwards> {
   const [first, second] = new Uint8Array(await file.slice(0, 2).arrayBuffer());
   const isPacked = first === 0x1f && second === 0x8b;
-  const stream = file.stream() as ReadableStream<Uint8Array<ArrayBuffer>>;
+  const stream = file.stream();
   return new Forwards(isPacked ? stream.pipeThrough(new DecompressionStream('gzip')) : stream);
 }
 
