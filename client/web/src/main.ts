@@ -23,10 +23,6 @@ import { Scope } from './ui/signal';
 import { startTheme, toggleTheme } from './ui/theme';
 import { tokenButtons, watchToken } from './ui/token_dialog';
 import { uploads } from './views/volumes/upload_panel';
-import { prepareView } from './views/prepare/prepare';
-import { ordersView } from './views/jobs/orders';
-import { queueView } from './views/jobs/queue';
-import { volumesView } from './views/volumes/volumes';
 
 const retryEvery = 2000;
 
@@ -35,32 +31,19 @@ interface Place {
   show: (scope: Scope, route: Route) => Promise<HTMLElement>;
 }
 
-// The views that draw in 3D are loaded when they are needed.
+// Views are loaded when they are needed.
 function placeOf({ path }: Route): Place {
   const [name, id] = path;
   if (name === undefined || (name === 'volumes' && id === undefined)) {
-    return { title: 'Volumes', show: volumesView };
+    return { title: 'Volumes', show: async (scope) => (await import('./views/volumes/volumes')).volumesView(scope) };
   }
-  if (name === 'volumes') return { title: 'New surface', show: prepareView };
-  if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: queueView };
-  if (name === 'orders') return { title: 'Orders', show: ordersView };
-  if (name === 'jobs') {
-    return {
-      title: 'Surface',
-      show: async (scope, route) => (await import('./views/jobs/job')).jobView(scope, route),
-    };
-  }
-  if (name === 'compare') {
-    return {
-      title: 'Compare',
-      show: async (scope, route) => (await import('./views/compare/compare')).compareView(scope, route),
-    };
-  }
+  if (name === 'volumes') return { title: 'New surface', show: async (...of) => (await import('./views/prepare/prepare')).prepareView(...of) };
+  if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: async (...of) => (await import('./views/jobs/queue')).queueView(...of) };
+  if (name === 'orders') return { title: 'Orders', show: async (...of) => (await import('./views/jobs/orders')).ordersView(...of) };
+  if (name === 'jobs') return { title: 'Surface', show: async (...of) => (await import('./views/jobs/job')).jobView(...of) };
+  if (name === 'compare') return { title: 'Compare', show: async (...of) => (await import('./views/compare/compare')).compareView(...of) };
   if (name === 'together') {
-    return {
-      title: 'Surfaces in one scene',
-      show: async (scope, route) => (await import('./views/compare/together')).togetherView(scope, route),
-    };
+    return { title: 'Surfaces in one scene', show: async (...of) => (await import('./views/compare/together')).togetherView(...of) };
   }
   return {
     title: 'Not found',

@@ -7,11 +7,11 @@ export function smallNrrd(fields: string[] = [], bytes: Buffer = samples): Buffe
   return Buffer.concat([Buffer.from(header.join('\n')), bytes]);
 }
 
-// Two volumes of 4 x 3 x 1 samples.
-export function seriesNifti(): Buffer {
+// Volumes of 4 x 3 x 1 samples.
+export function seriesNifti(bytes: Buffer = samples): Buffer {
   const header = Buffer.alloc(352);
   header.writeInt32LE(348, 0);
-  [4, 4, 3, 1, 2].forEach((size, at) => header.writeInt16LE(size, 40 + 2 * at));
+  [4, 4, 3, 1, bytes.length / 12].forEach((size, at) => header.writeInt16LE(size, 40 + 2 * at));
   header.writeInt16LE(2, 70);
   header.writeInt16LE(8, 72);
   for (let at = 0; at < 5; at += 1) header.writeFloatLE(1, 76 + 4 * at);
@@ -19,7 +19,7 @@ export function seriesNifti(): Buffer {
   header.writeInt16LE(2, 254);
   for (const at of [280, 300, 320]) header.writeFloatLE(1, at);
   header.write('n+1', 344);
-  return Buffer.concat([header, samples]);
+  return Buffer.concat([header, bytes]);
 }
 
 // An element of explicit little-endian DICOM.
@@ -42,8 +42,14 @@ function words(...values: number[]): Buffer {
   return bytes;
 }
 
+interface Study {
+  patient: string;
+  uid: string;
+  title: string;
+}
+
 // One slice of a CT of 4 x 4 samples, `index` mm from the first, with the name of its series.
-export function ctSlice(index: number, frameOfReference: string, series: string, seriesUid = '1.2.3.4'): Buffer {
+export function ctSlice(index: number, frameOfReference: string, series: string, seriesUid = '1.2.3.4', study: Study = { patient: '', uid: '1.2.3', title: '' }): Buffer {
   const image = '1.2.840.10008.5.1.4.1.1.2';
   const uid = `1.2.826.0.1.3680043.9.1.${index}`;
   const meta = Buffer.concat([
@@ -62,8 +68,10 @@ export function ctSlice(index: number, frameOfReference: string, series: string,
     element(8, 0x18, 'UI', uid),
     element(8, 0x20, 'DA', '20240517'),
     element(8, 0x60, 'CS', 'CT'),
+    element(8, 0x1030, 'LO', study.title),
     element(8, 0x103e, 'LO', series),
-    element(0x20, 0xd, 'UI', '1.2.3'),
+    element(0x10, 0x10, 'PN', study.patient),
+    element(0x20, 0xd, 'UI', study.uid),
     element(0x20, 0xe, 'UI', seriesUid),
     element(0x20, 0x32, 'DS', `0\\0\\${index}`),
     element(0x20, 0x37, 'DS', '1\\0\\0\\0\\1\\0'),

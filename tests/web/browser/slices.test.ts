@@ -168,11 +168,11 @@ describe('slices before there is a mesh', () => {
         return { count: found.length, isRight: found.every(([x]) => x > width / 2), isBelow: found.every(([, y]) => y > height / 2) };
       });
     expect((await coloured()).count).toBe(0);
-    const other = page.getByLabel('Volume over it', { exact: true });
+    const other = page.getByLabel('Overlay', { exact: true });
     await other.selectOption({ index: 1 });
     await expect.poll(async () => (await coloured()).count).toBeGreaterThan(100);
     expect(await coloured()).toMatchObject({ isRight: true, isBelow: true });
-    await page.getByLabel('Opacity of the volume over it').fill('0');
+    await page.getByLabel('Opacity of the overlay').fill('0');
     await expect.poll(async () => (await coloured()).count).toBe(0);
     // At the ball's pole there is little; a slab of 40 mm reaches its middle.
     await page.locator('[data-plane=axial] input[type=range]').fill('8');
@@ -203,7 +203,7 @@ describe('slices before there is a mesh', () => {
   it('take the whole room one by one, and give it back', async () => {
     const { page } = at;
     await open(page);
-    const all = page.locator('.slices > figure');
+    const all = page.locator('.slices > figure:not([hidden])');
     const [axial, coronal] = [page.locator('[data-plane=axial]'), page.locator('[data-plane=coronal]')];
     await expect.poll(() => all.count()).toBe(4);
     const before = (await axial.boundingBox())?.width ?? 0;

@@ -105,19 +105,21 @@ export interface JobAnswer {
   } | null;
 }
 
-export function startBrowser(): Promise<Browser> {
+// Software draws WebGPU, too. If ISOMESH_WEBGPU is set, all tests of the page use it.
+export const webGpuOptions = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader', '--enable-features=Vulkan', '--use-vulkan=swiftshader'];
+
+export function startBrowser(options = process.env.ISOMESH_WEBGPU === undefined ? [] : webGpuOptions): Promise<Browser> {
   return chromium.launch({
     executablePath: fromEnvironment('CHROMIUM'),
     args: [
       '--no-sandbox',
-      '--use-gl=angle',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
+      ...['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
       '--disable-quic',
       '--no-first-run',
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',
+      ...options,
     ],
   });
 }

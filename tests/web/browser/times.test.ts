@@ -4,7 +4,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { CDPSession, Page } from 'playwright-core';
 import { expect, it } from 'vitest';
-import { ballNrrd, head, setup, surfaceLoaded } from './support';
+import { ballNrrd, head, setup, still, surfaceLoaded } from './support';
 
 const at = setup({ viewport: { width: 1280, height: 800 } });
 const folder = process.env.ISOMESH_TIMES ?? '';
@@ -70,7 +70,7 @@ async function heapOf(session: CDPSession): Promise<number> {
 it('a surface of millions of triangles', async () => {
   const { daemon, browser } = at;
   const volume = await uploadHead();
-  const job = await daemon.submit({ volume, iso: 60, formats: ['glb'] }, 60);
+  const job = await daemon.submit({ volume, iso: 60, regularize: false, formats: ['glb'] }, 60);
   const seen: Times[] = [];
   for (let run = 0; run < 3; run += 1) {
     const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
@@ -87,6 +87,46 @@ it('a surface of millions of triangles', async () => {
     say('ch2 at 60, from a cold page', `first triangles ${Math.round(first)} ms, all ${Math.round(whole)} ms, ${told(times)}`);
   }
   expect(seen.every(({ first, whole }) => first > 0 && first < whole)).toBe(true);
+});
+
+// Of the surface in that pane, which a drag turns for so many seconds.
+async function framesTurning(page: Page, seconds: number): Promise<number> {
+  const viewport = page.locator('.viewport');
+  const box = await viewport.boundingBox();
+  if (!box) throw new Error('there is no surface');
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  const frames = (): Promise<number> => viewport.evaluate(({ dataset }) => Number(dataset.frames ?? 0));
+  const turn = async (milliseconds: number): Promise<void> => {
+    const began = performance.now();
+    while (performance.now() < began + milliseconds) {
+      const angle = (performance.now() - began) / 300;
+      await page.mouse.move(x + 150 * Math.sin(angle), y + 40 * Math.cos(angle));
+    }
+  };
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  // Until then it finds out how much effort there is time for.
+  await turn(3000);
+  const before = await frames();
+  await turn(1000 * seconds);
+  const drawn = (await frames()) - before;
+  await page.mouse.up();
+  return drawn / seconds;
+}
+
+it('a surface of millions of triangles that is turned', async () => {
+  const { page, daemon } = at;
+  const volume = await uploadHead();
+  const { id, mesh } = await daemon.submit({ volume, iso: 60, regularize: false, formats: ['glb'] }, 60);
+  await page.goto(`${daemon.url}/#/jobs/${id}`);
+  await surfaceLoaded(page);
+  for (let run = 0; run < 3; run += 1) {
+    const rate = await framesTurning(page, 5);
+    await still(page);
+    const { effort = '' } = await page.locator('.viewport').evaluate(({ dataset }) => ({ effort: dataset.effort }));
+    say(`${mesh?.triangles ?? 0} triangles while they are turned`, `${rate.toFixed(1)} frames a second, ${effort}`);
+    expect(rate).toBeGreaterThan(0);
+  }
 });
 
 it('twenty surfaces, one after the other', async () => {

@@ -104,6 +104,52 @@ describe('an upload', () => {
   });
 });
 
+describe('an upload of several volumes', () => {
+  it('shows its time points on a slider before one is chosen', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    const frames = Buffer.concat([1, 2, 3, 4, 5].map((bright) => Buffer.from(Array.from({ length: 12 }, (_, n) => bright * (n + 3)))));
+    await drop(page, [{ name: 'five.nii', bytes: seriesNifti(frames) }]);
+    const choice = page.locator('.time-choice');
+    const slider = page.getByRole('slider', { name: 'Volume of the file' });
+    const brightness = (): Promise<number> =>
+      choice.locator('canvas').evaluate((canvas: HTMLCanvasElement) => {
+        const { data = [] } = canvas.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height) ?? {};
+        return [...data].reduce((sum, value) => sum + value, 0);
+      });
+    await expect.poll(() => choice.locator('canvas').getAttribute('data-shown')).toBe('0');
+    await expect.poll(() => choice.innerText()).toContain('1 of 5');
+    const before = await brightness();
+    await slider.focus();
+    for (let step = 0; step < 3; step += 1) await page.keyboard.press('ArrowRight');
+    await expect.poll(() => choice.locator('canvas').getAttribute('data-shown')).toBe('3');
+    expect(await brightness()).toBeGreaterThan(before);
+    await page.getByRole('button', { name: 'Use this one' }).click();
+    await page.waitForURL(volumePage);
+    const id = /volumes\/([0-9a-f]+)/.exec(page.url())?.[1] ?? '';
+    expect((await daemon.json<{ range: number[] }>(`/v1/volumes/${id}`)).range).toEqual([12, 56]);
+  });
+
+  it('shows series below their patients and studies', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    const jane = { patient: 'Doe^Jane', uid: '1.5.1', title: 'Head' };
+    const joe = { patient: 'Doe^Joe', uid: '1.5.2', title: 'Knee' };
+    const series = [['thin', '1.6.1', jane], ['knee', '1.6.2', joe], ['thick', '1.6.3', jane]] as const;
+    const slices = series.flatMap(([name, uid, study], n) =>
+      [1, 2].map((index) => ({ name: `${name}${index}.dcm`, bytes: ctSlice(10 * n + index, `1.9.${n}`, name, uid, study) })),
+    );
+    await drop(page, slices);
+    const groups = page.locator('.choice-group');
+    await expect.poll(() => groups.count()).toBe(2);
+    const [first, second] = await groups.allInnerTexts();
+    expect(first).toMatch(/Doe Jane[^]*Head, 2024-05-17[^]*thin[^]*thick/);
+    expect(second).toMatch(/Doe Joe[^]*Knee[^]*knee/);
+    await groups.nth(1).getByRole('button').click();
+    await page.waitForURL(volumePage);
+  });
+});
+
 describe('what was uploaded and refused', () => {
   it('is sent again when the daemon does not keep it any more', async () => {
     const { page, daemon } = at;

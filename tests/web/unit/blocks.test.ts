@@ -1,6 +1,7 @@
 import { Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
-import { areaNormals, borderVertices, clustered, mostTriangles, movingCell, prepare, split, type Triangles } from '@/mesh/blocks';
+import { borderVertices, coarseCell, mostTriangles, prepare, split, type Triangles } from '@/mesh/blocks';
+import { clustered, levelsOf, merged, type Coarse } from '@/mesh/coarse';
 import { Seams } from '@/mesh/seams';
 
 // A bumpy sheet of n x n squares over [x0, x0 + n] x [0, n].
@@ -64,13 +65,14 @@ describe('blocks', () => {
 
   it('keeps the shape with far fewer triangles while it is turned', () => {
     const whole = sheet(100);
-    const { coarse, border } = prepare(whole);
-    expect(coarse.length).toBeLessThan(whole.index.length / 4);
-    expect(area({ positions: whole.positions, index: coarse }) / area(whole)).toBeGreaterThan(0.85);
+    const { coarse, border, normals } = prepare(whole);
+    expect(coarse.index.length).toBeLessThan(whole.index.length / 4);
+    expect(coarse.positions.length).toBeLessThan(whole.positions.length / 4);
+    expect(area(coarse) / area(whole)).toBeGreaterThan(0.85);
     const coarser = prepare(whole, 7).coarse;
-    expect(coarser.length).toBeLessThan(coarse.length / 1.5);
-    expect(area({ positions: whole.positions, index: coarser }) / area(whole)).toBeGreaterThan(0.7);
-    expect(clustered(whole, new Float32Array(whole.positions.length), border, 0).length).toBe(whole.index.length);
+    expect(coarser.index.length).toBeLessThan(coarse.index.length / 1.5);
+    expect(area(coarser) / area(whole)).toBeGreaterThan(0.7);
+    expect(clustered({ ...whole, normals }, border, { size: 0, areByOctant: true }).length).toBe(whole.index.length);
   });
 
   it('opens no gap between neighbours while they are turned', () => {
@@ -78,28 +80,28 @@ describe('blocks', () => {
     const right = sheet(40, 40);
     const cell = 7;
     // Without the ends, where other borders are in the same cell.
-    const onSeam = ({ positions }: Triangles, vertices: Iterable<number>): number[][] =>
-      [...vertices]
+    const onSeam = ({ positions, index }: Triangles | Coarse): number[][] =>
+      [...index]
         .map((vertex) => [...positions.subarray(3 * vertex, 3 * vertex + 3)])
         .filter(([x = 0, y = 0]) => x === 40 && y >= cell && y < 35);
     const least = new Map<string, number[]>();
-    for (const place of onSeam(left, left.index)) {
+    for (const place of onSeam(left)) {
       const key = place.map((value) => Math.floor(value / cell)).join();
       const before = least.get(key);
       if (!before || (place[1] as number) < (before[1] as number)) least.set(key, place);
     }
     const expected = new Set([...least.values()].map(String));
     for (const side of [left, right]) {
-      const named = new Set(onSeam(side, prepare(side, cell).coarse).map(String));
+      const named = new Set(onSeam(prepare(side, cell).coarse).map(String));
       expect([...named].filter((place) => !expected.has(place))).toEqual([]);
       expect(named.size).toBeGreaterThan(3);
     }
   });
 
-  it('leaves about as many triangles of a large surface as software turns', () => {
+  it('leaves some ten thousand triangles of a large surface', () => {
     const whole = sheet(500);
-    const cell = movingCell(area(whole));
-    const kept = split(whole).reduce((sum, part) => sum + prepare(part, cell).coarse.length / 3, 0);
+    const cell = coarseCell(area(whole));
+    const kept = split(whole).reduce((sum, part) => sum + prepare(part, cell).coarse.index.length / 3, 0);
     expect(kept).toBeGreaterThan(5_000);
     expect(kept).toBeLessThan(50_000);
   });
@@ -113,9 +115,10 @@ describe('blocks', () => {
       index: Uint32Array.from([...front.index, ...[...front.index].reverse().map((vertex) => vertex + vertices)]),
     };
     const { coarse } = prepare(wall);
-    const behind = [...coarse].filter((vertex) => vertex >= vertices).length;
-    expect(behind / coarse.length).toBeGreaterThan(0.4);
-    expect(behind / coarse.length).toBeLessThan(0.6);
+    // The normals of the back point down.
+    const behind = [...coarse.index].filter((vertex) => (coarse.normals[4 * vertex + 2] ?? 0) < 0).length;
+    expect(behind / coarse.index.length).toBeGreaterThan(0.4);
+    expect(behind / coarse.index.length).toBeLessThan(0.6);
   });
 
   it('has normals that point away from the outside of the winding', () => {
@@ -159,19 +162,69 @@ describe('a coarse copy', () => {
         if (x + 1 < size && y + 1 < size) index.push(a, a + 1, a + size, a + 1, a + size + 1, a + size);
       }
     }
-    const triangles = { positions, index: Uint32Array.from(index) };
-    const normals = areaNormals(triangles);
-    const coarse = clustered(triangles, normals, borderVertices(triangles.index, size * size), 3.5);
-    expect(coarse.length).toBeGreaterThan(300);
-    let turned = 0;
-    for (let i = 0; i < coarse.length; i += 3) {
-      const vertices = [...coarse.subarray(i, i + 3)];
-      const [a, b, c] = vertices.map((vertex) => new Vector3().fromArray(positions, 3 * vertex)) as [Vector3, Vector3, Vector3];
-      const face = b.sub(a).cross(c.sub(a));
-      const mean = new Vector3();
-      for (const vertex of vertices) mean.add(new Vector3().fromArray(normals, 3 * vertex).normalize());
-      if (face.dot(mean) < 0) turned += 1;
+    const { coarse } = prepare({ positions, index: Uint32Array.from(index) });
+    expect(coarse.index.length).toBeGreaterThan(300);
+    expect(turnedOver(coarse)).toBe(0);
+    const levels = levelsOf([coarse], [200, 100]);
+    for (const [level] of levels) {
+      expect(level?.index.length).toBeGreaterThan(30);
+      expect(level && turnedOver(level)).toBe(0);
     }
-    expect(turned).toBe(0);
+  });
+
+  it('of several surfaces has at most so many triangles together, by the same cells', () => {
+    const left = prepare(sheet(80)).coarse;
+    const right = prepare(sheet(80, 80)).coarse;
+    const before = left.index.length / 3;
+    const most = [10_000, Math.floor(before), Math.floor(before / 3)];
+    const levels = levelsOf([left, right], most);
+    const counts = levels.map((surfaces) => surfaces.map(({ index }) => index.length / 3));
+    expect(counts[0]).toEqual([before, right.index.length / 3]);
+    counts.forEach(([a = 0, b = 0], level) => {
+      expect(a + b).toBeLessThanOrEqual(most[level] ?? 0);
+      expect(a + b).toBeGreaterThan(0.25 * Math.min(most[level] ?? 0, 2 * before));
+      expect(a / b).toBeGreaterThan(0.6);
+      expect(a / b).toBeLessThan(1.6);
+    });
+    for (const surfaces of levels) {
+      for (const { positions, normals, index } of surfaces) {
+        expect(normals.length / 4).toBe(positions.length / 3);
+        expect(Math.max(...index)).toBe(positions.length / 3 - 1);
+      }
+    }
+  });
+
+  it('of nothing, or of points, ends', () => {
+    const none = merged([]);
+    expect(levelsOf([none], [8, 4]).flat().map(({ index }) => index.length)).toEqual([0, 0]);
+    const point: Coarse = { positions: new Float32Array(9), normals: new Int16Array(12), index: Uint32Array.from([0, 1, 2, 0, 1, 2]) };
+    expect(levelsOf([point], [1]).flat().map(({ index }) => index.length)).toEqual([0]);
+  });
+
+  it('keeps distances with their vertices', () => {
+    const whole = sheet(60);
+    const distances = Float32Array.from({ length: whole.positions.length / 3 }, (_, vertex) => whole.positions[3 * vertex] as number);
+    const { coarse } = prepare({ ...whole, distances });
+    const all = merged([prepare(sheet(20, 60)).coarse, coarse]);
+    const behind = all.positions.length / 3 - coarse.positions.length / 3;
+    coarse.distances?.forEach((distance, vertex) => {
+      expect(distance).toBe(coarse.positions[3 * vertex]);
+      expect(all.distances?.[behind + vertex]).toBe(distance);
+    });
+    expect(coarse.distances?.length).toBe(coarse.positions.length / 3);
   });
 });
+
+// How many triangles face away from where the normals of their vertices point.
+function turnedOver({ positions, normals, index }: Coarse): number {
+  let turned = 0;
+  for (let i = 0; i < index.length; i += 3) {
+    const vertices = [...index.subarray(i, i + 3)];
+    const [a, b, c] = vertices.map((vertex) => new Vector3().fromArray(positions, 3 * vertex)) as [Vector3, Vector3, Vector3];
+    const face = b.sub(a).cross(c.sub(a));
+    const mean = new Vector3();
+    for (const vertex of vertices) mean.add(new Vector3().fromArray(normals, 4 * vertex));
+    if (face.dot(mean) < 0) turned += 1;
+  }
+  return turned;
+}

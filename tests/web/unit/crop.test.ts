@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '@/api/types';
 import { boxOf, cropOf, isUpright, wholeBox, within, type Box } from '@/volume/crop';
 import { SliceCrop } from '@/views/slices/slice_crop';
+import type { Spot } from '@/views/slices/slice_grip';
 
 // x towards the right, y towards the back, z down.
 const turned = {
@@ -36,18 +37,19 @@ describe('the edges of a crop in a slice', () => {
   it('are caught near them and moved, but not past each other', () => {
     let box: Box = [[2, 3, 4], [10, 20, 39]];
     const crop = new SliceCrop({ box: () => box, setBox: (next) => (box = next) }, [0, 2]);
-    const at = (column: number, row: number): unknown => crop.at([column, row], [4, 4], false);
-    expect(at(2.5, 20)).toEqual([0, null]);
-    expect(at(10, 39)).toEqual([1, 1]);
-    expect(at(6, 20)).toBeNull();
-    expect(at(2, 60)).toBeNull();
-    expect(crop.at([6, 20], [4, 4], true)).toEqual([0, null]);
-    crop.begin(7, [0, 1]);
-    expect(crop.move(8, [5, 30])).toBe(false);
-    expect(crop.move(7, [5.2, 30])).toBe(true);
+    const at = (column: number, row: number, isTouch = false): Spot => ({ place: [column, row], pixels: [4, 4], isTouch });
+    expect(crop.isAt(at(2.5, 20))).toBe(true);
+    expect(crop.isAt(at(6, 20))).toBe(false);
+    expect(crop.isAt(at(2, 60))).toBe(false);
+    expect(crop.isAt(at(6, 20, true))).toBe(true);
+    expect(crop.hold(7, at(6, 20))).toBe(false);
+    // A corner is two edges.
+    expect(crop.hold(7, at(2, 39))).toBe(true);
+    expect(crop.move(8, at(5, 30))).toBe(false);
+    expect(crop.move(7, at(5.2, 30))).toBe(true);
     expect(box).toEqual([[5, 3, 4], [10, 20, 30]]);
-    crop.move(7, [99, -99]);
+    crop.move(7, at(99, -99));
     expect(box).toEqual([[9, 3, 4], [10, 20, 5]]);
-    expect([crop.end(8), crop.end(7), crop.move(7, [3, 3])]).toEqual([false, true, false]);
+    expect([crop.letGo(8), crop.letGo(7), crop.move(7, at(3, 3))]).toEqual([false, true, false]);
   });
 });

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { defaultStyle } from '@/scene/parts';
+import { defaultStyle } from '@/scene/style';
 import { History } from '@/ui/history';
 import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from '@/views/surface/look_text';
 

@@ -15,7 +15,7 @@ import {
 import { commandSnippet, curlSnippet, librarySnippet } from '@/job/snippets';
 import { parameterOf } from '@/job/table';
 import { rawFault } from '@/volume/raw';
-import { draggedWindow } from '@/views/slices/slice_view';
+import { draggedWindow } from '@/volume/slices';
 import { inSlice, windowToFetch } from '@/volume/slices';
 import { fitDistance, placeOfText, placeToText, turned } from '@/scene/views';
 

@@ -1,7 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import { Mesh, MeshPhongMaterial, Plane, Ray, Scene, Vector3, type BufferGeometry, type Side } from 'three';
 import { prepare, type Block } from '@/mesh/blocks';
-import { defaultStyle, Parts } from '@/scene/parts';
+import { merged, type Coarse } from '@/mesh/coarse';
+import { Parts } from '@/scene/parts';
+import { defaultStyle } from '@/scene/style';
 import { wholeRay } from '@/scene/pick';
 import type { Waiting } from '@/scene/uploading';
 
@@ -98,10 +100,10 @@ describe('the parts of a surface', () => {
     expect(drawn(scene)).toEqual([]);
     waiting[0]?.onThere();
     expect(drawn(scene)).toHaveLength(1);
-    expect(waiting[0]?.geometries).toHaveLength(2);
+    expect(waiting[0]?.geometries).toHaveLength(1);
   });
 
-  it('are seen by their coarse level until all is there, and while they move', () => {
+  it('are seen by their coarse level until all is there', () => {
     const scene = new Scene();
     const parts = new Parts(scene, atOnce, () => undefined);
     const heights = (): number[] => drawn(scene).map(({ geometry }) => geometry.getAttribute('position').array[2] ?? NaN);
@@ -113,10 +115,6 @@ describe('the parts of a surface', () => {
     parts.finish();
     expect([heights(), parts.trianglesThere]).toEqual([[1, 2], 4]);
     expect(parts.hit(up, wholeRay)?.at).toBe(2);
-    parts.setCoarse(true);
-    expect(heights()).toEqual([9]);
-    parts.setCoarse(false);
-    expect(heights()).toEqual([1, 2]);
     expect(Array.from({ length: 7 }, (_, step) => parts.joinSeams(step)).filter(Boolean)).toHaveLength(6);
   });
 
@@ -124,11 +122,30 @@ describe('the parts of a surface', () => {
     const { parts, scene } = labelled();
     parts.add([square(9)], { label: 1, colour: '#d02020' }, true);
     expect(colours(scene).sort()).toEqual(['2040d0', '2040d0', 'd02020']);
-    parts.finish();
-    parts.setCoarse(true);
-    expect(colours(scene).sort()).toEqual(['2040d0', '2040d0', 'd02020']);
     parts.setHidden(new Set([1]));
     expect(colours(scene)).toEqual(['2040d0', '2040d0']);
+  });
+
+  it('are seen by a copy of each label while they move, where there are copies', () => {
+    const { parts, scene } = labelled();
+    const triangles = (): number[] => drawn(scene).map(({ geometry }) => (geometry.index?.count ?? 0) / 3);
+    expect([parts.numberOf(1), parts.numberOf(2)]).toEqual([0, 1]);
+    parts.setCoarse(true);
+    expect(drawn(scene)).toHaveLength(3);
+    const one = (): Coarse => ({ ...square(0), index: Uint32Array.from(square(0).index) });
+    parts.takeCopies([[merged([one(), one()]), merged([one(), one(), one()])], [one(), one()]]);
+    expect([triangles(), parts.trianglesMoving]).toEqual([[4, 6], 10]);
+    expect(colours(scene)).toEqual(['d02020', '2040d0']);
+    parts.setLevel(1);
+    expect([triangles(), parts.trianglesMoving]).toEqual([[2, 2], 4]);
+    parts.setLevel(7);
+    expect(triangles()).toEqual([2, 2]);
+    parts.setHidden(new Set([2]));
+    expect(colours(scene)).toEqual(['d02020']);
+    parts.setCut([new Plane(new Vector3(0, 0, 1), 0)]);
+    expect(sides(scene)).toHaveLength(2);
+    parts.setCoarse(false);
+    expect(parts.hit(up, wholeRay)).toMatchObject({ at: 1, label: 1 });
   });
 
   it('tell the distance where they are hit, and how far all reach', () => {

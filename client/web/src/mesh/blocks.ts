@@ -1,6 +1,7 @@
 // Arrays of triangles made ready for drawing: blocks of 16-bit indices, normals, borders, and a
 // coarse copy for the time that it is turned.
 import type { Vec3 } from '../api/types';
+import { clustered, compacted, meanEdge, type Coarse } from './coarse';
 
 export interface Triangles {
   positions: Float32Array<ArrayBuffer>;
@@ -13,8 +14,8 @@ export interface Triangles {
 export interface Block {
   positions: Float32Array<ArrayBuffer>;
   index: Uint16Array<ArrayBuffer>;
-  // Fewer triangles of the same vertices.
-  coarse: Uint16Array<ArrayBuffer>;
+  // Fewer triangles, of some of its vertices.
+  coarse: Coarse;
   // Four numbers of 16 bits a vertex, normalised; the fourth is there to align the vertices to 4 bytes.
   normals: Int16Array<ArrayBuffer>;
   // Vertices on edges of one triangle, where the neighbouring block goes on, and their normals before
@@ -30,8 +31,8 @@ const mostVertices = 65_535;
 export const mostTriangles = 65_000;
 // Edge lengths that one cell of the coarse copy spans at least.
 const coarseness = 3.5;
-// The most of a whole surface while it turns: an estimate that software draws each in about 5 µs of a core.
-const movingTriangles = 30_000;
+// About as many triangles does the coarse copy of a whole surface have at least.
+const coarseTriangles = 30_000;
 
 // Sums of the triangles' normals times twice their area, three a vertex.
 export function areaNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
@@ -120,113 +121,10 @@ export function borderVertices(index: ArrayLike<number>, vertices: number): Uint
   return border;
 }
 
-function meanEdge({ positions, index }: Triangles): number {
-  const step = Math.max(1, Math.floor(index.length / 3 / 500));
-  let sum = 0;
-  let count = 0;
-  for (let triangle = 0; 3 * triangle + 1 < index.length; triangle += step) {
-    const a = 3 * (index[3 * triangle] as number);
-    const b = 3 * (index[3 * triangle + 1] as number);
-    sum += Math.hypot(
-      (positions[a] as number) - (positions[b] as number),
-      (positions[a + 1] as number) - (positions[b + 1] as number),
-      (positions[a + 2] as number) - (positions[b + 2] as number),
-    );
-    count += 1;
-  }
-  return count > 0 ? sum / count : 0;
-}
-
-// The size of cells that leave about `movingTriangles` of a surface of that area: about six for each square of a cell's side, as
-// bone and cortex are folded.
-export function movingCell(area: number): number {
-  return Math.sqrt((6 * area) / movingTriangles);
-}
-
-// The vertex that stands for each on the border: the least one of its cell, which is the same in the neighbouring block, so that
-// no gap opens between the two.
-function joinBorder(positions: Float32Array, border: Uint16Array, keyOf: (at: number) => number, heads: Uint16Array): void {
-  const isBefore = (a: number, b: number): boolean => {
-    for (let axis = 0; axis < 3; axis += 1) {
-      const difference = (positions[3 * a + axis] as number) - (positions[3 * b + axis] as number);
-      if (difference !== 0) return difference < 0;
-    }
-    return false;
-  };
-  const least = new Map<number, number>();
-  for (const vertex of border) {
-    const key = keyOf(3 * vertex);
-    const head = least.get(key);
-    if (head === undefined || isBefore(vertex, head)) least.set(key, vertex);
-  }
-  for (const vertex of border) heads[vertex] = least.get(keyOf(3 * vertex)) ?? vertex;
-}
-
-// The triangles that are left when the vertices of a cell of that size become one, apart for each
-// octant that their normals point into, so that both sides of a thin wall stay. Vertices on the border become one of these.
-//
-// meshoptimizer's simplifySloppy takes 1.4 to 1.8 times as long for as many triangles (5.1 million made
-// coarse: 272 against 154 ms) and joins vertices of both sides of a thin wall.
-export function clustered(
-  { positions, index }: Triangles,
-  normals: Float32Array,
-  border: Uint16Array,
-  cell: number,
-): Uint16Array<ArrayBuffer> {
-  if (!(cell > 0)) return Uint16Array.from(index);
-  const first = new Map<number, number>();
-  const heads = new Uint16Array(positions.length / 3);
-  // 15 bits an axis: cells whose numbers are the same by overflow are farther apart than a block is wide.
-  const place = (at: number): number => Math.floor((positions[at] as number) / cell) & 0x7fff;
-  const cellOf = (at: number): number => (place(at) * 0x8000 + place(at + 1)) * 0x8000 + place(at + 2);
-  const side = (at: number): number => ((normals[at] as number) < 0 ? 1 : 0);
-  for (let vertex = 0; vertex < heads.length; vertex += 1) {
-    const at = 3 * vertex;
-    const octant = 4 * side(at) + 2 * side(at + 1) + side(at + 2);
-    const key = cellOf(at) * 8 + octant;
-    const head = first.get(key);
-    if (head === undefined) first.set(key, vertex);
-    heads[vertex] = head ?? vertex;
-  }
-  joinBorder(positions, border, cellOf, heads);
-  const kept = new Uint16Array(index.length);
-  let used = 0;
-  // The head of one inside may be on the border, and that one's head another.
-  const headAt = (corner: number): number => heads[heads[index[corner] as number] as number] as number;
-  for (let i = 0; i + 2 < index.length; i += 3) {
-    const a = headAt(i);
-    const b = headAt(i + 1);
-    const c = headAt(i + 2);
-    if (a === b || b === c || a === c) continue;
-    // What was turned over by that would be dark or, of a label, not be drawn at all.
-    const isOver = isTurned(positions, normals, 3 * a, 3 * b, 3 * c);
-    kept[used] = a;
-    kept[used + 1] = isOver ? c : b;
-    kept[used + 2] = isOver ? b : c;
-    used += 3;
-  }
-  return kept.slice(0, used);
-}
-
-// Whether the triangle faces away from where the normals of its vertices point.
-function isTurned(positions: Float32Array, normals: Float32Array, a: number, b: number, c: number): boolean {
-  const at = (vertex: number, axis: number): number => positions[vertex + axis] as number;
-  const normal = (axis: number): number => {
-    let sum = 0;
-    for (const vertex of [a, b, c]) {
-      const length = Math.hypot(normals[vertex] as number, normals[vertex + 1] as number, normals[vertex + 2] as number);
-      if (length > 0) sum += (normals[vertex + axis] as number) / length;
-    }
-    return sum;
-  };
-  const side = (axis: number): number => {
-    const [second, third] = [(axis + 1) % 3, (axis + 2) % 3];
-    return (
-      (at(b, second) - at(a, second)) * (at(c, third) - at(a, third)) -
-      (at(b, third) - at(a, third)) * (at(c, second) - at(a, second))
-    );
-  };
-  return side(0) * normal(0) + side(1) * normal(1) + side(2) * normal(2) < 0;
+// The size of cells that leave at least about `coarseTriangles` of a surface of that area: about six for each square of a cell's
+// side, and several times as many where bone or cortex is folded.
+export function coarseCell(area: number): number {
+  return Math.sqrt((6 * area) / coarseTriangles);
 }
 
 // Parts of consecutive triangles, each with the vertices that it names: few enough for 16-bit indices.
@@ -285,7 +183,9 @@ export function boundsOf(positions: ArrayLike<number>): [Vec3, Vec3] {
 export function prepare(triangles: Triangles, cell = 0): Block {
   const { positions, index } = triangles;
   const sums = areaNormals(triangles);
+  const normals = packedNormals(sums);
   const border = borderVertices(index, positions.length / 3);
+  const cells = { size: Math.max(cell, coarseness * meanEdge(triangles)), areByOctant: true };
   const borderNormals = new Float32Array(3 * border.length);
   border.forEach((vertex, i) => {
     borderNormals.set(sums.subarray(3 * vertex, 3 * vertex + 3), 3 * i);
@@ -293,8 +193,8 @@ export function prepare(triangles: Triangles, cell = 0): Block {
   return {
     positions,
     index: Uint16Array.from(index),
-    coarse: clustered(triangles, sums, border, Math.max(cell, coarseness * meanEdge(triangles))),
-    normals: packedNormals(sums),
+    coarse: compacted({ ...triangles, normals }, clustered({ positions, index, normals }, border, cells)),
+    normals,
     border,
     borderNormals,
     bounds: boundsOf(positions),

@@ -2,6 +2,7 @@
 import create, { type DracoAttribute, type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
 import wasmUrl from 'three/examples/jsm/libs/draco/gltf/draco_decoder.wasm?url';
 import { prepare, split, type Block, type Triangles } from './blocks';
+import { buffersIn } from './transfer';
 
 export interface DecodeRequest {
   id: number;
@@ -82,10 +83,7 @@ scope.onmessage = (event) => {
   ready
     .then((draco) => {
       const blocks = split(decode(draco, request)).map((part) => prepare(part, request.cell));
-      const buffers = blocks.flatMap((block) =>
-        Object.values(block).flatMap((value: unknown) => (ArrayBuffer.isView(value) ? [value.buffer as ArrayBuffer] : [])),
-      );
-      scope.postMessage({ id: request.id, blocks, error: '' }, buffers);
+      scope.postMessage({ id: request.id, blocks, error: '' }, buffersIn(blocks));
     })
     .catch((error: unknown) => {
       scope.postMessage({ id: request.id, blocks: [], error: String(error) }, []);

@@ -2,7 +2,7 @@
 import { client, connected } from '../client';
 import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
 import type { Job, MeshFile } from '../api/types';
-import { movingCell, type Block } from './blocks';
+import { coarseCell, type Block } from './blocks';
 import { GlbReader, type DracoPrimitive, type Part } from './glb';
 import { decoders } from './pool';
 
@@ -113,7 +113,7 @@ export async function loadMesh(
     totalBytes: file.bytes,
     totalTriangles: job.mesh?.triangles ?? 0,
   };
-  const cell = movingCell(job.mesh?.area_mm2 ?? 0);
+  const cell = coarseCell(job.mesh?.area_mm2 ?? 0);
   const began = performance.now();
   const decoding: Promise<void>[] = [];
   const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: DracoPrimitive | undefined): void => {

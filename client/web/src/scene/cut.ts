@@ -1,4 +1,4 @@
-// The plane that cuts the surface along one of the volume's axes, with the slice that lies there.
+// The plane that cuts the surface along one of the volume's axes or at any angle, with the slice that lies there.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -14,8 +14,10 @@ import {
   type Object3D,
   type Raycaster,
 } from 'three';
-import type { Axis, Volume } from '../api/types';
+import type { Axis, Vec3, Volume } from '../api/types';
 import { axisDirection, axisIndex, pictureAxes, toPatient } from '../volume/geometry';
+import { cross, dot, sectionOf } from '../volume/oblique';
+import type { Square } from '../volume/reslice';
 
 export interface CutPlace {
   axis: Axis;
@@ -36,9 +38,6 @@ export class Cut {
     this.texture.minFilter = LinearFilter;
     this.texture.generateMipmaps = false;
     this.texture.flipY = false;
-    this.geometry.setAttribute('position', new BufferAttribute(new Float32Array(12), 3));
-    this.geometry.setAttribute('uv', new BufferAttribute(new Float32Array([0, 0, 1, 0, 1, 1, 0, 1]), 2));
-    this.geometry.setIndex([0, 1, 2, 0, 2, 3]);
     this.quad.visible = false;
     this.quad.frustumCulled = false;
     parent.add(this.quad);
@@ -47,33 +46,49 @@ export class Cut {
   place(volume: Volume, { axis, index, flipped }: CutPlace): void {
     const across = axisIndex(axis);
     const [first, second] = pictureAxes(axis);
-    const positions = this.geometry.getAttribute('position') as BufferAttribute;
     const corners = [
       [0, 0],
       [1, 0],
       [1, 1],
       [0, 1],
     ] as const;
-    corners.forEach(([u, v], corner) => {
-      const at: [number, number, number] = [0, 0, 0];
+    const places = corners.map(([u, v]) => {
+      const at: Vec3 = [0, 0, 0];
       at[across] = index;
       // A picture's element covers half a sample to each side.
       at[first] = u * volume.dims[first] - 0.5;
       at[second] = v * volume.dims[second] - 0.5;
-      positions.setXYZ(corner, ...toPatient(volume, at));
+      return toPatient(volume, at);
     });
-    positions.needsUpdate = true;
-    this.geometry.computeBoundingSphere();
     // Across the slice, which in a tilted volume is not where its third axis points.
-    const along = new Vector3(...axisDirection(volume, across));
-    const normal = new Vector3(...axisDirection(volume, first))
-      .cross(new Vector3(...axisDirection(volume, second)))
-      .normalize();
-    if (normal.dot(along) > 0 !== flipped) normal.negate();
-    this.plane.setFromNormalAndCoplanarPoint(
-      normal,
-      new Vector3().fromBufferAttribute(positions, 0),
-    );
+    const along = axisDirection(volume, across);
+    const normal = cross(axisDirection(volume, first), axisDirection(volume, second));
+    this.set(normal, dot(normal, along) > 0 !== flipped, places, corners);
+  }
+
+  // At any angle: the plane n . p = depth, and a picture of a square in it; what is seen is what it cuts out of the volume.
+  placeFreely(volume: Volume, normal: Vec3, depth: number, { middle, right, down, size }: Square): void {
+    const cornerAt = (bits: number): Vec3 =>
+      toPatient(volume, volume.dims.map((count, axis) => (((bits >> axis) & 1) === 0 ? -0.5 : count - 0.5)) as Vec3);
+    const places = sectionOf(cornerAt, normal, depth);
+    const uvs = places.map((place) => {
+      const from = place.map((value, axis) => value - middle[axis as 0]) as Vec3;
+      return [dot(from, right) / size + 0.5, dot(from, down) / size + 0.5] as const;
+    });
+    this.set(normal, false, places, uvs);
+    // It may pass by the volume.
+    this.plane.set(new Vector3(...normal), -depth);
+  }
+
+  private set(normal: Vec3, isTurned: boolean, places: readonly Vec3[], uvs: readonly (readonly [number, number])[]): void {
+    const { geometry, plane } = this;
+    geometry.setAttribute('position', new BufferAttribute(Float32Array.from(places.flat()), 3));
+    geometry.setAttribute('uv', new BufferAttribute(Float32Array.from(uvs.flat()), 2));
+    geometry.setIndex(places.slice(2).flatMap((_, at) => [0, at + 1, at + 2]));
+    geometry.computeBoundingSphere();
+    const away = new Vector3(...normal).normalize();
+    if (isTurned) away.negate();
+    plane.setFromNormalAndCoplanarPoint(away, new Vector3(...(places[0] ?? [0, 0, 0])));
   }
 
   // Takes the picture over; null shows no slice.

@@ -1,8 +1,17 @@
-// One picture of a surface: drawn at once, or in steps of some blocks each, of which a change ends the rest.
+// One picture of a surface: drawn at once, or in steps of some blocks each, of which a change ends the rest; with all pixels of
+// the screen or with fewer.
 import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { overLayer } from './cross';
 import { Painting } from './painting';
 import type { Parts } from './parts';
+
+export interface Manner {
+  steps: number;
+  // The part of the screen's pixels along each side.
+  sharpness: number;
+}
+
+const mostPixelRatio = 2;
 
 export class Frame {
   readonly painting: Painting;
@@ -20,16 +29,20 @@ export class Frame {
   }
 
   // `then` is told whether the picture is there: `isOver` may have ended it between two steps. `after` draws over it.
-  paint(steps: number, isOver: () => boolean, after: () => void, then: (isWhole: boolean) => void): void {
-    const { width, height, clientWidth, clientHeight } = this.renderer.domElement;
+  paint({ steps, sharpness }: Manner, isOver: () => boolean, after: () => void, then: (isWhole: boolean) => void): void {
+    const { clientWidth, clientHeight } = this.renderer.domElement;
+    const ratio = sharpness * Math.min(mostPixelRatio, window.devicePixelRatio);
+    const [width, height] = [Math.floor(ratio * clientWidth), Math.floor(ratio * clientHeight)];
     // By a picture that is not whole yet.
     this.showAll();
     const before = (): void => {
+      // A canvas of another size is blank, so that it gets it with its picture.
+      if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
       this.renderer.setViewport(0, 0, clientWidth, clientHeight);
       this.renderer.clear();
     };
     const begin = (step: number): void => this.show(step, steps);
-    this.painting.paint({ width, height, steps, begin, before, after }, isOver, (isWhole) => {
+    this.painting.paint({ width, height, steps, isEnlarged: false, begin, before, after }, isOver, (isWhole) => {
       this.showAll();
       then(isWhole);
     });

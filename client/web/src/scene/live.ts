@@ -1,38 +1,17 @@
 // The surface that a volume has at an iso-value, drawn anew for each value and from any side: nothing is extracted.
 // Takes as many pixels as there is time for while something moves, and all of them when it rests.
-import {
-  BackSide,
-  BoxGeometry,
-  BufferAttribute,
-  BufferGeometry,
-  type Data3DTexture,
-  type DataTexture,
-  GLSL3,
-  LineBasicMaterial,
-  LineSegments,
-  Matrix3,
-  Matrix4,
-  Mesh,
-  PerspectiveCamera,
-  RawShaderMaterial,
-  Scene,
-  Vector2,
-  Vector3,
-  WebGLRenderer,
-  type WebGLRenderTarget,
-} from 'three';
+import { Matrix4, PerspectiveCamera, Vector2, Vector3 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
-import { blockSize, firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
-import { compile } from './compile';
-import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
+import { firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
+import { verticalAngle } from './camera';
+import { GlPainter } from './live_gl';
+import { GpuPainter } from './live_gpu';
+import { placeOfSamples, type LivePainter, type LivePicture, type LiveScene } from './live_painter';
 import type { Look } from '../volume/looks';
-import { fragmentShader, vertexShader } from './live_shader';
-import { Painting, type Picture } from './painting';
 import { onTap } from './tap';
 import { firstOffset, fitted } from './views';
 
-const verticalAngle = 30;
 // How long a frame may take while something moves, and at rest, in milliseconds. A change in the middle of a frame is
 // drawn after it, so that half a frame's time comes on top.
 const movingTime = 33;
@@ -61,50 +40,21 @@ export class LiveSurface {
   // Software draws: coarser volumes do.
   readonly isSoftware: boolean;
   onFrame: ((frame: Frame) => void) | null = null;
+  // It can paint no more; another one can, without WebGPU.
+  onLost: (() => void) | null = null;
   // A click or tap on the surface, in samples of the preview.
   onPick: ((place: Vec3) => void) | null = null;
 
-  private readonly renderer: WebGLRenderer;
-  private readonly gl: WebGL2RenderingContext;
-  private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
   private readonly controls: OrbitControls;
   private readonly resizing: ResizeObserver;
-  private readonly uniforms = {
-    samples: { value: null as Data3DTexture | null },
-    blocks: { value: null as Data3DTexture | null },
-    blockSize: { value: blockSize },
-    dims: { value: new Vector3(2, 2, 2) },
-    eye: { value: new Vector3() },
-    toNormal: { value: new Matrix3() },
-    towardsLight: { value: new Vector3() },
-    towardsEye: { value: new Vector3() },
-    colour: { value: new Vector3(0.86, 0.84, 0.78) },
-    iso: { value: 0.5 },
-    reach: { value: 1 },
-    isThrough: { value: false },
-    isOfLabels: { value: false },
-    look: { value: null as DataTexture | null },
-    sums: { value: null as DataTexture | null },
-    edges: { value: 0 },
-    isCropped: { value: false },
-    cropLow: { value: new Vector3() },
-    cropHigh: { value: new Vector3(1, 1, 1) },
-  };
-  private readonly box: Mesh<BoxGeometry, RawShaderMaterial>;
-  // Through where the slices meet, over the surface.
-  private readonly cross = new LineSegments(
-    new BufferGeometry(),
-    new LineBasicMaterial({ color: '#2ce0cb', transparent: true, opacity: 0.45, depthTest: false }),
-  );
-  private cursor: Vec3 | null = null;
+  private cursor: Vector3 | null = null;
   private iso = NaN;
-  private labelTable = new Uint8Array(0);
-  private crop: readonly [Vec3, Vec3] | null = null;
-  private readonly painting: Painting;
+  private look: Look | null = null;
+  private isOfLabels = false;
+  private crop: readonly [Vector3, Vector3] | null = null;
   // Software draws the first, coarser one while something moves.
-  private first: Drawable | null = null;
-  private best: Drawable | null = null;
+  private first: Preview | null = null;
+  private best: Preview | null = null;
   private readonly over = new AbortController();
   // Whether the shaders are there.
   private isCompiled = false;
@@ -115,33 +65,27 @@ export class LiveSurface {
   // Milliseconds a pixel, of the last frames of each kind; guessed before the first.
   private readonly costs: { moving: number; resting: number };
 
-  // Throws where WebGL 2 is missing.
-  constructor(private readonly host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: false, depth: false, alpha: true, powerPreference: 'high-performance' });
-    this.gl = this.renderer.getContext() as WebGL2RenderingContext;
-    this.painting = new Painting(this.renderer, this.scene, this.camera);
-    this.isSoftware = isSoftware(this.gl);
+  // Rejects if the browser has neither WebGPU nor WebGL 2.
+  static async begin(host: HTMLElement, withoutGpu = false): Promise<LiveSurface> {
+    const camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
+    const gpu = withoutGpu ? null : await GpuPainter.begin();
+    return new LiveSurface(host, camera, gpu ?? new GlPainter(camera));
+  }
+
+  private constructor(
+    private readonly host: HTMLElement,
+    private readonly camera: PerspectiveCamera,
+    private readonly painter: LivePainter,
+  ) {
+    host.dataset.painter = painter.name;
+    painter.onLost = () => this.onLost?.();
+    this.isSoftware = this.painter.isSoftware;
     const guess = this.isSoftware ? 4e-3 : 1e-5;
     this.costs = { moving: guess, resting: 2 * guess };
-    this.canvas = this.renderer.domElement;
+    this.canvas = this.painter.canvas;
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute('role', 'img');
     host.prepend(this.canvas);
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader,
-      fragmentShader,
-      uniforms: this.uniforms,
-      side: BackSide,
-      depthTest: false,
-    });
-    this.box = new Mesh(new BoxGeometry(1, 1, 1).translate(0.5, 0.5, 0.5), material);
-    this.box.matrixAutoUpdate = false;
-    this.box.frustumCulled = false;
-    this.cross.frustumCulled = false;
-    this.cross.geometry.setAttribute('position', new BufferAttribute(new Float32Array(18), 3));
-    this.box.add(this.cross);
-    this.scene.add(this.box);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener('change', () => this.moved());
@@ -149,11 +93,7 @@ export class LiveSurface {
     this.canvas.addEventListener('webglcontextrestored', () => this.changed());
     this.resizing = new ResizeObserver(() => this.changed());
     this.resizing.observe(host);
-    const shaders: [Scene | Mesh, PerspectiveCamera][] = [
-      [this.scene, this.camera],
-      [this.painting.enlarging, this.camera],
-    ];
-    compile(this.renderer, shaders, this.over.signal, () => {
+    void this.painter.ready.then(() => {
       this.isCompiled = true;
       this.changed();
     });
@@ -165,53 +105,22 @@ export class LiveSurface {
 
   // The first one is looked at as a whole; another one of the same volume leaves the camera where it is.
   setPreview(preview: Preview): void {
-    const made = drawable(preview);
     const isFirst = this.first === null;
-    // Of another window, or in place of the one before.
-    const isOther = this.first?.preview.window.join() !== preview.window.join();
-    if (isOther) for (const old of new Set([this.first, this.best])) if (old) letGo(old);
-    if (isOther) this.first = made;
-    else if (this.best && this.best !== this.first) letGo(this.best);
-    this.best = made;
-    this.use(made);
+    // Samples of another window begin anew, and so do labels, which have none: their NaN equals nothing.
+    const { first } = this;
+    if (!first || preview.window.some((end, at) => end !== first.window[at])) this.first = preview;
+    this.best = preview;
+    this.painter.keep(new Set([this.first ?? preview, preview]));
     if (isFirst) this.fit(firstOffset);
     this.changed();
   }
 
-  private use({ preview, samples, blocks }: Drawable): void {
-    this.uniforms.samples.value = samples;
-    this.uniforms.blocks.value = blocks;
-    this.uniforms.dims.value.set(...preview.dims);
-    this.uniforms.iso.value = inPreview(preview, this.iso);
-    const [x, y, z] = preview.steps;
-    const [ox, oy, oz] = preview.origin;
-    this.box.matrix.set(x[0], y[0], z[0], ox, x[1], y[1], z[1], oy, x[2], y[2], z[2], oz, 0, 0, 0, 1);
-    this.box.matrixWorldNeedsUpdate = true;
-    this.uniforms.toNormal.value.setFromMatrix4(this.box.matrix).invert().transpose();
-    this.placeCross();
-    this.placeCrop();
-  }
-
   // Where the slices meet, in millimetres.
   setCursor(cursor: Vec3): void {
-    if (this.cursor?.join() === cursor.join()) return;
-    this.cursor = cursor;
-    this.placeCross();
+    const next = new Vector3(...cursor);
+    if (this.cursor?.equals(next)) return;
+    this.cursor = next;
     this.changed();
-  }
-
-  private placeCross(): void {
-    this.cross.visible = this.cursor !== null;
-    if (!this.cursor) return;
-    const place = new Vector3(...this.cursor).applyMatrix4(new Matrix4().copy(this.box.matrix).invert());
-    const positions = this.cross.geometry.getAttribute('position');
-    for (const axis of [0, 1, 2]) {
-      for (const end of [0, 1]) {
-        const point = place.clone().setComponent(axis, end * (this.uniforms.dims.value.getComponent(axis) - 1));
-        positions.setXYZ(2 * axis + end, ...point.toArray());
-      }
-    }
-    positions.needsUpdate = true;
   }
 
   // In the volume's units, of a preview of values.
@@ -223,50 +132,37 @@ export class LiveSurface {
 
   // What of the volume is drawn, as parts of its samples along each axis; null for all of it.
   setCrop(box: readonly [Vec3, Vec3] | null): void {
-    if (JSON.stringify(box) === JSON.stringify(this.crop)) return;
-    this.crop = box;
+    const next = box && ([new Vector3(...box[0]), new Vector3(...box[1])] as const);
+    if (JSON.stringify(next) === JSON.stringify(this.crop)) return;
+    this.crop = next;
     this.changed();
-  }
-
-  // In samples of what is drawn now, of which a copy may have fewer.
-  private placeCrop(): void {
-    const { cropLow, cropHigh, dims, isCropped } = this.uniforms;
-    const last = dims.value.clone().subScalar(1);
-    isCropped.value = this.crop !== null;
-    cropLow.value.set(...(this.crop?.[0] ?? [0, 0, 0])).multiply(last);
-    cropHigh.value.set(...(this.crop?.[1] ?? [1, 1, 1])).multiply(last);
   }
 
   // The preview is one of labels, with these colours.
   setLabels(table: Uint8Array): void {
     const whole = new Uint8Array(4 * 256);
     whole.set(table.subarray(0, whole.length));
-    this.setLook({ table: whole, edges: 0 });
-    this.uniforms.isOfLabels.value = true;
-    this.labelTable = whole;
+    this.use({ table: whole, edges: 0 }, true);
   }
 
   // Null: the surface at the iso-value.
   setLook(look: Look | null): void {
-    const { isThrough, isOfLabels, look: table, sums, edges } = this.uniforms;
-    isOfLabels.value = false;
-    if (isThrough.value !== (look !== null)) {
+    this.use(look, false);
+  }
+
+  private use(look: Look | null, isOfLabels: boolean): void {
+    if ((this.look !== null) !== (look !== null)) {
       const factor = look ? costOfLook : 1 / costOfLook;
       for (const kind of ['moving', 'resting'] as const) this.costs[kind] *= factor;
     }
-    isThrough.value = look !== null;
-    if (look) {
-      table.value?.dispose();
-      sums.value?.dispose();
-      ({ table: table.value, sums: sums.value } = tablesOf(look));
-      edges.value = look.edges;
-    }
+    this.look = look;
+    this.isOfLabels = isOfLabels;
     this.changed();
   }
 
   fit(offset: Vec3): void {
     if (!this.best) return;
-    const corners = this.corners();
+    const corners = this.corners(this.best);
     const low = corners[0].clone().min(corners[1]);
     const high = corners[0].clone().max(corners[1]);
     const { clientWidth: width, clientHeight: height } = this.host;
@@ -297,27 +193,18 @@ export class LiveSurface {
     clearTimeout(this.settling);
     this.resizing.disconnect();
     this.controls.dispose();
-    for (const old of new Set([this.first, this.best])) if (old) letGo(old);
-    this.uniforms.look.value?.dispose();
-    this.uniforms.sums.value?.dispose();
-    this.box.geometry.dispose();
-    this.box.material.dispose();
-    this.cross.geometry.dispose();
-    this.cross.material.dispose();
-    this.painting.dispose();
-    this.renderer.dispose();
-    this.renderer.forceContextLoss();
-    this.canvas.remove();
+    this.painter.dispose();
   }
 
   // Two opposite corners of the box around the whole volume.
-  private corners(): [Vector3, Vector3] {
+  private corners(preview: Preview): [Vector3, Vector3] {
+    const [x, y, z] = preview.dims;
+    const matrix = placeOfSamples(preview);
     const low = new Vector3(Infinity, Infinity, Infinity);
     const high = low.clone().negate();
-    const { x, y, z } = this.uniforms.dims.value;
     for (let corner = 0; corner < 8; corner += 1) {
       const place = new Vector3(corner & 1 ? x - 1 : 0, corner & 2 ? y - 1 : 0, corner & 4 ? z - 1 : 0);
-      place.applyMatrix4(this.box.matrix);
+      place.applyMatrix4(matrix);
       low.min(place);
       high.max(place);
     }
@@ -353,11 +240,10 @@ export class LiveSurface {
     const changedAt = this.changedAt;
     this.changedAt = 0;
     const kind = isResting ? 'resting' : 'moving';
-    this.use(this.isSoftware && !isResting ? this.first : this.best);
-    this.uniforms.reach.value = this.isSoftware && !isResting ? 1 : 0.5;
+    const isRough = this.isSoftware && !isResting;
+    const scene = this.sceneOf(isRough ? this.first : this.best, isRough ? 1 : 0.5);
     const ratio = Math.min(2, window.devicePixelRatio || 1);
     const [wide, high] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
-    if (this.canvas.width !== wide || this.canvas.height !== high) this.renderer.setSize(wide, high, false);
     const scale = this.scaleFor(wide * high, kind);
     const [width, height] = [Math.max(1, Math.round(wide * scale)), Math.max(1, Math.round(high * scale))];
     this.camera.aspect = clientWidth / clientHeight;
@@ -366,13 +252,11 @@ export class LiveSurface {
     this.camera.far = distance * 20;
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
-    this.uniforms.eye.value.copy(this.camera.position).applyMatrix4(new Matrix4().copy(this.box.matrix).invert());
-    this.uniforms.towardsEye.value.copy(this.camera.position).sub(this.controls.target).normalize();
-    this.uniforms.towardsLight.value.set(-0.35, 0.5, 1).transformDirection(this.camera.matrixWorld);
     const began = performance.now();
     const { iso } = this;
     const isOver = (): boolean => this.isDisposed || this.changedAt !== 0;
-    this.painting.paint(this.inBands(width, height, kind), isOver, (isWhole) => {
+    const picture: LivePicture = { wide, high, width, height, bands: this.bandsFor(width * height, kind) };
+    this.painter.paint(scene, picture, isOver, (isWhole) => {
       const now = performance.now();
       this.isBusy = false;
       if (this.isDisposed) return;
@@ -387,14 +271,14 @@ export class LiveSurface {
     });
   }
 
-  private inBands(width: number, height: number, kind: 'moving' | 'resting'): Picture {
-    const steps = kind === 'resting' ? Math.max(1, Math.min(mostBands, Math.ceil((this.costs.resting * width * height) / bandTime))) : 1;
-    const edge = (step: number): number => Math.floor((height * step) / steps);
-    const begin = (step: number, target: WebGLRenderTarget): void => {
-      target.scissorTest = true;
-      target.scissor.set(0, edge(step), width, edge(step + 1) - edge(step));
-    };
-    return { width, height, steps, begin };
+  private sceneOf(preview: Preview, reach: number): LiveScene {
+    const { camera, look, crop, cursor } = this;
+    const kind = look === null ? 'surface' : this.isOfLabels ? 'labels' : 'through';
+    return { preview, camera, target: this.controls.target, iso: inPreview(preview, this.iso), reach, kind, look, crop, cursor };
+  }
+
+  private bandsFor(pixels: number, kind: 'moving' | 'resting'): number {
+    return kind === 'resting' ? Math.max(1, Math.min(mostBands, Math.ceil((this.costs.resting * pixels) / bandTime))) : 1;
   }
 
   private scaleFor(pixels: number, kind: 'moving' | 'resting'): number {
@@ -404,23 +288,16 @@ export class LiveSurface {
 
   private tapped(event: PointerEvent): void {
     if (!this.best || !this.onPick) return;
-    this.use(this.best);
+    const preview = this.best;
     const bounds = this.canvas.getBoundingClientRect();
     const x = (2 * (event.clientX - bounds.left)) / bounds.width - 1;
     const y = 1 - (2 * (event.clientY - bounds.top)) / bounds.height;
-    const toSamples = new Matrix4().copy(this.box.matrix).invert();
+    const toSamples = new Matrix4().copy(placeOfSamples(preview)).invert();
     const from = this.camera.position.clone().applyMatrix4(toSamples);
     const through = new Vector3(...new Vector2(x, y).toArray(), 0.5).unproject(this.camera).applyMatrix4(toSamples);
-    const { isOfLabels, iso } = this.uniforms;
     const ray = [from.toArray(), through.sub(from).toArray()] as const;
-    const { preview } = this.best;
-    const place = isOfLabels.value ? firstLabel(preview, this.labelTable, ...ray) : firstCrossing(preview, iso.value, ...ray);
+    const { look, isOfLabels } = this;
+    const place = look && isOfLabels ? firstLabel(preview, look.table, ...ray) : firstCrossing(preview, inPreview(preview, this.iso), ...ray);
     if (place) this.onPick(place);
   }
-}
-
-function isSoftware(gl: WebGL2RenderingContext): boolean {
-  const info = gl.getExtension('WEBGL_debug_renderer_info');
-  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }

@@ -1,6 +1,6 @@
 // A scene painted with fewer pixels than its canvas has, or in steps of which a change ends the rest; then it is put over the
-// canvas, which shows the picture before until then. A canvas that changes its size instead holds the page up until all that was
-// drawn before is done.
+// canvas, which shows the picture before until then. A canvas that changes its size for each picture instead holds the page up
+// until all that was drawn before is done.
 import {
   GLSL3,
   Mesh,
@@ -21,6 +21,8 @@ export interface Picture {
   // In pixels of the canvas.
   width: number;
   height: number;
+  // It has fewer pixels than the canvas.
+  isEnlarged: boolean;
   // A picture of one step and all pixels is drawn on the canvas itself.
   steps: number;
   // Says what a step paints.
@@ -66,11 +68,13 @@ export class Painting {
   // Calls back with true when it is drawn; with false if `isOver` says so between two steps, and then the canvas stays as it is.
   paint(picture: Picture, isOver: () => boolean, then: (isWhole: boolean) => void): void {
     const { renderer, target } = this;
-    const { width, height } = renderer.domElement;
-    if (picture.width === width && picture.steps === 1) {
+    if (!picture.isEnlarged && picture.steps === 1) {
       this.onCanvas(picture, () => renderer.render(this.scene, this.camera), then);
       return;
     }
+    // A canvas may have fewer pixels until it gets the picture.
+    const width = Math.max(picture.width, renderer.domElement.width);
+    const height = Math.max(picture.height, renderer.domElement.height);
     if (target.width !== width || target.height !== height) target.setSize(width, height);
     target.viewport.set(0, 0, picture.width, picture.height);
     const paintFrom = (step: number): void => {

@@ -16,21 +16,14 @@ import {
 } from 'three';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
+import type { Coarse } from '../mesh/coarse';
+import type { CoarseAnswer } from '../mesh/coarse.worker';
 import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
 import { firstMet, type Interval } from './pick';
+import { defaultStyle, type SurfaceStyle } from './style';
 import type { Uploading } from './uploading';
-
-export interface SurfaceStyle {
-  shading: 'smooth' | 'flat';
-  wireframe: boolean;
-  opacity: number;
-  // Colours tell the vertices' distances, where the file has them.
-  distance: boolean;
-}
-
-export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1, distance: false };
 
 export interface Hit {
   at: number; // along the ray
@@ -46,18 +39,20 @@ interface Look {
   isShown: boolean;
   seams: Seams;
   blocks: number;
-  // Blocks of the coarsest level of detail, which stand for the others while these are still to come, and
-  // while it moves.
+  // Blocks of the file's coarsest level of detail, which stand for the others while these are still to come.
   level: { seams: Seams; blocks: number };
+  // A coarse copy of all its blocks, drawn while it moves. Its meshes are as those of a block.
+  copy: Drawn[];
   showsDistance: boolean;
   opacity: number;
 }
 
+type Drawn = Mesh<BufferGeometry, MeshPhongMaterial>;
+
 interface DrawnBlock {
   // One mesh; of a label two, for its front and for its back.
-  meshes: Mesh<BufferGeometry, MeshPhongMaterial>[];
-  fine: BufferGeometry;
-  coarse: BufferGeometry;
+  meshes: Drawn[];
+  geometry: BufferGeometry;
   look: Look;
   label: number | null;
   isLevel: boolean;
@@ -72,6 +67,15 @@ const wiresPerFrame = 4;
 
 function material(colour: string): MeshPhongMaterial {
   return new MeshPhongMaterial({ color: colour, specular: 0x1c1c1c, shininess: 24, side: DoubleSide });
+}
+
+function geometryOf({ positions, normals, distances }: Omit<Coarse, 'index'>, index: Uint16Array | Uint32Array): BufferGeometry {
+  const made = new BufferGeometry();
+  made.setAttribute('position', new BufferAttribute(positions, 3));
+  made.setAttribute('normal', new BufferAttribute(normals, 4, true));
+  if (distances) made.setAttribute('distanceMm', new BufferAttribute(distances, 1));
+  made.setIndex(new BufferAttribute(index, 1));
+  return made;
 }
 
 // The wall that two labels share is there for each of them, and seen from inside of one it is the other's
@@ -95,6 +99,10 @@ export class Parts {
   private hidden: ReadonlySet<number> = new Set();
   private style = defaultStyle;
   private planes: Plane[] | null = null;
+  // Coarse copies of all looks, for each level; and the level that is drawn.
+  private copies: { geometry: BufferGeometry; triangles: number }[][] = [];
+  private level = 0;
+  private known: PartFinder | null = null;
   private isCoarse = false;
   private isWhole = false;
   private readonly shader = new DistanceShader();
@@ -117,39 +125,23 @@ export class Parts {
     const areFirst = part !== null && this.looks.size === 0;
     const look = this.looks.get(label) ?? this.newLook(part);
     for (const block of blocks) {
-      const position = new BufferAttribute(block.positions, 3);
-      const normal = new BufferAttribute(block.normals, 4, true);
-      const distance = block.distances && new BufferAttribute(block.distances, 1);
-      const geometry = (index: Uint16Array<ArrayBuffer>): BufferGeometry => {
-        const made = new BufferGeometry();
-        made.setAttribute('position', position);
-        made.setAttribute('normal', normal);
-        if (distance) made.setAttribute('distanceMm', distance);
-        made.setIndex(new BufferAttribute(index, 1));
-        return made;
-      };
-      const fine = geometry(block.index);
-      const coarse = geometry(block.coarse);
+      const geometry = geometryOf(block, block.index);
       const [low, high] = block.bounds;
-      fine.boundingBox = new Box3(new Vector3(...low), new Vector3(...high));
-      fine.boundingSphere = fine.boundingBox.getBoundingSphere(new Sphere());
-      coarse.boundingSphere = fine.boundingSphere;
-      const meshes = look.materials.map((made) => new Mesh(this.isCoarse && !isLevel ? coarse : fine, made));
+      geometry.boundingBox = new Box3(new Vector3(...low), new Vector3(...high));
+      geometry.boundingSphere = geometry.boundingBox.getBoundingSphere(new Sphere());
+      const meshes = look.materials.map((made) => new Mesh(geometry, made));
       const owner = isLevel ? look.level : look;
       const member = owner.blocks;
-      const drawn: DrawnBlock = { meshes, fine, coarse, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
+      const drawn: DrawnBlock = { meshes, geometry, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
       this.uploading.add({
-        geometries: [fine, coarse],
+        geometries: [geometry],
         onThere: () => {
           drawn.isThere = true;
           this.show(drawn);
         },
       });
       owner.blocks += 1;
-      for (const mesh of meshes) {
-        mesh.matrixAutoUpdate = false;
-        this.scene.add(mesh);
-      }
+      this.place(meshes);
       this.show(drawn);
       this.blocks.push(drawn);
     }
@@ -176,14 +168,15 @@ export class Parts {
     return this.blocks.filter(({ isLevel }) => !isLevel);
   }
 
-  // Finds which of its triangles belong together.
-  finder(): PartFinder {
-    return new PartFinder(this.finest.map(({ made }) => made));
+  // Finds which of its triangles belong together. To be asked for once all is there.
+  get finder(): PartFinder {
+    this.known ??= new PartFinder(this.finest.map(({ made }) => made));
+    return this.known;
   }
 
   // Those of the finest blocks that can be drawn.
   get trianglesThere(): number {
-    return this.finest.reduce((sum, { fine, isThere }) => sum + (isThere ? (fine.index?.count ?? 0) / 3 : 0), 0);
+    return this.finest.reduce((sum, { made, isThere }) => sum + (isThere ? made.index.length / 3 : 0), 0);
   }
 
   // Whether it takes other shaders.
@@ -230,12 +223,44 @@ export class Parts {
     return isOther;
   }
 
+  // The number of that label's surface, of which there is a block.
+  numberOf(label: number | null): number {
+    return [...this.looks.keys()].indexOf(label);
+  }
+
+  // Coarse copies of its surfaces, by their numbers; in place of those before.
+  takeCopies(levels: CoarseAnswer): void {
+    for (const { geometry } of this.copies.flat()) geometry.dispose();
+    this.copies = levels.map((surfaces) =>
+      surfaces.map((made) => ({ geometry: geometryOf(made, made.index), triangles: made.index.length / 3 })),
+    );
+    for (const look of this.looks.values()) {
+      if (look.copy.length > 0) continue;
+      look.copy = look.materials.map((made) => new Mesh(new BufferGeometry(), made));
+      this.place(look.copy);
+    }
+    this.setLevel(this.level);
+  }
+
+  // Which of the coarse copies is drawn while it moves.
+  setLevel(level: number): void {
+    this.level = level;
+    const surfaces = this.copies[Math.min(level, this.copies.length - 1)];
+    [...this.looks.values()].forEach(({ copy }, number) => {
+      for (const mesh of copy) mesh.geometry = surfaces?.[number]?.geometry ?? mesh.geometry;
+    });
+    this.showAll();
+  }
+
+  // Of the copy that is drawn while it moves; 0 without one.
+  get trianglesMoving(): number {
+    return (this.copies[Math.min(this.level, this.copies.length - 1)] ?? []).reduce((sum, { triangles }) => sum + triangles, 0);
+  }
+
+  // Draws the coarse copy, where there is one, or the blocks.
   setCoarse(isCoarse: boolean): void {
     this.isCoarse = isCoarse;
-    for (const { meshes, fine, coarse, isLevel } of this.blocks) {
-      for (const mesh of meshes) mesh.geometry = isCoarse && !isLevel ? coarse : fine;
-    }
-    if ([...this.looks.values()].some(({ level }) => level.blocks > 0)) this.showAll();
+    this.showAll();
   }
 
   // Draws one of so many steps; null: all at once. Transparent blocks must be drawn in order, from the back.
@@ -256,21 +281,21 @@ export class Parts {
     let end = to;
     let nearest: { block: DrawnBlock; corner: number } | null = null;
     for (const block of this.blocks) {
-      const { fine } = block;
-      if (!this.isSeen(block) || !fine.index || !fine.boundingBox || !ray.intersectsBox(fine.boundingBox)) continue;
-      const met = firstMet(fine.getAttribute('position').array, fine.index.array, ray, { from, to: end });
+      const { geometry, made } = block;
+      if (!this.isSeen(block) || !geometry.boundingBox || !ray.intersectsBox(geometry.boundingBox)) continue;
+      const met = firstMet(made.positions, made.index, ray, { from, to: end });
       if (met.corner < 0) continue;
       end = met.at;
       nearest = { block, corner: met.corner };
     }
     if (!nearest) return null;
     const { block, corner } = nearest;
-    const { label, distances, fine } = block;
+    const { label, distances, made } = block;
     const place = { block: this.finest.indexOf(block), corner };
     if (!distances) return { at: end, label, ...place };
     const point = ray.at(end, new Vector3()).toArray();
-    const corners = [0, 1, 2].map((i) => fine.index?.array[corner + i] ?? 0) as [number, number, number];
-    const distance = valueWithin(distances, fine.getAttribute('position').array, corners, point);
+    const corners = [0, 1, 2].map((i) => made.index[corner + i] ?? 0) as [number, number, number];
+    const distance = valueWithin(distances, made.positions, corners, point);
     return { at: end, label, distance, ...place };
   }
 
@@ -287,15 +312,12 @@ export class Parts {
       return true;
     }
     seams.join(member);
-    block.fine.getAttribute('normal').needsUpdate = true;
+    block.geometry.getAttribute('normal').needsUpdate = true;
     return true;
   }
 
   dispose(): void {
-    for (const { fine, coarse } of this.blocks) {
-      fine.dispose();
-      coarse.dispose();
-    }
+    for (const { geometry } of [...this.blocks, ...this.copies.flat()]) geometry.dispose();
     for (const { materials } of this.looks.values()) for (const made of materials) made.dispose();
     this.usual.dispose();
     this.shader.dispose();
@@ -309,6 +331,7 @@ export class Parts {
       seams: new Seams(),
       blocks: 0,
       level: { seams: new Seams(), blocks: 0 },
+      copy: [],
       showsDistance: false,
       opacity: part ? (this.opacities.get(part.label) ?? 1) : 1,
     };
@@ -349,23 +372,37 @@ export class Parts {
     return hasChanged;
   }
 
-  // The back of a closed surface is only seen where it is cut or looked through.
+  private place(meshes: readonly Drawn[]): void {
+    for (const mesh of meshes) {
+      mesh.matrixAutoUpdate = false;
+      this.scene.add(mesh);
+    }
+  }
+
   private show(block: DrawnBlock): void {
-    const [front, back] = block.meshes;
-    const isSeen = this.isSeen(block);
+    this.showMeshes(block.meshes, block.look, this.isSeen(block));
+  }
+
+  // The back of a closed surface is only seen where it is cut or looked through.
+  private showMeshes([front, back]: readonly Drawn[], { opacity }: Look, isSeen: boolean): void {
     if (front) front.visible = isSeen;
-    const isThrough = this.style.opacity * block.look.opacity < 1;
+    const isThrough = this.style.opacity * opacity < 1;
     if (back) back.visible = isSeen && (this.planes !== null || isThrough || this.style.wireframe);
+  }
+
+  private get isCopySeen(): boolean {
+    return this.isCoarse && this.copies.length > 0;
   }
 
   // Of a look with a coarse level either that one is seen or the finest.
   private isSeen({ look, isLevel, isThere }: DrawnBlock): boolean {
-    const isByLevel = look.level.blocks > 0 && (this.isCoarse || !this.isWhole);
-    return look.isShown && isThere && isLevel === isByLevel;
+    const isByLevel = look.level.blocks > 0 && !this.isWhole;
+    return look.isShown && isThere && isLevel === isByLevel && !this.isCopySeen;
   }
 
   private showAll(): void {
     for (const block of this.blocks) this.show(block);
+    for (const look of this.looks.values()) this.showMeshes(look.copy, look, look.isShown && this.isCopySeen);
   }
 
   // Wires are made of a block when it is first drawn with them, so that some blocks at a time turn.

@@ -13,15 +13,7 @@ import {
 import { overLayer } from './cross';
 import { h } from '../ui/dom';
 import type { Vec3 } from '../api/types';
-
-export interface Ruler {
-  from: Vec3;
-  to: Vec3;
-}
-
-export function lengthOf({ from, to }: Ruler): number {
-  return Math.hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
-}
+import { lengthOf, type Ruler } from './style';
 
 function labelOf(ruler: Ruler): string {
   return `${lengthOf(ruler).toFixed(1)} mm`;

@@ -1,6 +1,6 @@
 // A surface in a canvas: blocks of triangles that come one by one, a camera around them, and what is
 // drawn over them. Draws when something changed, never for nothing.
-import { type Object3D, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from 'three';
+import { type Object3D, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3, Volume } from '../api/types';
 import type { Block } from '../mesh/blocks';
@@ -10,21 +10,23 @@ import { OrientationCube } from './cube';
 import { compile, whenDrawn } from './compile';
 import { Cross } from './cross';
 import { Cut } from './cut';
-import { FrameBudget } from './budget';
+import { efforts, FrameBudget } from './budget';
+import { clipTo, panned, verticalAngle } from './camera';
+import { CoarseMaker } from './coarse_maker';
 import type { Reach } from './distances';
 import { facing } from './facing';
-import { Frame } from './frame';
+import { Frame, type Manner } from './frame';
 import { addLights } from './lights';
 import { joinSeams } from './joining';
-import { Parts, type SurfaceStyle } from './parts';
+import { Parts } from './parts';
 import { pickedAt, type Picked } from './picked';
 import { pictureOf } from './picture';
 import { Rulers } from './rulers';
+import type { SurfaceStyle } from './style';
 import { Uploading } from './uploading';
 import { onTap } from './tap';
 import { firstOffset, fitted, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
-const verticalAngle = 30;
 const settleDelay = 180;
 
 export class Surface {
@@ -32,7 +34,7 @@ export class Surface {
   readonly rulers: Rulers;
   readonly cut: Cut;
   private readonly cross: Cross;
-  readonly budget = new FrameBudget();
+  private readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
   // More blocks can be drawn.
   onShown: (() => void) | null = null;
@@ -48,12 +50,14 @@ export class Surface {
   private readonly uploading: Uploading;
   private readonly frame: Frame;
   private readonly parts: Parts;
+  // A level for each number of triangles that a frame may have.
+  private readonly copies: CoarseMaker;
+  private readonly levels = [...new Set(efforts.map(({ triangles }) => triangles))];
   private readonly resizing: ResizeObserver;
   private bounds: [Vec3, Vec3] = [
     [-1, -1, -1],
     [1, 1, 1],
   ];
-  private finder: PartFinder | null = null;
   private scheduled = 0;
   private settling = 0;
   private isMoving = false;
@@ -62,6 +66,8 @@ export class Surface {
   // While the graphics processor has something to do; and whether a frame waits for its end.
   private isBusy = false;
   private isWaiting = false;
+  // Whether the frame that is to be drawn waited for the one before.
+  private wasWaiting = false;
   // Whether the shaders are there; one that is made anew ends the wait for those before.
   private isCompiled = false;
   private compiling = new AbortController();
@@ -73,6 +79,10 @@ export class Surface {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
     this.uploading = new Uploading(this.renderer);
     this.parts = new Parts(this.scene, this.uploading, () => this.draw());
+    this.copies = new CoarseMaker(this.levels, (levels) => {
+      this.parts.takeCopies(levels);
+      if (this.isCoarse) this.draw();
+    });
     this.frame = new Frame(this.renderer, this.scene, this.camera, this.parts);
     this.renderer.localClippingEnabled = true;
     this.renderer.autoClear = false;
@@ -139,6 +149,7 @@ export class Surface {
 
   addBlocks(blocks: Block[], part: Part | null, isCoarse = false): void {
     if (this.parts.add(blocks, part, isCoarse)) this.compile();
+    if (!isCoarse) for (const { coarse } of blocks) this.copies.add(this.parts.numberOf(part?.label ?? null), coarse);
     delete this.host.dataset.still;
     this.bring();
   }
@@ -157,6 +168,7 @@ export class Surface {
   private release(then: () => void): void {
     this.isBusy = false;
     if (this.isDisposed) return;
+    this.wasWaiting = this.isWaiting;
     then();
     if (this.isWaiting) this.draw();
     else this.bring();
@@ -165,6 +177,7 @@ export class Surface {
   // To be called once the last block is drawn: from then on the shading has no edges at the seams.
   finish(): void {
     this.parts.finish();
+    this.copies.finish();
     joinSeams(this.parts, this.over.signal, () => this.draw());
   }
 
@@ -183,8 +196,7 @@ export class Surface {
 
   // Which triangles belong together. To be asked for once all is there.
   get partFinder(): PartFinder {
-    this.finder ??= this.parts.finder();
-    return this.finder;
+    return this.parts.finder;
   }
 
   setStyle(style: SurfaceStyle): void {
@@ -278,21 +290,16 @@ export class Surface {
   }
 
   turn(azimuth: number, elevation: number): void {
-    const { offset, target } = this.place;
-    this.nudge({ offset: turned(offset, azimuth, elevation), target });
+    this.nudge({ ...this.place, offset: turned(this.place.offset, azimuth, elevation) });
   }
 
   zoom(factor: number): void {
-    const { offset, target } = this.place;
-    this.nudge({ offset: [offset[0] * factor, offset[1] * factor, offset[2] * factor], target });
+    this.nudge({ ...this.place, offset: this.place.offset.map((value) => value * factor) as Vec3 });
   }
 
   // Both in parts of the view's height.
   pan(right: number, up: number): void {
-    const { offset, target } = this.place;
-    const height = 2 * Math.hypot(...offset) * Math.tan((verticalAngle * Math.PI) / 360);
-    const shift = new Vector3(right * height, up * height, 0).applyQuaternion(this.camera.quaternion);
-    this.nudge({ offset, target: [target[0] + shift.x, target[1] + shift.y, target[2] + shift.z] });
+    this.nudge(panned(this.camera, this.place, right, up));
   }
 
   // Asks for a frame.
@@ -311,7 +318,7 @@ export class Surface {
   // The picture as it is, over that colour.
   picture(background: string): Promise<Blob> {
     this.setCoarse(false);
-    this.render(1);
+    this.render({ steps: 1, sharpness: 1 });
     const scale = this.canvas.width / Math.max(1, this.host.clientWidth);
     return pictureOf(this.canvas, background, (context) => this.rulers.paintLabels(context, this.camera, scale));
   }
@@ -322,26 +329,26 @@ export class Surface {
     cancelAnimationFrame(this.scheduled);
     clearTimeout(this.settling);
     this.resizing.disconnect();
-    this.controls.dispose();
-    this.parts.dispose();
-    this.uploading.dispose();
-    this.frame.painting.dispose();
-    this.rulers.dispose();
-    this.cut.dispose();
-    this.cross.dispose();
-    this.cube?.dispose();
-    this.renderer.dispose();
+    const { controls, parts, copies, uploading, rulers, cut, cross, cube, renderer } = this;
+    for (const one of [controls, parts, copies, uploading, this.frame.painting, rulers, cut, cross, cube, renderer]) one?.dispose();
     // The browser keeps only some contexts; it must not wait for garbage to be collected.
     this.renderer.forceContextLoss();
     this.canvas.remove();
   }
 
   // In one step it is drawn at once.
-  private render(steps = this.isMoving || this.parts.isSeenThrough ? 1 : this.budget.steps): void {
+  private get manner(): Manner {
+    if (this.isCoarse) return { steps: 1, sharpness: this.budget.effort.sharpness };
+    return { steps: this.isMoving || this.parts.isSeenThrough ? 1 : this.budget.steps, sharpness: 1 };
+  }
+
+  private render(manner = this.manner): void {
     if (this.isDisposed) return;
     this.isStale = false;
     const began = performance.now();
     const { isCoarse } = this;
+    const isNext = this.wasWaiting;
+    this.wasWaiting = false;
     const { clientWidth: width, clientHeight: height } = this.host;
     const after = (): void => {
       this.cube?.render(this.renderer, this.camera, height);
@@ -349,12 +356,20 @@ export class Surface {
     };
     this.isBusy = true;
     const isOver = (): boolean => this.isDisposed || this.isWaiting;
-    this.frame.paint(steps, isOver, after, (isWhole) => this.release(() => isWhole && this.drawn(began, isCoarse)));
+    this.frame.paint(manner, isOver, after, (isWhole) => {
+      // Before the next one begins.
+      if (isWhole && !this.isDisposed) this.budget.drawn({ began, isMoving: this.isMoving, isCoarse, isNext });
+      this.release(() => isWhole && this.drawn());
+    });
   }
 
-  private drawn(began: number, isCoarse: boolean): void {
-    this.budget.drawn(began, { isMoving: this.isMoving, isCoarse });
-    if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
+  private drawn(): void {
+    const { isMoving, budget } = this;
+    if (budget.isSlow) this.copies.want();
+    if (isMoving && budget.isSlow) this.setCoarse(true);
+    if (this.isCoarse) this.parts.setLevel(this.levels.indexOf(budget.effort.triangles));
+    // For measurements.
+    if (isMoving) budget.note(this.host.dataset, this.isCoarse ? this.parts.trianglesMoving : null);
     if (this.uploading.isEmpty && !this.isStale) for (const resolve of this.onAllShown.splice(0)) resolve();
     this.noteStill();
   }
@@ -368,7 +383,6 @@ export class Surface {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.host;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -378,17 +392,12 @@ export class Surface {
     if (!this.isCompiled) return;
     // A surface that takes long stays coarse until the size is the last one.
     this.beginMove();
-    this.render(1);
+    this.render({ ...this.manner, steps: 1 });
     this.endMove();
   }
 
   private cameraChanged(): void {
-    const distance = this.camera.position.distanceTo(this.controls.target);
-    const [low, high] = this.bounds;
-    const wide = 2 * Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
-    this.camera.far = wide + distance;
-    this.camera.near = Math.max(this.camera.far / 5000, distance - wide);
-    this.camera.updateProjectionMatrix();
+    clipTo(this.camera, this.controls.target, this.bounds);
     this.draw();
     this.onCamera?.();
   }
@@ -401,6 +410,7 @@ export class Surface {
 
   private beginMove(): void {
     clearTimeout(this.settling);
+    if (!this.isMoving) this.budget.begin();
     this.isMoving = true;
     if (this.budget.isSlow) this.setCoarse(true);
   }
@@ -419,6 +429,7 @@ export class Surface {
     if (isCoarse === this.isCoarse) return;
     this.isCoarse = isCoarse;
     this.parts.setCoarse(isCoarse);
+    if (isCoarse) this.copies.want();
     this.draw();
   }
 

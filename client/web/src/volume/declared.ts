@@ -53,12 +53,25 @@ function fieldsOf(text: string, separator: string): Fields {
   );
 }
 
-function ofNifti(head: Uint8Array): Declared | null {
+export interface NiftiHead {
+  dims: number[];
+  // Where the samples begin.
+  begin: number;
+  // NIfTI's code of their type, and their bits.
+  type: number;
+  bits: number;
+  isLittle: boolean;
+  isElsewhere: boolean;
+}
+
+// Of the first bytes of a NIfTI file, as they are when nothing is compressed. Null where they tell nothing.
+export function niftiHead(head: Uint8Array): NiftiHead | null {
   if (head.length < 352) return null;
   const view = new DataView(head.buffer, head.byteOffset, head.byteLength);
   const isLittle = [348, 540].includes(view.getInt32(0, true));
-  const isSecond = view.getInt32(0, isLittle) === 540;
-  if (isSecond && head.length < 540) return null;
+  const version = view.getInt32(0, isLittle);
+  const isSecond = version === 540;
+  if (![348, 540].includes(version) || head.length < version) return null;
   const magic = String.fromCharCode(...head.subarray(isSecond ? 4 : 344, isSecond ? 7 : 347));
   const dimAt = (at: number): number =>
     isSecond ? Number(view.getBigInt64(16 + 8 * at, isLittle)) : view.getInt16(40 + 2 * at, isLittle);
@@ -66,9 +79,20 @@ function ofNifti(head: Uint8Array): Declared | null {
   if (!(count >= 1 && count <= 7)) return null;
   const dims = Array.from({ length: count }, (_, at) => dimAt(at + 1));
   if (!areDims(dims)) return null;
-  const bits = view.getInt16(isSecond ? 14 : 72, isLittle);
-  const begin = isSecond ? Number(view.getBigInt64(168, isLittle)) : view.getFloat32(108, isLittle);
-  const isElsewhere = !magic.startsWith('n+');
+  return {
+    dims,
+    begin: isSecond ? Number(view.getBigInt64(168, isLittle)) : view.getFloat32(108, isLittle),
+    type: view.getInt16(isSecond ? 12 : 70, isLittle),
+    bits: view.getInt16(isSecond ? 14 : 72, isLittle),
+    isLittle,
+    isElsewhere: !magic.startsWith('n+'),
+  };
+}
+
+function ofNifti(bytes: Uint8Array): Declared | null {
+  const head = niftiHead(bytes);
+  if (!head) return null;
+  const { dims, begin, bits, isElsewhere } = head;
   const isTold = bits > 0 && bits % 8 === 0 && begin >= 0 && !isElsewhere;
   return { dims, bytes: isTold ? begin + bytesOf(dims, bits / 8) : null, isElsewhere };
 }
@@ -104,7 +128,5 @@ export function declaredBy(head: Uint8Array): Declared | null {
   const text = new TextDecoder('latin1').decode(head);
   if (text.startsWith('NRRD')) return ofNrrd(text);
   if (/^\s*[A-Za-z]\w*\s*=/.test(text)) return ofMetaImage(text);
-  const first = head.length >= 4 ? new DataView(head.buffer, head.byteOffset, 4) : null;
-  if (first && [true, false].some((isLittle) => [348, 540].includes(first.getInt32(0, isLittle)))) return ofNifti(head);
-  return null;
+  return ofNifti(head);
 }

@@ -1,11 +1,22 @@
 // Looks into DICOM files that are to be uploaded, so that a person can tell series apart: their dates and a picture. What
 // cannot be read here (compressed, big-endian, not DICOM) has neither; the daemon decides what a file is.
 
+export interface Picture {
+  width: number;
+  height: number;
+  grey: Uint8ClampedArray;
+}
+
+// What the file has none of is ''.
 export interface Peek {
   series: string;
-  // YYYY-MM-DD; '' if the file has none.
+  // YYYY-MM-DD
   date: string;
-  picture: { width: number; height: number; grey: Uint8ClampedArray } | null;
+  patient: string;
+  // Its UID, and what a person calls it.
+  study: string;
+  studyTitle: string;
+  picture: Picture | null;
 }
 
 const explicitLittle = ['1.2.840.10008.1.2.1'];
@@ -73,12 +84,17 @@ class Reader {
 const series = 0x0020_000e;
 const seriesDate = 0x0008_0021;
 const studyDate = 0x0008_0020;
+const studyDescription = 0x0008_1030;
+const patientName = 0x0010_0010;
+const patientId = 0x0010_0020;
+const study = 0x0020_000d;
 const rows = 0x0028_0010;
 const columns = 0x0028_0011;
 const bitsAllocated = 0x0028_0100;
 const pixelRepresentation = 0x0028_0103;
 const pixels = 0x7fe0_0010;
 const syntax = 0x0002_0010;
+const textTags = [syntax, series, seriesDate, study, studyDate, studyDescription, patientName, patientId];
 
 function pictureOf(view: DataView, found: ReadonlyMap<number, number>, { at, length }: Element): Peek['picture'] {
   const [width = 0, height = 0, bits = 0] = [columns, rows, bitsAllocated].map((tag) => found.get(tag));
@@ -112,7 +128,7 @@ export function peekAt(bytes: ArrayBuffer): Peek | null {
         picture = pictureOf(view, numbers, element);
         break;
       }
-      if ([syntax, series, seriesDate, studyDate].includes(element.tag)) texts.set(element.tag, reader.text(element));
+      if (textTags.includes(element.tag)) texts.set(element.tag, reader.text(element));
       if ([rows, columns, bitsAllocated, pixelRepresentation].includes(element.tag)) numbers.set(element.tag, view.getUint16(element.at, true));
       reader.skip(element);
     }
@@ -122,21 +138,61 @@ export function peekAt(bytes: ArrayBuffer): Peek | null {
   }
   const uid = texts.get(series);
   if (uid === undefined) return null;
-  const [, year, month, day] = /^(\d{4})(\d{2})(\d{2})$/.exec(texts.get(seriesDate) ?? texts.get(studyDate) ?? '') ?? [];
-  return { series: uid, date: year === undefined ? '' : `${year}-${month}-${day}`, picture };
+  const name = (texts.get(patientName) ?? '').replace(/\^+/g, ' ').trim();
+  return {
+    series: uid,
+    date: dateOf(texts.get(seriesDate) ?? texts.get(studyDate)),
+    patient: [name, texts.get(patientId)].filter(Boolean).join(', '),
+    study: texts.get(study) ?? '',
+    studyTitle: [texts.get(studyDescription), dateOf(texts.get(studyDate))].filter(Boolean).join(', '),
+    picture,
+  };
 }
 
-const mostFiles = 64;
+function dateOf(text = ''): string {
+  const [, year, month, day] = /^(\d{4})(\d{2})(\d{2})$/.exec(text) ?? [];
+  return year === undefined ? '' : `${year}-${month}-${day}`;
+}
+
+const mostFiles = 512;
 const mostBytes = 8 * 1024 * 1024;
+// The series is told before the samples.
+const headBytes = 65_536;
 
 // One file of each of these series, as far as some files spread over all of them have one.
 export async function peekAtSeries(files: readonly Blob[], wanted: readonly string[]): Promise<Map<string, Peek>> {
   const found = new Map<string, Peek>();
+  const isNew = (peek: Peek | null): peek is Peek => peek !== null && wanted.includes(peek.series) && !found.has(peek.series);
   const step = Math.max(1, files.length / mostFiles);
   for (let at = step / 2; at < files.length && found.size < wanted.length; at += step) {
     const file = files[Math.floor(at)];
-    const peek = file && file.size <= mostBytes ? peekAt(await file.arrayBuffer()) : null;
-    if (peek && wanted.includes(peek.series) && !found.has(peek.series)) found.set(peek.series, peek);
+    if (!file || file.size > mostBytes || !isNew(peekAt(await file.slice(0, headBytes).arrayBuffer()))) continue;
+    const whole = peekAt(await file.arrayBuffer());
+    if (isNew(whole)) found.set(whole.series, whole);
   }
   return found;
+}
+
+export interface SeriesGroup {
+  patient: string;
+  study: string;
+  studyTitle: string;
+  series: string[];
+}
+
+// The series by patients and studies, each in the order in which it comes first. Those that nothing is known of are a group
+// of their own, at the end.
+export function grouped(series: readonly string[], peeks: ReadonlyMap<string, Peek>): SeriesGroup[] {
+  const groups = new Map<string, SeriesGroup>();
+  const isKnown = (uid: string): boolean => peeks.has(uid);
+  for (const uid of [...series.filter(isKnown), ...series.filter((one) => !isKnown(one))]) {
+    const { patient = '', study: of = '', studyTitle = '' } = peeks.get(uid) ?? {};
+    const key = JSON.stringify(isKnown(uid) ? [patient, of] : []);
+    const group = groups.get(key) ?? { patient, study: of, studyTitle, series: [] };
+    group.series.push(uid);
+    groups.set(key, group);
+  }
+  // A patient's studies stand together.
+  const patients = [...new Set([...groups.values()].map(({ patient }) => patient))];
+  return [...groups.values()].sort((a, b) => patients.indexOf(a.patient) - patients.indexOf(b.patient));
 }

@@ -1,6 +1,6 @@
 // A volume's values where the samples of another one's slice lie in the patient, and through a slab around that slice.
 import type { Axis, Vec3, Volume } from '../api/types';
-import { axisIndex, pictureAxes, toPatient, toSamples } from './geometry';
+import { axisDirection, axisIndex, pictureAxes, toPatient, toSamples } from './geometry';
 import type { Preview } from './preview';
 
 export type Projection = 'maximum' | 'mean';
@@ -18,17 +18,13 @@ export interface Resliced {
   values: Uint8Array<ArrayBuffer>;
 }
 
-// In samples of the preview: where the first sample of a slice is, and where a step along each of the volume's axes leads.
-function stepsIn({ dims, origin, steps }: Preview, volume: Volume): { at: (place: Vec3) => Vec3; step: (axis: number) => Vec3 } {
+// Where a point of the patient is in samples of the preview, and where a step leads.
+function inSamplesOf({ dims, origin, steps }: Preview): { at: (point: Vec3) => Vec3; step: (vector: Vec3) => Vec3 } {
   const direction = [0, 1, 2].flatMap((row) => steps.map((step) => step[row as 0]));
   const geometry = { dims, origin, spacing: [1, 1, 1] as Vec3, direction };
-  const at = (place: Vec3): Vec3 => toSamples(geometry, toPatient(volume, place));
+  const at = (point: Vec3): Vec3 => toSamples(geometry, point);
   const zero = at([0, 0, 0]);
-  const step = (axis: number): Vec3 => {
-    const end = at([0, 1, 2].map((one) => (one === axis ? 1 : 0)) as Vec3);
-    return end.map((value, one) => value - zero[one as 0]) as Vec3;
-  };
-  return { at, step };
+  return { at, step: (vector) => at(vector).map((value, axis) => value - zero[axis as 0]) as Vec3 };
 }
 
 // Trilinear; 0 farther than half a sample outside.
@@ -56,24 +52,41 @@ function sampler({ dims, samples }: Preview): (x: number, y: number, z: number) 
   };
 }
 
-export function resliced(preview: Preview, volume: Volume, axis: Axis, index: number, slab: Slab | null = null): Resliced {
-  const normal = axisIndex(axis);
-  const [across, downwards] = pictureAxes(axis);
-  const [width, height] = [volume.dims[across], volume.dims[downwards]];
-  const { at, step } = stepsIn(preview, volume);
-  const [u, v, w] = [step(across), step(downwards), step(normal)];
-  const low = Math.max(0, index - (slab?.reach ?? 0));
-  const high = Math.min(volume.dims[normal] - 1, index + (slab?.reach ?? 0));
-  const [x0, y0, z0] = at([0, 1, 2].map((one) => (one === normal ? low : 0)) as Vec3);
-  const sample = sampler(preview);
+// 0 farther than half a sample outside.
+function nearest({ dims, samples }: Preview): (x: number, y: number, z: number) => number {
+  const [wide, high, deep] = dims;
+  return (px, py, pz) => {
+    const [x, y, z] = [Math.round(px), Math.round(py), Math.round(pz)];
+    if (x < 0 || y < 0 || z < 0 || x >= wide || y >= high || z >= deep) return 0;
+    return samples[(z * high + y) * wide + x] as number;
+  };
+}
+
+// A picture of a plane, whose layers lie behind each other.
+interface Layers {
+  width: number;
+  height: number;
+  // The middle of the first sample of the first layer, and where a step along rows, columns and layers leads, in millimetres.
+  first: Vec3;
+  steps: [Vec3, Vec3, Vec3];
+  count: number;
+  projection: Projection;
+  // Between samples: the nearest one's value, as numbers of labels need it.
+  isNearest?: boolean;
+}
+
+function projected(preview: Preview, { width, height, first, steps, count, projection, isNearest = false }: Layers): Resliced {
+  const { at, step } = inSamplesOf(preview);
+  const [u, v, w] = steps.map(step) as [Vec3, Vec3, Vec3];
+  const [x0, y0, z0] = at(first);
+  const sample = isNearest ? nearest(preview) : sampler(preview);
   const values = new Uint8Array(width * height);
-  const isMean = slab?.projection === 'mean';
   for (let row = 0; row < height; row += 1) {
     for (let column = 0; column < width; column += 1) {
       let [x, y, z] = [x0 + column * u[0] + row * v[0], y0 + column * u[1] + row * v[1], z0 + column * u[2] + row * v[2]];
       let most = 0;
       let sum = 0;
-      for (let layer = low; layer <= high; layer += 1) {
+      for (let layer = 0; layer < count; layer += 1) {
         const value = sample(x, y, z);
         sum += value;
         if (value > most) most = value;
@@ -81,8 +94,43 @@ export function resliced(preview: Preview, volume: Volume, axis: Axis, index: nu
         y += w[1];
         z += w[2];
       }
-      values[row * width + column] = Math.round(isMean ? sum / (high - low + 1) : most);
+      values[row * width + column] = Math.round(projection === 'mean' ? sum / count : most);
     }
   }
   return { width, height, values };
+}
+
+export function resliced(preview: Preview, volume: Volume, axis: Axis, index: number, slab: Slab | null = null): Resliced {
+  const normal = axisIndex(axis);
+  const [across, downwards] = pictureAxes(axis);
+  const low = Math.max(0, index - (slab?.reach ?? 0));
+  const high = Math.min(volume.dims[normal] - 1, index + (slab?.reach ?? 0));
+  const stepAlong = (one: 0 | 1 | 2): Vec3 => axisDirection(volume, one).map((value) => value * volume.spacing[one]) as Vec3;
+  return projected(preview, {
+    width: volume.dims[across],
+    height: volume.dims[downwards],
+    first: toPatient(volume, [0, 1, 2].map((one) => (one === normal ? low : 0)) as Vec3),
+    steps: [stepAlong(across), stepAlong(downwards), stepAlong(normal)],
+    count: high - low + 1,
+    projection: slab?.projection ?? 'maximum',
+  });
+}
+
+export interface Square {
+  middle: Vec3;
+  right: Vec3;
+  down: Vec3;
+  // Of a side, in millimetres and in pixels.
+  size: number;
+  pixels: number;
+}
+
+// The values in a square of the patient.
+export function sampledSquare(preview: Preview, { middle, right, down, size, pixels }: Square, isNearest = false): Resliced {
+  const step = size / pixels;
+  const half = (pixels - 1) / 2;
+  const scaled = (vector: Vec3): Vec3 => vector.map((value) => value * step) as Vec3;
+  const [u, v] = [scaled(right), scaled(down)];
+  const first = middle.map((value, axis) => value - half * (u[axis as 0] + v[axis as 0])) as Vec3;
+  return projected(preview, { width: pixels, height: pixels, first, steps: [u, v, [0, 0, 0]], count: 1, projection: 'maximum', isNearest });
 }

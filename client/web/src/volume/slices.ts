@@ -141,3 +141,12 @@ export function inSlice(slice: Pick<Slice, 'window'>, iso: number): number {
   const [low, high] = slice.window;
   return (255 * (iso - low)) / (high - low || 1);
 }
+
+// As on a radiologist's station: to the right widens the window, upwards darkens (raises its level).
+export function draggedWindow([low, high]: Window, dx: number, dy: number): Window {
+  const width = Math.max(1e-6, high - low);
+  const level = (low + high) / 2;
+  const newWidth = width * Math.exp(dx / 250);
+  const newLevel = level - (dy / 400) * width;
+  return [newLevel - newWidth / 2, newLevel + newWidth / 2];
+}

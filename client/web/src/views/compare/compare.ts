@@ -4,8 +4,7 @@ import { ApiError, asApiError, errorOfProblem } from '../../api/problem';
 import { isFinal, type Job, type LabelSummary } from '../../api/types';
 import { titlesOf } from '../../job/differences';
 import { LabelState, labelsOfMesh } from '../../job/labels';
-import type { SurfaceStyle } from '../../scene/parts';
-import { graphicsStarted } from '../../scene/graphics';
+import type { SurfaceStyle } from '../../scene/style';
 import { placeOfText, placeToText, viewNames, viewTitles, type CameraPlace } from '../../scene/views';
 import { button, h } from '../../ui/dom';
 import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../../ui/format';
@@ -170,7 +169,7 @@ class Comparison {
       cell.show(refusal(reason));
       return;
     }
-    const [labels] = await Promise.all([labelsOfMesh(job), graphicsStarted()]);
+    const labels = await labelsOfMesh(job);
     if (this.scope.isOver) return;
     const pane = this.addPane(job, labels);
     cell.show(pane.element);

@@ -6,8 +6,8 @@ import { titlesOf } from '../../job/differences';
 import { labelCount } from '../../job/labels';
 import type { Part } from '../../mesh/glb';
 import { loadMesh, viewableFile } from '../../mesh/load';
-import { graphicsStarted } from '../../scene/graphics';
-import { Surface } from '../../scene/surface';
+import { surfaceDrawing } from '../../scene/graphics';
+import type { Surface } from '../../scene/surface';
 import { placeOfText, placeToText, viewNames, viewTitles } from '../../scene/views';
 import { button, checkbox, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
@@ -142,9 +142,9 @@ class Together {
   }
 
   private async begin(): Promise<void> {
-    await graphicsStarted();
+    const drawing = await surfaceDrawing();
     if (this.scope.isOver) return;
-    const surface = new Surface(this.view);
+    const surface = new drawing.Surface(this.view);
     this.surface = surface;
     this.scope.onEnd(() => surface.dispose());
     surface.canvas.setAttribute('aria-label', `${this.jobs.length} surfaces in one scene. Drag to turn them.`);

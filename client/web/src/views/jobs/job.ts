@@ -6,7 +6,7 @@ import { emptyReason } from '../../job/empty';
 import { LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords, surfaceInWords } from '../../job/parameters';
 import { changeLink } from '../../job/variants';
-import { graphicsStarted } from '../../scene/graphics';
+import { surfaceDrawing } from '../../scene/graphics';
 import { placeOfText, placeToText } from '../../scene/views';
 import { button, h } from '../../ui/dom';
 import { formatIso, shortId } from '../../ui/format';
@@ -108,7 +108,7 @@ class ProgressPanel {
 
 export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> {
   // While the daemon is asked.
-  void graphicsStarted();
+  surfaceDrawing().catch(() => undefined);
   const first = await client.getJob(route.path[1] ?? '');
   const volume = await volumeOf(first);
   const stageArea = h('div', { class: 'stage-area' });
@@ -179,6 +179,7 @@ function showSurface(
   const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices, look: route.query });
   pane.onLook = noteInAddress;
   slices?.linkTo(pane);
+  pane.onTools = () => slices?.restore();
   let noting = 0;
   pane.onCamera = (place) => {
     clearTimeout(noting);
@@ -198,14 +199,7 @@ function showSurface(
     compareSection(job),
     againSection(job),
   );
-  const show = (): void => {
-    if (scope.isOver) return;
-    const loading = pane.load();
-    slices?.restore();
-    void loading.then((timing) => {
-      if (timing && !scope.isOver) times.replaceWith(timings(job, { ...timing }));
-    });
-  };
-  // The canvas takes its size from the page, so the view has to be in it first.
-  void graphicsStarted().then(() => requestAnimationFrame(show));
+  pane.load().then((timing) => {
+    if (timing && !scope.isOver) times.replaceWith(timings(job, { ...timing }));
+  }, tellError);
 }

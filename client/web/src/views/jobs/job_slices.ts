@@ -56,6 +56,7 @@ class JobSlices {
       crop: null,
       measures: null,
       layers: null,
+      oblique: null,
       onError: tellError,
     };
     this.views = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));

@@ -1,5 +1,5 @@
 // The surface at the iso-value, beside the slices and as it changes: drawn from a reduced copy of the volume.
-import { client, connected } from '../../client';
+import { connected } from '../../client';
 import { asApiError } from '../../api/problem';
 import type { Vec3, Volume } from '../../api/types';
 import { graphicsStarted } from '../../scene/graphics';
@@ -12,13 +12,12 @@ import type { Box } from '../../volume/crop';
 import { coloursOf, LabelMap, type LabelLook } from '../../volume/label_map';
 import { lookOf, looksFor, type LookName } from '../../volume/looks';
 import type { Preview } from '../../volume/preview';
-import { readPreview } from '../../volume/preview_file';
+import { fetchLabelPreview, fetchPreview, largestPreview } from '../../volume/preview_file';
 import type { Window } from '../../volume/slices';
 
 // Samples along an axis: what is there soon, and what is drawn then.
 const firstSize = 64;
 const softwareSize = 128;
-const hardwareSize = 256;
 const mostLabels = 255;
 const retryDelay = 3000;
 const turnStep = Math.PI / 24;
@@ -54,6 +53,7 @@ export class LiveView {
   private loading: AbortController | null = null;
   private retry = 0;
   private hasFailed = false;
+  private hasLostGpu = false;
   private look: LookName | '' = '';
   private readonly choice: HTMLElement;
   private box: Box | null = null;
@@ -122,10 +122,10 @@ export class LiveView {
   showLabels(look: LabelLook | null, cursor: Vec3): void {
     this.choice.hidden = true;
     this.cursor = cursor;
-    const isTooLarge = this.host.volume.dims.some((count) => count > hardwareSize);
+    const isTooLarge = this.host.volume.dims.some((count) => count > largestPreview);
     this.view.hidden = look === null || isTooLarge;
     if (!look || isTooLarge) {
-      this.say(isTooLarge ? `The preview shows labels of volumes with at most ${hardwareSize} samples along each axis.` : '');
+      this.say(isTooLarge ? `The preview shows labels of volumes with at most ${largestPreview} samples along each axis.` : '');
       return;
     }
     this.iso = null;
@@ -204,39 +204,38 @@ export class LiveView {
     if (!this.preview) this.say('Loading the preview');
     const { labels } = this;
     const [first, { LiveSurface }] = await Promise.all([
-      labels ? this.fetchLabels(labels.map, signal) : this.fetch(firstSize, signal),
+      labels ? fetchLabelPreview(this.host.volume.id, labels.map, signal) : this.fetch(firstSize, signal),
       import('../../scene/live'),
       graphicsStarted(),
     ]);
     if (signal.aborted) return;
     try {
-      this.surface ??= this.begin(new LiveSurface(this.view));
+      this.surface ??= await this.begin(LiveSurface.begin(this.view, this.hasLostGpu), signal);
     } catch {
+      if (signal.aborted) return;
       this.say('This browser cannot draw in 3D (WebGL 2 is missing or off).');
       return;
     }
     this.say('');
     this.take(first);
-    const size = this.surface.isSoftware ? softwareSize : hardwareSize;
+    const size = this.surface.isSoftware ? softwareSize : largestPreview;
     if (labels || this.host.volume.dims.every((count) => count <= firstSize)) return;
     this.take(await this.fetch(size, signal));
   }
 
-  private async fetch(size: number, signal: AbortSignal): Promise<Preview> {
+  private fetch(size: number, signal: AbortSignal): Promise<Preview> {
     const { window } = this;
     if (!window) throw new Error('There is no window.');
-    const file = await client.previewFile(this.host.volume.id, size, window, signal);
-    return readPreview({ file, window }, [file], signal);
+    return fetchPreview(this.host.volume.id, size, window, signal);
   }
 
-  // All samples: a mean of labels is none of them.
-  private async fetchLabels({ windows, labels }: LabelMap, signal: AbortSignal): Promise<Preview> {
-    const { id } = this.host.volume;
-    const files = await Promise.all(windows.map((window) => client.previewFile(id, hardwareSize, [...window], signal)));
-    return readPreview({ files, labels }, files, signal);
-  }
-
-  private begin(surface: LiveSurface): LiveSurface {
+  private async begin(made: Promise<LiveSurface>, signal: AbortSignal): Promise<LiveSurface> {
+    const surface = await made;
+    if (signal.aborted) {
+      surface.dispose();
+      signal.throwIfAborted();
+    }
+    surface.onLost = () => this.begunAnew();
     surface.onFrame = ({ took, scale, isResting, iso }) => {
       this.element.dataset.iso = String(iso);
       this.element.dataset.took = took.toFixed(1);
@@ -248,6 +247,14 @@ export class LiveView {
     surface.onPick = (place) => this.host.setCursor(this.inVolume(place));
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     return surface;
+  }
+
+  // Without WebGPU, which the browser gave up.
+  private begunAnew(): void {
+    this.hasLostGpu = true;
+    this.surface?.dispose();
+    this.surface = null;
+    if (!this.scope.isOver) this.load();
   }
 
   private take(preview: Preview): void {

@@ -27,9 +27,10 @@ import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
-import { makeEnlargeable } from '../slices/enlarge';
+import { paneArea } from '../slices/pane_area';
 import { sliceControls } from '../slices/slice_looks';
 import { SliceLayers } from '../slices/slice_layers';
+import { ObliqueView } from '../slices/oblique_view';
 import { SliceMeasures } from '../slices/slice_measure';
 import { SliceView, type SliceHost } from '../slices/slice_view';
 
@@ -65,6 +66,7 @@ class Prepare {
   private readonly slices: SliceView[];
   private readonly measures = new SliceMeasures();
   private readonly layers: SliceLayers;
+  private readonly oblique: ObliqueView;
   private readonly histogram: HistogramView;
   private readonly live: LiveView;
   // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
@@ -104,7 +106,8 @@ class Prepare {
     this.window = windowOfText(route.query.get('window') ?? '') ?? common;
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
-    this.layers = new SliceLayers(volume, common, scope);
+    this.oblique = new ObliqueView({ volume, setCursor: (cursor) => this.setCursor(cursor), cursor: () => this.cursor, window: () => this.window }, scope);
+    this.layers = new SliceLayers(volume, common, this.oblique, scope);
     const host: SliceHost = {
       volume,
       source: new SliceSource(volume, scope.signal),
@@ -116,10 +119,7 @@ class Prepare {
         cursor: this.cursor,
       }),
       setWindow: (window) => this.setWindow(window),
-      setCursor: (cursor) => {
-        this.cursor = cursor;
-        this.update();
-      },
+      setCursor: (cursor) => this.setCursor(cursor),
       setIso: (iso) => {
         if (!isByLabels(this.parameters)) this.setIso(iso);
       },
@@ -129,11 +129,10 @@ class Prepare {
       onError: (error) => this.sliceFailed(error),
       measures: this.measures,
       layers: this.layers,
+      oblique: this.oblique,
     };
     this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
-    this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
-      (plane) => new SliceView(plane, host, scope),
-    );
+    this.slices = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));
     this.live = this.liveView(route, host);
     this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box));
     this.isoInput = h('input', { type: 'number', step: 'any', id: 'iso', class: 'iso-input' });
@@ -153,16 +152,8 @@ class Prepare {
   }
 
   private liveView({ query }: Route, { volume, setCursor }: SliceHost): LiveView {
-    return new LiveView(
-      {
-        volume,
-        window: this.histogram.shown,
-        setCursor,
-        look: query.get('look') ?? '',
-        setLook: (look) => noteInAddress({ look }),
-      },
-      this.scope,
-    );
+    const setLook = (look: string): void => noteInAddress({ look });
+    return new LiveView({ volume, window: this.histogram.shown, setCursor, look: query.get('look') ?? '', setLook }, this.scope);
   }
 
   private listenToPage(): void {
@@ -284,9 +275,7 @@ class Prepare {
 
   private layout(common: Window): HTMLElement {
     const { volume } = this;
-    const panes = [...this.slices.map(({ element, name }) => ({ element, name })), { element: this.live.element, name: 'the preview' }];
-    const area = h('section', { class: 'slices', 'aria-label': 'Slices' }, ...panes.map(({ element }) => element));
-    makeEnlargeable(area, panes);
+    const area = paneArea(this.scope, [...this.slices, { element: this.live.element, name: 'the preview' }, this.oblique]);
     const element = h(
       'div',
       { class: 'prepare', 'data-title': volumeName(volume) },
@@ -319,6 +308,11 @@ class Prepare {
   private windowRow(common: Window): HTMLElement {
     this.resetWindow.addEventListener('click', () => this.setWindow(common));
     return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, this.resetWindow);
+  }
+
+  private setCursor(cursor: Vec3): void {
+    this.cursor = cursor;
+    this.update();
   }
 
   private setWindow(window: Window): void {
@@ -374,7 +368,7 @@ class Prepare {
   private update(): void {
     this.undoButton.hidden = !this.history.canUndo;
     choose(this.surfaceKind, kindOf(this.parameters));
-    for (const view of this.slices) view.update();
+    for (const view of [...this.slices, this.oblique]) view.update();
     if (isByLabels(this.parameters)) this.live.showLabels(this.labelLook, this.cursor);
     else this.live.show(this.iso, this.cursor);
     this.live.showCrop(this.box);

@@ -1,6 +1,7 @@
 // The box of a crop in a slice: seen, and moved by its edges.
 import type { Vec3 } from '../../api/types';
 import type { Box } from '../../volume/crop';
+import type { SliceGrip, Spot } from './slice_grip';
 
 export interface CropHost {
   // Null while nothing is cropped.
@@ -19,7 +20,7 @@ interface Grabbed {
 const reachOfMouse = 7;
 const reachOfTouch = 18;
 
-export class SliceCrop {
+export class SliceCrop implements SliceGrip {
   private grabbed: Grabbed | null = null;
 
   constructor(
@@ -39,8 +40,12 @@ export class SliceCrop {
     return true;
   }
 
-  // Which edges are at that place: of the picture's samples, with how many pixels of the screen one is.
-  at(place: [number, number], pixels: [number, number], isTouch: boolean): Grabbed['ends'] | null {
+  isAt(spot: Spot): boolean {
+    return this.endsAt(spot) !== null;
+  }
+
+  // Which edges are at that place.
+  private endsAt({ place, pixels, isTouch }: Spot): Grabbed['ends'] | null {
     const box = this.host.box();
     if (!box) return null;
     const reach = isTouch ? reachOfTouch : reachOfMouse;
@@ -56,12 +61,13 @@ export class SliceCrop {
     return ends.every((end) => end === null) ? null : ends;
   }
 
-  begin(pointer: number, ends: Grabbed['ends']): void {
-    this.grabbed = { pointer, ends };
+  hold(pointer: number, spot: Spot): boolean {
+    const ends = this.endsAt(spot);
+    if (ends) this.grabbed = { pointer, ends };
+    return ends !== null;
   }
 
-  // True if this pointer moves the box.
-  move(pointer: number, place: [number, number]): boolean {
+  move(pointer: number, { place }: Spot): boolean {
     const box = this.host.box();
     if (this.grabbed?.pointer !== pointer || !box) return false;
     const next: Box = [[...box[0]], [...box[1]]];
@@ -77,7 +83,7 @@ export class SliceCrop {
     return true;
   }
 
-  end(pointer: number): boolean {
+  letGo(pointer: number): boolean {
     if (this.grabbed?.pointer !== pointer) return false;
     this.grabbed = null;
     return true;

@@ -1,19 +1,19 @@
 // Layers of slices beside their own samples: another volume over them, and a projection of the slab around them.
 import { client } from '../../client';
 import type { Axis, Volume } from '../../api/types';
-import { field, h } from '../../ui/dom';
+import { checkbox, field, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { Signal, type Scope } from '../../ui/signal';
 import { axisIndex } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
 import { volumeName } from '../../volume/names';
 import type { Preview } from '../../volume/preview';
-import { readPreview } from '../../volume/preview_file';
+import { fetchPreview, largestPreview } from '../../volume/preview_file';
 import { resliced, type Projection, type Slab } from '../../volume/reslice';
 import type { Slice, Window } from '../../volume/slices';
+import type { ObliqueView } from './oblique_view';
 import { pixelsOf } from './slice_looks';
 
-const previewSize = 256;
 const bins = 256;
 const thicknesses = [5, 10, 20, 40]; // mm
 // The lowest of 255 values fade out, so that air around a body does not darken the other volume.
@@ -47,8 +47,9 @@ export class SliceLayers {
   private own: Preview | null = null;
   private projection: Projection | null = null;
   private thickness = 10;
+  private showsOblique = false;
   private readonly choice = h('select', {}, h('option', { value: '' }, 'None'));
-  private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the volume over it' });
+  private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the overlay' });
   private readonly overlays = new Kept<HTMLCanvasElement>();
   private readonly projections = new Kept<Slice>();
   private wanted = new AbortController();
@@ -56,16 +57,17 @@ export class SliceLayers {
   constructor(
     private readonly volume: Volume,
     private readonly window: Window,
+    private readonly oblique: ObliqueView,
     private readonly scope: Scope,
   ) {
     scope.onEnd(() => this.wanted.abort());
     this.opacity.hidden = true;
     this.opacity.addEventListener('input', () => this.changed());
     this.choice.addEventListener('change', () => void this.show(this.choice.value).catch(tellError));
-    const over = field('Volume over it', this.choice);
+    const over = field('Overlay', this.choice);
     over.append(this.opacity);
     over.hidden = true;
-    this.element = h('div', { class: 'row slice-layers' }, over, ...this.slabControls());
+    this.element = h('div', { class: 'stack' }, h('div', { class: 'row slice-layers' }, over, ...this.slabControls()), this.obliqueControl());
     // Without the list nothing can be laid over, and everything else works.
     void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
   }
@@ -120,6 +122,13 @@ export class SliceLayers {
     return [field('Show', kind), thickness];
   }
 
+  private obliqueControl(): HTMLElement {
+    return checkbox('Oblique plane', false, (isOn) => {
+      this.showsOblique = isOn;
+      void this.loadOwn().then(() => this.oblique.show(this.showsOblique ? this.own : null), tellError);
+    });
+  }
+
   private async list(): Promise<boolean> {
     const { volumes } = await client.listVolumes('', this.scope.signal);
     const others = volumes.filter(({ id }) => id !== this.volume.id);
@@ -128,7 +137,7 @@ export class SliceLayers {
   }
 
   private async loadOwn(): Promise<void> {
-    if (this.projection) this.own ??= await this.load(this.volume.id, this.window, this.scope.signal);
+    if (this.projection || this.showsOblique) this.own ??= await fetchPreview(this.volume.id, largestPreview, this.window, this.scope.signal);
   }
 
   // That one over the slices; '' for none.
@@ -142,17 +151,12 @@ export class SliceLayers {
     if (id === '') return;
     try {
       const [volume, counts] = await Promise.all([client.getVolume(id), client.histogramOf(id, bins, wanted.signal)]);
-      const preview = await this.load(id, defaultWindow(counts, volume.suggested_iso), wanted.signal);
+      const preview = await fetchPreview(id, largestPreview, defaultWindow(counts, volume.suggested_iso), wanted.signal);
       this.other = { volume, preview };
       this.changed();
     } catch (error) {
       if (!wanted.signal.aborted) throw error;
     }
-  }
-
-  private async load(id: string, window: Window, signal: AbortSignal): Promise<Preview> {
-    const file = await client.previewFile(id, previewSize, window, signal);
-    return readPreview({ file, window }, [file], signal);
   }
 
   private changed(): void {

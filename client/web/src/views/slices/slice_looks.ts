@@ -7,6 +7,7 @@ import { Signal } from '../../ui/signal';
 import { isCt } from '../../volume/looks';
 import type { MeasureKind } from '../../volume/measure';
 import type { Window } from '../../volume/slices';
+import { layoutNames, paneLayout, type Layout } from './pane_area';
 import type { SliceMeasures } from './slice_measure';
 
 type ColourName = 'grey' | 'inverted' | 'hot' | 'even';
@@ -46,6 +47,12 @@ export function placeText([left, posterior, superior]: Vec3, space: Space): stri
   return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value === 0 ? 0 : value, 1)).join(', ')} mm`;
 }
 
+function layoutChoice(): HTMLElement {
+  const choice = select('Layout', Object.entries(layoutNames) as [Layout, string][], paneLayout.value, (name) => (paneLayout.value = name));
+  choice.classList.add('layout-choice');
+  return choice;
+}
+
 function select<T extends string>(label: string, options: readonly (readonly [T, string])[], value: T, onChange: (value: T) => void): HTMLElement {
   const element = h('select', {}, ...options.map(([name, text]) => h('option', { value: name, selected: name === value }, text)));
   element.addEventListener('change', () => onChange(element.value as T));
@@ -74,6 +81,7 @@ export function sliceControls(volume: Volume, measures: SliceMeasures, setWindow
       { class: 'row' },
       presets,
       select('Colours', Object.entries(colourNames) as [ColourName, string][], sliceColours.value, (name) => (sliceColours.value = name)),
+      layoutChoice(),
       select('Coordinates', [['LPS', 'LPS'], ['RAS', 'RAS']], sliceSpace.value, (space) => (sliceSpace.value = space)),
     ),
     segmented<MeasureKind | 'none'>('Measure in slices', kinds, 'none', (kind) => (measures.kind.value = kind === 'none' ? null : kind)),

@@ -7,6 +7,8 @@ import { coloursOf, paintLabels, type LabelLook } from '../../volume/label_map';
 import { labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
 import { pixelsOf, sliceColours, sliceSpace } from './slice_looks';
+import type { ObliqueView } from './oblique_view';
+import type { SliceGrip, Spot } from './slice_grip';
 import type { SliceLayers } from './slice_layers';
 import type { SliceMeasures } from './slice_measure';
 import { SliceReadout } from './slice_readout';
@@ -22,7 +24,7 @@ import {
   type SlicePlane,
 } from '../../volume/geometry';
 import { SliceLoader } from '../../volume/slice_loader';
-import { greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
+import { draggedWindow, greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
 
 export interface SliceState {
   iso: number | null; // of the contour
@@ -50,6 +52,7 @@ export interface SliceHost {
   measures: SliceMeasures | null;
   // Null where nothing is shown beside the samples.
   layers: SliceLayers | null;
+  oblique: ObliqueView | null;
 }
 
 interface Press {
@@ -79,6 +82,7 @@ export class SliceView {
   private readonly readout: SliceReadout;
   private readonly zoom: SliceZoom;
   private readonly crop: SliceCrop | null;
+  private readonly grips: SliceGrip[];
   private scheduled = false;
 
   constructor(
@@ -99,6 +103,7 @@ export class SliceView {
     this.slider.disabled = this.count(this.layout.normal) === 1;
     this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
     this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
+    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop].filter((grip) => grip != null);
     this.readout = new SliceReadout({
       volume: host.volume,
       isInteger: host.isInteger,
@@ -122,7 +127,7 @@ export class SliceView {
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
-    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes]) {
+    for (const look of [labelOpacity, sliceColours, sliceSpace, host.measures?.changes, host.layers?.changes, host.oblique?.changes]) {
       if (look) scope.onEnd(look.subscribe(() => this.draw()));
     }
   }
@@ -218,6 +223,7 @@ export class SliceView {
     context.imageSmoothingEnabled = labels === null;
     context.drawImage(this.buffer, 0, 0);
     layers?.paint(context, slice.axis, slice.index);
+    this.host.oblique?.paint(context, slice.axis);
 
     // The contour is one slice's.
     const segments = iso === null || projected ? [] : contour(slice, inSlice(slice, iso));
@@ -299,11 +305,11 @@ export class SliceView {
     return this.host.measures?.take(this.plane, index, this.placeAt(event)) ?? false;
   }
 
-  private edgesAt(event: PointerEvent): ReturnType<SliceCrop['at']> {
+  private spotAt(event: PointerEvent): Spot {
     const [a, b, c, d] = this.placement();
     const ratio = window.devicePixelRatio || 1;
     const pixels: [number, number] = [Math.hypot(a, b) / ratio, Math.hypot(c, d) / ratio];
-    return this.crop?.at(this.placeAt(event), pixels, event.pointerType === 'touch') ?? null;
+    return { place: this.placeAt(event), pixels, isTouch: event.pointerType === 'touch' };
   }
 
   // The sample under a point of the screen.
@@ -330,11 +336,7 @@ export class SliceView {
         return;
       }
       canvas.setPointerCapture(event.pointerId);
-      const edges = this.edgesAt(event);
-      if (edges) {
-        this.crop?.begin(event.pointerId, edges);
-        return;
-      }
+      if (this.grips.some((grip) => grip.hold(event.pointerId, this.spotAt(event)))) return;
       press = {
         pointer: event.pointerId,
         x: event.clientX,
@@ -345,8 +347,9 @@ export class SliceView {
       };
     });
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
-      if (this.crop?.move(event.pointerId, this.placeAt(event))) return;
-      if (event.pointerType === 'mouse') canvas.classList.toggle('on-edge', this.edgesAt(event) !== null);
+      const spot = this.spotAt(event);
+      if (this.grips.some((grip) => grip.move(event.pointerId, spot))) return;
+      if (event.pointerType === 'mouse') canvas.classList.toggle('on-edge', this.grips.some((grip) => grip.isAt(spot)));
       if (press?.pointer !== event.pointerId || this.zoom.isMoving(event)) return;
       const dx = event.clientX - press.x;
       const dy = event.clientY - press.y;
@@ -357,13 +360,13 @@ export class SliceView {
       if (press.moved) this.host.setWindow(draggedWindow(press.window, dx, dy));
     });
     scope.listen(canvas, 'pointerup', (event: PointerEvent) => {
-      if (this.crop?.end(event.pointerId) || press?.pointer !== event.pointerId) return;
+      if (this.grips.some((grip) => grip.letGo(event.pointerId)) || press?.pointer !== event.pointerId) return;
       const cursor = press.moved ? null : this.sampleAt(event);
       press = null;
       if (cursor && !this.isMeasuring(event)) this.host.setCursor(cursor);
     });
     scope.listen(canvas, 'pointercancel', (event: PointerEvent) => {
-      this.crop?.end(event.pointerId);
+      for (const grip of this.grips) grip.letGo(event.pointerId);
       // The browser has taken the finger to scroll with: what it did here before was not meant.
       if (press?.isWindowing) this.host.setWindow(press.window);
       press = null;
@@ -427,13 +430,4 @@ function strokePixels(context: CanvasRenderingContext2D, width: number, colour: 
   context.strokeStyle = colour;
   context.stroke();
   context.restore();
-}
-
-// As on a radiologist's station: to the right widens the window, upwards darkens (raises its level).
-export function draggedWindow([low, high]: Window, dx: number, dy: number): Window {
-  const width = Math.max(1e-6, high - low);
-  const level = (low + high) / 2;
-  const newWidth = width * Math.exp(dx / 250);
-  const newLevel = level - (dy / 400) * width;
-  return [newLevel - newWidth / 2, newLevel + newWidth / 2];
 }

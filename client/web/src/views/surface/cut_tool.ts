@@ -1,16 +1,18 @@
-// The cut along a slice: its controls, and the slice's picture on it.
+// The cut along a slice or at any angle: its controls, and the slice's picture on it.
 import { client } from '../../client';
 import type { Axis, Job, Volume } from '../../api/types';
 import type { LabelState } from '../../job/labels';
 import type { Surface } from '../../scene/surface';
-import { checkbox, h } from '../../ui/dom';
+import { button, checkbox, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import type { Scope } from '../../ui/signal';
 import { axisIndex, patientAxes } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
 import { coloursOf, paintLabels, type LabelLook, type NumberedSlice } from '../../volume/label_map';
+import type { Resliced } from '../../volume/reslice';
 import { SliceSource, type Window } from '../../volume/slices';
 import { labelOpacity } from '../labels/label_opacity';
+import { FreeCut } from './free_cut';
 
 const bins = 512;
 
@@ -25,6 +27,12 @@ function paintedLabels(slice: NumberedSlice, look: LabelLook): Promise<ImageBitm
   return createImageBitmap(new ImageData(pixels, slice.width, slice.height));
 }
 
+function greyBitmap({ width, height, values }: Resliced): Promise<ImageBitmap> {
+  const pixels = new Uint8ClampedArray(4 * width * height).fill(255);
+  values.forEach((value, at) => pixels.fill(value, 4 * at, 4 * at + 3));
+  return createImageBitmap(new ImageData(pixels, width, height));
+}
+
 export class CutTool {
   readonly element = h('div', { class: 'cut-controls', hidden: true });
   // For the address: which slice, and on which side what stays; '' where nothing is cut.
@@ -33,6 +41,8 @@ export class CutTool {
   private axis: Axis;
   private index: number;
   private flipped = false;
+  private readonly free: FreeCut;
+  private isFree = false;
   // Axial first: what most people think of as a slice.
   private readonly axes: [string, Axis][];
   private window: Window | null = null;
@@ -58,6 +68,7 @@ export class CutTool {
     this.axis = axial;
     this.index = this.middle;
     this.source = new SliceSource(volume, scope.signal);
+    this.free = new FreeCut(volume, scope.signal);
     // Labels are painted anew where others are seen, or the same ones otherwise.
     if (labels.labels.length > 0) {
       for (const changed of [labels.hidden, labels.colours, labelOpacity]) scope.onEnd(changed.subscribe(() => this.repaint()));
@@ -66,6 +77,11 @@ export class CutTool {
 
   // As `onChange` told it; what is no cut of this volume changes nothing.
   restore(text: string): void {
+    this.isFree = this.free.restore(text);
+    if (this.isFree) {
+      this.set(true, false);
+      return;
+    }
     const [, axis, index, side] = /^([xyz])(\d+)([+-])$/.exec(text) ?? [];
     if (axis === undefined || Number(index) >= this.volume.dims[axisIndex(axis as Axis)]) return;
     this.axis = axis as Axis;
@@ -99,44 +115,77 @@ export class CutTool {
   }
 
   private showControls(): void {
-    const slider = h('input', { type: 'range', min: 0, max: this.count - 1, step: 1, 'aria-label': 'Position of the cut' });
-    slider.value = String(this.index);
-    const place = h('span', { class: 'cut-place' }, `${this.index + 1} / ${this.count}`);
-    slider.addEventListener('input', () => {
-      this.index = slider.valueAsNumber;
-      place.textContent = `${this.index + 1} / ${this.count}`;
-      this.place();
-    });
+    const directions: [string, Axis | 'free'][] = [...this.axes, ['Free', 'free']];
+    const shown = this.isFree ? 'free' : this.axis;
     const choice = h(
       'select',
       { 'aria-label': 'Direction of the cut' },
-      ...this.axes.map(([name, axis]) => h('option', { value: axis, selected: axis === this.axis }, name)),
+      ...directions.map(([name, value]) => h('option', { value, selected: value === shown }, name)),
     );
     choice.addEventListener('change', () => {
-      this.axis = choice.value as Axis;
-      this.index = this.middle;
+      this.isFree = choice.value === 'free';
+      if (this.isFree) {
+        this.free.faceView(this.surface);
+      } else {
+        this.axis = choice.value as Axis;
+        this.index = this.middle;
+      }
       this.showControls();
       this.place();
-      this.surface.faceCut();
+      if (!this.isFree) this.surface.faceCut();
     });
+    this.element.replaceChildren(choice, ...(this.isFree ? this.freeControls() : this.sliceControls()));
+  }
+
+  private slider(range: { min: number; max: number; step: number; value: number }, textOf: (value: number) => string, onValue: (value: number) => void): HTMLElement[] {
+    const slider = h('input', { type: 'range', ...range, 'aria-label': 'Position of the cut' });
+    const place = h('span', { class: 'cut-place' }, textOf(range.value));
+    slider.addEventListener('input', () => {
+      onValue(slider.valueAsNumber);
+      place.textContent = textOf(slider.valueAsNumber);
+      this.place();
+    });
+    return [slider, place];
+  }
+
+  private sliceControls(): HTMLElement[] {
+    const range = { min: 0, max: this.count - 1, step: 1, value: this.index };
     const other = checkbox('Other side', this.flipped, (flipped) => {
       this.flipped = flipped;
       this.place();
     });
-    this.element.replaceChildren(choice, slider, place, other);
+    return [...this.slider(range, (index) => `${index + 1} / ${this.count}`, (index) => (this.index = index)), other];
+  }
+
+  private freeControls(): HTMLElement[] {
+    const { free } = this;
+    const reach = Math.ceil(free.reach);
+    const range = { min: -reach, max: reach, step: 'any' as unknown as number, value: free.depth };
+    const change = (how: () => void): void => {
+      how();
+      this.showControls();
+      this.place();
+    };
+    return [
+      ...this.slider(range, (depth) => `${depth.toFixed(1)} mm`, (depth) => (free.depth = depth)),
+      button('Turn to the view', () => change(() => free.faceView(this.surface)), { title: 'Cut parallel to the screen, as the surface is seen now' }),
+      button('Other side', () => change(() => free.flip())),
+    ];
   }
 
   private place(): void {
     const { axis, index, flipped } = this;
-    this.surface.cut.place(this.volume, { axis, index, flipped });
+    if (this.isFree) this.free.place(this.surface);
+    else this.surface.cut.place(this.volume, { axis, index, flipped });
     this.surface.draw();
     this.pictureWanted = this.wanted;
-    this.onChange?.(`${axis}${index}${flipped ? '-' : '+'}`);
+    this.onChange?.(this.isFree ? this.free.text : `${axis}${index}${flipped ? '-' : '+'}`);
     void this.fetchPicture();
   }
 
   private get wanted(): string {
-    return `${this.axis}/${this.index}${this.paintings > 0 ? `/${this.paintings}` : ''}`;
+    const place = this.isFree ? this.free.text : `${this.axis}/${this.index}`;
+    return `${place}${this.paintings > 0 ? `/${this.paintings}` : ''}`;
   }
 
   private repaint(): void {
@@ -149,7 +198,11 @@ export class CutTool {
   private async picture(): Promise<ImageBitmap> {
     const { axis, index, volume } = this;
     const look = this.labels.look();
-    if (look) {
+    if (look && this.isFree && !this.free.isTooLargeForLabels) {
+      const { width, height, values } = await this.free.picture(volume.range, look);
+      return paintedLabels({ width, height, labels: Uint16Array.from(values) }, look);
+    }
+    if (look && !this.isFree) {
       const { width, height, labels } = await this.source.get(axis, index, volume.range, look.map);
       return paintedLabels({ width, height, labels: labels ?? new Uint16Array(width * height) }, look);
     }
@@ -158,6 +211,7 @@ export class CutTool {
       const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
       this.window = defaultWindow(await client.histogramOf(volume.id, bins, this.scope.signal), iso);
     }
+    if (this.isFree) return greyBitmap(await this.free.picture(this.window, null));
     return createImageBitmap(await client.slicePicture(volume.id, axis, index, this.window, this.scope.signal));
   }
 

@@ -1,7 +1,6 @@
 // How a surface is looked at, as texts for the address: its style, what is measured, which labels are hidden.
 import type { Vec3 } from '../../api/types';
-import { defaultStyle, type SurfaceStyle } from '../../scene/parts';
-import type { Ruler } from '../../scene/rulers';
+import { defaultStyle, type Ruler, type SurfaceStyle } from '../../scene/style';
 
 const mostRulers = 32;
 

@@ -2,10 +2,10 @@
 import { asApiError } from '../../api/problem';
 import type { Job, MeshSummary, Vec3, Volume } from '../../api/types';
 import { loadMesh, viewableFile, type LoadProgress, type LoadTiming } from '../../mesh/load';
-import { lengthOf } from '../../scene/rulers';
-import { defaultStyle, type SurfaceStyle } from '../../scene/parts';
+import { surfaceDrawing } from '../../scene/graphics';
 import type { Picked } from '../../scene/picked';
-import { Surface } from '../../scene/surface';
+import { defaultStyle, lengthOf, type SurfaceStyle } from '../../scene/style';
+import type { Surface } from '../../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../../scene/views';
 import type { LabelState } from '../../job/labels';
 import { withGlb } from '../../job/parameters';
@@ -44,6 +44,8 @@ export class SurfacePane {
   onCamera: ((place: CameraPlace) => void) | null = null;
   // How it is looked at has changed: for the address.
   onLook: ((values: Record<string, string>) => void) | null = null;
+  // Its tools are there.
+  onTools: (() => void) | null = null;
   // A place of the surface was clicked.
   onPoint: ((point: Vec3) => void) | null = null;
   private surface: Surface | null = null;
@@ -85,7 +87,7 @@ export class SurfacePane {
   // Shows the mesh; resolves once all of it is there.
   async load(): Promise<LoadTiming | null> {
     const { mesh } = this.job;
-    const surface = mesh && this.begin(mesh);
+    const surface = mesh && (await this.begin(mesh));
     if (!mesh || !surface) return null;
     this.surface = surface;
     this.scope.onEnd(() => surface.dispose());
@@ -93,6 +95,7 @@ export class SurfacePane {
     surface.setBounds(mesh.bounds);
     if (this.options.camera) surface.moveTo(this.options.camera);
     this.restore(surface, this.options.look);
+    this.onTools?.();
     try {
       const timing = await this.loadBlocks(surface);
       if (this.scope.isOver) return null;
@@ -145,7 +148,7 @@ export class SurfacePane {
   }
 
   // Null, and says why, where there is nothing to be shown.
-  private begin(mesh: MeshSummary): Surface | null {
+  private async begin(mesh: MeshSummary): Promise<Surface | null> {
     if (!viewableFile(this.job)) {
       this.say('This job has no file that the page can show. Start it again with GLB or Draco.');
       return null;
@@ -154,8 +157,17 @@ export class SurfacePane {
       this.say(emptyReason(this.job, this.options.volume), h('a', { href: changeLink(this.job) }, 'Change parameters'));
       return null;
     }
+    const drawing = await surfaceDrawing().catch(() => null);
+    if (this.scope.isOver) return null;
+    if (!drawing) {
+      this.say('The 3D view could not be loaded.', button('Reload', () => window.location.reload()));
+      return null;
+    }
+    // The canvas takes its size from the page, so the view has to be in it first.
+    await new Promise(requestAnimationFrame);
+    if (this.scope.isOver) return null;
     try {
-      return new Surface(this.view);
+      return new drawing.Surface(this.view);
     } catch {
       this.say('This browser cannot draw in 3D (WebGL 2 is missing or off). Downloads still work.');
       return null;
@@ -190,11 +202,6 @@ export class SurfacePane {
   look(view: (typeof viewNames)[number]): void {
     this.surface?.look(view);
     this.announcement.textContent = viewTitles[view];
-  }
-
-  // Frame times while it moved, for measurements.
-  get frameTimes(): readonly number[] {
-    return this.surface?.budget.moving ?? [];
   }
 
   private say(text: string, ...more: Node[]): void {

@@ -2,8 +2,9 @@
 import { choicesOf, type ApiError } from '../../api/problem';
 import type { Choice } from '../../api/types';
 import { button, h } from '../../ui/dom';
-import { peekAtSeries, type Peek } from '../../volume/dicom_peek';
+import { grouped, peekAtSeries, type Peek } from '../../volume/dicom_peek';
 import type { NamedFile } from '../../volume/tar';
+import { paintPicture, timeChoice } from './time_choice';
 
 // The values of the query's parameters that choose or accept something.
 export type Choices = Readonly<Record<string, string>>;
@@ -28,16 +29,30 @@ export function questionOf(error: ApiError, before: Choices): string {
   return first === undefined || before[first] !== undefined ? '' : `Which ${nouns[first]}?`;
 }
 
-// Of a series, as far as the page can read its files.
-function showPeek({ date, picture }: Peek, thumbnail: HTMLCanvasElement, facts: HTMLElement): void {
-  facts.textContent = date;
-  const context = picture && thumbnail.getContext('2d');
-  if (!context) return;
-  const { width, height, grey } = picture;
-  [thumbnail.width, thumbnail.height] = [width, height];
-  const image = context.createImageData(width, height);
-  grey.forEach((value, i) => image.data.set([value, value, value, 255], 4 * i));
-  context.putImageData(image, 0, 0);
+interface Row {
+  value: string;
+  thumbnail: HTMLCanvasElement;
+  facts: HTMLElement;
+  element: HTMLElement;
+}
+
+// Patients, their studies and the series of these, as far as the page can read the files. A single study needs no heading.
+function tree(rows: readonly Row[], found: ReadonlyMap<string, Peek>): HTMLElement[] {
+  const rowOf = new Map(rows.map((row) => [row.value, row]));
+  const groups = grouped(rows.map(({ value }) => value), found);
+  const inside = (series: readonly string[]): HTMLElement[] => series.flatMap((uid) => rowOf.get(uid)?.element ?? []);
+  if (groups.length === 1) return inside(groups[0]?.series ?? []);
+  const patients = [...new Set(groups.map(({ patient }) => patient))];
+  return patients.map((patient) =>
+    h(
+      'li',
+      { class: 'choice-group' },
+      h('b', {}, patient || 'Other patients'),
+      ...groups
+        .filter((group) => group.patient === patient)
+        .map(({ studyTitle, series }) => h('div', { class: 'choice-study' }, h('span', { class: 'faint' }, studyTitle || 'Study'), h('ul', {}, ...inside(series)))),
+    ),
+  );
 }
 
 function choiceList(
@@ -52,20 +67,25 @@ function choiceList(
     const text = h('span', { class: 'choice-text' }, h('b', {}, title === '' ? `${nouns[parameter]} ${value}` : title), facts);
     return { value, thumbnail, facts, element: h('li', {}, button(h('span', { class: 'choice' }, thumbnail, text), () => onChoice(value))) };
   });
+  const own = parameter === 'spacing' && h('li', {}, spacingForm(onChoice));
+  const list = h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
   if (parameter === 'series') {
     peekAtSeries(files.map(({ file }) => file), choices.map(({ value }) => value)).then(
       (found) => {
         for (const { value, thumbnail, facts } of rows) {
           const peek = found.get(value);
-          if (peek) showPeek(peek, thumbnail, facts);
+          facts.textContent = peek?.date ?? '';
+          if (peek?.picture) paintPicture(peek.picture, thumbnail);
         }
+        list.replaceChildren(...tree(rows, found));
       },
       // The browser cannot read the files any more. The titles are enough to choose.
       () => undefined,
     );
   }
-  const own = parameter === 'spacing' && h('li', {}, spacingForm(onChoice));
-  return h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
+  const [only] = files;
+  if (parameter !== 'volume' || !only || files.length > 1) return list;
+  return h('div', { class: 'stack' }, timeChoice(choices, only.file, onChoice), list);
 }
 
 // Other distances than those that the server offers.
