@@ -54,14 +54,20 @@ int number_of(std::string_view name) {
 }  // namespace
 
 std::string with_numbers(std::string_view sql) {
+  constexpr std::string_view kEmptyObject = "{}";
   std::string text;
   while (true) {
     const std::size_t begin = sql.find('{');
     text += sql.substr(0, begin);
     if (begin == std::string_view::npos) return text;
-    const std::size_t end = sql.find('}', begin);
+    sql.remove_prefix(begin);
+    const std::size_t end = sql.find('}');
     if (end == std::string_view::npos) throw Error(ErrorCode::kInternal, "SQL has an open brace");
-    text += std::to_string(number_of(sql.substr(begin + 1, end - begin - 1)));
+    if (sql.starts_with(kEmptyObject)) {
+      text += kEmptyObject;
+    } else {
+      text += std::to_string(number_of(sql.substr(1, end - 1)));
+    }
     sql.remove_prefix(end + 1);
   }
 }

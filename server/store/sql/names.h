@@ -6,8 +6,8 @@
 
 namespace isomesh::store {
 
-// Replaces the names in a statement by their numbers, which is done when it is prepared. Throws
-// Error kInternal for an unknown name.
+// Replaces the names in a statement by their numbers, which is done when it is prepared. An
+// empty JSON object stays. Throws Error kInternal for an unknown name.
 std::string with_numbers(std::string_view sql);
 
 }  // namespace isomesh::store

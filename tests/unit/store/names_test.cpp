@@ -12,10 +12,11 @@ TEST(NamesInSql, BecomeTheNumbersOfTheTables) {
             "state = 0 OR state < 4");
   EXPECT_EQ(with_numbers("SELECT ?1"), "SELECT ?1");
   EXPECT_EQ(with_numbers("{stage.done}"), "7");
+  EXPECT_EQ(with_numbers("record = '{}' AND stage = {stage.done}"), "record = '{}' AND stage = 7");
 }
 
 TEST(NamesInSql, AnUnknownOneIsAnError) {
-  for (const char* sql : {"state = {job.sleeping}", "state = {}", "state = {job.queued"}) {
+  for (const char* sql : {"state = {job.sleeping}", "state = { }", "state = {job.queued"}) {
     EXPECT_EQ(test::code_thrown_by([&] { with_numbers(sql); }), ErrorCode::kInternal) << sql;
   }
 }
