@@ -21,20 +21,20 @@ class LayerClusters {
 
   Clusters find(const ClusterLayer& layer, std::size_t z) const {
     Clusters clusters;
-    if (layer.samples.empty()) return clusters;
-    for (std::size_t y = 0; y + 1 < layer.row_begin.size(); ++y) {
+    for (std::uint32_t y = 0; y + 1 < layer.row_begin.size(); ++y) {
       const std::size_t row = ((z + before_) * dims_.y + y + before_) * dims_.x + before_;
-      for (std::uint32_t i = layer.row_begin[y]; i < layer.row_begin[y + 1]; ++i) {
-        const JoiningSample& sample = layer.samples[i];
-        add(sample, static_cast<std::uint32_t>(row + sample.x), clusters);
+      for (const JoiningWord& word : layer.row(y)) {
+        visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
+          add(joined.directions(), static_cast<std::uint32_t>(row + word.word * 64 + bit),
+              clusters);
+        });
       }
     }
     return clusters;
   }
 
  private:
-  void add(const JoiningSample& sample, std::uint32_t number, Clusters& clusters) const {
-    Directions left = sample.directions & ~JoiningSample::kFlags;
+  void add(Directions left, std::uint32_t number, Clusters& clusters) const {
     while (left != 0) {
       const Directions component = links_.facts(0, left).first();
       left &= ~component;

@@ -169,7 +169,8 @@ class BccClusterWalk {
                  std::uint32_t z) {
     std::array<PointStar*, 2> stars;
     std::array<Word*, 2> owners;
-    std::array<const std::int32_t*, 2> near = {};
+    std::array<const std::byte*, 2> near = {};
+    const std::size_t bytes = kinds_[0].nearness.rank_bytes();
     for (std::size_t e = 0; e < 2; ++e) {
       Kind& points = kind(ends[e].point);
       const std::uint32_t end_y = y + ends[e].y;
@@ -177,14 +178,15 @@ class BccClusterWalk {
       stars[e] = points.stars_of(end_y, end_z) + ends[e].x;
       owners[e] = points.owners_of(end_y, end_z);
       if (extraction_.is_midpoint) continue;
-      near[e] = points.nearness.from(w, end_y, end_z) + ends[e].x;
+      near[e] = points.nearness.from(w, end_y, end_z) + ends[e].x * bytes;
     }
     for (Word rest = crossed; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
       const std::size_t x = w * kWordBits + bit;
       for (std::size_t e = 0; e < 2; ++e) stars[e][x].crossed |= ends[e].direction;
-      const bool is_first =
-          extraction_.is_midpoint ? (inside >> bit & 1) != 0 : near[0][bit] < near[1][bit];
+      const bool is_first = extraction_.is_midpoint
+                                ? (inside >> bit & 1) != 0
+                                : is_less(bytes, near[0] + bit * bytes, near[1] + bit * bytes);
       const std::size_t owner = is_first ? 0 : 1;
       const std::size_t at = x + ends[owner].x;
       stars[owner][x].own |= ends[owner].direction;
@@ -213,8 +215,8 @@ class BccClusterWalk {
       for (Word rest = owners[w] & joining_points(point, w, y, z); rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
         const std::size_t x = w * kWordBits + bit;
-        const Directions kept =
-            components_to_join(points.links, 0, {stars[x].own, stars[x].crossed});
+        const Directions kept = components_to_join(points.links, 0, stars[x].own,
+                                                   [&] { return Directions{stars[x].crossed}; });
         points.kept_of(y, z)[x] = static_cast<std::uint16_t>(kept);
         candidates[w] |= Word{kept != 0} << bit;
       }
@@ -235,14 +237,19 @@ class BccClusterWalk {
     Kind& points = kind(point);
     const Word* candidates = points.candidates_of(y, z);
     for (std::size_t w = 0; w < words_; ++w) {
+      JoiningWord joining = {0, static_cast<std::uint32_t>(w),
+                             static_cast<std::uint32_t>(layer_.clusters.joined.size())};
       for (Word rest = candidates[w]; rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
         const GridSample at = {w * kWordBits + bit, y, z};
         const Directions all = points.kept_of(y, z)[at.x];
         const Directions risks = points.links.facts(0, all).risks();
         const Directions kept = risks == 0 ? all : without_clashes(point, at, all, risks);
-        if (kept != 0) add_clusters(points.links, at.x, kept);
+        if (kept == 0) continue;
+        joining.samples |= Word{1} << bit;
+        add_clusters(points.links, kept);
       }
+      if (joining.samples != 0) layer_.clusters.words.push_back(joining);
     }
   }
 
@@ -269,10 +276,9 @@ class BccClusterWalk {
     return kept;
   }
 
-  void add_clusters(const Links& links, std::size_t x, Directions joined) {
+  void add_clusters(const Links& links, Directions joined) {
     const ClusterFacts facts = links.facts(0, joined);
-    const Directions flags = facts.components() > 1 ? JoiningSample::kSeveral : 0;
-    layer_.clusters.samples.push_back({static_cast<std::uint32_t>(x), joined | flags});
+    layer_.clusters.joined.push_back({joined | (facts.components() > 1 ? Joined::kSeveral : 0)});
     layer_.take_off(loss_of_components(links, joined, facts));
   }
 

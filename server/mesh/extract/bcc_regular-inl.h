@@ -67,11 +67,10 @@ class BccRegular {
                                 const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
                                 Mesh* mesh) {
     joined_.mark(extraction_.clusters, y, z,
-                 [&](const JoiningSample& sample, std::uint32_t row, std::uint32_t /*z*/,
-                     const JoinedPoints* /*none*/, auto visit) {
-                   for (Directions rest = sample.directions & ~JoiningSample::kFlags; rest != 0;
-                        rest &= rest - 1) {
-                     visit(names_[row % kKinds][static_cast<unsigned>(std::countr_zero(rest))]);
+                 [&](const JoiningPlace& at, const Joined& joined, const JoinedPoints* /*none*/,
+                     auto visit) {
+                   for (Directions rest = joined.directions(); rest != 0; rest &= rest - 1) {
+                     visit(names_[at.row % kKinds][static_cast<unsigned>(std::countr_zero(rest))]);
                    }
                  });
     const std::uint32_t first = vertex;
@@ -80,14 +79,14 @@ class BccRegular {
     for (std::uint32_t kind = 0; kind < kKinds; ++kind) {
       const Links& links = links_of(static_cast<BccPoint>(kind));
       visit_joining(extraction_.clusters, y * kKinds + kind, z,
-                    [&](const JoiningSample& sample, const JoinedPoints* /*none*/) {
-                      const bool is_one = (sample.directions & JoiningSample::kSeveral) == 0;
-                      Directions joined = sample.directions & ~JoiningSample::kFlags;
+                    [&](std::uint32_t x, const Joined& all, const JoinedPoints* /*none*/) {
+                      const bool is_one = all.is_one();
+                      Directions joined = all.directions();
                       while (joined != 0) {
                         const Directions component =
                             is_one ? joined : links.facts(0, joined).first();
                         joined &= ~component;
-                        add_cluster({sample.x, kind, component}, rows, vertex++);
+                        add_cluster({x, kind, component}, rows, vertex++);
                       }
                     });
     }

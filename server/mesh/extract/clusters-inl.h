@@ -53,22 +53,37 @@ struct EdgeWords {
   std::array<Word, 8> second = {};
 };
 
-// The crossings around 64 samples, by direction of Links, with zeros behind those.
-struct StarWords {
-  std::array<Word, 20> own = {};  // a multiple of four, for wide registers
-  std::array<Word, 20> crossed = {};
+// A set of directions for each of 64 samples: first a word for each direction, then turned so that
+// each sample's directions are together.
+class DirectionSets {
+ public:
+  Word& operator[](std::size_t direction) { return words_[direction / 8][direction % 8]; }
+
+  void turn(std::size_t directions) {
+    for (std::size_t i = 0; 8 * i < directions; ++i) bytes_[i] = transpose(words_[i]);
+  }
+  HWY_INLINE Directions of(unsigned bit) const {
+    return bytes_[0][bit] | Directions{bytes_[1][bit]} << 8 | Directions{bytes_[2][bit]} << 16;
+  }
+
+ private:
+  static constexpr std::size_t kBytes = (kMostDirections + 7) / 8;
+
+  std::array<BitWords, kBytes> words_ = {};
+  std::array<BitBytes, kBytes> bytes_ = {};
 };
+
+// The bits of the samples that are `step` after those of word w, which is -1, 0 or 1.
+HWY_INLINE Word bits_beside(const Word* row, std::size_t w, std::size_t words, int step) {
+  if (step == 0) return row[w];
+  if (step < 0) return row[w] << 1 | (w == 0 ? 0 : row[w - 1] >> 63);
+  return row[w] >> 1 | (w + 1 == words ? 0 : row[w + 1] << 63);
+}
 
 struct GridSample {
   std::size_t x = 0;
   std::uint32_t y = 0;
   std::uint32_t z = 0;
-};
-
-// The crossings around one sample: its own, and all.
-struct Star {
-  Directions own = 0;
-  Directions crossed = 0;
 };
 
 // The vertices and triangles that vanish because a sample's clusters are vertices: in its own
@@ -87,7 +102,7 @@ struct CountedLayer {
   std::uint64_t triangles = 0;
 
   void begin_row() {
-    clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.samples.size()));
+    clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.words.size()));
     clusters.points_begin.push_back(static_cast<std::uint32_t>(clusters.points.size()));
   }
 
@@ -99,8 +114,8 @@ struct CountedLayer {
   }
 
   void end(std::uint32_t z, SurfaceCount& count) {
-    clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.samples.size()));
-    if (clusters.samples.empty()) clusters = {};
+    clusters.row_begin.push_back(static_cast<std::uint32_t>(clusters.words.size()));
+    if (clusters.words.empty()) clusters = {};
     count.clusters[z] = std::move(clusters);
     count.layer_vertices[z + 1] = vertices;
     count.layer_triangles[z + 1] = triangles;
@@ -108,17 +123,22 @@ struct CountedLayer {
 };
 
 // Returns the components of the sample's own crossings that keep the first two conditions of
-// links.h.
-HWY_INLINE Directions components_to_join(const Links& links, unsigned parity, const Star& star) {
+// links.h. `crossed()`: in which directions there are crossings, asked for when that matters.
+template <class Crossed>
+HWY_INLINE Directions components_to_join(const Links& links, unsigned parity, Directions own,
+                                         Crossed crossed) {
+  const auto allowed = [&](Directions component, const ClusterFacts& facts) {
+    if (!facts.may_join()) return Directions{0};
+    if (facts.forbidden() != 0 && (facts.forbidden() & crossed()) != 0) return Directions{0};
+    return component;
+  };
+  const ClusterFacts all = links.facts(parity, own);
+  if (all.components() == 1) return allowed(own, all);
   Directions kept = 0;
-  for (Directions own = star.own; own != 0;) {
-    ClusterFacts facts = links.facts(parity, own);
-    const Directions component = facts.first();
-    if (component != own) facts = links.facts(parity, component);
+  while (own != 0) {
+    const Directions component = links.facts(parity, own).first();
+    kept |= allowed(component, links.facts(parity, component));
     own &= ~component;
-    const bool is_allowed = (facts.forbidden() & star.crossed) == 0;
-    const unsigned joins = unsigned{facts.may_join()} & unsigned{is_allowed};  // no branch
-    kept |= joins != 0 ? component : 0;
   }
   return kept;
 }
@@ -141,7 +161,10 @@ HWY_INLINE ClusterLoss loss_of_components(const Links& links, Directions joined,
 //  * open(z): they are going to be of plane z + 1, too;
 //  * split_edges(w, y, z, words): the crossed edges of a word of samples, and what they and their
 //    cells would have without clusters;
-//  * candidates(sample, star): the directions that may be joined, and flags of JoiningSample;
+//  * candidates(sample, own, crossed): those of its own directions that may be joined, and flags of
+//    Joined; crossed() tells all that are crossed;
+//  * may_clash(w, sample, neighbour, step): the samples of word w whose candidates may clash with
+//    those of their neighbours, `step` farther along x in another row;
 //  * clashing(sample, direction, neighbour, mine, theirs): those of the candidates that clash with
 //    the neighbour's;
 //  * loss(sample, joined, layer): what the clusters save. Adds their points to the layer.
@@ -196,62 +219,67 @@ class ClusterWalk {
 
   void find_candidates(std::uint32_t y, std::uint32_t z) {
     Word* candidates = candidate_samples(y, z);
-    std::fill_n(candidates, words_, 0);
-    StarWords star;
     for (std::size_t w = 0; w < words_; ++w) {
+      candidates[w] = 0;
       const Word joining = joining_samples(marched_, w, y, z);
-      if (joining == 0) continue;
-      for (Word rest = joining & gather(w, y, z, star); rest != 0; rest &= rest - 1) {
+      if (joining == 0 || !look_around(w, y, z)) continue;
+      const Word owners = gather(Which::kOwn, own_);
+      if ((joining & owners) == 0) continue;
+      own_.turn(links_.directions().size());
+      bool knows_crossed = false;
+      Directions* kept = candidate_directions(y, z) + w * kWordBits;
+      for (Word rest = joining & owners; rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
-        const std::size_t x = w * kWordBits + bit;
-        const Directions kept = rule_.candidates(
-            {x, y, z}, {directions_at(star.own, bit), directions_at(star.crossed, bit)});
-        candidate_directions(y, z)[x] = kept;
-        candidates[w] |= Word{kept != 0} << bit;
+        const auto crossed = [&] {
+          if (!std::exchange(knows_crossed, true)) {
+            gather(Which::kCrossed, crossed_);
+            crossed_.turn(links_.directions().size());
+          }
+          return crossed_.of(bit);
+        };
+        kept[bit] = rule_.candidates({w * kWordBits + bit, y, z}, own_.of(bit), crossed);
+        candidates[w] |= Word{kept[bit] != 0} << bit;
       }
     }
   }
 
-  // What is crossed around the samples of word w, and which of those crossings are their own.
-  // Returns the samples that have any.
-  Word gather(std::size_t w, std::uint32_t y, std::uint32_t z, StarWords& star) {
+  // Looks up what the samples of word w and those around them own. Returns false if that is
+  // nothing.
+  bool look_around(std::size_t w, std::uint32_t y, std::uint32_t z) {
     static constexpr EdgeWords kNone = {};
-    std::array<const EdgeWords*, 4> here;    // of the rows (y, z), (y - 1, z), (y, z - 1), ...
-    std::array<const EdgeWords*, 4> before;  // the words before those
     Word any = 0;
     for (unsigned r = 0; r < 4; ++r) {
       const EdgeWords* row = edges(y - (r & 1), z - (r >> 1));
-      here[r] = row[w].any == 0 ? &kNone : &row[w];
-      before[r] = w == 0 || row[w - 1].any == 0 ? &kNone : &row[w - 1];
-      any |= here[r]->any | here[r]->any << 1 | before[r]->any >> 63;
+      here_[r] = row[w].any == 0 ? &kNone : &row[w];
+      before_[r] = w == 0 || row[w - 1].any == 0 ? &kNone : &row[w - 1];
+      any |= here_[r]->any | here_[r]->any << 1 | before_[r]->any >> 63;
     }
-    if (any == 0) return 0;
-    Word owners = 0;
-    const auto directions = links_.directions();
-    const Word even = marched_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
-    for (std::size_t d = 0; d < directions.size(); ++d) {
-      const unsigned place = directions[d].place;
-      const unsigned owner = directions[d].corner >> 1;
-      Word first = here[owner]->first[place];
-      Word second = here[owner]->second[place];
-      if ((directions[d].corner & 1) != 0) {
-        first = first << 1 | before[owner]->first[place] >> 63;
-        second = second << 1 | before[owner]->second[place] >> 63;
-      }
-      // With five tetrahedra the diagonals join even samples.
-      const bool is_diagonal = marched_.scheme == Scheme::kFive && (place & (place - 1)) != 0;
-      const Word there = is_diagonal ? even : ~Word{0};
-      star.own[d] = (directions[d].is_end ? second : first) & there;
-      star.crossed[d] = (first | second) & there;
-      owners |= star.own[d];
-    }
-    return owners;
+    even_ = marched_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
+    return any != 0;
   }
 
-  static Directions directions_at(const std::array<Word, 20>& words, unsigned bit) {
-    Word directions = 0;
-    for (std::size_t d = 0; d < words.size(); ++d) directions |= (words[d] >> bit & 1) << d;
-    return static_cast<Directions>(directions);
+  enum class Which { kOwn, kCrossed };
+
+  // In which directions the samples' own crossings are, or all. Returns the samples that have any.
+  HWY_INLINE Word gather(Which which, DirectionSets& sets) const {
+    Word any = 0;
+    const auto directions = links_.directions();
+    for (std::size_t d = 0; d < directions.size(); ++d) {
+      const unsigned place = directions[d].place;
+      const auto bits_of = [&](const EdgeWords& words) {
+        if (which == Which::kCrossed) return words.first[place] | words.second[place];
+        return directions[d].is_end ? words.second[place] : words.first[place];
+      };
+      const unsigned owner = directions[d].corner >> 1;
+      Word bits = bits_of(*here_[owner]);
+      if ((directions[d].corner & 1) != 0) bits = bits << 1 | bits_of(*before_[owner]) >> 63;
+      // With five tetrahedra the diagonals join even samples.
+      const bool is_diagonal = marched_.scheme == Scheme::kFive && (place & (place - 1)) != 0;
+      if (is_diagonal) bits &= even_;
+      sets[d] = bits;
+      any |= bits;
+    }
+    return any;
   }
 
   // Keeps the candidates in a row that clash with none of an earlier sample.
@@ -259,16 +287,41 @@ class ClusterWalk {
     layer_.begin_row();
     const Word* candidates = candidate_samples(y, z);
     for (std::size_t w = 0; w < words_; ++w) {
+      if (candidates[w] == 0) continue;
+      look_at_earlier(w, y, z);
+      JoiningWord joining = {0, static_cast<std::uint32_t>(w),
+                             static_cast<std::uint32_t>(layer_.clusters.joined.size())};
       for (Word rest = candidates[w]; rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
         const GridSample sample = {w * kWordBits + bit, y, z};
         const Directions all = candidate_directions(y, z)[sample.x];
-        const ClusterFacts facts = links_.facts(parity(sample), all & ~JoiningSample::kFlags);
-        const Directions kept =
-            facts.risks() == 0 ? all : without_clashes(sample, all, facts.risks());
-        if ((kept & ~JoiningSample::kFlags) != 0) add_clusters(sample, kept);
+        ClusterFacts facts = links_.facts(parity(sample), all & ~Joined::kFlags);
+        const Directions risks = facts.risks() & earlier_.of(bit);
+        Directions kept = all;
+        if (risks != 0) {
+          kept = without_clashes(sample, all, risks);
+          if ((kept & ~Joined::kFlags) == 0) continue;
+          if (kept != all) facts = links_.facts(parity(sample), kept & ~Joined::kFlags);
+        }
+        if (facts.components() > 1) kept |= Joined::kSeveral;
+        joining.samples |= Word{1} << bit;
+        layer_.clusters.joined.push_back({kept});
+        layer_.take_off(rule_.loss(sample, {kept}, facts, layer_.clusters));
       }
+      if (joining.samples != 0) layer_.clusters.words.push_back(joining);
     }
+  }
+
+  // Finds for the samples of word w in which of the earlier directions candidates may clash.
+  void look_at_earlier(std::size_t w, std::uint32_t y, std::uint32_t z) {
+    for (std::size_t i = 0; i < links_.half(); ++i) {
+      const auto& step = links_.directions()[links_.half() + i].step;
+      const std::uint32_t to_y = y + static_cast<std::uint32_t>(step[1]);
+      const std::uint32_t to_z = z + static_cast<std::uint32_t>(step[2]);
+      earlier_[i] = bits_beside(candidate_samples(to_y, to_z), w, words_, step[0]) &
+                    rule_.may_clash(w, {0, y, z}, {0, to_y, to_z}, step[0]);
+    }
+    earlier_.turn(links_.half());
   }
 
   Directions without_clashes(const GridSample& sample, Directions mine, Directions risks) {
@@ -279,22 +332,9 @@ class ClusterWalk {
       const GridSample to = {sample.x + static_cast<std::size_t>(step[0]),
                              sample.y + static_cast<std::uint32_t>(step[1]),
                              sample.z + static_cast<std::uint32_t>(step[2])};
-      if (!has(candidate_samples(to.y, to.z), to.x)) continue;
       kept &= ~rule_.clashing(sample, d, to, mine, candidate_directions(to.y, to.z)[to.x]);
     }
     return kept;
-  }
-
-  void add_clusters(const GridSample& sample, Directions kept) {
-    const Directions joined = kept & ~JoiningSample::kFlags;
-    const ClusterFacts facts = links_.facts(parity(sample), joined);
-    if (facts.components() > 1) kept |= JoiningSample::kSeveral;
-    layer_.clusters.samples.push_back({static_cast<std::uint32_t>(sample.x), kept});
-    layer_.take_off(rule_.loss(sample, kept, facts, layer_.clusters));
-  }
-
-  static bool has(const Word* row, std::size_t x) {
-    return (row[x / kWordBits] >> (x % kWordBits) & 1) != 0;
   }
 
   unsigned parity(const GridSample& sample) const {
@@ -325,6 +365,14 @@ class ClusterWalk {
   std::vector<EdgeWords> edges_;
   std::vector<Word> candidates_;        // of two planes: which samples have some
   std::vector<Directions> directions_;  // and in which directions
+  // Around the word that is looked at: the edges of the rows (y, z), (y - 1, z), (y, z - 1), ...
+  // there and in the word before, the samples of even parity, and what is found in them.
+  std::array<const EdgeWords*, 4> here_ = {};
+  std::array<const EdgeWords*, 4> before_ = {};
+  Word even_ = 0;
+  DirectionSets own_;
+  DirectionSets crossed_;
+  DirectionSets earlier_;
   CountedLayer layer_;
 };
 

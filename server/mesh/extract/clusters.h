@@ -1,21 +1,33 @@
 // Which crossings of a surface are joined into one vertex; see links.h for the rule.
 #pragma once
 
+#include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace isomesh::mesh {
 
-// A sample that joins crossings.
-struct JoiningSample {
+// What a sample joins: in which directions (links.h), and flags.
+struct Joined {
   static constexpr std::uint32_t kSeveral = std::uint32_t{1} << 31;
   static constexpr std::uint32_t kJunction = std::uint32_t{1} << 30;
   static constexpr std::uint32_t kFlags = kSeveral | kJunction;
 
-  std::uint32_t x = 0;
-  // In which directions (links.h); kSeveral if those are more than one component, and kJunction if
-  // points where more than two labels meet are joined with the crossings.
-  std::uint32_t directions = 0;
+  // kSeveral if the directions are more than one component, and kJunction if points where more than
+  // two labels meet are joined with the crossings.
+  std::uint32_t bits = 0;
+
+  std::uint32_t directions() const { return bits & ~kFlags; }
+  bool is_one() const { return (bits & kSeveral) == 0; }
+  bool is_junction() const { return (bits & kJunction) != 0; }
+};
+
+// Those of 64 samples of a row that join crossings.
+struct JoiningWord {
+  std::uint64_t samples = 0;  // a bit each
+  std::uint32_t word = 0;     // bit 0 is the sample x = 64 * word
+  std::uint32_t first = 0;    // where their directions begin in ClusterLayer::joined
 };
 
 // The points that such a sample of a junction joins with its crossings; a bit for each place in the
@@ -27,8 +39,9 @@ struct JoinedPoints {
 
 // What one plane's samples join. Empty where they join nothing.
 struct ClusterLayer {
-  std::vector<JoiningSample> samples;    // row by row
-  std::vector<std::uint32_t> row_begin;  // how many those are before each row, and all
+  std::vector<JoiningWord> words;        // row by row
+  std::vector<std::uint32_t> row_begin;  // how many words are before each row, and all
+  std::vector<Joined> joined;            // what each sample joins, in their order
 
   // The points of those samples that are at junctions, in their order.
   std::vector<JoinedPoints> points;
@@ -37,6 +50,20 @@ struct ClusterLayer {
   // What vanishes from the layer below, whose samples own some of the edges.
   std::uint64_t vertices_below = 0;
   std::uint64_t triangles_below = 0;
+
+  std::span<const JoiningWord> row(std::uint32_t y) const {
+    if (words.empty()) return {};
+    return std::span(words).subspan(row_begin[y], row_begin[y + 1] - row_begin[y]);
+  }
 };
+
+// Calls visit(bit, what it joins) for the samples of a word.
+template <class Visit>
+void visit_joining(const ClusterLayer& layer, const JoiningWord& word, Visit visit) {
+  const Joined* joined = layer.joined.data() + word.first;
+  for (std::uint64_t rest = word.samples; rest != 0; rest &= rest - 1) {
+    visit(static_cast<unsigned>(std::countr_zero(rest)), *joined++);
+  }
+}
 
 }  // namespace isomesh::mesh

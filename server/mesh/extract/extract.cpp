@@ -105,7 +105,7 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
   }
 
   Extraction extraction(lattice, options, *smallest);
-  extraction.clusters = count.clusters;
+  if (options.regularize) extraction.keep(count.clusters);
   write_pass(extraction, places_of(options), context, mesh, mesh);
 }
 

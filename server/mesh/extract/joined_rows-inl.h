@@ -18,21 +18,23 @@
 
 #include "server/mesh/extract/clusters.h"
 #include "server/mesh/lattice/lattice.h"
+#include "server/mesh/lattice/rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// Calls visit(sample, its points, or null) for the samples of a row of plane z that join crossings.
+// Calls visit(x, what it joins, its points or null) for the samples of a row of plane z that join
+// crossings.
 template <class Visit>
 void visit_joining(std::span<const ClusterLayer> clusters, std::uint32_t row, std::uint32_t z,
                    Visit visit) {
-  if (z >= clusters.size() || clusters[z].samples.empty()) return;
+  if (z >= clusters.size() || clusters[z].words.empty()) return;
   const ClusterLayer& layer = clusters[z];
   const JoinedPoints* points = layer.points.data() + layer.points_begin[row];
-  for (std::uint32_t i = layer.row_begin[row]; i < layer.row_begin[row + 1]; ++i) {
-    const JoiningSample& sample = layer.samples[i];
-    const bool is_junction = (sample.directions & JoiningSample::kJunction) != 0;
-    visit(sample, is_junction ? points++ : nullptr);
+  for (const JoiningWord& word : layer.row(row)) {
+    visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
+      visit(word.word * kWordBits + bit, joined, joined.is_junction() ? points++ : nullptr);
+    });
   }
 }
 
@@ -42,6 +44,12 @@ struct JoinedName {
   std::uint8_t row = 0;
   std::uint8_t before = 0;
   std::uint8_t place = 0;
+};
+
+struct JoiningPlace {
+  std::uint32_t x = 0;
+  std::uint32_t row = 0;
+  std::uint32_t z = 0;
 };
 
 // `Places`: an integer with a bit for each place of a sample. `kKinds`: how many rows of points
@@ -61,8 +69,8 @@ class JoinedRows {
   }
 
   // Marks what the clusters of the rows around (y, z) join: the rest of that row then has vertices
-  // of its own. `visit_names(sample, row, z, points, visit)` tells the names of all that a sample
-  // joins, of a row of plane z. To be called row by row.
+  // of its own. `visit_names({x, row, z}, joined, points, visit)` tells the names of all that a
+  // sample joins, of a row of plane z. To be called row by row.
   template <class VisitNames>
   void mark(std::span<const ClusterLayer> clusters, std::uint32_t y, std::uint32_t z,
             VisitNames visit_names) {
@@ -75,9 +83,9 @@ class JoinedRows {
                                            at(next_row_ - dims_.y), at(next_row_ - dims_.y - 1)};
       for (std::uint32_t row = row_y * kKinds; row < (row_y + 1) * kKinds; ++row) {
         visit_joining(clusters, row, row_z,
-                      [&](const JoiningSample& sample, const JoinedPoints* points) {
-                        visit_names(sample, row, row_z, points, [&](const JoinedName& name) {
-                          Places& places = rows[name.row][sample.x - name.before];
+                      [&](std::uint32_t x, const Joined& joined, const JoinedPoints* points) {
+                        visit_names({x, row, row_z}, joined, points, [&](const JoinedName& name) {
+                          Places& places = rows[name.row][x - name.before];
                           places = static_cast<Places>(places | Places{1} << name.place);
                         });
                       });

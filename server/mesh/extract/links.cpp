@@ -42,13 +42,13 @@ Directions component_of(const std::array<Directions, kMostDirections>& adjacent,
 }
 
 // Sets of places of a ring, one bit each set.
-struct RingSets {
+struct PlaceSets {
   std::uint64_t runs = 0;   // none, or one run that leaves two places free
   std::uint64_t risky = 0;  // those with a subset that is no such run
 };
 
-constexpr RingSets make_ring_sets(unsigned size) {
-  RingSets sets;
+constexpr PlaceSets make_place_sets(unsigned size) {
+  PlaceSets sets;
   for (unsigned bits = 0; bits < 1U << size; ++bits) {
     const unsigned next = (bits >> 1 | bits << (size - 1)) & ((1U << size) - 1);
     const bool is_run =
@@ -63,9 +63,9 @@ constexpr RingSets make_ring_sets(unsigned size) {
   return sets;
 }
 
-const RingSets& ring_sets(std::size_t size) {
-  static constexpr RingSets kOfFour = make_ring_sets(4);
-  static constexpr RingSets kOfSix = make_ring_sets(6);
+const PlaceSets& place_sets(std::size_t size) {
+  static constexpr PlaceSets kOfFour = make_place_sets(4);
+  static constexpr PlaceSets kOfSix = make_place_sets(6);
   return size == 4 ? kOfFour : kOfSix;
 }
 
@@ -166,6 +166,7 @@ Links::Link Links::make_link(unsigned parity, int below, Has has) const {
   }
   for (std::size_t a = 0; a < directions_.size(); ++a) {
     if ((link.existing >> a & 1) != 0) link.rings[a] = make_ring(link, a);
+    if (a >= half()) link.ring_sets[a - half()] = make_ring_sets(link.rings[a]);
     for (std::size_t b = a + 1; b < directions_.size(); ++b) {
       for (std::size_t c = b + 1; c < directions_.size(); ++c) {
         if ((link.adjacent[a] >> b & link.adjacent[a] >> c & link.adjacent[b] >> c & 1) != 0) {
@@ -194,6 +195,31 @@ Links::Ring Links::make_ring(const Link& link, std::size_t direction) const {
   return ring;
 }
 
+Links::RingSets Links::make_ring_sets(const Ring& ring) {
+  RingSets sets;
+  sets.runs = place_sets(ring.size).runs;
+  sets.risky = place_sets(ring.size).risky;
+  const auto make = [&](const std::array<std::uint8_t, 6>& directions) {
+    std::array<std::uint8_t, std::size_t{2}* OnRing::kHalf> places = {};
+    for (std::size_t i = 0; i < ring.size; ++i) {
+      places[directions[i]] = static_cast<std::uint8_t>(1U << i);
+    }
+    OnRing on_ring;
+    for (std::size_t half = 0; half < 2; ++half) {
+      auto& sets_of_half = on_ring.halves[half];
+      for (std::size_t set = 1; set < sets_of_half.size(); ++set) {
+        const auto lowest = static_cast<std::size_t>(std::countr_zero(set));
+        const std::uint8_t place = places[half * OnRing::kHalf + lowest];
+        sets_of_half[set] = static_cast<std::uint8_t>(sets_of_half[set & (set - 1)] | place);
+      }
+    }
+    return on_ring;
+  };
+  sets.mine = make(ring.mine);
+  sets.theirs = make(ring.theirs);
+  return sets;
+}
+
 ClusterFacts Links::find_facts(const Link& link, Directions set) const {
   const auto on_ring = [&](const Ring& ring) {
     unsigned bits = 0;
@@ -211,7 +237,7 @@ ClusterFacts Links::find_facts(const Link& link, Directions set) const {
     if ((link.existing >> d & 1) == 0) continue;
     const Ring& ring = link.rings[d];
     const unsigned bits = on_ring(ring);
-    const RingSets& sets = ring_sets(ring.size);
+    const PlaceSets& sets = place_sets(ring.size);
     if ((free >> d & 1) != 0 && (sets.runs >> bits & 1) == 0) parts.forbidden |= bit(d);
     if (d >= half() && (sets.risky >> bits & 1) != 0) parts.risks |= bit(d - half());
   }
@@ -226,18 +252,8 @@ ClusterFacts Links::find_facts(const Link& link, Directions set) const {
   return ClusterFacts(parts);
 }
 
-bool Links::clash(unsigned parity, std::size_t direction, Directions mine,
-                  Directions theirs) const {
-  const Ring& ring = link_of(parity).rings[direction];
-  unsigned both = 0;
-  for (std::size_t i = 0; i < ring.size; ++i) {
-    both |= (mine >> ring.mine[i] & theirs >> ring.theirs[i] & 1) << i;
-  }
-  return (ring_sets(ring.size).runs >> both & 1) == 0;
-}
-
-Directions Links::clashing(unsigned parity, std::size_t direction, Directions mine,
-                           Directions theirs) const {
+Directions Links::find_clashing(unsigned parity, std::size_t direction, Directions mine,
+                                Directions theirs) const {
   const auto& step = directions_[direction].step;
   const unsigned there = (parity + static_cast<unsigned>(step[0] + step[1] + step[2])) & 1;
   Directions found = 0;

@@ -120,13 +120,21 @@ class Links {
     return facts;
   }
 
-  // Whether components `mine` of a sample and `theirs` of its neighbour in a direction clash.
-  bool clash(unsigned parity, std::size_t direction, Directions mine, Directions theirs) const;
+  // Whether components `mine` of a sample and `theirs` of its neighbour in an earlier direction
+  // clash.
+  bool clash(unsigned parity, std::size_t direction, Directions mine, Directions theirs) const {
+    const RingSets& ring = link_of(parity).ring_sets[direction - half()];
+    return (ring.runs >> ring.both(mine, theirs) & 1) == 0;
+  }
 
   // Those of the components in `mine` of a sample that clash with one in `theirs` of its neighbour
-  // in a direction.
+  // in an earlier direction.
   Directions clashing(unsigned parity, std::size_t direction, Directions mine,
-                      Directions theirs) const;
+                      Directions theirs) const {
+    const RingSets& ring = link_of(parity).ring_sets[direction - half()];
+    const bool may_clash = (ring.risky >> ring.both(mine, theirs) & 1) != 0;
+    return may_clash ? find_clashing(parity, direction, mine, theirs) : 0;
+  }
 
   // The directions to both a sample and one of its neighbours, in cyclic order: as the sample and
   // as the neighbour number them.
@@ -146,10 +154,36 @@ class Links {
   std::span<const Directions> below(unsigned parity) const { return link_of(parity).below; }
 
  private:
+  // Which places of a ring are in a set of directions, a bit each; looked up by halves of the set.
+  struct OnRing {
+    static constexpr unsigned kHalf = kMostDirections / 2;
+
+    unsigned operator()(Directions set) const {
+      return halves[0][set & ((Directions{1} << kHalf) - 1)] | unsigned{halves[1][set >> kHalf]};
+    }
+
+    std::array<std::array<std::uint8_t, std::size_t{1} << kHalf>, 2> halves = {};
+  };
+
+  // The places of the ring of an earlier neighbour.
+  struct RingSets {
+    unsigned both(Directions my_set, Directions their_set) const {
+      return mine(my_set) & theirs(their_set);
+    }
+
+    OnRing mine;
+    OnRing theirs;
+    // Bit s: whether the set s of places is nothing, or one run that leaves two places free; and
+    // whether it has a subset that is neither.
+    std::uint64_t runs = 0;
+    std::uint64_t risky = 0;
+  };
+
   struct Link {
     Directions existing = 0;
     std::array<Directions, kMostDirections> adjacent = {};  // neighbours that are neighbours
     std::array<Ring, kMostDirections> rings = {};
+    std::array<RingSets, kMostDirections / 2> ring_sets;  // of the earlier directions
     // Its triangles: those of tetrahedra in the sample's layer, and in the one below.
     std::vector<Directions> above;
     std::vector<Directions> below;
@@ -165,8 +199,11 @@ class Links {
   template <class Has>
   Link make_link(unsigned parity, int below, Has has) const;
   Ring make_ring(const Link& link, std::size_t direction) const;
+  static RingSets make_ring_sets(const Ring& ring);
   int find(const std::array<int, 3>& step) const;
   ClusterFacts find_facts(const Link& link, Directions set) const;
+  Directions find_clashing(unsigned parity, std::size_t direction, Directions mine,
+                           Directions theirs) const;
 
   std::vector<LinkDirection> directions_;
   Directions below_ = 0;

@@ -15,11 +15,13 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <hwy/highway.h>
 
-#include "server/mesh/extract/joined_rows-inl.h"
+#include "server/mesh/extract/joined_edges-inl.h"
+#include "server/mesh/extract/kept_triangles-inl.h"
 #include "server/mesh/extract/links.h"
 #include "server/mesh/extract/signs-inl.h"
 #include "server/mesh/extract/slabs.h"
@@ -27,45 +29,141 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
+using RegularWords = JoinedWords<kEdgePlaces>;
+
+// As SignCells, with the edges of each sample that no cluster has.
+struct RegularCells : SignCells {
+  BitBytes lone;
+};
+
 // A row without the vertices that clusters have instead of its edges.
 class RegularRow : public SignRow {
  public:
-  // `joined`: for each sample the set of its edges, by direction, that are some cluster's.
-  RegularRow(const SignRow& row, const std::uint8_t* joined) : SignRow(row), joined_(joined) {}
+  RegularRow(const SignRow& row, const RegularWords* joined) : SignRow(row), joined_(joined) {}
 
-  HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const SignCells& cells,
-                                 std::uint32_t* next) const {
-    return list_edges(x, directions(x, bit, cells) & ~unsigned{joined_[x]}, next);
+  Word describe(std::size_t w, RegularCells& cells) const {
+    const CornerWords signs = corners(w);
+    cells.crossed = crossed_cells(w, signs);
+    cells.cases = transpose(signs);
+    BitWords lone = crossed_edges(w, signs);
+    Word owners = 0;
+    for (std::size_t place = 0; place < kEdgePlaces; ++place) {
+      lone[place] &= ~(joined_[w].first[place] | joined_[w].second[place]);
+      owners |= lone[place];
+    }
+    if (owners != 0) cells.lone = transpose(lone);
+    return owners;
+  }
+
+  HWY_INLINE static std::uint32_t* list(std::size_t x, unsigned bit, const RegularCells& cells,
+                                        std::uint32_t* next) {
+    return list_edges(x, cells.lone[bit], next);
   }
 
  private:
-  const std::uint8_t* joined_;
+  const RegularWords* joined_;
 };
 
-// Leaves triangles out of which two corners are one vertex.
+// The crossings around 64 cells that are joined. `rows`: of the samples at (y, z), (y + 1, z),
+// (y, z + 1), (y + 1, z + 1).
+struct JoinedCorners {
+  // The cells whose crossing on the edge between two corners is joined at the first of them.
+  template <unsigned kAt, unsigned kTo>
+  HWY_INLINE Word at() const {
+    constexpr unsigned kOwner = kAt & kTo;
+    const RegularWords* words = rows[kOwner >> 1] + w;
+    const auto bits_of = [](const RegularWords& edges) {
+      // An edge's first end is its corner of the smaller number.
+      return kAt < kTo ? edges.first[kAt ^ kTo] : edges.second[kAt ^ kTo];
+    };
+    const Word bits = bits_of(words[0]);
+    return (kOwner & 1) == 0 ? bits : bits >> 1 | bits_of(words[1]) << 63;
+  }
+
+  const std::array<const RegularWords*, 4>& rows;
+  std::size_t w;
+};
+
+// Writes the triangles that are left of the cells of one row.
 class RegularCellWriter {
  public:
-  // `end`: where the layer's triangles end, beyond which nothing may be written.
-  RegularCellWriter(const std::array<CellSplit, 2>& splits, const SignRow& row,
-                    const EdgeOffsets& offsets, const Triangle* end)
-      : splits_(splits), row_(row), offsets_(offsets), end_(end) {}
+  // `joined`: as JoinedCorners::rows.
+  RegularCellWriter(std::span<const PlacedTriangles> triangles, const SignRow& row,
+                    const std::array<const RegularWords*, 4>& joined, const EdgeOffsets& offsets)
+      : triangles_{triangles.front().data(), triangles.back().data()},
+        row_(row),
+        joined_(joined),
+        offsets_(offsets) {}
 
-  HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const SignCells& cells,
-                             const std::uint32_t* places, Triangle* out) const {
-    const CellCase& cell = splits_[row_.parity_at(x)].cases[cells.cases[bit]];
-    return write_kept(cell, places, offsets_, end_, out);
+  // `places`: of the word's first sample.
+  HWY_INLINE Triangle* write_word(std::size_t w, const RegularCells& cells,
+                                  const std::uint32_t* places, Triangle* out) const {
+    const std::array<BitWords, 2> kept = keep(w, cells.crossed);
+    Word any = 0;
+    for (const BitWords& words : kept) {
+      for (const Word word : words) any |= word;
+    }
+    const std::array<BitBytes, 2> bytes = {transpose(kept[0]), transpose(kept[1])};
+    // A flat list, because how many triangles a cell has is hard to predict.
+    std::array<std::uint32_t, kWordBits * kMostTriangles + 8> list;
+    std::uint32_t* next = list.data();
+    for (Word rest = any; rest != 0; rest &= rest - 1) {
+      const auto bit = static_cast<unsigned>(std::countr_zero(rest));
+      const std::uint32_t cell = bit << kCellShift | unsigned{cells.cases[bit]} << kCaseShift;
+      for (unsigned half = 0; half < 2; ++half) {
+        const unsigned set = bytes[half][bit];
+        for (std::size_t i = 0; i < 8; ++i) next[i] = cell + half * 8 + kMembers[set][i];
+        next += std::popcount(set);
+      }
+    }
+    const unsigned odd = row_.parity_at(0);
+    for (const std::uint32_t* listed = list.data(); listed != next; ++listed) {
+      const std::uint32_t x = *listed >> kCellShift;
+      const std::uint32_t place = *listed & ((1U << kCellShift) - 1);
+      const auto& names = triangles_[(x ^ odd) & 1][0].data()[place];
+      const std::uint32_t* first = places + std::size_t{x} * kEdgePlaces;
+      *out++ = {first[offsets_[names[0]]], first[offsets_[names[1]]], first[offsets_[names[2]]]};
+    }
+    return out;
   }
 
  private:
-  const std::array<CellSplit, 2>& splits_;
+  static constexpr unsigned kCaseShift = 4;   // places of PlacedTriangles
+  static constexpr unsigned kCellShift = 12;  // and cases
+
+  // A word for each place of PlacedTriangles.
+  HWY_INLINE std::array<BitWords, 2> keep(std::size_t w, Word cells) const {
+    std::array<BitWords, 2> kept = {};
+    if (!row_.is_five()) {
+      keep_of<kSixTetrahedra>(w, cells, kept, std::make_index_sequence<6>());
+    } else {
+      keep_of<kFiveTetrahedra[0]>(w, cells & row_.even(), kept, std::make_index_sequence<5>());
+      keep_of<kFiveTetrahedra[1]>(w, cells & ~row_.even(), kept, std::make_index_sequence<5>());
+    }
+    return kept;
+  }
+
+  template <const auto& kTetrahedra, std::size_t... t>
+  HWY_INLINE void keep_of(std::size_t w, Word cells, std::array<BitWords, 2>& kept,
+                          std::index_sequence<t...> /*tetrahedra*/) const {
+    const CornerWords signs = row_.corners(w);
+    const JoinedCorners joined = {joined_, w};
+    const auto keep_one = [&](std::size_t place, const std::array<Word, 2>& words) {
+      for (std::size_t i = 0; i < 2; ++i) kept[place / 8][place % 8 + i] |= words[i] & cells;
+    };
+    (keep_one(2 * t, keep_triangles_of<kTetrahedra[t]>(signs, joined)), ...);
+  }
+
+  std::array<const std::array<std::array<EdgeName, 4>, kTrianglePlaces>*, 2> triangles_;
   const SignRow row_;
+  const std::array<const RegularWords*, 4> joined_;
   const EdgeOffsets& offsets_;
-  const Triangle* end_;
 };
 
 class RegularField : public SignField {
  public:
   using Row = RegularRow;
+  using Cells = RegularCells;
   static constexpr bool kHasClusters = true;
 
   RegularField(const Extraction& extraction, std::uint32_t first)
@@ -73,9 +171,10 @@ class RegularField : public SignField {
         extraction_(extraction),
         dims_(extraction.dims),
         links_(links_of(extraction.scheme)),
-        joined_(dims_, first),
-        edges_(std::size_t{dims_.x} * kMostDirections),
-        sizes_(edges_.size()) {
+        joined_(dims_, first, {&links_}),
+        edges_(std::size_t{dims_.x} * kMostDirections + kMembersRoom),
+        numbers_(edges_.size()),
+        sums_(dims_.x * kMostComponents) {
     const auto directions = links_.directions();
     for (unsigned parity = 0; parity < 2; ++parity) {
       for (std::size_t d = 0; d < directions.size(); ++d) {
@@ -84,8 +183,6 @@ class RegularField : public SignField {
         const unsigned owner = parity ^ (std::popcount(direction.corner) & 1U);
         const EdgeEnds ends = extraction.splits[owner].ends[direction.place];
         const std::ptrdiff_t to_owner = -sample_offset(extraction.inner, direction.corner);
-        names_[d] = {static_cast<std::uint8_t>(direction.corner >> 1),
-                     static_cast<std::uint8_t>(direction.corner & 1), direction.place};
         const std::size_t place = parity * kClusterPlaces + d;
         ends_[place] = {to_owner + sample_offset(extraction.inner, ends.from),
                         to_owner + sample_offset(extraction.inner, ends.to)};
@@ -100,9 +197,12 @@ class RegularField : public SignField {
   }
 
   RegularCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
-                                Mesh& mesh) const {
-    return {extraction_.splits, SignField::row(y, z), offsets,
-            mesh.triangles.data() + mesh.layer_triangles[z + 1]};
+                                Mesh& /*mesh*/) const {
+    return {extraction_.placed,
+            SignField::row(y, z),
+            {joined_.row(y, z), joined_.row(y + 1, z), joined_.row(y, z + 1),
+             joined_.row(y + 1, z + 1)},
+            offsets};
   }
 
   // Gives the clusters of a row the vertices from `vertex` on and writes those to the edges that
@@ -112,86 +212,114 @@ class RegularField : public SignField {
   std::uint32_t number_clusters(std::uint32_t y, std::uint32_t z,
                                 const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
                                 Mesh* mesh) {
-    joined_.mark(extraction_.clusters, y, z,
-                 [&](const JoiningSample& sample, std::uint32_t /*y*/, std::uint32_t /*z*/,
-                     const JoinedPoints* /*none*/, auto visit) {
-                   for (Directions rest = sample.directions & ~JoiningSample::kFlags; rest != 0;
-                        rest &= rest - 1) {
-                     visit(names_[static_cast<unsigned>(std::countr_zero(rest))]);
-                   }
-                 });
-    const std::uint32_t first = vertex;
-    std::uint32_t* edge = edges_.data();
-    std::uint8_t* size = sizes_.data();
-    visit_joining(
-        extraction_.clusters, y, z, [&](const JoiningSample& sample, const JoinedPoints* /*none*/) {
-          const std::size_t x = sample.x;
-          const bool is_one = (sample.directions & JoiningSample::kSeveral) == 0;
-          Directions joined = sample.directions & ~JoiningSample::kFlags;
-          while (joined != 0) {
-            const Directions component =
-                is_one ? joined : links_.facts(extraction_.parity(x, y, z), joined).first();
-            joined &= ~component;
-            *size++ = static_cast<std::uint8_t>(std::popcount(component));
-            for (Directions rest = component; rest != 0; rest &= rest - 1) {
-              const auto d = static_cast<unsigned>(std::countr_zero(rest));
-              const JoinedName& name = names_[d];
-              rows[name.row][(x - name.before) * kEdgePlaces + name.place] = vertex;
-              *edge++ = static_cast<std::uint32_t>(x) * kClusterPlaces + d;
-            }
-            ++vertex;
-          }
-        });
-    clusters_ = static_cast<std::size_t>(size - sizes_.data());
-    if (mesh != nullptr && clusters_ != 0) {
-      place_clusters(y, z, {edges_.data(), edge}, mesh->positions.data() + first);
+    joined_.mark(extraction_.clusters, y, z);
+    if (z >= extraction_.clusters.size()) return vertex;
+    list_clusters(y, z, vertex);
+    if (clusters_ == 0) return vertex;
+    std::uint32_t* here = rows[0];
+    std::array<std::ptrdiff_t, kClusterPlaces> places =
+        {};  // from the sample's first, by direction
+    for (std::size_t d = 0; d < links_.directions().size(); ++d) {
+      const LinkDirection& direction = links_.directions()[d];
+      const unsigned before = direction.corner & 1;
+      places[d] = rows[direction.corner >> 1] - here + direction.place -
+                  static_cast<std::ptrdiff_t>(before * kEdgePlaces);
     }
-    return vertex;
+    for (std::size_t i = 0; i < found_; ++i) {
+      const std::ptrdiff_t sample = edges_[i] / kClusterPlaces * std::ptrdiff_t{kEdgePlaces};
+      here[sample + places[edges_[i] % kClusterPlaces]] = numbers_[i];
+    }
+    if (mesh != nullptr) place_clusters(y, z, vertex, mesh->positions.data());
+    return vertex + static_cast<std::uint32_t>(clusters_);
   }
 
  private:
   static constexpr std::uint32_t kClusterPlaces = 32;  // a sample, for its directions
+  static constexpr std::size_t kMembersRoom = 8;       // members are listed eight at a time
+  static constexpr std::size_t kMostComponents = 9;    // of no two neighbours in a link
 
-  // The means of the crossings of each cluster.
-  void place_clusters(std::uint32_t y, std::uint32_t z, std::span<const std::uint32_t> edges,
-                      Vec3* out) {
+  // Lists the edges of the clusters of a row, cluster by cluster, and the vertices that they
+  // become.
+  void list_clusters(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
+    const ClusterLayer& layer = extraction_.clusters[z];
+    const auto directions = static_cast<unsigned>(links_.directions().size());
+    std::uint32_t* edge = edges_.data();
+    std::uint32_t* number = numbers_.data();
+    Sum* sum = sums_.data();
+    const auto add = [&](std::uint32_t x, Directions component) {
+      *sum++ = Sum{.edges = static_cast<double>(std::popcount(component)), .x = x};
+      for (unsigned first = 0; first < directions; first += 8) {
+        const unsigned set = component >> first & 0xFF;
+        for (std::size_t i = 0; i < 8; ++i) {
+          edge[i] = x * kClusterPlaces + first + kMembers[set][i];
+          number[i] = vertex;
+        }
+        edge += std::popcount(set);
+        number += std::popcount(set);
+      }
+      ++vertex;
+    };
+    for (const JoiningWord& word : layer.row(y)) {
+      visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
+        const std::uint32_t x = word.word * kWordBits + bit;
+        if (joined.is_one()) return add(x, joined.directions());
+        for (Directions rest = joined.directions(); rest != 0;) {
+          const Directions component = links_.facts(extraction_.parity(x, y, z), rest).first();
+          rest &= ~component;
+          add(x, component);
+        }
+      });
+    }
+    found_ = static_cast<std::size_t>(edge - edges_.data());
+    clusters_ = static_cast<std::size_t>(sum - sums_.data());
+  }
+
+  // The means of the crossings of each cluster, the first of which is `vertex`.
+  void place_clusters(std::uint32_t y, std::uint32_t z, std::uint32_t vertex, Vec3* positions) {
     const std::uint32_t margin = extraction_.margin;
-    shares_.resize(std::max(shares_.size(), edges.size()));
-    extraction_.samples->shares({y - margin, z - margin, margin, kClusterPlaces,
-                                 extraction_.parity(0, y, z), ends_.data(), edges},
+    shares_.resize(std::max(shares_.size(), found_));
+    const unsigned row_parity = extraction_.parity(0, y, z);
+    extraction_.samples->shares({y - margin, z - margin, margin, kClusterPlaces, row_parity,
+                                 ends_.data(), std::span(edges_).first(found_)},
                                 shares_.data());
+    for (std::size_t i = 0; i < found_; ++i) {
+      const std::uint32_t x = edges_[i] / kClusterPlaces;
+      const std::size_t place =
+          ((x ^ row_parity) & 1) * kClusterPlaces + edges_[i] % kClusterPlaces;
+      sums_[numbers_[i] - vertex].points += frames_[place].start + frames_[place].run * shares_[i];
+    }
     const LatticeToSpace& map = extraction_.to_space;
     const Double4 row_at =
         lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
-    std::size_t edge = 0;
     for (std::size_t cluster = 0; cluster < clusters_; ++cluster) {
-      const std::uint32_t x = edges[edge] / kClusterPlaces;
-      const EdgeFrame* frames = &frames_[extraction_.parity(x, y, z) * kClusterPlaces];
-      Double4 sum = {};
-      for (const std::size_t end = edge + sizes_[cluster]; edge < end; ++edge) {
-        const EdgeFrame& frame = frames[edges[edge] % kClusterPlaces];
-        sum += frame.start + frame.run * shares_[edge];
-      }
-      const Double4 at = row_at + lanes(map.step_x) * static_cast<double>(x - margin);
-      const Float4 position =
-          __builtin_convertvector(at + sum / static_cast<double>(sizes_[cluster]), Float4);
-      std::memcpy(out++, &position, sizeof *out);
+      const Sum& sum = sums_[cluster];
+      const Double4 at = row_at + lanes(map.step_x) * static_cast<double>(sum.x - margin);
+      const Float4 position = __builtin_convertvector(at + sum.points / sum.edges, Float4);
+      std::memcpy(positions + vertex + cluster, &position, sizeof *positions);
     }
   }
+
+  // Of the points of one cluster's edges, around the sample at x.
+  struct Sum {
+    StoredDouble4 points = {};
+    double edges = 0;
+    std::uint32_t x = 0;
+  };
 
   const Extraction& extraction_;
   const Dims dims_;
   const Links& links_;
-  JoinedRows<std::uint8_t> joined_;
+  JoinedEdges<kEdgePlaces> joined_;
   std::array<EdgeSamples, std::size_t{2}* kClusterPlaces> ends_ = {};  // by parity and direction
   std::array<EdgeFrame, std::size_t{2}* kClusterPlaces> frames_ = {};
-  std::array<JoinedName, kMostDirections> names_ = {};
   // Of the row that is numbered: the edges of its clusters, one after the other, as
-  // kClusterPlaces * x + direction, and how many each has.
+  // kClusterPlaces * x + direction, and the vertex that each becomes.
   std::vector<std::uint32_t> edges_;
-  std::vector<std::uint8_t> sizes_;
+  std::vector<std::uint32_t> numbers_;
+  std::size_t found_ = 0;
+  std::vector<double> shares_;  // of those edges
+  std::vector<Sum> sums_;       // of the clusters
   std::size_t clusters_ = 0;
-  std::vector<double> shares_;
 };
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

@@ -15,6 +15,7 @@
 #include <hwy/highway.h>
 
 #include "proto/samples.h"
+#include "server/mesh/extract/nearness.h"
 #include "server/mesh/lattice/bcc_faces.h"
 #include "server/mesh/lattice/rows-inl.h"
 
@@ -33,17 +34,23 @@ HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
   return pack_word(flags);
 }
 
-// The mean of the eight samples of a cell, of which `first` is corner 0.
+// The sum of the eight samples of a cell, of which `first` is corner 0.
+template <class T>
+HWY_INLINE auto sum_of_cell(const T* first, std::ptrdiff_t row, std::ptrdiff_t plane) {
+  using Sum = std::conditional_t<sizeof(T) <= 2, std::int32_t, std::int64_t>;
+  Sum sum = 0;
+  for (const T* at : {first, first + row, first + plane, first + row + plane}) {
+    sum += static_cast<Sum>(at[0]) + static_cast<Sum>(at[1]);
+  }
+  return sum;
+}
+
+// The mean of those.
 template <class T>
 HWY_INLINE double mean_of_cell(const T* first, std::ptrdiff_t row, std::ptrdiff_t plane) {
   constexpr double kEighth = 0.125;
   if constexpr (std::is_integral_v<T>) {
-    using Sum = std::conditional_t<sizeof(T) <= 2, std::int32_t, std::int64_t>;
-    Sum sum = 0;
-    for (const T* at : {first, first + row, first + plane, first + row + plane}) {
-      sum += static_cast<Sum>(at[0]) + static_cast<Sum>(at[1]);
-    }
-    return static_cast<double>(sum) * kEighth;
+    return static_cast<double>(sum_of_cell(first, row, plane)) * kEighth;
   } else {
     const auto face = [&](const T* at, double scale) {
       const auto value = [&](std::ptrdiff_t offset) {
@@ -67,6 +74,7 @@ class RowsOf final : public SampleRows {
       : lattice_(lattice),
         iso_(options.iso),
         smallest_(smallest),
+        nearness_(options.iso, options.scheme == Scheme::kBcc),
         placement_(options, lattice.dims, lattice.to_space),
         // An edge from a centre to a corner takes half a step along each axis.
         half_edges_(options, std::min(2 * placement_.nearest(), kMostNearest)) {
@@ -82,23 +90,34 @@ class RowsOf final : public SampleRows {
     }
   }
 
-  void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
-                std::span<std::int32_t> out) const override {
+  void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin, std::size_t count,
+                std::byte* out) const override {
     const T* samples = row(y, z) + begin;
-    for (std::size_t x = 0; x < out.size(); ++x) {
-      out[x] = rank(static_cast<double>(samples[x]), samples[x] < smallest_);
-    }
+    write_ranks(out, count, [=, nearness = nearness_](std::size_t x, auto rank) {
+      using Rank = decltype(rank);
+      if constexpr (sizeof(Rank) == sizeof(std::int32_t)) {
+        return nearness.of_value(static_cast<double>(samples[x]));
+      } else {
+        return nearness.template of_sample<Rank>(samples[x]);
+      }
+    });
   }
 
-  void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
-                       std::span<std::int32_t> out) const override {
+  void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin, std::size_t count,
+                       std::byte* out) const override {
     const T* samples = row(y, z) + begin;
     const auto [next_row, next_plane] = steps();
-    for (std::size_t x = 0; x < out.size(); ++x) {
-      const double mean = mean_of_cell(samples + x, next_row, next_plane);
-      out[x] = rank(mean, mean < iso_);
-    }
+    write_ranks(out, count, [=, this](std::size_t x, auto rank) {
+      using Rank = decltype(rank);
+      if constexpr (sizeof(Rank) == sizeof(std::int32_t)) {
+        return nearness_.of_value(mean_of_cell(samples + x, next_row, next_plane));
+      } else {
+        return nearness_.template of_sum<Rank>(sum_of_cell(samples + x, next_row, next_plane));
+      }
+    });
   }
+
+  std::size_t rank_bytes() const override { return nearness_.bytes(); }
 
   void shares(const RowEdges& edges, double* out) const override {
     const T* samples = row(edges.y, edges.z) - edges.margin;
@@ -160,13 +179,21 @@ class RowsOf final : public SampleRows {
  private:
   static constexpr double kMostNearest = 0.25;
 
-  HWY_INLINE std::int32_t rank(double value, bool is_outside) const {
-    const auto distance = static_cast<float>(std::abs(value - iso_));
-    // Its bits rise with a number that is not negative; they are moved down to where signed
-    // numbers begin, since those are what processors compare.
-    const std::uint32_t rank =
-        std::bit_cast<std::uint32_t>(distance) << 1 | static_cast<std::uint32_t>(is_outside);
-    return std::bit_cast<std::int32_t>(rank ^ std::uint32_t{1} << 31);
+  // rank_at(x, a Rank) for each of the samples.
+  template <class RankAt>
+  HWY_INLINE void write_ranks(std::byte* out, std::size_t count, RankAt rank_at) const {
+    const auto write = [&](auto* ranks) {
+      for (std::size_t x = 0; x < count; ++x) ranks[x] = rank_at(x, *ranks);
+    };
+    if (nearness_.bytes() == sizeof(std::int32_t)) {
+      return write(reinterpret_cast<std::int32_t*>(out));
+    }
+    if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
+      if (nearness_.bytes() == sizeof(std::int8_t)) {
+        return write(reinterpret_cast<std::int8_t*>(out));
+      }
+      write(reinterpret_cast<std::int16_t*>(out));
+    }
   }
 
   static bool is_from_centre(unsigned slot) {
@@ -185,6 +212,7 @@ class RowsOf final : public SampleRows {
   const Lattice<T>& lattice_;
   const double iso_;
   const T smallest_;
+  const Nearness<T> nearness_;
   const Placement placement_;
   const Placement half_edges_;  // of the body-centred lattice
   std::optional<BorderPlacement<T>> border_;

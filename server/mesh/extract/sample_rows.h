@@ -52,15 +52,18 @@ class SampleRows {
   // other bits of the row's words are zero then.
   virtual void classify(std::uint32_t y, std::uint32_t z, std::uint64_t* out) const = 0;
 
-  // The places of a row's samples [begin, begin + out.size()) in the order of nearness to the
-  // iso-value: by the distance of their values from it in single precision, and what is inside
-  // first of those that are equally near.
-  virtual void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
-                        std::span<std::int32_t> out) const = 0;
+  // The places of a row's samples [begin, begin + count) in the order of nearness to the iso-value:
+  // by the distance of their values from it in single precision, and what is inside first of those
+  // that are equally near. Only places on different sides can be compared. They are signed integers
+  // of rank_bytes() each: 1, 2 or 4.
+  virtual void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin, std::size_t count,
+                        std::byte* out) const = 0;
 
   // As nearness(), of the centres of cells.
   virtual void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
-                               std::span<std::int32_t> out) const = 0;
+                               std::size_t count, std::byte* out) const = 0;
+
+  virtual std::size_t rank_bytes() const = 0;
 
   // How far the surface is along each edge from its first end, as a share of the edge.
   virtual void shares(const RowEdges& row, double* out) const = 0;

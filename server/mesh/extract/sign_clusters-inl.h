@@ -13,8 +13,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
-#include <span>
 #include <vector>
 
 #include <hwy/highway.h>
@@ -34,71 +32,93 @@ class NearnessPlanes {
   explicit NearnessPlanes(const Extraction& extraction, BccPoint point = BccPoint::kSample)
       : extraction_(extraction),
         point_(point),
+        rank_bytes_(extraction.samples->rank_bytes()),
         words_(words_of(extraction.dims.x) + 1),
         rows_(std::size_t{2} * extraction.dims.y),
         known_(rows_ * words_),
-        values_(rows_ * words_ * kWordBits) {}
+        ranks_(rows_ * words_ * kWordBits * rank_bytes_) {}
+
+  std::size_t rank_bytes() const { return rank_bytes_; }
 
   // Forgets the plane before the last one that was asked for.
   void open(std::uint32_t z) {
     std::fill_n(known_.data() + first_row(z) * words_, words_ * rows_ / 2, std::uint8_t{0});
   }
 
-  // Those of the samples from word w on, of which 65 can be read.
-  const std::int32_t* from(std::size_t w, std::uint32_t y, std::uint32_t z) {
+  // The ranks of the samples from word w on, of which 65 can be read.
+  const std::byte* from(std::size_t w, std::uint32_t y, std::uint32_t z) {
     const std::size_t word = (first_row(z) + y) * words_ + w;
+    const std::size_t bytes = kWordBits * rank_bytes_;
     for (std::size_t i = 0; i < 2; ++i) {
-      if (known_[word + i] == 0) look_up(w + i, y, z, &values_[(word + i) * kWordBits]);
+      if (known_[word + i] == 0) look_up(w + i, y, z, &ranks_[(word + i) * bytes]);
       known_[word + i] = 1;
     }
-    return &values_[word * kWordBits];
+    return &ranks_[word * bytes];
   }
 
  private:
   std::size_t first_row(std::uint32_t z) const { return z % 2 * (rows_ / 2); }
 
-  void look_up(std::size_t w, std::uint32_t y, std::uint32_t z, std::int32_t* out) const {
-    std::fill_n(out, kWordBits, std::numeric_limits<std::int32_t>::max());
+  // Phantoms keep what they have: samples beside them join nothing.
+  void look_up(std::size_t w, std::uint32_t y, std::uint32_t z, std::byte* out) const {
     const std::uint32_t margin = extraction_.margin;
     const bool is_centre = point_ == BccPoint::kCentre;
     const std::uint32_t less = is_centre ? 1 : 0;
     const Dims inner = {extraction_.inner.x - less, extraction_.inner.y - less,
                         extraction_.inner.z - less};
-    if (y - margin >= inner.y || z - margin >= inner.z) return;  // before the first, it wraps
     const std::size_t begin = std::max<std::size_t>(w * kWordBits, margin);
     const std::size_t end = std::min<std::size_t>((w + 1) * kWordBits, inner.x + margin);
-    if (begin >= end) return;
+    if (begin >= end || y - margin >= inner.y || z - margin >= inner.z) return;
+    out += (begin - w * kWordBits) * rank_bytes_;
     const auto first = static_cast<std::uint32_t>(begin - margin);
-    const std::span found(out + (begin - w * kWordBits), end - begin);
-    is_centre ? extraction_.samples->centre_nearness(y - margin, z - margin, first, found)
-              : extraction_.samples->nearness(y - margin, z - margin, first, found);
+    is_centre
+        ? extraction_.samples->centre_nearness(y - margin, z - margin, first, end - begin, out)
+        : extraction_.samples->nearness(y - margin, z - margin, first, end - begin, out);
   }
 
   const Extraction& extraction_;
   const BccPoint point_;
+  const std::size_t rank_bytes_;
   const std::size_t words_;  // of a row, and one that is read past the last
   const std::size_t rows_;
   std::vector<std::uint8_t> known_;
-  std::vector<std::int32_t> values_;
+  std::vector<std::byte> ranks_;
 };
 
-HWY_INLINE Word less(const std::int32_t* a, const std::int32_t* b) {
+// Those of 64 samples that are nearer to the iso-value than what they are compared with; ranks
+// begin there.
+template <class Rank>
+HWY_INLINE Word less(const Rank* a, const Rank* b) {
+#if HWY_TARGET == HWY_AVX2
   namespace hn = hwy::HWY_NAMESPACE;
-  const hn::CappedTag<std::int32_t, 8> eight;
-  if constexpr (hn::MaxLanes(eight) == 8) {
-    std::array<std::uint8_t, 16> bytes;  // eight of them may be written at once
-    for (std::size_t i = 0; i < 8; ++i) {
-      const auto is_less = hn::Lt(hn::LoadU(eight, a + 8 * i), hn::LoadU(eight, b + 8 * i));
-      hn::StoreMaskBits(eight, is_less, bytes.data() + i);
-    }
-    Word word = 0;
-    std::memcpy(&word, bytes.data(), sizeof word);
-    return word;
-  } else {
-    std::array<std::uint8_t, kWordBits> flags;
-    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] < b[x] ? 1 : 0;
-    return pack_word(flags);
+  const hn::CappedTag<Rank, 32> ranks;
+  constexpr std::size_t kLanes = 32 / sizeof(Rank);
+  std::array<std::uint8_t, 16> bytes;  // eight of them may be written at once
+  for (std::size_t i = 0; i < kWordBits; i += kLanes) {
+    const auto is_less = hn::Lt(hn::LoadU(ranks, a + i), hn::LoadU(ranks, b + i));
+    hn::StoreMaskBits(ranks, is_less, bytes.data() + i / 8);
   }
+  Word word = 0;
+  std::memcpy(&word, bytes.data(), sizeof word);
+  return word;
+#else
+  BitBytes flags;
+  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] < b[x] ? 1 : 0;
+  return pack_word(flags);
+#endif
+}
+
+// Whether the first of two samples is nearer. `bytes`: of a rank.
+HWY_INLINE bool is_less(std::size_t bytes, const std::byte* a, const std::byte* b) {
+  const auto less_as = [&](auto rank) {
+    auto other = rank;
+    std::memcpy(&rank, a, sizeof rank);
+    std::memcpy(&other, b, sizeof other);
+    return rank < other;
+  };
+  if (bytes == sizeof(std::int8_t)) return less_as(std::int8_t{});
+  if (bytes == sizeof(std::int16_t)) return less_as(std::int16_t{});
+  return less_as(std::int32_t{});
 }
 
 class SignClusters {
@@ -108,6 +128,7 @@ class SignClusters {
   SignClusters(const Extraction& extraction, std::uint32_t first)
       : extraction_(extraction),
         links_(links_of(extraction.scheme)),
+        words_(words_of(extraction.dims.x)),
         last_y_(extraction.dims.y - 1),
         last_z_(extraction.dims.z - 1),
         field_(extraction, first),
@@ -125,53 +146,83 @@ class SignClusters {
     const std::array<Word, 8> crossed = row.crossed_edges(w, signs);
     for (const Word all : crossed) out.any |= all;
     if (out.any == 0) return count;
-    std::array<const std::int32_t*, 4> near = {};  // from (y, z), (y + 1, z), ... on
-    if (!extraction_.is_midpoint) {
-      for (unsigned r = 0; r < 4; ++r) near[r] = nearness(w, y + (r & 1), z + (r >> 1));
-    }
-    const auto nearer = [&](unsigned a, unsigned b) {
-      // All middles are as near to the one sample as to the other.
-      if (extraction_.is_midpoint) return signs[a];
-      return less(near[a >> 1] + (a & 1), near[b >> 1] + (b & 1));
-    };
+    const std::array<Word, 8> first = first_ends(w, y, z, row, crossed);
     for (unsigned direction = 1; direction < 8; ++direction) {
       const Word all = crossed[direction];
-      const Word first = all == 0 ? 0 : all & row.between_ends(direction, nearer);
-      out.first[direction] = first;
-      out.second[direction] = all & ~first;
+      out.first[direction] = all & first[direction];
+      out.second[direction] = all & ~first[direction];
       count.vertices += static_cast<unsigned>(std::popcount(all));
     }
     return count;
   }
 
-  Directions candidates(const GridSample& at, const Star& star) const {
-    return components_to_join(links_, extraction_.parity(at.x, at.y, at.z), star);
+  template <class Crossed>
+  Directions candidates(const GridSample& at, Directions own, Crossed crossed) const {
+    return components_to_join(links_, extraction_.parity(at.x, at.y, at.z), own, crossed);
   }
 
   // Samples on two sides share no crossing.
-  Directions clashing(const GridSample& at, std::size_t direction, const GridSample& to,
+  Word may_clash(std::size_t w, const GridSample& at, const GridSample& to, int step) const {
+    const Word there = bits_beside(field_.signs(to.y, to.z), w, words_, step);
+    return ~(field_.signs(at.y, at.z)[w] ^ there);
+  }
+
+  Directions clashing(const GridSample& at, std::size_t direction, const GridSample& /*to*/,
                       Directions mine, Directions theirs) const {
-    if (is_inside(at) != is_inside(to)) return 0;
     return links_.clashing(extraction_.parity(at.x, at.y, at.z), direction, mine, theirs);
   }
 
-  ClusterLoss loss(const GridSample& /*at*/, Directions kept, const ClusterFacts& facts,
+  ClusterLoss loss(const GridSample& /*at*/, Joined kept, const ClusterFacts& facts,
                    ClusterLayer& /*layer*/) const {
-    return loss_of_components(links_, kept & ~JoiningSample::kFlags, facts);
+    return loss_of_components(links_, kept.directions(), facts);
   }
 
  private:
-  // Beyond the last rows there is no edge to compare.
-  const std::int32_t* nearness(std::size_t w, std::uint32_t y, std::uint32_t z) {
-    return nearness_.from(w, std::min(y, last_y_), std::min(z, last_z_));
+  // The samples whose crossed edge of each direction is nearer to its first end.
+  std::array<Word, 8> first_ends(std::size_t w, std::uint32_t y, std::uint32_t z,
+                                 const SignRow& row, const std::array<Word, 8>& crossed) {
+    std::array<Word, 8> first = {};
+    const auto find = [&](auto is_nearer) {
+      for (unsigned direction = 1; direction < 8; ++direction) {
+        if (crossed[direction] != 0) first[direction] = row.between_ends(direction, is_nearer);
+      }
+    };
+    if (extraction_.is_midpoint) {  // all middles are as near to the one end as to the other
+      const CornerWords signs = row.corners(w);
+      find([&](unsigned a, unsigned /*b*/) { return signs[a]; });
+      return first;
+    }
+    std::array<const std::byte*, 4> near;  // from (y, z), (y + 1, z), ... on
+    for (unsigned r = 0; r < 4; ++r) near[r] = nearness(w, y + (r & 1), z + (r >> 1));
+    const auto find_with = [&](auto rank) {
+      using Rank = decltype(rank);
+      const auto at = [&](unsigned corner) {
+        return reinterpret_cast<const Rank*>(near[corner >> 1]) + (corner & 1);
+      };
+      find([&](unsigned a, unsigned b) { return less(at(a), at(b)); });
+    };
+    switch (nearness_.rank_bytes()) {
+      case sizeof(std::int8_t):
+        find_with(std::int8_t{});
+        break;
+      case sizeof(std::int16_t):
+        find_with(std::int16_t{});
+        break;
+      default:
+        find_with(std::int32_t{});
+        break;
+    }
+    return first;
   }
 
-  bool is_inside(const GridSample& at) const {
-    return (field_.signs(at.y, at.z)[at.x / kWordBits] >> (at.x % kWordBits) & 1) != 0;
+  // Beyond the last rows there is no edge to compare.
+  const std::byte* nearness(std::size_t w, std::uint32_t y, std::uint32_t z) {
+    return nearness_.from(w, std::min(y, last_y_), std::min(z, last_z_));
   }
 
   const Extraction& extraction_;
   const Links& links_;
+  const std::size_t words_;
   const std::uint32_t last_y_;
   const std::uint32_t last_z_;
   SignField field_;

@@ -169,7 +169,6 @@ class SignRow : public RowShape {
     return next + std::popcount(directions);
   }
 
- private:
   // The cells that exist and have corners on both sides.
   Word crossed_cells(std::size_t w, const CornerWords& corners) const {
     Word any = 0;
@@ -181,6 +180,7 @@ class SignRow : public RowShape {
     return any & ~all & cells(w);
   }
 
+ private:
   const std::array<CellSplit, 2>& splits_;
   std::array<const Word*, 4> rows_;  // at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)
 };

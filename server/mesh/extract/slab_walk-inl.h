@@ -210,10 +210,15 @@ class SlabWriter {
     const EdgeOffsets offsets = edge_offsets(y, z);
     const auto writer = field_.cell_writer(y, z, offsets, output_);
     for (std::size_t w = 0; w < rows_.words(); ++w) {
-      for (Word rest = cells[w].crossed; rest != 0; rest &= rest - 1) {
-        const auto bit = static_cast<unsigned>(std::countr_zero(rest));
-        const std::size_t x = w * kWordBits + bit;
-        out = writer.write(x, bit, cells[w], indices + x * kPlaces, out);
+      if (cells[w].crossed == 0) continue;
+      const std::uint32_t* places = indices + w * kWordBits * kPlaces;
+      if constexpr (requires { writer.write_word(w, cells[w], places, out); }) {
+        out = writer.write_word(w, cells[w], places, out);
+      } else {
+        for (Word rest = cells[w].crossed; rest != 0; rest &= rest - 1) {
+          const auto bit = static_cast<unsigned>(std::countr_zero(rest));
+          out = writer.write(w * kWordBits + bit, bit, cells[w], places + bit * kPlaces, out);
+        }
       }
     }
     return out;

@@ -67,11 +67,20 @@ struct Extraction : Marching {
         regularize(options.regularize),
         samples(make_sample_rows(lattice, options, smallest)) {}
 
+  // Prepares for a surface that is regularised, when it is written.
+  void keep(std::span<const ClusterLayer> joining) {
+    clusters = joining;
+    placed.push_back(placed_triangles(splits.front()));
+    if (scheme == Scheme::kFive) placed.push_back(placed_triangles(splits.back()));
+  }
+
   Dims inner;  // of the lattice itself
   bool is_midpoint;
   bool regularize;
   std::unique_ptr<const SampleRows> samples;
-  std::span<const ClusterLayer> clusters;  // of a surface that is regularised, when it is written
+  std::span<const ClusterLayer> clusters;
+  // Of cells of even parity and, if they differ, of odd parity.
+  std::vector<PlacedTriangles> placed;
 };
 
 // The memory that a slab numbers its vertices in. A slab that has ended gives its block back and

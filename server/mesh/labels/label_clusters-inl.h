@@ -70,18 +70,25 @@ class LabelClusters {
     return row.count(w);
   }
 
-  Directions candidates(const GridSample& at, const Star& star) {
+  template <class Crossed>
+  Directions candidates(const GridSample& at, Directions own, Crossed crossed) {
     look_around(at);
-    if (!is_junction(star.crossed)) return components_to_join(links_, parity(at), star);
-    return !separation_.parts.overlap() && joins_all(at, star) ? star.own | JoiningSample::kJunction
-                                                               : 0;
+    if (!is_junction(crossed())) return components_to_join(links_, parity(at), own, crossed);
+    const bool joins = !separation_.parts.overlap() && joins_all(at, own, crossed());
+    return joins ? own | Joined::kJunction : 0;
+  }
+
+  // What labels they have is looked up later.
+  static Word may_clash(std::size_t /*w*/, const GridSample& /*at*/, const GridSample& /*to*/,
+                        int /*step*/) {
+    return ~Word{0};
   }
 
   Directions clashing(const GridSample& at, std::size_t direction, const GridSample& to,
                       Directions mine, Directions theirs) {
-    const bool has_junction = ((mine | theirs) & JoiningSample::kJunction) != 0;
-    const Directions own = mine & ~JoiningSample::kFlags;
-    const Directions others = theirs & ~JoiningSample::kFlags;
+    const bool has_junction = ((mine | theirs) & Joined::kJunction) != 0;
+    const Directions own = mine & ~Joined::kFlags;
+    const Directions others = theirs & ~Joined::kFlags;
     if (!has_junction) {
       if (label(at) != label(to)) return 0;
       return links_.clashing(parity(at), direction, own, others);
@@ -90,10 +97,10 @@ class LabelClusters {
     return meet_well(at, direction, own, others) ? 0 : mine;
   }
 
-  ClusterLoss loss(const GridSample& at, Directions kept, const ClusterFacts& facts,
+  ClusterLoss loss(const GridSample& at, Joined kept, const ClusterFacts& facts,
                    ClusterLayer& layer) {
-    const Directions joined = kept & ~JoiningSample::kFlags;
-    const bool is_junction = (kept & JoiningSample::kJunction) != 0;
+    const Directions joined = kept.directions();
+    const bool is_junction = kept.is_junction();
     if (!is_junction && tally_.empty()) return loss_of_components(links_, joined, facts);
     look_around(at);
     if (!is_junction) {
@@ -175,13 +182,13 @@ class LabelClusters {
     return facts.components() == 1 && facts.may_join();
   }
 
-  bool joins_all(const GridSample& at, const Star& star) const {
+  bool joins_all(const GridSample& at, Directions own, Directions crossed) const {
     const unsigned here = parity(at);
-    if (!is_disk(here, star.own)) return false;
-    if ((links_.facts(here, star.own).forbidden() & star.crossed) != 0) return false;
+    if (!is_disk(here, own)) return false;
+    if ((links_.facts(here, own).forbidden() & crossed) != 0) return false;
     std::size_t labels = 0;
     std::array<Directions, 3> groups = {};
-    for (Directions rest = star.own; rest != 0; ++labels) {
+    for (Directions rest = own; rest != 0; ++labels) {
       if (labels == groups.size()) return false;
       groups[labels] = with_label(rest, around_[first_of(rest)]);
       rest &= ~groups[labels];
@@ -189,9 +196,9 @@ class LabelClusters {
     if (labels == 1) return true;
     for (std::size_t n = 0; n < labels; ++n) {
       if (!is_disk(here, groups[n])) return false;
-      if (labels == 3 && !is_disk(here, star.own & ~groups[n])) return false;
+      if (labels == 3 && !is_disk(here, own & ~groups[n])) return false;
     }
-    return labels < 3 || corners(here, star.own) == 1;
+    return labels < 3 || corners(here, own) == 1;
   }
 
   // The tetrahedra in whose other corners, all in the set, three labels are.

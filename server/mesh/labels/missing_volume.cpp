@@ -62,10 +62,10 @@ std::array<double, 4> shares_of(const Corners& corners, Scheme scheme) {
   return shares;
 }
 
-class Tetrahedron {
+class TetrahedronDebt {
  public:
-  Tetrahedron(const Corners& corners, unsigned pattern, const TetrahedronWalls& walls,
-              const Places& places)
+  TetrahedronDebt(const Corners& corners, unsigned pattern, const TetrahedronWalls& walls,
+                  const Places& places)
       : corners_(corners), classes_(classes_of(pattern)), walls_(walls), places_(places) {}
 
   OwedVolumes owed(Scheme scheme) const {
@@ -159,7 +159,7 @@ std::array<TallyCases, 2> make_tally_cases(Scheme scheme, const std::array<WallC
         const TetrahedronWalls& own = walls[parity].tetrahedra[t][pattern];
         if (own.triangles == 0) continue;
         cases.tetrahedra[t][pattern] =
-            Tetrahedron(split.corners[t], pattern, own, cases.places).owed(scheme);
+            TetrahedronDebt(split.corners[t], pattern, own, cases.places).owed(scheme);
       }
     }
   }

@@ -73,26 +73,26 @@ class RegularLabelField : public LabelField {
   std::uint32_t number_clusters(std::uint32_t y, std::uint32_t z,
                                 const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
                                 SeparatingSurface* surface) {
-    joined_.mark(separation_.clusters, y, z,
-                 [&](const JoiningSample& sample, std::uint32_t row_y, std::uint32_t row_z,
-                     const JoinedPoints* points, auto visit) {
-                   const unsigned parity = separation_.parity(sample.x, row_y, row_z);
-                   visit_points(parity, sample.directions & ~JoiningSample::kFlags, points,
-                                [&](const PlacedPoint& point) { visit(point.name); });
-                 });
+    joined_.mark(
+        separation_.clusters, y, z,
+        [&](const JoiningPlace& at, const Joined& joined, const JoinedPoints* points, auto visit) {
+          const unsigned parity = separation_.parity(at.x, at.row, at.z);
+          visit_points(parity, joined.directions(), points,
+                       [&](const PlacedPoint& point) { visit(point.name); });
+        });
     const LatticeToSpace& map = separation_.to_space;
     const double margin = separation_.margin;
     const Double4 row_at =
         lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
     visit_joining(
-        separation_.clusters, y, z, [&](const JoiningSample& sample, const JoinedPoints* points) {
-          const std::size_t x = sample.x;
+        separation_.clusters, y, z,
+        [&](std::uint32_t x, const Joined& all, const JoinedPoints* points) {
           const unsigned parity = separation_.parity(x, y, z);
           const Double4 at = row_at + lanes(map.step_x) * (static_cast<double>(x) - margin);
-          Directions joined = sample.directions & ~JoiningSample::kFlags;
-          const bool is_one = (sample.directions & JoiningSample::kSeveral) == 0;
+          Directions joined = all.directions();
           while (joined != 0) {
-            const Directions component = is_one ? joined : links_.facts(parity, joined).first();
+            const Directions component =
+                all.is_one() ? joined : links_.facts(parity, joined).first();
             joined &= ~component;
             visit_points(parity, component, points, [&](const PlacedPoint& point) {
               const JoinedName& name = point.name;
@@ -111,7 +111,7 @@ class RegularLabelField : public LabelField {
  private:
   struct PlacedPoint {
     JoinedName name;
-    Double4 offset = {};  // from the sample, in millimetres
+    StoredDouble4 offset = {};  // from the sample, in millimetres
   };
 
   PlacedPoint placed(const StarPoint& point, unsigned parity) const {

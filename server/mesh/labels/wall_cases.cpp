@@ -8,7 +8,6 @@
 namespace isomesh::mesh {
 namespace {
 
-using Tetrahedron = std::array<std::uint8_t, 4>;
 using Corners = unsigned;  // a set: bit c is corner c
 using Point = std::array<int, 3>;
 

@@ -20,13 +20,12 @@
 
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/lattice/tetrahedra.h"
+#include "server/mesh/lattice/transpose-inl.h"
 #include "server/mesh/mesh.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-using Word = std::uint64_t;  // 64 samples of a row, the lowest bit the smallest x
-inline constexpr unsigned kWordBits = 64;
 inline constexpr Word kEvenX = 0x5555555555555555;
 
 // The number of words of a row of this many samples.
@@ -51,25 +50,7 @@ HWY_INLINE Word pack_word(const std::array<std::uint8_t, kWordBits>& flags) {
 }
 
 // One bit for each of the eight corners of 64 cells of a row: word c holds corner c of each.
-using CornerWords = std::array<Word, 8>;
-
-// Bit i of byte j of the result is bit j of word i, for the 64 bits of eight words.
-inline std::array<std::uint8_t, kWordBits> transpose(const std::array<Word, 8>& words) {
-  std::array<std::uint8_t, kWordBits> bytes;
-  for (unsigned group = 0; group < 8; ++group) {
-    Word square = 0;  // row r: byte `group` of word r
-    for (unsigned r = 0; r < 8; ++r) square |= (words[r] >> (group * 8) & 0xFF) << (r * 8);
-    // Swaps ever larger squares across the diagonal (H. S. Warren, Hacker's Delight, 7-3).
-    Word swap = (square ^ square >> 7) & 0x00AA00AA00AA00AA;
-    square ^= swap ^ swap << 7;
-    swap = (square ^ square >> 14) & 0x0000CCCC0000CCCC;
-    square ^= swap ^ swap << 14;
-    swap = (square ^ square >> 28) & 0x00000000F0F0F0F0;
-    square ^= swap ^ swap << 28;
-    std::memcpy(bytes.data() + group * std::size_t{8}, &square, sizeof square);
-  }
-  return bytes;
-}
+using CornerWords = BitWords;
 
 // The members of each set of directions, in order.
 inline constexpr auto kMembers = [] {
@@ -128,6 +109,9 @@ class RowShape {
   // 0 or 1: the parity of the sample or cell at x.
   unsigned parity_at(std::size_t x) const { return (x + odd_) & 1; }
 
+  bool is_five() const { return five_; }
+  Word even() const { return even_; }
+
  protected:
   std::uint32_t next_row(std::uint32_t y) const { return has_y_ ? y + 1 : y; }
 
@@ -170,9 +154,6 @@ class RowShape {
     return crossed;
   }
 
-  bool is_five() const { return five_; }
-  Word even() const { return even_; }
-
  private:
   std::size_t last_x_;
   bool has_y_;
@@ -185,6 +166,9 @@ class RowShape {
 // Four lanes, of which the last is idle: positions in double precision until they are stored.
 using Double4 = double __attribute__((vector_size(32)));
 using Float4 = float __attribute__((vector_size(16)));
+// The same in objects that may be allocated: containers take the alignment of wide lanes for that
+// of the oldest processors.
+using StoredDouble4 = double __attribute__((vector_size(32), aligned(16)));
 
 HWY_INLINE Double4 lanes(const std::array<double, 3>& offset) {
   return Double4{offset[0], offset[1], offset[2], 0};
@@ -199,8 +183,8 @@ HWY_INLINE Double4 space_offset(const LatticeToSpace& map, unsigned corner) {
 // The edge of a vertex: where it begins and its direction, in millimetres, relative to the sample
 // that owns it. A vertex on no edge has a line of its own, and is half-way along it.
 struct EdgeFrame {
-  Double4 start = {};
-  Double4 run = {};
+  StoredDouble4 start = {};
+  StoredDouble4 run = {};
 };
 
 // The place of each edge's vertex index, relative to corner 0's first one.

@@ -1,20 +1,12 @@
 #include "server/mesh/lattice/tetrahedra.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace isomesh::mesh {
 namespace {
 
 using Corner = std::uint8_t;
-using Tetrahedron = std::array<Corner, 4>;
-
-// Table 1 of Doi and Koide (see extract.h), whose corners 0..7 are 000 100 110 010 001 101 111 011.
-constexpr std::array<Corner, 8> kPaperCorner = {0, 1, 3, 2, 4, 5, 7, 6};
-constexpr std::array<Tetrahedron, 6> kPaperSix = {
-    {{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6}, {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}}};
-constexpr std::array<Tetrahedron, 5> kPaperFive = {
-    {{0, 2, 3, 7}, {0, 1, 2, 5}, {0, 4, 5, 7}, {2, 5, 6, 7}, {0, 2, 5, 7}}};
-
 using Point = std::array<int, 3>;
 
 Point position(Corner corner) { return {corner & 1, corner >> 1 & 1, corner >> 2 & 1}; }
@@ -80,14 +72,10 @@ void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsigned inside_
 
 // When the program runs: the compiler would take seconds.
 template <std::size_t N>
-CellSplit make_split(const std::array<Tetrahedron, N>& paper, Corner mirror) {
+CellSplit make_split(const std::array<Tetrahedron, N>& tetrahedra) {
   CellSplit split;
   split.tetrahedra = N;
-  for (std::size_t t = 0; t < N; ++t) {
-    for (std::size_t c = 0; c < 4; ++c) {
-      split.corners[t][c] = kPaperCorner[paper[t][c]] ^ mirror;
-    }
-  }
+  std::ranges::copy(tetrahedra, split.corners.begin());
   for (unsigned inside = 0; inside < 256; ++inside) {
     for (std::size_t t = 0; t < N; ++t) {
       add_tetrahedron(split.cases[inside], split.corners[t], inside);
@@ -111,20 +99,36 @@ CellSplit make_split(const std::array<Tetrahedron, N>& paper, Corner mirror) {
   return split;
 }
 
-constexpr Corner kMirrorX = 1;
-
 }  // namespace
 
-CellCase tetrahedron_case(const std::array<std::uint8_t, 4>& corners, unsigned inside) {
+CellCase tetrahedron_case(const Tetrahedron& corners, unsigned inside) {
   CellCase result;
   add_tetrahedron(result, corners, inside);
   return result;
 }
 
+PlacedTriangles placed_triangles(const CellSplit& split) {
+  PlacedTriangles placed = {};
+  for (unsigned inside = 0; inside < split.cases.size(); ++inside) {
+    const auto& edges = split.cases[inside].edges;
+    std::size_t next = 0;
+    for (std::size_t t = 0; t < split.tetrahedra; ++t) {
+      int corners = 0;
+      for (const Corner corner : split.corners[t])
+        corners += static_cast<int>(inside >> corner & 1);
+      const std::size_t triangles = corners == 2 ? 2 : corners == 1 || corners == 3 ? 1 : 0;
+      for (std::size_t i = 0; i < triangles; ++i) {
+        std::ranges::copy(edges[next++], placed[inside][2 * t + i].begin());
+      }
+    }
+  }
+  return placed;
+}
+
 const CellSplit& cell_split(Scheme scheme, bool odd) {
-  static const CellSplit six = make_split(kPaperSix, 0);
-  static const CellSplit five_even = make_split(kPaperFive, 0);
-  static const CellSplit five_odd = make_split(kPaperFive, kMirrorX);
+  static const CellSplit six = make_split(kSixTetrahedra);
+  static const CellSplit five_even = make_split(kFiveTetrahedra[0]);
+  static const CellSplit five_odd = make_split(kFiveTetrahedra[1]);
   if (scheme != Scheme::kFive) return six;
   return odd ? five_odd : five_even;
 }

@@ -1,0 +1,97 @@
+#include "server/mesh/extract/nearness.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace isomesh::mesh {
+namespace {
+
+// The order that ranks stand for.
+bool is_nearer(double iso, double a, double b) {
+  const auto distance = [&](double value) { return static_cast<float>(std::abs(value - iso)); };
+  return std::pair(distance(a), a < iso) < std::pair(distance(b), b < iso);
+}
+
+// At and around a value and a middle of two, also as near as single precision does not resolve.
+std::vector<double> iso_values_near(double value) {
+  std::vector<double> found;
+  for (const double at : {value, value + 0.5}) {
+    for (const double apart : {0.0, 0.25, 1e-3, 1e-11, 1e-20}) {
+      found.push_back(at - apart);
+      found.push_back(at + apart);
+    }
+  }
+  return found;
+}
+
+template <class T, class Rank>
+void expect_order_of_samples(double iso, int step) {
+  const Nearness<T> nearness(iso, false);
+  const bool is_whole = nearness.bytes() == sizeof(std::int32_t);
+  ASSERT_TRUE(is_whole || nearness.bytes() == sizeof(Rank)) << iso;
+  const auto rank = [&](int value) -> std::int32_t {
+    if (is_whole) return nearness.of_value(value);
+    return nearness.template of_sample<Rank>(static_cast<T>(value));
+  };
+  constexpr int kHighest = std::numeric_limits<T>::max();
+  for (int a = std::numeric_limits<T>::lowest(); a <= kHighest; a += step) {
+    if (a < iso) continue;
+    for (int b = std::numeric_limits<T>::lowest(); b < iso && b <= kHighest; ++b) {
+      ASSERT_EQ(rank(a) < rank(b), is_nearer(iso, a, b)) << iso << ": " << a << ", " << b;
+      ASSERT_EQ(rank(b) < rank(a), is_nearer(iso, b, a)) << iso << ": " << a << ", " << b;
+    }
+  }
+}
+
+TEST(Nearness, OrdersBytesAsTheirDistances) {
+  for (const double value : {0.0, 1.0, 77.0, 254.0, 255.0}) {
+    for (const double iso : iso_values_near(value)) {
+      expect_order_of_samples<std::uint8_t, std::int8_t>(iso, 1);
+      expect_order_of_samples<std::int8_t, std::int8_t>(iso - 128, 1);
+    }
+  }
+}
+
+TEST(Nearness, OrdersSixteenBitsAsTheirDistances) {
+  constexpr int kSome = 4099;
+  for (const double iso : iso_values_near(30000)) {
+    expect_order_of_samples<std::uint16_t, std::int16_t>(iso, kSome);
+    expect_order_of_samples<std::int16_t, std::int16_t>(iso - 32768, kSome);
+  }
+}
+
+TEST(Nearness, OrdersMeansOfEightBytesWithThem) {
+  for (const double iso : iso_values_near(100)) {
+    const Nearness<std::uint8_t> nearness(iso, true);
+    if (nearness.bytes() == sizeof(std::int32_t)) continue;  // of values, as above
+    ASSERT_EQ(nearness.bytes(), sizeof(std::int16_t));
+    const auto of_sum = [&](int sum) { return nearness.of_sum<std::int16_t>(sum); };
+    for (int a = 0; a <= 8 * 255; a += 3) {
+      EXPECT_EQ(of_sum(a / 8 * 8),
+                nearness.of_sample<std::int16_t>(static_cast<std::uint8_t>(a / 8)));
+      for (int b = 0; b <= 8 * 255; b += 7) {
+        if ((a / 8.0 < iso) == (b / 8.0 < iso)) continue;
+        ASSERT_EQ(of_sum(a) < of_sum(b), is_nearer(iso, a / 8.0, b / 8.0))
+            << iso << ": " << a << ", " << b;
+      }
+    }
+  }
+}
+
+TEST(Nearness, TakesStepsOfOneByteWhereValuesAreBytes) {
+  EXPECT_EQ(Nearness<std::uint8_t>(60, false).bytes(), 1);
+  EXPECT_EQ(Nearness<std::uint8_t>(60, true).bytes(), 2);
+  EXPECT_EQ(Nearness<std::int16_t>(-300, false).bytes(), 2);
+  EXPECT_EQ(Nearness<std::int16_t>(-300, true).bytes(), 4);
+  EXPECT_EQ(Nearness<float>(0.5, false).bytes(), 4);
+  // The one sample is nearer by less than single precision tells.
+  EXPECT_EQ(Nearness<std::uint8_t>(60 + 1e-11, false).bytes(), 4);
+}
+
+}  // namespace
+}  // namespace isomesh::mesh
