@@ -22,7 +22,7 @@ struct PipelineLimits {
 };
 
 // Increment whenever the same volume and parameters would give different bytes than before.
-inline constexpr const char* kMesherVersion = "11";
+inline constexpr const char* kMesherVersion = "12";
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the
 // results. The same volume and parameters give the same bytes. Throws Error kCancelled if `stop` is
