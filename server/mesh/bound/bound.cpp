@@ -153,7 +153,7 @@ double BoundedMesh::bound_at(std::span<const Vec3> places) const {
 }
 
 bool has_bound(const ExtractOptions& options) {
-  return options.scheme == Scheme::kSix && !options.regularize;
+  return options.scheme != Scheme::kBcc && !options.regularize;
 }
 
 template <class T>

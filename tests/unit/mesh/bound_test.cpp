@@ -46,8 +46,8 @@ std::optional<BoundedMesh> simplified(const test::SampleVolume<T>& volume,
 
 // What a stranger finds: exact distances of random points, both ways.
 template <class T>
-void expect_within(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
-                   double error_mm) {
+void expect_within_by_scheme(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
+                             double error_mm) {
   const Mesh plain = test::extracted(volume, extract);
   Mesh mesh = test::extracted(volume, extract);
   const auto bound = simplified(volume, extract, {.max_error_mm = error_mm}, mesh);
@@ -65,6 +65,15 @@ void expect_within(const test::SampleVolume<T>& volume, const ExtractOptions& ex
   EXPECT_EQ(is.manifold, was.manifold);
   EXPECT_EQ(is.oriented, was.oriented);
   EXPECT_EQ(is.boundary_edges, was.boundary_edges);
+}
+
+template <class T>
+void expect_within(const test::SampleVolume<T>& volume, ExtractOptions extract, double error_mm) {
+  for (const Scheme scheme : {Scheme::kSix, Scheme::kFive}) {
+    SCOPED_TRACE(scheme == Scheme::kSix ? "six" : "five");
+    extract.scheme = scheme;
+    expect_within_by_scheme(volume, extract, error_mm);
+  }
 }
 
 TEST(BoundTest, KeepsAllOfASphereWithinTheError) {
@@ -184,7 +193,7 @@ TEST(BoundTest, GivesTheSameMeshForAnyNumberOfThreads) {
 
 TEST(BoundTest, ClaimsNothingWhereItProvesNothing) {
   const auto volume = test::sample<float>(test::sphere({8, 8, 8}, 6.3), {17, 17, 17});
-  EXPECT_FALSE(has_bound({.scheme = Scheme::kFive}));
+  EXPECT_FALSE(has_bound({.scheme = Scheme::kBcc}));
   EXPECT_FALSE(has_bound({.regularize = true}));
   Mesh mesh = test::extracted(volume, {});
   const std::size_t vertices = mesh.positions.size();
