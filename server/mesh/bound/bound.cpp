@@ -27,7 +27,9 @@ constexpr double kLeastReach = 0.25;  // of the error: with less nothing is gain
 // caps.
 std::uint32_t margin_for(const Metric& metric, double error_mm) {
   constexpr double kMost = 8;
-  return 1 + static_cast<std::uint32_t>(std::min(kMost, std::ceil(error_mm / metric.least_step())));
+  const auto steps =
+      static_cast<std::uint32_t>(std::min(kMost, std::ceil(error_mm / metric.least_step())));
+  return 2 * (1 + steps / 2);  // even: a cell keeps its parity
 }
 
 // What rounding to the grid of the copies, and to the mesh's single precision, may move a place.

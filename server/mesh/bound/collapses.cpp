@@ -28,35 +28,23 @@ double area_of(const Tube& tube, const Context& context) {
   return std::accumulate(areas.begin(), areas.end(), 0.0);
 }
 
-// Numbers the vertices that a block's triangles name, in the order in which they are named.
+// Numbers the vertices that a block's triangles name, in ascending order.
 class Names {
  public:
-  explicit Names(std::size_t corners) {
-    std::size_t size = 16;
-    while (size < corners) size *= 2;
-    slots_.assign(size, {kNone, 0});
+  Names(const Tube& tube, std::span<const std::uint32_t> members) {
+    for (const std::size_t t : members) {
+      names_.insert(names_.end(), tube.triangles[t].begin(), tube.triangles[t].end());
+    }
+    std::ranges::sort(names_);
+    names_.erase(std::unique(names_.begin(), names_.end()), names_.end());
   }
 
-  std::uint32_t number_of(std::uint32_t name) {
-    std::size_t slot = name * std::size_t{0x9E3779B1} & (slots_.size() - 1);
-    for (; slots_[slot].name != name; slot = (slot + 1) & (slots_.size() - 1)) {
-      if (slots_[slot].name != kNone) continue;
-      slots_[slot] = {name, static_cast<std::uint32_t>(names_.size())};
-      names_.push_back(name);
-      break;
-    }
-    return slots_[slot].number;
+  std::uint32_t number_of(std::uint32_t name) const {
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(names_, name) - names_.begin());
   }
   const std::vector<std::uint32_t>& names() const { return names_; }
 
  private:
-  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  struct Slot {
-    std::uint32_t name;
-    std::uint32_t number;
-  };
-
-  std::vector<Slot> slots_;
   std::vector<std::uint32_t> names_;
 };
 
@@ -122,7 +110,7 @@ class Rounds {
   }
 
   Result collapsed(std::span<const std::uint32_t> members, double share, bool is_for_seams) {
-    Names names(3 * members.size());
+    const Names names(tube_, members);
     Block block = block_of(members, is_for_seams, names);
     collapse_block(around_, static_cast<std::size_t>(share * static_cast<double>(members.size())),
                    block);
@@ -142,7 +130,8 @@ class Rounds {
     return result;
   }
 
-  Block block_of(std::span<const std::uint32_t> members, bool is_for_seams, Names& names) const {
+  Block block_of(std::span<const std::uint32_t> members, bool is_for_seams,
+                 const Names& names) const {
     Block block;
     block.triangles.reserve(members.size());
     for (const std::size_t t : members) {
