@@ -71,7 +71,7 @@ std::string prim_of(const LabelSummary& label, std::set<std::string>& taken) {
   return prim;
 }
 
-struct Object {
+struct MeshPrim {
   std::string prim;
   std::string metadata;         // lines
   std::array<double, 3> color;  // sRGB
@@ -89,7 +89,7 @@ class Stage {
           "    upAxis = \"Y\"\n)\n\ndef Xform \"isomesh\" (\n    kind = \"component\"\n)\n{\n");
   }
 
-  void add(const Object& object, const mesh::Mesh& mesh, const mesh::Context& context) {
+  void add(const MeshPrim& object, const mesh::Mesh& mesh, const mesh::Context& context) {
     check_signed_indices(mesh.positions.size(), mesh.triangles.size(), format_);
     mesh::Buffer<mesh::Vec3> normals;
     if (has_normals_) vertex_normals(mesh, {context.stop, nullptr}, normals);

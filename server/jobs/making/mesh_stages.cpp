@@ -53,7 +53,7 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
 // whole surface that the samples define.
 const char* why_measured(const MeshParameters& parameters) {
   if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
-  if (numbered(parameters.scheme) != Scheme::kSix) return "The proof is for scheme 6.";
+  if (numbered(parameters.scheme) == Scheme::kBcc) return "The proof is for schemes 5 and 6.";
   if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
   if (!parameters.components.keeps_all()) return "The proof is for all components together.";
   return nullptr;

@@ -27,7 +27,9 @@ constexpr double kLeastReach = 0.25;  // of the error: with less nothing is gain
 // caps.
 std::uint32_t margin_for(const Metric& metric, double error_mm) {
   constexpr double kMost = 8;
-  return 1 + static_cast<std::uint32_t>(std::min(kMost, std::ceil(error_mm / metric.least_step())));
+  const auto steps =
+      static_cast<std::uint32_t>(std::min(kMost, std::ceil(error_mm / metric.least_step())));
+  return 2 * (1 + steps / 2);  // even: a cell keeps its parity
 }
 
 // What rounding to the grid of the copies, and to the mesh's single precision, may move a place.
@@ -48,59 +50,46 @@ double rounding_of(const Dims& dims, const Metric& metric) {
 // The triangles of the components of S in `which`, with all vertices on lattice edges, instead of
 // what has become of them. A component of a few voxels may have been folded until T+ and T- lay
 // around it no longer.
-void restore(const StartSurface& surface, std::span<const std::uint32_t> components,
+void restore(const StartSurface& surface, const Components& components,
              std::span<const std::uint32_t> which, Tube& tube) {
-  const std::size_t crossings = surface.crossings.size();
-  std::vector<std::uint8_t> back(crossings, 0);
+  std::vector<std::uint8_t> back(components.count, 0);
   for (const std::uint32_t component : which) back[component] = 1;
-  const auto goes_back = [&](const Triangle& triangle) {
-    return back[components[triangle[0]]] != 0;
+  const auto goes_back = [&](std::uint32_t crossing) {
+    return back[components.of_vertex[crossing]] != 0;
   };
-  std::erase_if(tube.triangles, goes_back);
-  for (Triangle triangle : surface.mesh.triangles) {
-    if (!goes_back(triangle)) continue;
-    if (!surface.metric.is_left_handed()) std::swap(triangle[1], triangle[2]);
-    tube.triangles.push_back(triangle);
-  }
-  for (std::size_t v = 0; v < crossings; ++v) {
-    if (back[components[v]] != 0) tube.vertices[v] = on_lattice_edge(surface, v);
-  }
-}
-
-// Forgets the vertices that no triangle names. The others, in their order: which they were.
-std::vector<std::uint32_t> compact(Tube& tube) {
-  std::vector<std::uint32_t> number(tube.vertices.size(), 0);
-  for (const Triangle& triangle : tube.triangles) {
-    for (const std::uint32_t v : triangle) number[v] = 1;
-  }
-  std::vector<std::uint32_t> origins;
+  std::erase_if(tube.triangles,
+                [&](const Triangle& triangle) { return goes_back(tube.origins[triangle[0]]); });
+  std::vector<std::uint32_t> number(surface.crossings.size());
   for (std::uint32_t v = 0; v < number.size(); ++v) {
-    if (number[v] == 0) continue;
-    number[v] = static_cast<std::uint32_t>(origins.size());
-    tube.vertices[origins.size()] = tube.vertices[v];
-    origins.push_back(v);
+    if (!goes_back(v)) continue;
+    number[v] = static_cast<std::uint32_t>(tube.vertices.size());
+    tube.add(on_lattice_edge(surface, v), v);
   }
-  tube.vertices.resize(origins.size());
-  for (Triangle& triangle : tube.triangles) {
-    for (std::uint32_t& v : triangle) v = number[v];
+  for (const auto& [a, b, c] : surface.mesh.triangles) {
+    if (!goes_back(a)) continue;
+    tube.triangles.push_back({number[a], number[b], number[c]});
+    if (!surface.metric.is_left_handed()) {
+      std::swap(tube.triangles.back()[1], tube.triangles.back()[2]);
+    }
   }
-  return origins;
+  tube.compact();
 }
 
-// The tube without the components of S that it lies around no longer, and with their plain surface
-// instead. Of each of its vertices: which crossing it began as.
-std::vector<std::uint32_t> restore_lost(const StartSurface& surface, const Context& context,
-                                        Tube& tube) {
-  const auto& crossings = surface.crossings;
-  const std::span<const Triangle> extracted = surface.mesh.triangles.span();
-  const std::vector<std::uint32_t> components = components_of(crossings.size(), extracted);
-  std::vector<std::uint32_t> all(crossings.size());
-  std::iota(all.begin(), all.end(), 0U);
-  const auto lost =
-      uncovered(surface.field, {crossings, extracted, tube.vertices, tube.triangles, all},
-                components, odd_edges(tube.vertices.size(), tube.triangles), context);
-  if (!lost.empty()) restore(surface, components, lost, tube);
-  return compact(tube);
+// Whether the tube is proven; gives it its lost components back, if that is what is wrong with it.
+bool is_proven(const StartSurface& surface, const Context& context, Tube& tube) {
+  Components components;
+  find_components(surface.mesh, context, components);
+  const auto proof_of_tube = [&] {
+    return prove(surface.field,
+                 {surface.crossings, surface.mesh.triangles.span(), components, tube.vertices,
+                  tube.triangles, tube.origins},
+                 context);
+  };
+  tube.compact();
+  const Proof proof = proof_of_tube();
+  if (proof.holds() || !proof.is_clear()) return proof.holds();
+  restore(surface, components, proof.uncovered, tube);
+  return proof_of_tube().holds();
 }
 
 BoundedMesh describe(const Metric& metric, const Tube& tube) {
@@ -116,29 +105,27 @@ BoundedMesh describe(const Metric& metric, const Tube& tube) {
   return result;
 }
 
-// Gives the mesh the tube's surface.
-void write(const Metric& metric, std::span<const std::uint32_t> origins,
-           std::span<const Vec3> places, const Tube& tube, Mesh& mesh) {
-  for (std::size_t v = 0; v < origins.size(); ++v) mesh.positions[origins[v]] = places[v];
+// Gives the mesh the tube's surface, at those places.
+void write(const Metric& metric, std::span<const Vec3> places, const Tube& tube, Mesh& mesh) {
+  for (std::size_t v = 0; v < places.size(); ++v) mesh.positions[tube.origins[v]] = places[v];
   std::vector<Triangle> triangles;
   triangles.reserve(tube.triangles.size());
   for (const auto& [a, b, c] : tube.triangles) {
-    triangles.push_back({origins[a], origins[b], origins[c]});
+    triangles.push_back({tube.origins[a], tube.origins[b], tube.origins[c]});
     if (!metric.is_left_handed()) std::swap(triangles.back()[1], triangles.back()[2]);
   }
   std::vector<WallSides> no_sides;
   replace_triangles(triangles, no_sides, mesh);
 }
 
-// Gives the mesh the tube's surface, whose places are rounded to single precision.
-BoundedMesh deliver(const Metric& metric, std::span<const std::uint32_t> origins, const Tube& tube,
-                    double shift_mm, double max_error_mm, Mesh& mesh) {
+BoundedMesh deliver(const StartSurface& surface, const Tube& tube, double shift_mm,
+                    double max_error_mm, Mesh& mesh) {
   std::vector<Vec3> places;
   for (const Vertex& vertex : tube.vertices) {
-    const Vecf place = narrow(metric.place(wide(vertex.p)));
+    const Vecf place = narrow(surface.metric.place(wide(vertex.p)));
     places.push_back({place.x, place.y, place.z});
   }
-  BoundedMesh result = describe(metric, tube);
+  BoundedMesh result = describe(surface.metric, tube);
   result.shift_mm = shift_mm;
   result.triangles_before = mesh.triangles.size();
   result.bound_mm = result.bound_at(places);
@@ -146,7 +133,7 @@ BoundedMesh deliver(const Metric& metric, std::span<const std::uint32_t> origins
   if (!(result.bound_mm <= max_error_mm)) {
     throw Error(ErrorCode::kInternal, "a proven distance is larger than its limit");
   }
-  write(metric, origins, places, tube, mesh);
+  write(surface.metric, places, tube, mesh);
   return result;
 }
 
@@ -168,7 +155,7 @@ double BoundedMesh::bound_at(std::span<const Vec3> places) const {
 }
 
 bool has_bound(const ExtractOptions& options) {
-  return options.scheme == Scheme::kSix && !options.regularize;
+  return options.scheme != Scheme::kBcc && !options.regularize;
 }
 
 template <class T>
@@ -186,12 +173,12 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
       extract.close ? margin_for(Metric(lattice.to_space), options.max_error_mm) : 0;
   const std::optional<Field> field = make_field(lattice, extract, margin, context);
   if (!field) return unproven("Single precision cannot hold the samples' differences.");
-  const std::vector<Crossing> crossings = crossings_of(*field, context);
-  if (crossings.size() != mesh.positions.size()) {
+  const Crossings crossings = crossings_of(*field, context);
+  if (crossings.all.size() != mesh.positions.size()) {
     return unproven("The surface is not the whole one of the samples.");
   }
   const Metric metric = Metric(lattice.to_space).before(margin);
-  const double shift = shift_of(lattice, extract, *field, crossings);
+  const double shift = shift_of(lattice, extract, *field, crossings.all, context);
   const double reach =
       options.max_error_mm - options.rounding_mm - shift - rounding_of(field->dims, metric);
   if (!(reach > kLeastReach * options.max_error_mm)) {
@@ -199,7 +186,7 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
   }
 
   const StartSurface surface = {*field,
-                                crossings,
+                                crossings.all,
                                 metric,
                                 mesh,
                                 reach,
@@ -208,13 +195,9 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
   std::optional<Tube> tube =
       make_start(surface, find_clusters(lattice, extract, *field, crossings, context), context);
   if (!tube) return unproven("Samples differ too little from the iso-value.");
-  collapse_edges(*field, metric, {.reach_mm = reach, .triangles = options.triangles}, context,
-                 *tube);
-  const std::vector<std::uint32_t> origins = restore_lost(surface, context, *tube);
-  const Surfaces surfaces = {crossings, mesh.triangles.span(), tube->vertices, tube->triangles,
-                             origins};
-  if (!prove(*field, surfaces, context).holds()) return unproven("The final check failed.");
-  return deliver(metric, origins, *tube, shift, options.max_error_mm, mesh);
+  collapse_edges({*field, metric, reach}, options.triangles, context, *tube);
+  if (!is_proven(surface, context, *tube)) return unproven("The final check failed.");
+  return deliver(surface, *tube, shift, options.max_error_mm, mesh);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                                       \

@@ -45,8 +45,8 @@ struct BoundedMesh {
   double bound_at(std::span<const Vec3> places) const;
 };
 
-// Whether simplify_within proves anything about such a surface: one of six tetrahedra a cell that
-// is not regularised.
+// Whether simplify_within proves anything about such a surface: one of five or six tetrahedra a
+// cell that is not regularised.
 bool has_bound(const ExtractOptions& options);
 
 // Simplifies `mesh` in place, which extract_surface made of the lattice with these options, whole,

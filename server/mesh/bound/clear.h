@@ -1,9 +1,16 @@
 // Whether F has one sign on a whole triangle: what every collapse asks; private to this folder.
 //
-// F is linear on each piece that the tetrahedra cut out of a triangle, so its sign is that at the
-// corners of the pieces. The planes of Kuhn's split are x, y, z, x-y, y-z, x-z = whole number, and
-// they meet in the lines through samples in seven directions. So those corners are the triangle's
-// own, the places where its edges cross a plane, and those where such a line crosses it.
+// F is linear on each piece that the tetrahedra cut out of a triangle. So its sign on the triangle
+// is that at the corners of the pieces. A corner of a piece lies where three planes meet, the
+// triangle's own among them, or on the triangle's boundary. So the corners are
+//   1. the triangle's own corners: point(),
+//   2. the places where one of its edges crosses a plane: edge(),
+//   3. the places where a line in which planes meet crosses it: inside().
+// On such a line F is linear between one sample and the next.
+//
+// Places lie on a grid of 2^-16 voxels (tube.h) and are counted from a sample nearby. So the
+// numbers of planes are exact in single precision. Two such numbers tell how a line passes the
+// triangle's edges by the signs of areas, and those are exact in double precision.
 #pragma once
 
 #include <array>
@@ -11,27 +18,22 @@
 #include <cstdint>
 
 #include "server/mesh/bound/field.h"
-#include "server/mesh/bound/tube.h"
+#include "server/mesh/bound/planes.h"
 #include "server/mesh/bound/vec.h"
 
 namespace isomesh::mesh::bound {
 
-// A point, by the numbers of the six families of planes, relative to Clear::base(). Exact within
-// 128 voxels. The last two are of no family and never meet a plane.
-struct alignas(32) PlaneNumbers {
-  std::array<float, 8> of;
-};
-
 // Not thread safe: one for each thread. `field` must outlive it.
+template <class Planes>
 class Clear {
  public:
   explicit Clear(const Field& field);
 
-  // What at() is relative to from now on: the sample before `a`, which is within the volume.
-  void base(Vecf a);
-  bool contains(Vecf a) const;
-  PlaneNumbers at(Vecf a) const;
-  double value(const PlaneNumbers& a) const { return value(a.of[0], a.of[1], a.of[2]); }
+  // What at() is relative to from now on: a sample before `a`, which is within the volume.
+  // Returns that sample.
+  Vecf base(Vecf a);
+  PlaneNumbers at(Vecf a) const { return Planes::numbers(a - base_); }
+  double value(const PlaneNumbers& a) const { return value(Vecd{a.of[0], a.of[1], a.of[2]}); }
 
   // Whether sign * F is positive: at a point, between two points, and between three, each without
   // the ends and edges, which the others tell.
@@ -41,22 +43,32 @@ class Clear {
   // sign * F where the last of them found that it was not.
   double failed() const { return failed_; }
 
- private:
-  struct Line;
+  // The same at one corner: where the edge crosses the plane of that number of a family, and where
+  // the line i, j of a direction crosses the triangle, if it does.
+  bool crossing(const PlaneNumbers& a, const PlaneNumbers& b, std::size_t family, double plane,
+                double sign);
+  bool line(const PlaneNumbers& a, const PlaneNumbers& b, const PlaneNumbers& c,
+            std::size_t direction, double i, double j, double sign);
 
-  double value(double x, double y, double z) const;
+  const float* at_base() const { return at_base_; }
+
+ private:
+  struct LineSteps {
+    std::ptrdiff_t first, second, along;
+  };
+
+  double value(Vecd place) const;
   bool is_positive(double value);
-  bool lines(const PlaneNumbers& a, const PlaneNumbers& b, const PlaneNumbers& c,
-             std::size_t direction, const std::array<float, 8>& low,
-             const std::array<float, 8>& high, double sign);
 
   const Field& field_;
-  std::array<std::ptrdiff_t, 7> step_, first_, second_;  // by direction: along it, and to line i, j
-  std::array<std::ptrdiff_t, 8> next_, before_last_;     // in a cell, by the order of x, y and z
-  std::ptrdiff_t last_;
+  const SampleSteps steps_;
+  std::array<LineSteps, Planes::kLines.size()> lines_;
   Vecf base_;
   const float* at_base_ = nullptr;
   double failed_ = 0;
 };
+
+extern template class Clear<SixPlanes>;
+extern template class Clear<FivePlanes>;
 
 }  // namespace isomesh::mesh::bound

@@ -12,21 +12,24 @@
 namespace isomesh::mesh::bound {
 namespace {
 
-// The clusters around the samples of one layer.
-class LayerClusters {
+// The clusters around the samples of one plane of the field.
+class PlaneClusters {
  public:
-  // `before`: how many layers of the field are before what is marched over.
-  LayerClusters(const Field& field, std::uint32_t before, std::span<const Crossing> crossings)
-      : dims_(field.dims), before_(before), crossings_(crossings), links_(links_of(Scheme::kSix)) {}
+  PlaneClusters(const Field& field, const Crossings& crossings, std::uint32_t z)
+      : field_(field),
+        links_(links_of(field.scheme)),
+        below_(field, crossings, z == 0 ? 0 : z - 1),
+        own_(field, crossings, z),
+        begin_(std::size_t{z} * field.dims.x * field.dims.y) {}
 
-  Clusters find(const ClusterLayer& layer, std::size_t z) const {
+  // `before`: how many samples of a row, and rows, are before those of the layer.
+  Clusters find(const ClusterLayer& layer, std::uint32_t before) const {
     Clusters clusters;
     for (std::uint32_t y = 0; y + 1 < layer.row_begin.size(); ++y) {
-      const std::size_t row = ((z + before_) * dims_.y + y + before_) * dims_.x + before_;
+      const std::size_t row = begin_ + (y + before) * field_.dims.x + before;
       for (const JoiningWord& word : layer.row(y)) {
         visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
-          add(joined.directions(), static_cast<std::uint32_t>(row + word.word * 64 + bit),
-              clusters);
+          add(joined.directions(), row + std::size_t{word.word} * 64 + bit, clusters);
         });
       }
     }
@@ -34,64 +37,79 @@ class LayerClusters {
   }
 
  private:
-  void add(Directions left, std::uint32_t number, Clusters& clusters) const {
+  void add(Directions left, std::size_t number, Clusters& clusters) const {
+    const std::size_t x = number % field_.dims.x;
+    const std::size_t y = number / field_.dims.x % field_.dims.y;
+    const auto parity =
+        static_cast<unsigned>((x + y + begin_ / (std::size_t{field_.dims.x} * field_.dims.y)) & 1);
     while (left != 0) {
-      const Directions component = links_.facts(0, left).first();
+      const Directions component = links_.facts(parity, left).first();
       left &= ~component;
       for (Directions rest = component; rest != 0; rest &= rest - 1) {
         const auto d = static_cast<std::size_t>(std::countr_zero(rest));
-        clusters.crossings.push_back(crossing(number, links_.directions()[d].step));
+        clusters.crossings.push_back(crossing(number, links_.directions()[d]));
       }
       std::sort(clusters.crossings.begin() + clusters.begin.back(), clusters.crossings.end());
       clusters.begin.push_back(static_cast<std::uint32_t>(clusters.crossings.size()));
     }
   }
 
-  // The number of the crossing between a sample and its neighbour. Crossings are in the order of
-  // their first samples, and of their second ones.
-  std::uint32_t crossing(std::uint32_t sample, const std::array<int, 3>& step) const {
-    const auto other = static_cast<std::uint32_t>(
-        std::ptrdiff_t{sample} + step[0] +
-        std::ptrdiff_t{dims_.x} * (step[1] + std::ptrdiff_t{dims_.y} * step[2]));
-    const std::pair ends(std::min(sample, other), std::max(sample, other));
-    const auto found = std::ranges::lower_bound(crossings_, ends, {}, [](const Crossing& crossing) {
-      return std::pair(std::min(crossing.inside, crossing.outside),
-                       std::max(crossing.inside, crossing.outside));
-    });
-    return static_cast<std::uint32_t>(found - crossings_.begin());
+  std::uint32_t crossing(std::size_t sample, const LinkDirection& direction) const {
+    const std::size_t owner =
+        sample - static_cast<std::size_t>(sample_offset(field_.dims, direction.corner));
+    return (owner < begin_ ? below_ : own_).number_of(owner, direction.place);
   }
 
-  const Dims& dims_;
-  const std::uint32_t before_;
-  const std::span<const Crossing> crossings_;
+  const Field& field_;
   const Links& links_;
+  const PlaneCrossings below_;
+  const PlaneCrossings own_;
+  const std::size_t begin_;
 };
+
+Clusters join(std::span<const Clusters> layers, const Context& context) {
+  std::vector<std::size_t> sets = {0};
+  std::vector<std::size_t> crossings = {0};
+  for (const Clusters& layer : layers) {
+    sets.push_back(sets.back() + layer.size());
+    crossings.push_back(crossings.back() + layer.crossings.size());
+  }
+  Clusters all;
+  all.begin.resize(sets.back() + 1);
+  all.crossings.resize(crossings.back());
+  parallel_for(context, layers.size(), [&](std::size_t z) {
+    for (std::size_t k = 0; k < layers[z].size(); ++k) {
+      all.begin[sets[z] + k + 1] =
+          static_cast<std::uint32_t>(crossings[z] + layers[z].begin[k + 1]);
+    }
+    std::ranges::copy(layers[z].crossings,
+                      all.crossings.begin() + static_cast<std::ptrdiff_t>(crossings[z]));
+  });
+  return all;
+}
 
 }  // namespace
 
 template <class T>
 Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
-                       std::span<const Crossing> crossings, const Context& context) {
+                       const Crossings& crossings, const Context& context) {
   ExtractOptions joining = options;
   joining.regularize = true;
   const SurfaceCount count = count_surface(lattice, joining, context);
   std::vector<Clusters> layers(count.clusters.size());
-  const LayerClusters finder(field, options.close ? field.margin - 1 : 0, crossings);
-  parallel_for(context, layers.size(),
-               [&](std::size_t z) { layers[z] = finder.find(count.clusters[z], z); });
-  Clusters all;
-  for (const Clusters& layer : layers) {
-    const auto shift = static_cast<std::uint32_t>(all.crossings.size());
-    all.crossings.insert(all.crossings.end(), layer.crossings.begin(), layer.crossings.end());
-    for (std::size_t k = 1; k < layer.begin.size(); ++k)
-      all.begin.push_back(shift + layer.begin[k]);
-  }
-  return all;
+  const std::uint32_t before = options.close ? field.margin - 1 : 0;
+  parallel_for(context, layers.size(), [&](std::size_t z) {
+    const ClusterLayer& layer = count.clusters[z];
+    if (layer.words.empty()) return;
+    const auto plane = static_cast<std::uint32_t>(z + before);
+    layers[z] = PlaneClusters(field, crossings, plane).find(layer, before);
+  });
+  return join(layers, context);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                               \
   template Clusters find_clusters(const Lattice<T>&, const ExtractOptions&, const Field&, \
-                                  std::span<const Crossing>, const Context&);
+                                  const Crossings&, const Context&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -24,9 +24,9 @@ struct Clusters {
   }
 };
 
-// `crossings`: all of the field's, in their order. Throws Error kCancelled.
+// Throws Error kCancelled.
 template <class T>
 Clusters find_clusters(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
-                       std::span<const Crossing> crossings, const Context& context);
+                       const Crossings& crossings, const Context& context);
 
 }  // namespace isomesh::mesh::bound

@@ -1,17 +1,21 @@
 // The edges of one block of triangles; private to this folder.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
-#include "server/mesh/bound/clear.h"
-#include "server/mesh/bound/collapses.h"
-#include "server/mesh/bound/quadric.h"
+#include "server/mesh/bound/field.h"
+#include "server/mesh/bound/tube.h"
 
 namespace isomesh::mesh::bound {
+
+// What collapses know besides the tube.
+struct CollapseSurroundings {
+  const Field& field;
+  const Metric& metric;
+  double reach_mm = 0;  // how far T+ and T- are put from T
+};
 
 // Some triangles of a tube with vertices numbered anew.
 struct Block {
@@ -24,7 +28,6 @@ struct Block {
 
 // Collapses what may go until `least` triangles are left, and leaves only the triangles that
 // remain. Vertices on the block's boundary keep their places and are set in `stays`.
-void collapse_block(const Field& field, const Metric& metric, double reach_mm, std::size_t least,
-                    Block& block);
+void collapse_block(const CollapseSurroundings& around, std::size_t least, Block& block);
 
 }  // namespace isomesh::mesh::bound

@@ -7,21 +7,16 @@
 
 #include <cstdint>
 
-#include "server/mesh/bound/field.h"
+#include "server/mesh/bound/collapse_block.h"
 #include "server/mesh/bound/tube.h"
 #include "server/mesh/context.h"
 
 namespace isomesh::mesh::bound {
 
-struct CollapseOptions {
-  double reach_mm = 0;          // how far T+ and T- are put from T
-  std::uint64_t triangles = 0;  // enough of them gone when there are so many; 0: as few as may be
-};
-
-// Removes triangles of `tube`; vertices that none names stay, unused. Those of the border are not
-// moved. No new triangle is a needle or lies on its back. The same for any number of threads.
-// Throws Error kCancelled.
-void collapse_edges(const Field& field, const Metric& metric, const CollapseOptions& options,
-                    const Context& context, Tube& tube);
+// Removes triangles of `tube` until there are `least`, 0: as few as may be; vertices that none
+// names stay, unused. Those of the border are not moved. No new triangle is a needle or lies on its
+// back. The same for any number of threads. Throws Error kCancelled.
+void collapse_edges(const CollapseSurroundings& around, std::uint64_t least, const Context& context,
+                    Tube& tube);
 
 }  // namespace isomesh::mesh::bound

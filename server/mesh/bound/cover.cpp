@@ -6,13 +6,12 @@
 #include <numeric>
 #include <random>
 
-#include "server/mesh/parallel.h"
+#include "server/mesh/bound/chunks.h"
 
 namespace isomesh::mesh::bound {
 namespace {
 
 constexpr int kAttempts = 5;
-constexpr std::size_t kCrossedPerChunk = 1 << 14;
 constexpr double kTooNear = 1e-11;
 
 // A ray from a point of a component along x; behind the volume's last face it goes on along y, and
@@ -36,7 +35,7 @@ struct Ray {
   bool is_odd() const { return !is_too_near && (crossed & 1) != 0; }
 };
 
-constexpr std::uint32_t kNoRay = ~std::uint32_t{0};
+constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
 struct Start {
   Vecd from;
@@ -45,18 +44,17 @@ struct Start {
 
 class Rays {
  public:
-  Rays(const Field& field, const Surfaces& surfaces, std::span<const std::uint32_t> components)
+  Rays(const Field& field, const Surfaces& surfaces)
       : surfaces_(surfaces),
-        components_(components),
         columns_y_(field.dims.y),
         begin_(std::size_t{field.dims.y} * field.dims.z + 1, 0),
-        ray_of_(components.size(), kNoRay),
+        ray_of_(surfaces.components.count, kNone),
         last_x_(static_cast<float>(field.dims.x - 1)),
         last_y_(static_cast<float>(field.dims.y - 1)) {}
 
   void set(std::vector<Start> starts) {
     std::ranges::fill(begin_, 0);
-    std::ranges::fill(ray_of_, kNoRay);
+    std::ranges::fill(ray_of_, kNone);
     rays_.clear();
     std::ranges::sort(starts, {}, [&](const Start& start) { return column_of(start.from); });
     for (const Start& start : starts) {
@@ -91,7 +89,7 @@ class Rays {
   void cross_behind(std::span<const Edge> edges, Vecf Vertex::*side) {
     for (const auto& [a, b] : edges) {
       const std::uint32_t index = ray_of_[component_of(a)];
-      if (index == kNoRay || !is_behind(a) || !is_behind(b)) continue;
+      if (index == kNone || !is_behind(a) || !is_behind(b)) continue;
       Ray& ray = rays_[index];
       cross_edge(place(a, side), place(b, side), ray);
       for (const std::uint32_t v : {a, b}) {
@@ -101,9 +99,7 @@ class Rays {
   }
 
   std::span<const Ray> rays() const { return rays_; }
-  std::uint32_t component_of(std::uint32_t vertex) const {
-    return components_[surfaces_.origins[vertex]];
-  }
+  std::uint32_t component_of(std::uint32_t vertex) const { return surfaces_.component_of(vertex); }
 
  private:
   std::size_t column_of(Vecd p) const {
@@ -142,10 +138,9 @@ class Rays {
   }
 
   const Surfaces& surfaces_;
-  const std::span<const std::uint32_t> components_;
   const std::size_t columns_y_;
   std::vector<std::size_t> begin_;     // of each column's rays
-  std::vector<std::uint32_t> ray_of_;  // of each component, by its first crossing
+  std::vector<std::uint32_t> ray_of_;  // of each component
   std::vector<Ray> rays_;
   const float last_x_;
   const float last_y_;
@@ -160,27 +155,34 @@ double area_of(const Field& field, const Surfaces& surfaces, const Triangle& tri
   return length(cross(place(1) - a, place(2) - a));
 }
 
-// A random point of the largest triangle of each of the components: around a sample at the
+// A triangle of each component of S: the first large one, or the largest. Around a sample at the
 // iso-value others are too small to tell a ray from an edge.
-std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
-                        std::span<const std::uint32_t> components,
-                        std::span<const std::uint32_t> left, std::mt19937& random) {
-  std::vector<double> largest(components.size(), -1);
-  std::vector<std::uint32_t> triangle_of(components.size(), kNoRay);
+std::vector<std::uint32_t> starts_of(const Field& field, const Surfaces& surfaces) {
+  constexpr double kLarge = 0.02;
+  std::vector<double> largest(surfaces.components.count, -1);
+  std::vector<std::uint32_t> starts(surfaces.components.count, kNone);
   for (std::uint32_t t = 0; t < surfaces.extracted.size(); ++t) {
-    const std::uint32_t component = components[surfaces.extracted[t][0]];
+    const std::uint32_t component = surfaces.components.of_vertex[surfaces.extracted[t][0]];
+    if (largest[component] > kLarge) continue;
     const double area = area_of(field, surfaces, surfaces.extracted[t]);
     if (!(area > largest[component])) continue;
     largest[component] = area;
-    triangle_of[component] = t;
+    starts[component] = t;
   }
+  return starts;
+}
+
+// A random point of the triangle of each of the components.
+std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
+                        std::span<const std::uint32_t> triangles,
+                        std::span<const std::uint32_t> left, std::mt19937& random) {
   const auto share = [&] { return 0.1 + static_cast<double>(random() >> 8) / (1 << 24); };
   std::vector<Start> starts;
   for (const std::uint32_t component : left) {
-    if (triangle_of[component] == kNoRay) continue;  // nothing is there to be covered
+    if (triangles[component] == kNone) continue;  // nothing is there to be covered
     Vecd sum;
     double weight = 0;
-    for (const std::uint32_t v : surfaces.extracted[triangle_of[component]]) {
+    for (const std::uint32_t v : surfaces.extracted[triangles[component]]) {
       const double part = share();
       sum = sum + zero_between(field, surfaces.crossings[v]) * part;
       weight += part;
@@ -192,70 +194,19 @@ std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
 
 }  // namespace
 
-std::vector<Edge> odd_edges(std::size_t vertices, std::span<const Triangle> triangles) {
-  std::vector<std::size_t> begin(vertices + 1, 0);
-  const auto visit = [&](auto&& take) {
-    for (const auto& [a, b, c] : triangles) {
-      take(std::min(a, b), std::max(a, b));
-      take(std::min(b, c), std::max(b, c));
-      take(std::min(c, a), std::max(c, a));
-    }
-  };
-  visit([&](std::uint32_t a, std::uint32_t) { ++begin[a + 1]; });
-  for (std::size_t v = 0; v < vertices; ++v) begin[v + 1] += begin[v];
-  std::vector<std::uint32_t> ends(begin.back());
-  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-  visit([&](std::uint32_t a, std::uint32_t b) { ends[next[a]++] = b; });
-  std::vector<Edge> odd;
-  for (std::uint32_t a = 0; a < vertices; ++a) {
-    const auto first = ends.begin() + static_cast<std::ptrdiff_t>(begin[a]);
-    const auto last = ends.begin() + static_cast<std::ptrdiff_t>(begin[a + 1]);
-    std::sort(first, last);
-    for (auto same = first; same != last;) {
-      const auto end = std::upper_bound(same, last, *same);
-      if ((end - same) % 2 != 0) odd.push_back({a, *same});
-      same = end;
-    }
-  }
-  return odd;
-}
-
-std::vector<std::uint32_t> components_of(std::size_t crossings,
-                                         std::span<const Triangle> triangles) {
-  std::vector<std::uint32_t> up(crossings);
-  std::iota(up.begin(), up.end(), 0U);
-  const auto root = [&](std::uint32_t a) {
-    while (up[a] != a) a = up[a] = up[up[a]];
-    return a;
-  };
-  for (const auto& [a, b, c] : triangles) {
-    const std::uint32_t least = std::min({root(a), root(b), root(c)});
-    up[root(a)] = up[root(b)] = up[root(c)] = least;
-  }
-  for (std::uint32_t a = 0; a < crossings; ++a) up[a] = root(a);
-  return up;
-}
-
 std::vector<std::uint32_t> uncovered(const Field& field, const Surfaces& surfaces,
-                                     std::span<const std::uint32_t> components,
                                      std::span<const Edge> border, const Context& context) {
-  std::vector<std::uint32_t> left;
-  for (std::uint32_t e = 0; e < components.size(); ++e) {
-    if (components[e] == e) left.push_back(e);
-  }
-  Rays rays(field, surfaces, components);
+  std::vector<std::uint32_t> left(surfaces.components.count);
+  std::iota(left.begin(), left.end(), 0U);
+  Rays rays(field, surfaces);
+  const std::vector<std::uint32_t> triangles = starts_of(field, surfaces);
   std::mt19937 random(1);
   for (int attempt = 0; attempt < kAttempts && !left.empty(); ++attempt) {
-    rays.set(cast(field, surfaces, components, left, random));
-    const std::size_t count = surfaces.triangles.size();
-    parallel_for(context, (count + kCrossedPerChunk - 1) / kCrossedPerChunk,
-                 [&](std::size_t chunk) {
-                   for (std::size_t t = chunk * kCrossedPerChunk;
-                        t < std::min(count, (chunk + 1) * kCrossedPerChunk); ++t) {
-                     rays.cross(surfaces.triangles[t], &Vertex::in);
-                     rays.cross(surfaces.triangles[t], &Vertex::out);
-                   }
-                 });
+    rays.set(cast(field, surfaces, triangles, left, random));
+    for_each(context, surfaces.triangles.size(), [&](std::size_t t) {
+      rays.cross(surfaces.triangles[t], &Vertex::in);
+      rays.cross(surfaces.triangles[t], &Vertex::out);
+    });
     rays.cross_behind(border, &Vertex::in);
     rays.cross_behind(border, &Vertex::out);
     left.clear();

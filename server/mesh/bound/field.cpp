@@ -1,11 +1,15 @@
 #include "server/mesh/bound/field.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "proto/samples.h"
+#include "server/mesh/bound/chunks.h"
+#include "server/mesh/lattice/tetrahedra.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh::bound {
@@ -22,38 +26,35 @@ double largest_difference(const Lattice<T>& lattice, double iso) {
                   std::abs(static_cast<double>(*high) - iso));
 }
 
-// The crossed edges that a sample owns, as bits by their direction 1..7.
-unsigned crossed_edges(const Field& field, std::size_t sample, unsigned within) {
-  const float* const at = field.values.data() + sample;
-  unsigned crossed = 0;
-  for (unsigned d = 1; d < 8; ++d) {
-    if ((d & ~within) != 0) continue;
-    const bool differs = (*at > 0) != (at[sample_offset(field.dims, d)] > 0);
-    crossed |= static_cast<unsigned>(differs) << d;
-  }
-  return crossed;
-}
-
-// The directions that stay within the volume.
-unsigned steps_within(const Dims& dims, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-  return static_cast<unsigned>(x + 1 < dims.x) | static_cast<unsigned>(y + 1 < dims.y) << 1 |
-         static_cast<unsigned>(z + 1 < dims.z) << 2;
-}
-
+// Calls visit(sample, its crossed edges as bits by their direction 1..7, the split of its cell) for
+// those of a layer that own any. A sample's edges lie in the cell whose corner 0 it is.
 template <class Visit>
-void visit_crossings(const Field& field, std::uint32_t z, Visit visit) {
+void visit_crossed(const Field& field, std::uint32_t z, Visit visit) {
   const Dims& dims = field.dims;
   std::size_t sample = std::size_t{z} * dims.x * dims.y;
   for (std::uint32_t y = 0; y < dims.y; ++y) {
+    const float* const row = field.values.data() + sample;
+    // The signs at the four corners of cells that have this x: those of the larger x, and of the
+    // smaller one once they are shifted.
+    const auto signs_at = [&](std::ptrdiff_t x) {
+      const auto sign = [&](unsigned c) {
+        return static_cast<unsigned>(row[x + sample_offset(dims, c)] > 0) << (c + 1);
+      };
+      return sign(0) | sign(2) | sign(4) | sign(6);
+    };
+    const unsigned steps = (y + 1 < dims.y ? 0b010U : 0U) | (z + 1 < dims.z ? 0b100U : 0U);
+    unsigned signs = signs_at(0);
     for (std::uint32_t x = 0; x < dims.x; ++x, ++sample) {
-      for (unsigned left = crossed_edges(field, sample, steps_within(dims, x, y, z)); left != 0;
-           left &= left - 1) {
+      signs = (signs >> 1 & 0b01010101U) | signs_at(std::ptrdiff_t{x} + 1);
+      if (signs == 0 || signs == 0xFF) continue;
+      const CellSplit& split = cell_split(field.scheme, ((x + y + z) & 1) != 0);
+      const unsigned outside = ~(steps | (x + 1 < dims.x ? 1U : 0U));
+      unsigned set = 0;
+      for (unsigned left = split.crossed[signs]; left != 0; left &= left - 1) {
         const auto d = static_cast<unsigned>(std::countr_zero(left));
-        const auto from = static_cast<std::uint32_t>(sample);
-        const auto to = static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(sample) +
-                                                   sample_offset(dims, d));
-        visit(field.values[from] > 0 ? Crossing{from, to} : Crossing{to, from});
+        if ((d & outside) == 0) set |= 1U << d;
       }
+      if (set != 0) visit(sample, set, split);
     }
   }
 }
@@ -73,6 +74,7 @@ std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions&
   std::optional<Field> field(std::in_place);
   field->dims = dims;
   field->margin = margin;
+  field->scheme = options.scheme;
   const auto value_of = [&](T sample) {
     const double difference = static_cast<double>(sample) - options.iso;
     const auto scaled = static_cast<float>(std::scalbn(std::abs(difference), exponent));
@@ -92,21 +94,48 @@ std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions&
   return field;
 }
 
-std::vector<Crossing> crossings_of(const Field& field, const Context& context) {
-  std::vector<std::size_t> begin(std::size_t{field.dims.z} + 1, 0);
+Crossings crossings_of(const Field& field, const Context& context) {
+  Crossings crossings;
+  std::vector<std::size_t>& begin = crossings.layer_begin;
+  begin.assign(std::size_t{field.dims.z} + 1, 0);
   parallel_for(context, field.dims.z, [&](std::size_t z) {
     std::size_t count = 0;
-    visit_crossings(field, static_cast<std::uint32_t>(z), [&](const Crossing&) { ++count; });
+    visit_crossed(field, static_cast<std::uint32_t>(z),
+                  [&](std::size_t, unsigned set, const CellSplit&) {
+                    count += static_cast<std::size_t>(std::popcount(set));
+                  });
     begin[z + 1] = count;
   });
-  for (std::size_t z = 0; z < field.dims.z; ++z) begin[z + 1] += begin[z];
-  std::vector<Crossing> crossings(begin.back());
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  crossings.all.resize(begin.back());
   parallel_for(context, field.dims.z, [&](std::size_t z) {
-    Crossing* out = crossings.data() + begin[z];
-    visit_crossings(field, static_cast<std::uint32_t>(z),
-                    [&](const Crossing& crossing) { *out++ = crossing; });
+    Crossing* out = crossings.all.data() + begin[z];
+    visit_crossed(field, static_cast<std::uint32_t>(z),
+                  [&](std::size_t sample, unsigned set, const CellSplit& split) {
+                    for (; set != 0; set &= set - 1) {
+                      const EdgeEnds& ends =
+                          split.ends[static_cast<unsigned>(std::countr_zero(set))];
+                      const auto end = [&](unsigned corner) {
+                        return static_cast<std::uint32_t>(static_cast<std::ptrdiff_t>(sample) +
+                                                          sample_offset(field.dims, corner));
+                      };
+                      const bool is_inside = field.values[end(ends.from)] > 0;
+                      *out++ = is_inside ? Crossing{end(ends.from), end(ends.to)}
+                                         : Crossing{end(ends.to), end(ends.from)};
+                    }
+                  });
   });
   return crossings;
+}
+
+PlaneCrossings::PlaneCrossings(const Field& field, const Crossings& crossings, std::uint32_t z)
+    : begin_(std::size_t{z} * field.dims.x * field.dims.y),
+      samples_(std::size_t{field.dims.x} * field.dims.y) {
+  auto next = static_cast<std::uint32_t>(crossings.layer_begin[z]);
+  visit_crossed(field, z, [&](std::size_t sample, unsigned set, const CellSplit&) {
+    samples_[sample - begin_] = {next, set};
+    next += static_cast<std::uint32_t>(std::popcount(set));
+  });
 }
 
 Vecd zero_between(const Field& field, const Crossing& crossing) {
@@ -118,34 +147,36 @@ Vecd zero_between(const Field& field, const Crossing& crossing) {
 
 template <class T>
 double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
-                const std::vector<Crossing>& crossings) {
-  double most = field.margin == 0 ? 0 : -kLargest / double{kPhantom};
+                std::span<const Crossing> crossings, const Context& context) {
+  const double of_caps = field.margin == 0 ? 0 : -kLargest / double{kPhantom};
   const Metric metric(lattice.to_space);
-  if (options.interpolation == Interpolation::kMidpoint) return most * metric.largest_step();
+  if (options.interpolation == Interpolation::kMidpoint) return of_caps * metric.largest_step();
   const auto difference = [&](std::uint32_t sample) {
     const Vecd at = field.place(sample) - Vecd{1, 1, 1} * field.margin;
     const Dims& inner = lattice.dims;
     const auto number = static_cast<std::size_t>(at.x + inner.x * (at.y + inner.y * at.z));
     return static_cast<double>(lattice.samples[number]) - options.iso;
   };
-  for (const Crossing& crossing : crossings) {
-    if (field.is_phantom(crossing.outside)) continue;
-    const double a = difference(crossing.inside);
-    const double b = difference(crossing.outside);
-    const double p = field.values[crossing.inside];
-    const double q = field.values[crossing.outside];
-    const double moved = std::abs(a / (a - b) - p / (p - q));
-    if (moved <= most) continue;
-    most = moved;
-  }
-  return most * metric.largest_step() * (1 + 1e-6);
+  std::vector<double> most(chunks_of(crossings.size()), of_caps);
+  for_chunks(context, crossings.size(), [&](std::size_t begin, std::size_t end, std::size_t chunk) {
+    for (const auto& [inside, outside] : crossings.subspan(begin, end - begin)) {
+      if (field.is_phantom(outside)) continue;
+      const double a = difference(inside);
+      const double b = difference(outside);
+      const double p = field.values[inside];
+      const double q = field.values[outside];
+      const double moved = std::abs(a / (a - b) - p / (p - q));
+      if (!(moved <= most[chunk])) most[chunk] = moved;
+    }
+  });
+  return std::ranges::max(most) * metric.largest_step() * (1 + 1e-6);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                          \
   template std::optional<Field> make_field(const Lattice<T>&, const ExtractOptions&, \
                                            std::uint32_t, const Context&);           \
   template double shift_of(const Lattice<T>&, const ExtractOptions&, const Field&,   \
-                           const std::vector<Crossing>&);
+                           std::span<const Crossing>, const Context&);
 ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 

@@ -1,11 +1,13 @@
 // The field F = sample - iso-value, scaled, whose zero set is the surface S: linear in each
-// tetrahedron of the six-way split (tetrahedra.h); private to this folder.
+// tetrahedron of the five- or six-way split (tetrahedra.h); private to this folder.
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/mesh/bound/vec.h"
@@ -24,12 +26,19 @@ inline constexpr float kPhantom = -4194304;  // -2^22
 // kPhantom, so that it ends that little outside of the volume: see shift_of. Immutable once made,
 // so safe to read from several threads.
 struct Field {
-  Dims dims;                  // with the layers around the volume
-  std::uint32_t margin = 0;   // how many those are on each side
-  std::vector<float> values;  // and one layer more, which is read with a weight of zero
+  Dims dims;                     // with the layers around the volume
+  std::uint32_t margin = 0;      // how many those are on each side
+  Scheme scheme = Scheme::kSix;  // or kFive
+  std::vector<float> values;     // and one layer more, which is read with a weight of zero
 
   std::ptrdiff_t step_y() const { return dims.x; }
   std::ptrdiff_t step_z() const { return std::ptrdiff_t{dims.x} * dims.y; }
+  bool contains(Vecf p) const {
+    const auto is_within = [](float x, std::uint32_t samples) {
+      return x >= 0 && x <= static_cast<float>(samples - 1);
+    };
+    return is_within(p.x, dims.x) && is_within(p.y, dims.y) && is_within(p.z, dims.z);
+  }
   // Whether a place is between the faces of the volume.
   bool encloses(Vecf p) const {
     const auto is_between = [this](float x, std::uint32_t samples) {
@@ -45,6 +54,9 @@ struct Field {
   }
 };
 
+// F at a place in the volume.
+double value_at(const Field& field, Vecf place);
+
 // The ends of a lattice edge that S crosses.
 struct Crossing {
   std::uint32_t inside = 0;
@@ -57,8 +69,36 @@ template <class T>
 std::optional<Field> make_field(const Lattice<T>& lattice, const ExtractOptions& options,
                                 std::uint32_t margin, const Context& context);
 
-// All crossings in the order in which extraction numbers its vertices.
-std::vector<Crossing> crossings_of(const Field& field, const Context& context);
+// All crossings, in the order in which extraction numbers its vertices: by the samples that own
+// their edges, and by direction.
+struct Crossings {
+  std::vector<Crossing> all;
+  std::vector<std::size_t> layer_begin;  // of those that a plane's samples own, and the end
+};
+
+Crossings crossings_of(const Field& field, const Context& context);
+
+// The numbers of the crossings that one plane's samples own.
+class PlaneCrossings {
+ public:
+  PlaneCrossings(const Field& field, const Crossings& crossings, std::uint32_t z);
+
+  // That of a sample of the plane in a direction 1..7 in which it has one.
+  std::uint32_t number_of(std::size_t sample, unsigned direction) const {
+    const Sample& owner = samples_[sample - begin_];
+    const unsigned before = owner.set & ((1U << direction) - 1);
+    return owner.first + static_cast<std::uint32_t>(std::popcount(before));
+  }
+
+ private:
+  struct Sample {
+    std::uint32_t first = 0;
+    std::uint32_t set = 0;
+  };
+
+  const std::size_t begin_;
+  std::vector<Sample> samples_;
+};
 
 // Where F is zero between the ends, in numbers of samples.
 Vecd zero_between(const Field& field, const Crossing& crossing);
@@ -69,6 +109,6 @@ Vecd zero_between(const Field& field, const Crossing& crossing);
 // a sample and a phantom.
 template <class T>
 double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
-                const std::vector<Crossing>& crossings);
+                std::span<const Crossing> crossings, const Context& context);
 
 }  // namespace isomesh::mesh::bound

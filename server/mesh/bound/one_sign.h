@@ -1,4 +1,10 @@
-// The sign of F on a triangle, by cutting it; private to this folder.
+// The sign of F on a surface, in double precision; private to this folder. It shares no code with
+// Clear, which collapses ask.
+//
+// All planes between tetrahedra belong to families (planes.h). Two planes meet the triangle in a
+// corner of a piece only where their common line crosses it. Each line lies in a plane of one of a
+// few families, the cutting ones. So the corners in a triangle lie on the segments that cutting
+// planes leave of it, and they are where planes of some other families cross the segments.
 #pragma once
 
 #include "server/mesh/bound/field.h"
@@ -6,8 +12,25 @@
 
 namespace isomesh::mesh::bound {
 
-// Whether the points are in the volume and sign * F is positive everywhere between them. Cuts the
-// triangle at all planes of the tetrahedra and looks at F at the corners of the pieces.
-bool has_one_sign(const Field& field, Vecd a, Vecd b, Vecd c, double sign);
+// Immutable. `field` must outlive it.
+class OneSign {
+ public:
+  OneSign(const Field& field, double sign) : field_(field), sign_(sign) {}
+
+  // Whether sign * F is positive: at a place, which is outside of the volume if not; all along an
+  // edge between two such places; and all over a triangle whose edges are such.
+  bool at(Vecd p) const;
+  bool along(Vecd p, Vecd q) const;
+  bool within(Vecd a, Vecd b, Vecd c) const;
+
+  // All three of a triangle.
+  bool all_over(Vecd a, Vecd b, Vecd c) const {
+    return at(a) && at(b) && at(c) && along(a, b) && along(b, c) && along(c, a) && within(a, b, c);
+  }
+
+ private:
+  const Field& field_;
+  const double sign_;
+};
 
 }  // namespace isomesh::mesh::bound

@@ -2,17 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <limits>
 
+#include "server/mesh/bound/chunks.h"
 #include "server/mesh/bound/cover.h"
 #include "server/mesh/bound/one_sign.h"
-#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh::bound {
 namespace {
-
-constexpr std::size_t kTrianglesPerChunk = 1 << 12;
 
 bool is_in_one_face(const Dims& dims, const Vertex& a, const Vertex& b) {
   const auto all_at = [&](float Vecf::*axis, float face) {
@@ -25,52 +21,54 @@ bool is_in_one_face(const Dims& dims, const Vertex& a, const Vertex& b) {
   return is_in(&Vecf::x, dims.x) || is_in(&Vecf::y, dims.y) || is_in(&Vecf::z, dims.z);
 }
 
-bool is_clear(const Field& field, const Surfaces& surfaces, const Triangle& triangle,
-              Vecf Vertex::*side, double sign) {
-  const auto place = [&](std::size_t i) { return wide(surfaces.vertices[triangle[i]].*side); };
-  return has_one_sign(field, place(0), place(1), place(2), sign);
+// How many triangles of T+ or T- have a point where sign * F is not positive, or more: each vertex
+// and each edge of those is counted.
+std::size_t count_unclear(const Field& field, const Surfaces& surfaces, const Edges& edges,
+                          Vecf Vertex::*side, double sign, const Context& context) {
+  const OneSign signs(field, sign);
+  const auto place = [&](std::uint32_t v) { return wide(surfaces.vertices[v].*side); };
+  std::atomic<std::size_t> unclear = 0;
+  for_each(context, surfaces.vertices.size(), [&](std::size_t v) {
+    const Vecd from = place(static_cast<std::uint32_t>(v));
+    if (!signs.at(from)) ++unclear;
+  });
+  if (unclear != 0) return unclear;  // some may be outside of the volume
+  for_each(context, surfaces.vertices.size(), [&](std::size_t v) {
+    const Vecd from = place(static_cast<std::uint32_t>(v));
+    for (const Edges::End& end : edges.of(v)) {
+      if (!signs.along(from, place(end.vertex))) ++unclear;
+    }
+  });
+  for_each(context, surfaces.triangles.size(), [&](std::size_t t) {
+    const auto& [a, b, c] = surfaces.triangles[t];
+    if (!signs.within(place(a), place(b), place(c))) ++unclear;
+  });
+  return unclear;
 }
 
-std::size_t count_unclear(const Field& field, const Surfaces& surfaces,
-                          std::span<const std::uint32_t> components, const Context& context) {
-  std::atomic<std::size_t> unclear = 0;
-  const std::size_t count = surfaces.triangles.size();
-  parallel_for(
-      context, (count + kTrianglesPerChunk - 1) / kTrianglesPerChunk, [&](std::size_t chunk) {
-        for (std::size_t t = chunk * kTrianglesPerChunk;
-             t < std::min(count, (chunk + 1) * kTrianglesPerChunk); ++t) {
-          const Triangle& triangle = surfaces.triangles[t];
-          const auto component = [&](std::size_t i) {
-            return components[surfaces.origins[triangle[i]]];
-          };
-          const bool is_of_one = component(0) == component(1) && component(0) == component(2);
-          if (!is_of_one || !is_clear(field, surfaces, triangle, &Vertex::in, 1) ||
-              !is_clear(field, surfaces, triangle, &Vertex::out, -1)) {
-            ++unclear;
-          }
-        }
-      });
-  return unclear;
+bool is_of_one_component(const Surfaces& surfaces, const Triangle& triangle) {
+  const auto& [a, b, c] = triangle;
+  const std::uint32_t component = surfaces.component_of(a);
+  return component == surfaces.component_of(b) && component == surfaces.component_of(c);
 }
 
 }  // namespace
 
 Proof prove(const Field& field, const Surfaces& surfaces, const Context& context) {
   Proof proof;
-  const std::vector<std::uint32_t> components =
-      components_of(surfaces.crossings.size(), surfaces.extracted);
-  for (std::uint32_t e = 0; e < components.size(); ++e) {
-    proof.components += components[e] == e ? 1 : 0;
-  }
-  const std::vector<Edge> border = odd_edges(surfaces.vertices.size(), surfaces.triangles);
+  const Edges edges = edges_of(surfaces.vertices.size(), surfaces.triangles, context);
+  const std::vector<Edge> border = edges.odd();
   for (const auto& [a, b] : border) {
     if (!is_in_one_face(field.dims, surfaces.vertices[a], surfaces.vertices[b])) {
       ++proof.open_edges;
     }
   }
-  proof.unclear_triangles = count_unclear(field, surfaces, components, context);
-  // Rays count on triangles that lie in the volume.
-  if (proof.holds()) proof.uncovered = uncovered(field, surfaces, components, border, context);
+  proof.unclear_triangles = count_unclear(field, surfaces, edges, &Vertex::in, 1, context) +
+                            count_unclear(field, surfaces, edges, &Vertex::out, -1, context);
+  for (const Triangle& triangle : surfaces.triangles) {
+    if (!is_of_one_component(surfaces, triangle)) ++proof.unclear_triangles;
+  }
+  if (proof.is_clear()) proof.uncovered = uncovered(field, surfaces, border, context);
   return proof;
 }
 

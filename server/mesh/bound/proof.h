@@ -27,27 +27,33 @@
 #include "server/mesh/bound/tube.h"
 #include "server/mesh/context.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/topology/components.h"
 
 namespace isomesh::mesh::bound {
 
 struct Surfaces {
   std::span<const Crossing> crossings;     // S: its vertices,
-  std::span<const Triangle> extracted;     // and triangles between them
+  std::span<const Triangle> extracted;     // triangles between them,
+  const Components& components;            // and what they connect
   std::span<const Vertex> vertices;        // T, in numbers of samples
   std::span<const Triangle> triangles;     // and triangles between them
   std::span<const std::uint32_t> origins;  // of each vertex of T: a crossing of its component of S
+
+  std::uint32_t component_of(std::uint32_t vertex) const {
+    return components.of_vertex[origins[vertex]];
+  }
 };
 
 struct Proof {
   std::size_t open_edges = 0;            // 1 fails
   std::size_t unclear_triangles = 0;     // 3 fails
-  std::vector<std::uint32_t> uncovered;  // 4 fails: a crossing of each such component
-  std::size_t components = 0;            // of S
+  std::vector<std::uint32_t> uncovered;  // 4 fails: these components
 
-  bool holds() const { return open_edges == 0 && unclear_triangles == 0 && uncovered.empty(); }
+  bool is_clear() const { return open_edges == 0 && unclear_triangles == 0; }
+  bool holds() const { return is_clear() && uncovered.empty(); }
 };
 
-// Proves 1, 3 and 4. Throws Error kCancelled.
+// Proves 1, 3 and, if those hold, 4. Throws Error kCancelled.
 Proof prove(const Field& field, const Surfaces& surfaces, const Context& context);
 
 }  // namespace isomesh::mesh::bound

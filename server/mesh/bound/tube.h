@@ -19,13 +19,24 @@ struct Vertex {
   Vecf out;  // in T-, where F < 0
 };
 
-// Seen from where T+ is, triangles are counter-clockwise. Vertex i began as the crossing i of S.
+enum class Side { kIn, kOut };  // T+ or T-
+
+// Seen from where T+ is, triangles are counter-clockwise.
 struct Tube {
   std::vector<Vertex> vertices;
   std::vector<Triangle> triangles;
-  std::vector<std::uint8_t> border;  // of each vertex: lies in a face of the volume, and stays
-  std::vector<std::uint8_t>
-      planes;  // of each vertex of a closed surface: the faces that it stays in
+  std::vector<std::uint32_t> origins;  // of each vertex: a crossing of S that it came from
+  std::vector<std::uint8_t> border;    // of each vertex: lies in a face of the volume, and stays
+  std::vector<std::uint8_t> planes;    // of each vertex of a closed surface: the faces it stays in
+
+  void add(const Vertex& vertex, std::uint32_t origin) {
+    vertices.push_back(vertex);
+    origins.push_back(origin);
+    border.push_back(0);
+    planes.push_back(0);
+  }
+  // Forgets the vertices that no triangle names, and puts the others in the order of their origins.
+  void compact();
 };
 
 // All three places of a vertex lie on a grid of this many points to the voxel, so that differences

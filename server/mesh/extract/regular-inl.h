@@ -137,8 +137,8 @@ class RegularCellWriter {
     if (!row_.is_five()) {
       keep_of<kSixTetrahedra>(w, cells, kept, std::make_index_sequence<6>());
     } else {
-      keep_of<kFiveTetrahedra[0]>(w, cells & row_.even(), kept, std::make_index_sequence<5>());
-      keep_of<kFiveTetrahedra[1]>(w, cells & ~row_.even(), kept, std::make_index_sequence<5>());
+      keep_of<kFiveTetrahedraEven>(w, cells & row_.even(), kept, std::make_index_sequence<5>());
+      keep_of<kFiveTetrahedraOdd>(w, cells & ~row_.even(), kept, std::make_index_sequence<5>());
     }
     return kept;
   }

@@ -106,13 +106,14 @@ class RowsOf final : public SampleRows {
   void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin, std::size_t count,
                        std::byte* out) const override {
     const T* samples = row(y, z) + begin;
-    const auto [next_row, next_plane] = steps();
+    // clang++ 14 lets no lambda capture a structured binding.
+    const std::array<std::ptrdiff_t, 2> next = steps();
     write_ranks(out, count, [=, this](std::size_t x, auto rank) {
       using Rank = decltype(rank);
       if constexpr (sizeof(Rank) == sizeof(std::int32_t)) {
-        return nearness_.of_value(mean_of_cell(samples + x, next_row, next_plane));
+        return nearness_.of_value(mean_of_cell(samples + x, next[0], next[1]));
       } else {
-        return nearness_.template of_sum<Rank>(sum_of_cell(samples + x, next_row, next_plane));
+        return nearness_.template of_sum<Rank>(sum_of_cell(samples + x, next[0], next[1]));
       }
     });
   }

@@ -127,8 +127,8 @@ PlacedTriangles placed_triangles(const CellSplit& split) {
 
 const CellSplit& cell_split(Scheme scheme, bool odd) {
   static const CellSplit six = make_split(kSixTetrahedra);
-  static const CellSplit five_even = make_split(kFiveTetrahedra[0]);
-  static const CellSplit five_odd = make_split(kFiveTetrahedra[1]);
+  static const CellSplit five_even = make_split(kFiveTetrahedraEven);
+  static const CellSplit five_odd = make_split(kFiveTetrahedraOdd);
   if (scheme != Scheme::kFive) return six;
   return odd ? five_odd : five_even;
 }

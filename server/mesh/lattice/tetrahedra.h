@@ -36,9 +36,9 @@ inline constexpr std::array<Tetrahedron, 6> kSixTetrahedra = from_paper<6>(
     {{{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6}, {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}}}, 0);
 inline constexpr std::array<Tetrahedron, 5> kPaperFive = {
     {{0, 2, 3, 7}, {0, 1, 2, 5}, {0, 4, 5, 7}, {2, 5, 6, 7}, {0, 2, 5, 7}}};
-// Of cells of even and of odd parity, which are mirrored along x.
-inline constexpr std::array<std::array<Tetrahedron, 5>, 2> kFiveTetrahedra = {
-    from_paper(kPaperFive, 0), from_paper(kPaperFive, 1)};
+// Cells of odd parity are mirrored along x.
+inline constexpr std::array<Tetrahedron, 5> kFiveTetrahedraEven = from_paper(kPaperFive, 0);
+inline constexpr std::array<Tetrahedron, 5> kFiveTetrahedraOdd = from_paper(kPaperFive, 1);
 
 // Identifies an edge of a cell: eight times the corner whose sample owns it, plus its direction.
 using EdgeName = std::uint8_t;

@@ -14,7 +14,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "server/mesh/smooth/lanes-inl.h"
+#include "server/mesh/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {

@@ -42,10 +42,10 @@ template <class T>
 void expect_the_regularised(const test::SampleVolume<T>& volume, const ExtractOptions& plain) {
   const auto field = make_field(volume.lattice(), plain, plain.close ? 3 : 0, {});
   ASSERT_TRUE(field);
-  const std::vector<Crossing> crossings = crossings_of(*field, {});
+  const Crossings crossings = crossings_of(*field, {});
   const Clusters clusters = find_clusters(volume.lattice(), plain, *field, crossings, {});
   EXPECT_GT(clusters.size(), 0U);
-  const std::vector<Vecd> places = vertices_of(*field, crossings, clusters);
+  const std::vector<Vecd> places = vertices_of(*field, crossings.all, clusters);
   ExtractOptions joining = plain;
   joining.regularize = true;
   const Mesh mesh = test::extracted(volume, joining);

@@ -1,4 +1,5 @@
-// Points of eight lanes in single precision. Compiled once for each instruction set, see fans.cpp.
+// Eight lanes of single precision, and points of them. Compiled once for each instruction set by
+// the sources that include it through Highway's foreach_target.h, such as fans.cpp.
 #if defined(ISOMESH_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_LANES_INL_H_
 #undef ISOMESH_LANES_INL_H_
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include <hwy/highway.h>
 
@@ -23,6 +25,7 @@ inline constexpr float kTiny = 1e-37F;                       // added where 0 wo
 HWY_INLINE Lanes splat(float value) { return Lanes{} + value; }
 HWY_INLINE Mask splat_int(int value) { return Mask{} + value; }
 HWY_INLINE Lanes larger(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
+HWY_INLINE Lanes smaller(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
 
 HWY_INLINE Lanes root(const Lanes& square) {
   Lanes result;
@@ -30,10 +33,43 @@ HWY_INLINE Lanes root(const Lanes& square) {
   return result;
 }
 
-HWY_INLINE bool any(const Mask& mask) {
-  std::int32_t all = 0;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) all |= mask[lane];
-  return all != 0;
+// A bit for each lane, the lowest of the first one.
+HWY_INLINE unsigned bits(const Mask& mask) {
+#if HWY_TARGET == HWY_AVX2
+  return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+#else
+  unsigned all = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) all |= (mask[lane] & 1U) << lane;
+  return all;
+#endif
+}
+
+HWY_INLINE bool any(const Mask& mask) { return bits(mask) != 0; }
+
+HWY_INLINE Lanes load(const float* from) {
+  Lanes lanes;
+  std::memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+
+HWY_INLINE void store(const Lanes& lanes, float* to) { std::memcpy(to, &lanes, sizeof lanes); }
+
+// The largest whole numbers that are not larger; of numbers within 2^31.
+HWY_INLINE Mask floor_of(const Lanes& x) {
+  const Mask cut = __builtin_convertvector(x, Mask);
+  return cut + (__builtin_convertvector(cut, Lanes) > x);
+}
+HWY_INLINE Lanes as_lanes(const Mask& whole) { return __builtin_convertvector(whole, Lanes); }
+
+// from[index] of each lane.
+HWY_INLINE Lanes gather(const float* from, const Mask& index) {
+#if HWY_TARGET == HWY_AVX2
+  return reinterpret_cast<Lanes>(_mm256_i32gather_ps(from, reinterpret_cast<__m256i>(index), 4));
+#else
+  Lanes result;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) result[lane] = from[index[lane]];
+  return result;
+#endif
 }
 
 struct Lanes3 {

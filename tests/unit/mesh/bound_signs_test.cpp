@@ -1,0 +1,177 @@
+// The tests of a triangle's sign agree with each other and with many values of the field. Compiled
+// once for each instruction set: this file includes itself through Highway's foreach_target.h.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tests/unit/mesh/bound_signs_test.cpp"
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "server/mesh/bound/bound.h"
+#include "server/mesh/bound/clear.h"
+#include "server/mesh/bound/fast_clear-inl.h"
+#include "server/mesh/bound/one_sign.h"
+#include "tests/support/kernels.h"
+#include "tests/support/shapes.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isomesh::mesh::bound::HWY_NAMESPACE {
+
+bool is_clear_in_lanes(const Field& field, const std::array<Vecf, 3>& p, Side side) {
+  FastClear clear(field);
+  clear.base(p[0], 8);
+  const auto at = [&](std::size_t i) { return clear.at(copies_of({p[i], p[i], p[i]}), side); };
+  const auto a = at(0);
+  const auto b = at(1);
+  const auto c = at(2);
+  const double sign = side == Side::kIn ? 1 : -1;
+  return clear.point(a, sign) && clear.point(b, sign) && clear.point(c, sign) &&
+         clear.edge(a, b, sign) && clear.edge(b, c, sign) && clear.edge(c, a, sign) &&
+         clear.inside(a, b, c, sign);
+}
+
+}  // namespace isomesh::mesh::bound::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace isomesh::mesh::bound {
+namespace {
+
+HWY_EXPORT(is_clear_in_lanes);
+
+// Calls body() on each instruction set that the sources are compiled for and the machine has.
+template <class Body>
+void on_each_instruction_set(Body body) {
+  const auto use = [](std::int64_t targets) {
+    hwy::SetSupportedTargetsForTest(targets);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  };
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    use(target);
+    body();
+  }
+  use(0);
+}
+
+class RandomTriangles {
+ public:
+  explicit RandomTriangles(const Dims& dims) : dims_(dims) {}
+
+  double number() { return static_cast<double>(random_()) / 4294967296.0; }
+
+  std::array<Vecf, 3> next() {
+    const double size = 0.1 + 5 * number() * number();
+    const Vecd at = {number() * (dims_.x - 1), number() * (dims_.y - 1), number() * (dims_.z - 1)};
+    const auto near = [&](double x, std::uint32_t samples) {
+      double moved = x + size * (number() - 0.5);
+      if (number() < 0.2) moved = std::round(moved);  // on planes and lines
+      return std::clamp(moved, 0.0, samples - 1.0);
+    };
+    std::array<Vecf, 3> corners;
+    for (Vecf& corner : corners) {
+      corner = snap({near(at.x, dims_.x), near(at.y, dims_.y), near(at.z, dims_.z)});
+    }
+    return corners;
+  }
+
+ private:
+  const Dims dims_;
+  std::mt19937 random_{4};
+};
+
+template <class Planes>
+bool is_clear(const Field& field, const std::array<Vecf, 3>& p, double sign) {
+  Clear<Planes> clear(field);
+  clear.base(p[0]);
+  const PlaneNumbers a = clear.at(p[0]);
+  const PlaneNumbers b = clear.at(p[1]);
+  const PlaneNumbers c = clear.at(p[2]);
+  return clear.point(a, sign) && clear.point(b, sign) && clear.point(c, sign) &&
+         clear.edge(a, b, sign) && clear.edge(b, c, sign) && clear.edge(c, a, sign) &&
+         clear.inside(a, b, c, sign);
+}
+
+// The least of sign * F at many points of the triangle.
+double least_value(const Field& field, const std::array<Vecf, 3>& p, double sign) {
+  double least = 1e30;
+  constexpr int kSteps = 40;
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; i + j <= kSteps; ++j) {
+      const float u = static_cast<float>(i) / kSteps;
+      const float v = static_cast<float>(j) / kSteps;
+      const Vecf at = p[0] + (p[1] - p[0]) * u + (p[2] - p[0]) * v;
+      if (!field.contains(at)) continue;  // rounded beyond the border
+      least = std::min(least, sign * value_at(field, at));
+    }
+  }
+  return least;
+}
+
+// Calls body(field, triangle, sign) for many of them, in noise.
+template <class Body>
+void for_random_triangles(Scheme scheme, Body body) {
+  const Dims dims = {9, 8, 7};
+  RandomTriangles triangles(dims);
+  std::optional<Field> field;
+  for (int n = 0; n < 4000; ++n) {
+    if (n % 100 == 0) {
+      const auto volume = test::noise_between<float>(-0.25, n % 300 == 0 ? 0.75 : 1.75, dims,
+                                                     static_cast<std::uint64_t>(n));
+      field = make_field(volume.lattice(), {.scheme = scheme}, 0, {});
+    }
+    body(*field, triangles.next(), n % 5 == 0 ? -1.0 : 1.0);
+  }
+}
+
+template <class Planes>
+void expect_agreement(Scheme scheme) {
+  int clear = 0;
+  for_random_triangles(scheme, [&](const Field& field, const std::array<Vecf, 3>& p, double sign) {
+    const bool is_fast = is_clear<Planes>(field, p, sign);
+    EXPECT_EQ(is_fast, OneSign(field, sign).all_over(wide(p[0]), wide(p[1]), wide(p[2])));
+    const double least = least_value(field, p, sign);
+    EXPECT_TRUE(is_fast ? least > 0 : least < 30);  // of 256: none is refused far from zero
+    clear += is_fast ? 1 : 0;
+  });
+  EXPECT_GT(clear, 300);
+  EXPECT_LT(clear, 3700);
+}
+
+TEST(BoundSignsTest, AgreeWithManyValues) { expect_agreement<SixPlanes>(Scheme::kSix); }
+TEST(BoundSignsTest, AgreeWithManyValuesOfFive) { expect_agreement<FivePlanes>(Scheme::kFive); }
+
+TEST(BoundSignsTest, AreTheSameInLanesOfEachInstructionSet) {
+  on_each_instruction_set([] {
+    for_random_triangles(
+        Scheme::kSix, [](const Field& field, const std::array<Vecf, 3>& p, double sign) {
+          EXPECT_EQ(
+              HWY_DYNAMIC_DISPATCH(is_clear_in_lanes)(field, p, sign > 0 ? Side::kIn : Side::kOut),
+              is_clear<SixPlanes>(field, p, sign));
+        });
+  });
+}
+
+TEST(BoundSignsTest, GiveTheSameMeshOnEachInstructionSet) {
+  const auto volume = test::sample<float>(test::gyroid(9), {20, 19, 18});
+  std::optional<std::vector<Vec3>> positions;
+  on_each_instruction_set([&] {
+    Mesh mesh = test::extracted(volume, {});
+    std::string why_not;
+    ASSERT_TRUE(simplify_within(volume.lattice(), {}, {.max_error_mm = 0.1}, {}, mesh, why_not));
+    const std::vector<Vec3> now(mesh.positions.begin(), mesh.positions.end());
+    if (!positions) positions = now;
+    EXPECT_TRUE(*positions == now);
+  });
+}
+
+}  // namespace
+}  // namespace isomesh::mesh::bound
+#endif  // HWY_ONCE
