@@ -9,4 +9,7 @@ namespace isomesh::store::postgresql {
 // process at a time. Throws Error kUnavailable if a newer version made them.
 void migrate(Connection& connection);
 
+// The SQL that creates the functions of the newest version.
+extern const char* const kFunctions;
+
 }  // namespace isomesh::store::postgresql
