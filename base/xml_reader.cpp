@@ -87,6 +87,10 @@ void XmlReader::stop() {
   ::XML_StopParser(parser_.get(), XML_FALSE);
 }
 
+// Newer libexpat has these three with 64 bits under other names, and deprecates them.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations"
+
 std::uint64_t XmlReader::begin() const {
   return static_cast<std::uint64_t>(
       std::max(::XML_GetCurrentByteIndex(parser_.get()), XML_Index{0}));
@@ -100,5 +104,7 @@ void XmlReader::throw_unreadable(std::string_view reason) const {
   throw XmlError(std::string(reason) + " in line " +
                  std::to_string(::XML_GetCurrentLineNumber(parser_.get())));
 }
+
+#pragma GCC diagnostic pop
 
 }  // namespace isomesh
