@@ -293,7 +293,7 @@ bool is_par(std::string_view head) {
 
 SourceVolume parse_par(const InputFile& file, const Companions& companions,
                        const ImportOptions& options) {
-  const std::filesystem::path& path = companion(rec_name(companions), companions);
+  const std::filesystem::path path = companion(rec_name(companions), companions);
   auto [volume, places] = describe(read_par_header(file.text(0, kMostParBytes)), options);
   const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
   const std::uint64_t size = InputFile(path).size();
