@@ -92,15 +92,27 @@ CanonicalWriter::CanonicalWriter(const std::filesystem::path& path, const Canoni
   void* data = ::mmap(nullptr, *size, PROT_READ | PROT_WRITE, MAP_SHARED, file.number(), 0);
   if (data == MAP_FAILED) throw_system_error("mmap", errno);
   data_ = static_cast<std::byte*>(data);
-  size_ = *size;
+  mapped_ = size_ = *size;
   file_ = file.release();
-  const std::string text = header_text(header);
-  std::copy_n(std::as_bytes(std::span(text)).begin(), kHeaderBytes, data_);
+  write_header(header);
 }
 
 CanonicalWriter::~CanonicalWriter() {
-  ::munmap(data_, size_);
+  ::munmap(data_, mapped_);
   ::close(file_);
+}
+
+void CanonicalWriter::shorten(const CanonicalHeader& header) {
+  const auto size = file_bytes(header);
+  if (!size || *size > size_) throw Error(ErrorCode::kInternal, "A volume cannot become longer.");
+  if (::ftruncate(file_, static_cast<off_t>(*size)) != 0) throw_system_error("ftruncate", errno);
+  size_ = *size;
+  write_header(header);
+}
+
+void CanonicalWriter::write_header(const CanonicalHeader& header) {
+  const std::string text = header_text(header);
+  std::copy_n(std::as_bytes(std::span(text)).begin(), kHeaderBytes, data_);
 }
 
 std::span<std::byte> CanonicalWriter::samples() {

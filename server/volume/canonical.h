@@ -43,9 +43,16 @@ class CanonicalWriter {
   // The caller syncs the file to disk.
   std::span<std::byte> samples();
 
+  // Replaces the header and shortens the file to the size in it, which is no larger. The samples
+  // stay as they are. Throws Error kInternal.
+  void shorten(const CanonicalHeader& header);
+
  private:
+  void write_header(const CanonicalHeader& header);
+
   std::byte* data_ = nullptr;
-  std::size_t size_ = 0;
+  std::size_t mapped_ = 0;
+  std::size_t size_ = 0;  // of the file
   int file_ = -1;
 };
 

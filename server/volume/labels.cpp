@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <type_traits>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "base/text.h"
@@ -96,6 +98,33 @@ std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::si
   return values.count();
 }
 
+// The smallest and the largest sample. Empty if one is no whole number, or no 32-bit integer.
+template <class Sample>
+std::optional<std::pair<std::int64_t, std::int64_t>> whole_range(std::span<const Sample> samples) {
+  constexpr double kLow = std::numeric_limits<std::int32_t>::min();
+  constexpr double kHigh = std::numeric_limits<std::uint32_t>::max();
+  std::int64_t low = std::numeric_limits<std::int64_t>::max();
+  std::int64_t high = std::numeric_limits<std::int64_t>::min();
+  for (const Sample sample : samples) {
+    const auto value = static_cast<double>(sample);
+    if (!(value >= kLow && value <= kHigh)) return std::nullopt;  // also NaN
+    const auto whole = static_cast<std::int64_t>(value);
+    if (static_cast<double>(whole) != value) return std::nullopt;
+    low = std::min(low, whole);
+    high = std::max(high, whole);
+  }
+  return std::pair(low, high);
+}
+
+template <class Sample>
+bool holds(std::int64_t low, std::int64_t high) {
+  if constexpr (std::is_integral_v<Sample>) {
+    return low >= std::numeric_limits<Sample>::min() && high <= std::numeric_limits<Sample>::max();
+  } else {
+    return false;
+  }
+}
+
 bool is_entry(const LabelEntry& entry) {
   return entry.name.size() <= LabelEntry::kMostNameBytes && !has_control_characters(entry.name) &&
          (!entry.color || is_color(*entry.color)) &&
@@ -110,16 +139,29 @@ bool is_label_table(std::span<const LabelEntry> labels) {
              labels.end();
 }
 
+std::optional<SampleType> whole_type(std::span<const std::byte> samples, SampleType type) {
+  const auto range = with_sample(type, [&](auto sample) {
+    using Sample = decltype(sample);
+    const auto* first = reinterpret_cast<const Sample*>(samples.data());
+    return whole_range(std::span(first, samples.size() / sizeof(Sample)));
+  });
+  if (!range) return std::nullopt;
+  for (const SampleType each : {SampleType::kUint8, SampleType::kInt8, SampleType::kUint16,
+                                SampleType::kInt16, SampleType::kUint32, SampleType::kInt32}) {
+    const bool fits = with_sample(
+        each, [&](auto sample) { return holds<decltype(sample)>(range->first, range->second); });
+    if (fits) return each;
+  }
+  return std::nullopt;
+}
+
 std::optional<std::size_t> label_count(std::span<const std::byte> samples, SampleType type,
                                        const std::array<std::uint32_t, 3>& dims) {
-  return with_sample(type, [&](auto sample) -> std::optional<std::size_t> {
+  if (!is_integer(type) && !whole_type(samples, type)) return std::nullopt;
+  return with_sample(type, [&](auto sample) {
     using Sample = decltype(sample);
-    if constexpr (std::is_integral_v<Sample>) {
-      const auto* first = reinterpret_cast<const Sample*>(samples.data());
-      return count_labels(std::span(first, samples.size() / sizeof(Sample)), dims[0]);
-    } else {
-      return std::nullopt;
-    }
+    const auto* first = reinterpret_cast<const Sample*>(samples.data());
+    return count_labels(std::span(first, samples.size() / sizeof(Sample)), dims[0]);
   });
 }
 

@@ -11,8 +11,12 @@
 
 namespace isomesh::volume {
 
+// The smallest integer type that represents all samples; empty if there is none. `samples` as for
+// measure(). Thread safe.
+std::optional<SampleType> whole_type(std::span<const std::byte> samples, SampleType type);
+
 // The number of distinct values if the volume looks like a label map; otherwise empty. A label map
-// has integers of at least three but few values, and most neighbours along x are equal, not
+// has whole numbers of at least three but few values, and most neighbours along x are equal, not
 // counting pairs of background (the first sample's value). A mask of two values needs no labels.
 // `samples` as for measure(). Thread safe.
 std::optional<std::size_t> label_count(std::span<const std::byte> samples, SampleType type,

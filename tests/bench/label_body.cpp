@@ -82,6 +82,7 @@ std::array<double, 3> even_point(std::size_t n) {
 Samples label_body(std::uint32_t n) {
   Samples body;
   body.name = "body-" + std::to_string(n);
+  body.source = std::to_string(n);
   body.dims = {n, n, n};
   body.geometry.spacing = {kSpacing, kSpacing, kSpacing};
   body.bytes.resize(body.dims.samples());

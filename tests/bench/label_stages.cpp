@@ -1,10 +1,14 @@
 #include "tests/bench/label_stages.h"
 
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <type_traits>
 
+#include "server/jobs/making/make_labels.h"
 #include "server/mesh/labels/label_surface.h"
+#include "server/mesh/stairs/stairs.h"
+#include "server/mesh/stairs/unfold.h"
 
 namespace isomesh::bench {
 namespace {
@@ -47,13 +51,19 @@ Samples load_labels(const std::filesystem::path& path) {
   Samples samples = load_volume(path).samples;
   with_lattice(samples, [](const auto&) {});
   samples.geometry.direction = Geometry{}.direction;
+  samples.source = path.string();
   return padded(samples);
 }
 
-LabelStages::LabelStages(const Samples& samples) : samples_(samples) {
+LabelStages::LabelStages(const Samples& samples, const MeshParameters& parameters)
+    : samples_(samples), parameters_(parameters) {
+  parameters_.formats = {MeshFormat::kGlb};
   with_lattice(samples, [&](const auto& lattice) {
     const auto present = mesh::count_labels(lattice, {});
     options_.labels = mesh::select_labels(present, 0);
+    options_.scheme = numbered(parameters.scheme);
+    options_.close = parameters.close;
+    options_.regularize = parameters.regularize;
     for (const mesh::LabelVoxels& one : present) {
       if (one.label != 0) voxels_.push_back(one);
     }
@@ -66,8 +76,22 @@ void LabelStages::count_voxels() const {
 
 void LabelStages::extract() {
   with_lattice(samples_, [&](const auto& lattice) {
-    mesh::extract_walls(lattice, options_, mesh::count_walls(lattice, options_, {}), {}, surface_);
+    count_ = mesh::count_walls(lattice, options_, {});
+    mesh::extract_walls(lattice, options_, count_, {}, surface_);
   });
+}
+
+void LabelStages::remove_stairs() {
+  with_lattice(samples_, [&](const auto& lattice) {
+    mesh::remove_stairs(lattice, options_, count_, std::numeric_limits<double>::infinity(), {},
+                        surface_);
+  });
+}
+
+std::size_t LabelStages::count_folded() const {
+  const mesh::WallShape shape(surface_, samples_.dims, mesh::lattice_to_space(samples_.geometry),
+                              options_.close, {});
+  return mesh::count_folded(shape, {});
 }
 
 void LabelStages::smooth(const mesh::SmoothOptions& options) {
@@ -76,6 +100,14 @@ void LabelStages::smooth(const mesh::SmoothOptions& options) {
 
 void LabelStages::measure() const {
   mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {});
+}
+
+JobFigures LabelStages::run_job() {
+  return bench::run_job(samples_, parameters_, 0, false,
+                        [&](const jobs::SampleArray& array, const jobs::MeshRequest& request,
+                            std::span<const codec::Sink> sinks, jobs::Progress& progress) {
+                          return jobs::make_labels(array, request, sinks, progress, surface_);
+                        });
 }
 
 Walls LabelStages::walls() const {

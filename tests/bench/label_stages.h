@@ -19,26 +19,35 @@ namespace isomesh::bench {
 Samples load_labels(const std::filesystem::path& path);
 Samples padded(const Samples& samples);
 
-// In memory that is kept. Extract comes first. Background is 0. Not thread safe. Keeps a reference
-// to the samples, whose type must be an integer.
+// By the parameters of a job by all labels, a job's defaults if there are none. In memory that is
+// kept. Extract comes first. Background is 0. Not thread safe. Keeps a reference to the samples,
+// whose type must be an integer.
 class LabelStages {
  public:
-  explicit LabelStages(const Samples& samples);
+  explicit LabelStages(const Samples& samples,
+                       const MeshParameters& parameters = label_parameters({}));
 
   void count_voxels() const;
   void extract();
   void smooth(const mesh::SmoothOptions& options);
-  void measure() const;  // topology, area and volume of each label
+  void remove_stairs();              // the default of jobs by labels
+  std::size_t count_folded() const;  // triangles, see unfold.h
+  void measure() const;              // topology, area and volume of each label
+  // A job to a GLB.
+  JobFigures run_job();
 
   const std::vector<std::int64_t>& labels() const { return options_.labels; }
   const std::vector<mesh::LabelVoxels>& voxels() const { return voxels_; }  // of those labels
   MeshSize size() const { return {surface_.mesh.positions.size(), surface_.mesh.triangles.size()}; }
   Walls walls() const;
+  const mesh::SeparatingSurface& surface() const { return surface_; }
 
  private:
   const Samples& samples_;
+  MeshParameters parameters_;
   std::vector<mesh::LabelVoxels> voxels_;
   mesh::SeparateOptions options_;
+  mesh::SurfaceCount count_;
   mesh::SeparatingSurface surface_;
 };
 

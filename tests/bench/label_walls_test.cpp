@@ -66,9 +66,17 @@ Samples two_blocks() {
   return padded(samples);
 }
 
+// Without clusters, so that both blocks have the same walls and nearly the volume of their voxels
+// before they are smoothed.
+MeshParameters plain() {
+  MeshParameters parameters = label_parameters({});
+  parameters.regularize = false;
+  return parameters;
+}
+
 TEST(Sharing, OfASharedWallHasNoGapUntilItIsTorn) {
   const Samples samples = two_blocks();
-  LabelStages stages(samples);
+  LabelStages stages(samples, plain());
   EXPECT_THAT(stages.labels(), ElementsAre(7, 9));
   stages.extract();
   Walls walls = stages.walls();
@@ -110,6 +118,31 @@ TEST(Sharing, OfASharedWallHasNoGapUntilItIsTorn) {
   }
 }
 
+double plain_triangles(const Samples& samples) {
+  LabelStages stages(samples, plain());
+  stages.extract();
+  return static_cast<double>(stages.size().triangles);
+}
+
+TEST(Sharing, OfWallsWithoutStairsHasNoGap) {
+  const Samples samples = two_blocks();
+  LabelStages stages(samples);
+  stages.extract();
+  EXPECT_LT(stages.size().triangles, 0.6 * plain_triangles(samples));
+  stages.remove_stairs();
+  const Walls walls = stages.walls();
+  const auto probes = probes_near_walls(samples, stages.labels(), 2000);
+  const Sharing sharing = measure_sharing(walls, probes);
+  EXPECT_GT(sharing.points_within_labels, 0U);
+  EXPECT_EQ(sharing.gaps, 0U);
+  EXPECT_EQ(sharing.overlaps, 0U);
+  const std::vector<double> volumes = enclosed_volumes(walls, 2);
+  for (std::size_t l = 0; l < 2; ++l) {
+    const double voxels = stages.voxels()[l].volume_mm3;
+    EXPECT_NEAR(volumes[l], voxels, 0.05 * voxels);
+  }
+}
+
 TEST(Probes, LieInCellsOfTwoLabels) {
   const Samples samples = two_blocks();
   const std::vector<std::int64_t> labels = {7, 9};
@@ -131,7 +164,7 @@ TEST(Probes, LieInCellsOfTwoLabels) {
 TEST(Peers, LabelsOfFlyingEdgesAreClosedAndWoundOutward) {
   if (!peers_available()) GTEST_SKIP() << peers_description();
   const Samples samples = two_blocks();
-  LabelStages stages(samples);
+  LabelStages stages(samples, plain());
   stages.extract();
   const auto ours = enclosed_volumes(stages.walls(), 2);
   Peers peers(samples, 0);

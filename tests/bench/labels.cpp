@@ -6,6 +6,7 @@
 
 #include "tests/bench/label_body.h"
 #include "tests/bench/label_stages.h"
+#include "tests/bench/memory.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"
@@ -17,16 +18,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Goal kPerLabelGoal = {0.1};
-constexpr Goal kSurfaceNetsGoal = {0.5};
+// Beside SurfaceNets with its 16 passes.
+constexpr Goal kStairsGoal = {1.0};
+constexpr Goal kLaplacianGoal = {0.5};
+constexpr Goal kJobGoal = {1.5};
+constexpr Goal kMemoryGoal = {1.2};
 constexpr int kLabelPairs = 3;
 constexpr std::size_t kProbes = 400'000;
-
-// A job's default for labels: no vertex leaves its half of the smallest spacing.
-mesh::SmoothOptions laplacian(const Samples& samples) {
-  mesh::SmoothOptions options = smooth_options(10, Smoothing::kLaplacian);
-  options.max_displacement_mm = std::ranges::min(samples.geometry.spacing) / 2;
-  return options;
-}
 
 mesh::SmoothOptions taubin() { return smooth_options(20, Smoothing::kTaubin); }
 
@@ -42,8 +40,9 @@ class LabelComparison {
   std::vector<Finding> run() {
     compare_surface_nets();
     compare_flying_edges();
-    add_alone("count_voxels", "voxels and bounds of each", [&] { stages_.count_voxels(); });
-    add_alone("measure", "topology, area and volume of each", [&] { stages_.measure(); });
+    add_stages();
+    add_alone("count_voxels", "voxels and bounds of each", {[&] { stages_.count_voxels(); }});
+    add_alone("measure", "topology, area and volume of each", {[&] { stages_.measure(); }});
     const std::uint64_t triangles = stages_.size().triangles;
     findings_.push_back({"labels/triangles",
                          "triangles, " + which_,
@@ -58,13 +57,36 @@ class LabelComparison {
   void extract() { stages_.extract(); }
   void extract_and_smooth() {
     stages_.extract();
-    stages_.smooth(laplacian(samples_));
+    stages_.smooth(laplacian_by_labels(samples_));
+  }
+  void extract_and_remove_stairs() {
+    stages_.extract();
+    stages_.remove_stairs();
   }
 
-  void add_alone(const std::string& name, const std::string& what,
-                 const std::function<void()>& ours) {
-    const double ms = median_ms({ours}, kLabelPairs);
+  void add_alone(const std::string& name, const std::string& what, const Timed& ours) {
+    const double ms = median_ms(ours, kLabelPairs);
     findings_.push_back({"labels/" + name, what + ", ms, " + which_, milliseconds(ms), "", ms, {}});
+  }
+
+  // Where the time of a job goes.
+  void add_stages() {
+    stages_.extract();
+    add_alone("remove_stairs", "the stairs of all alone",
+              {[&] { stages_.remove_stairs(); }, [&] { stages_.extract(); }});
+    stages_.run_job();
+    const Timing timing = stages_.run_job().timing;
+    const auto add_stage = [&](const std::string& name, double ms) {
+      findings_.push_back({"labels/job/" + name,
+                           name + " of a job to a GLB, ms, " + which_,
+                           milliseconds(ms),
+                           "",
+                           ms,
+                           {}});
+    };
+    add_stage("extract", timing.extract);
+    add_stage("smooth", timing.smooth);
+    add_stage("encode", timing.encode);
   }
 
   void add(const std::string& name, const std::string& what, const Paired& times,
@@ -76,19 +98,37 @@ class LabelComparison {
   void compare_surface_nets() {
     if (plan_.surface_nets_root.empty()) return;
     SurfaceNets nets(plan_.surface_nets_root, samples_, stages_.labels(), plan_.threads);
-    const Timed ours = {[&] { extract_and_smooth(); }};
-    time_ms(ours);
-    add("surface_nets", "all with 10 passes of smoothing / SurfaceNets with 16",
-        pair_times([&] { return time_ms(ours); }, [&] { return nets.run_ms(); }, kLabelPairs),
-        kSurfaceNetsGoal);
+    const auto compare = [&](const std::string& name, const std::string& what, const Timed& ours,
+                             Goal goal) {
+      time_ms(ours);
+      add(name, what + " / SurfaceNets with 16 passes",
+          pair_times([&] { return time_ms(ours); }, [&] { return nets.run_ms(); }, kLabelPairs),
+          goal);
+    };
+    compare("surface_nets/labels", "surface without stairs", {[&] { extract_and_remove_stairs(); }},
+            kStairsGoal);
+    compare("surface_nets/laplacian", "surface with 10 Laplacian passes",
+            {[&] { extract_and_smooth(); }}, kLaplacianGoal);
+    compare("surface_nets/job", "job to a GLB", {[&] { stages_.run_job(); }}, kJobGoal);
+    compare_memory(nets);
+  }
+
+  void compare_memory(const SurfaceNets& nets) {
+    const auto ours = measure_memory(kLabelJobStage, samples_.source, plan_.threads);
+    if (!ours) return;
+    const double ratio =
+        static_cast<double>(ours->peak_bytes) / static_cast<double>(nets.peak_bytes());
+    findings_.push_back(
+        {"labels/surface_nets/memory", "peak memory of a job to a GLB / SurfaceNets, " + which_,
+         mebibytes(ours->peak_bytes), mebibytes(nets.peak_bytes()), ratio, kMemoryGoal});
   }
 
   void compare_flying_edges() {
     const Timed bare = {[&] { extract(); }};
     const Timed smoothed = {[&] { extract_and_smooth(); }};
     if (!peers_available()) {
-      add_alone("extract", "extraction of all", bare.run);
-      add_alone("extract_smooth", "the same and 10 passes of smoothing", smoothed.run);
+      add_alone("extract", "extraction of all", bare);
+      add_alone("extract_smooth", "the same and 10 passes of smoothing", smoothed);
       return;
     }
     Peers peers(samples_, 0);
@@ -156,7 +196,7 @@ class QualityOfWays {
 std::vector<Samples> segmentations(std::uint32_t body_samples) {
   std::vector<Samples> all;
   all.push_back(label_body(body_samples));
-  for (const char* name : {"aal", "brodmann"}) {
+  for (const char* name : {"aal", "brodmann", "JHU-WhiteMatter-labels-1mm"}) {
     const fs::path path =
         fs::path("/usr/share/mricron/templates") / (std::string(name) + ".nii.gz");
     if (!fs::exists(path)) continue;
@@ -179,7 +219,10 @@ std::vector<LabelQuality> measure_label_quality(const Samples& samples, const La
   LabelStages& stages = ways.stages();
   std::vector<LabelQuality> qualities;
   stages.extract();
-  stages.smooth(laplacian(samples));
+  stages.remove_stairs();
+  qualities.push_back(ways.look("isomesh without stairs", stages.walls(), true));
+  stages.extract();
+  stages.smooth(laplacian_by_labels(samples));
   qualities.push_back(ways.look("isomesh, 10 Laplacian passes", stages.walls(), true));
   stages.extract();
   stages.smooth(taubin());

@@ -1,6 +1,7 @@
 // isomesh-bench: times every stage and, where VTK was found when it was built, VTK's on the same
 // volume in the same run.
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -18,6 +19,7 @@
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/cluster.h"
 #include "tests/bench/label_stages.h"
+#include "tests/bench/label_table.h"
 #include "tests/bench/labels.h"
 #include "tests/bench/machine.h"
 #include "tests/bench/memory.h"
@@ -159,7 +161,14 @@ std::string count_of(int threads) {
   return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
 }
 
-int run_labels(const Options& options, std::uint32_t body_samples) {
+// The tables of `isomesh-bench labels`.
+constexpr std::array kLabelTables = {"times", "sharing", "shapes", "volumes"};
+
+int run_labels(const Options& options, std::uint32_t body_samples,
+               const std::vector<std::string>& tables) {
+  const auto has = [&](const char* table) {
+    return tables.empty() || std::ranges::find(tables, table) != tables.end();
+  };
   const std::vector<Samples> all = options.volume.empty()
                                        ? segmentations(body_samples)
                                        : std::vector{load_labels(options.volume)};
@@ -167,14 +176,19 @@ int run_labels(const Options& options, std::uint32_t body_samples) {
   const std::vector<int> counts = thread_counts(options);
   for (const int count : counts) {
     for (const Samples& samples : all) {
+      if (!has("times")) continue;
       output.add(samples.name + ", " + count_of(count),
                  measure_label_findings(samples, {count, options.surface_nets_root}));
     }
   }
   for (const Samples& samples : all) {
+    if (!has("sharing")) continue;
     output.add(samples.name + ", gaps and overlaps",
                to_json(measure_label_quality(samples, {counts.back(), options.surface_nets_root})));
   }
+  set_threads(counts.back());
+  if (has("shapes")) output.add("shapes", shape_table(kShapePlacements));
+  if (has("volumes")) output.add("volumes of labels over 1 000 voxels", volume_table(all));
   const bool without_nets = options.surface_nets_root.empty();
   output.end(missing_peers() + (without_nets ? kNoSurfaceNets + std::string("\n") : ""));
   return 0;
@@ -262,9 +276,13 @@ int run_program(int argc, char** argv) {
   CLI::App* labels = app.add_subcommand(
       "labels",
       "Separate all labels of --volume, or of a synthetic body and of Debian's atlases, beside the "
-      "peers: times, gaps, overlaps and volumes");
+      "peers: times, gaps, overlaps and volumes; and how true simple shapes become");
   labels->add_option("--samples", samples, "Of the synthetic body along each axis")
       ->check(CLI::Range(64, 1024));
+  std::vector<std::string> tables;
+  labels->add_option("--only", tables, "Tables to measure; several are separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember(std::vector<std::string>(kLabelTables.begin(), kLabelTables.end())));
   labels->fallthrough();
 
   AccuracyPlan accuracy;
@@ -280,11 +298,11 @@ int run_program(int argc, char** argv) {
   certify->fallthrough();
 
   std::string stage;
-  std::uint32_t size = 0;
+  std::string size_or_file;
   int threads = 1;
   CLI::App* memory = app.add_subcommand(kMemoryCommand, "")->group("");
   memory->add_option("stage", stage)->required();
-  memory->add_option("size", size)->required();
+  memory->add_option("size-or-file", size_or_file)->required();
   memory->add_option("threads", threads)->required();
 
   try {
@@ -293,13 +311,13 @@ int run_program(int argc, char** argv) {
     constexpr int kWrongUsage = 2;
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
-  if (*memory) return run_memory_command(stage, size, threads);
+  if (*memory) return run_memory_command(stage, size_or_file, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
   if (*cluster) return run_cluster(options, daemon);
   accuracy.with_peers = !only_fast;
   if (*simplify || *certify) return run_accuracy(options, accuracy, bool(*certify));
-  if (*labels) return run_labels(options, samples);
+  if (*labels) return run_labels(options, samples, tables);
   return *report ? run_report(folder, usual_plan(daemon), sections) : run(options);
 }
 

@@ -11,6 +11,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/bench/label_body.h"
+#include "tests/bench/label_stages.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
@@ -38,6 +40,10 @@ bool reset_peak() {
 // Runs a stage. Returns the sizes that are known from it; the peak is not.
 PeakMemory run_stage(const std::string& stage, const Samples& field) {
   PeakMemory memory = {.input_bytes = field.bytes.size()};
+  if (stage == kLabelJobStage) {
+    memory.output_bytes = LabelStages(field).run_job().bytes;
+    return memory;
+  }
   const Surface surface = {.iso = kFieldIso};
   if (stage == kPeerExtractStage || stage == kPeerJobStage) {
     Peers peers(field, surface.iso);
@@ -64,6 +70,13 @@ PeakMemory run_stage(const std::string& stage, const Samples& field) {
   }
   memory.output_bytes = stages.mesh_bytes();
   return memory;
+}
+
+Samples samples_of(const std::string& stage, const std::string& size_or_file) {
+  const bool is_size = size_or_file.find_first_not_of("0123456789") == std::string::npos;
+  if (!is_size) return load_labels(size_or_file);
+  const auto size = static_cast<std::uint32_t>(std::stoul(size_or_file));
+  return stage == kLabelJobStage ? label_body(size) : synthetic_field(size);
 }
 
 std::string own_path() {
@@ -107,24 +120,24 @@ std::string run_self(std::vector<std::string> arguments) {
 
 }  // namespace
 
-std::optional<PeakMemory> measure_memory(const std::string& stage, std::uint32_t size,
+std::optional<PeakMemory> measure_memory(const std::string& stage, const std::string& size_or_file,
                                          int threads) {
   std::istringstream answer(
-      run_self({kMemoryCommand, stage, std::to_string(size), std::to_string(threads)}));
+      run_self({kMemoryCommand, stage, size_or_file, std::to_string(threads)}));
   PeakMemory memory;
   if (answer >> memory.peak_bytes >> memory.input_bytes >> memory.output_bytes >>
       memory.layer_bytes) {
     return memory;
   }
-  std::cerr << "isomesh-bench: the memory of " << stage << " at " << size
-            << "^3 could not be measured\n";
+  std::cerr << "isomesh-bench: the memory of " << stage << " on " << size_or_file
+            << " could not be measured\n";
   return std::nullopt;
 }
 
-int run_memory_command(const std::string& stage, std::uint32_t size, int threads) {
+int run_memory_command(const std::string& stage, const std::string& size_or_file, int threads) {
   set_threads(threads);
   Peers::set_threads(threads);
-  const Samples field = synthetic_field(size);
+  const Samples field = samples_of(stage, size_or_file);
   if (!reset_peak()) return 1;
   const std::uint64_t before = own_status("VmRSS");
   const PeakMemory memory = run_stage(stage, field);

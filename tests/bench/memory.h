@@ -28,16 +28,19 @@ struct PeakMemory {
 };
 
 inline constexpr const char* kExtractStage = "extract";
-inline constexpr const char* kSmoothStage = "smooth";  // extract, connectivity and 5 passes
-inline constexpr const char* kJobStage = "job";        // with the encoder
+inline constexpr const char* kSmoothStage = "smooth";       // extract, connectivity and 5 passes
+inline constexpr const char* kJobStage = "job";             // with the encoder
+inline constexpr const char* kLabelJobStage = "label-job";  // to a GLB
 inline constexpr const char* kPeerExtractStage = "flying-edges";
 inline constexpr const char* kPeerJobStage = "peer-pipeline";
 
-// On the synthetic field of that size, six tetrahedra. Empty, with the reason on standard error,
+// On the synthetic field of that size, six tetrahedra; by labels, on the body of that size or on a
+// file of labels. Empty, with the reason on standard error,
 // when the process could not be run or did not answer.
-std::optional<PeakMemory> measure_memory(const std::string& stage, std::uint32_t size, int threads);
+std::optional<PeakMemory> measure_memory(const std::string& stage, const std::string& size_or_file,
+                                         int threads);
 
 // What that process does: prints one line for `measure_memory`. The exit status.
-int run_memory_command(const std::string& stage, std::uint32_t size, int threads);
+int run_memory_command(const std::string& stage, const std::string& size_or_file, int threads);
 
 }  // namespace isomesh::bench

@@ -235,7 +235,7 @@ Finding growth_of_time(const std::vector<std::uint32_t>& sizes) {
 // Peak over input + output + O(slice): what each thread may hold of planes while it walks through
 // them, what smoothing says that it takes of layers, and a little that does not grow at all.
 std::optional<Finding> memory_of(const std::string& stage, int threads) {
-  const auto memory = measure_memory(stage, kMemorySize, threads);
+  const auto memory = measure_memory(stage, std::to_string(kMemorySize), threads);
   if (!memory) return std::nullopt;
   constexpr std::uint64_t kBytesPerPlaneSample = 16;
   constexpr std::uint64_t kConstant = 4 << 20;

@@ -143,7 +143,7 @@ Json measure_growth(std::uint32_t size, int threads) {
     stages.insert(stages.end(), {{"peer_extract", kPeerExtractStage}, {"peer_job", kPeerJobStage}});
   }
   for (const auto& [name, stage] : stages) {
-    const auto memory = measure_memory(stage, size, threads);
+    const auto memory = measure_memory(stage, std::to_string(size), threads);
     if (name == "extract" && memory) {
       row["least_bytes"] = memory->input_bytes + memory->output_bytes;
     }

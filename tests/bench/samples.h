@@ -16,7 +16,8 @@ namespace isomesh::bench {
 
 // Samples with their owner, x fastest, as many bytes as dims and type tell.
 struct Samples {
-  std::string name;  // as it appears in the names of benchmarks
+  std::string name;    // as it appears in the names of benchmarks
+  std::string source;  // its file, or its size if it is synthetic; empty if it is derived
   SampleType type = SampleType::kUint8;
   mesh::Dims dims;
   Geometry geometry;

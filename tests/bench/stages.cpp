@@ -1,5 +1,6 @@
 #include "tests/bench/stages.h"
 
+#include <algorithm>
 #include <limits>
 
 #include <malloc.h>
@@ -91,6 +92,13 @@ mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing) {
   return jobs::smooth_options(parameters);
 }
 
+mesh::SmoothOptions laplacian_by_labels(const Samples& samples) {
+  MeshParameters parameters = label_parameters({});
+  parameters.smoothing = Smoothing::kLaplacian;
+  parameters.max_displacement_mm = std::ranges::min(samples.geometry.spacing) / 2;
+  return jobs::smooth_options(parameters);
+}
+
 void Stages::smooth(int passes, Smoothing smoothing) {
   mesh::smooth(smooth_options(passes, smoothing), {}, mesh_);
 }
@@ -152,6 +160,28 @@ std::string Stages::drc() const {
   return bytes;
 }
 
+JobFigures run_job(const Samples& samples, const MeshParameters& parameters, double iso,
+                   bool certify, const MakeJob& make) {
+  CountingSink counting;
+  const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
+  const jobs::Report nobody = [](Stage, double, const Timing&) {};
+  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, 0, parameters, certify));
+  const auto& [x, y, z] = samples.dims;
+  const Volume volume;
+  JobFigures figures;
+  figures.mesh = make({samples.type, {x, y, z}, samples.geometry, samples.bytes.data()},
+                      {.volume = volume,
+                       .parameters = parameters,
+                       .iso = iso,
+                       .certify = certify,
+                       .memory_bytes = std::numeric_limits<std::uint64_t>::max()},
+                      sinks, progress);
+  progress.end_stage();
+  figures.timing = progress.timing();
+  figures.bytes = counting.bytes;
+  return figures;
+}
+
 std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   MeshParameters parameters;
   parameters.passes = passes;
@@ -165,25 +195,11 @@ JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
   parameters.interpolation = surface_.interpolation;
   parameters.close = surface_.close;
   parameters.regularize = surface_.regularize;
-  CountingSink counting;
-  const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
-  const jobs::Report nobody = [](Stage, double, const Timing&) {};
-  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, 0, parameters, certify));
-  const auto& [x, y, z] = samples_.dims;
-  const Volume volume;
-  JobFigures figures;
-  figures.mesh =
-      jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
-                      {.volume = volume,
-                       .parameters = parameters,
-                       .iso = surface_.iso,
-                       .certify = certify,
-                       .memory_bytes = std::numeric_limits<std::uint64_t>::max()},
-                      sinks, progress, mesh_);
-  progress.end_stage();
-  figures.timing = progress.timing();
-  figures.bytes = counting.bytes;
-  return figures;
+  return bench::run_job(samples_, parameters, surface_.iso, certify,
+                        [&](const jobs::SampleArray& array, const jobs::MeshRequest& request,
+                            std::span<const codec::Sink> sinks, jobs::Progress& progress) {
+                          return jobs::make_mesh(array, request, sinks, progress, mesh_);
+                        });
 }
 
 void Stages::release_memory() {

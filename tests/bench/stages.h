@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "proto/types.h"
+#include "server/jobs/making/make_mesh.h"
 #include "server/mesh/measure/shapes.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/smooth/smooth.h"
@@ -62,11 +64,19 @@ struct JobFigures {
   std::uint64_t bytes = 0;  // of all files
 };
 
+// What a job does between the samples in memory and the bytes of its files, which are counted.
+using MakeJob = std::function<MeshSummary(const jobs::SampleArray&, const jobs::MeshRequest&,
+                                          std::span<const codec::Sink>, jobs::Progress&)>;
+JobFigures run_job(const Samples& samples, const MeshParameters& parameters, double iso,
+                   bool certify, const MakeJob& make);
+
 // Threads that the stages run on, 1 at least. Not while one runs.
 void set_threads(int threads);
 
 // As a job that asks for the method has them.
 mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing);
+// As a job by labels has them that asks for Laplacian smoothing and for nothing else.
+mesh::SmoothOptions laplacian_by_labels(const Samples& samples);
 
 // One volume's way through the stages, in memory that is kept from run to run as a worker of the
 // daemon keeps it. Extract comes first; the others take whatever mesh there is. Not thread safe.

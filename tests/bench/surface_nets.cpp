@@ -89,6 +89,7 @@ double SurfaceNets::run_ms() {
   const auto answer = nlohmann::json::parse(finished.output);
   description_ = "VTK " + answer.at("version").get<std::string>() + " with its SMP backend " +
                  answer.at("backend").get<std::string>();
+  peak_bytes_ = answer.at("bytes").get<std::uint64_t>();
   return answer.at("milliseconds").at(0).get<double>();
 }
 

@@ -33,6 +33,9 @@ class SurfaceNets {
   double run_ms();
 
   Walls walls() const;  // of the last run; the winding of its triangles tells nothing
+  // The peak of that run's memory, with the samples and without libraries; as memory.h has it. 0
+  // before the first run.
+  std::uint64_t peak_bytes() const { return peak_bytes_; }
   const std::string& description() const { return description_; }  // empty before the first run
 
  private:
@@ -41,6 +44,7 @@ class SurfaceNets {
   std::vector<std::int64_t> labels_;
   test::TemporaryFolder folder_;
   std::string description_;
+  std::uint64_t peak_bytes_ = 0;
 };
 
 }  // namespace isomesh::bench

@@ -8,8 +8,9 @@ Usage: surface_nets.py ORDER, a JSON object of
   "passes"      of the filter's smoothing
   "runs"        after one that warms up
   "output"      an existing folder
-Prints one JSON object: "version" and "backend" of VTK, and "milliseconds" of each run, from samples
-to points and triangles in memory. Writes the last run's "points" (float32), "triangles" (int64)
+Prints one JSON object: "version" and "backend" of VTK, "milliseconds" of each run, from samples to
+points and triangles in memory, and "bytes", the peak of the memory of the first run, with the
+samples. Writes the last run's "points" (float32), "triangles" (int64)
 and "sides" (float64, both labels of each triangle) into the folder.
 """
 import json
@@ -38,6 +39,14 @@ def surface_nets(image, labels, passes):
     return nets.GetOutput()
 
 
+def own_status(field):
+    """A field of /proc/self/status, in bytes."""
+    for line in pathlib.Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(field + ":"):
+            return int(line.split()[1]) << 10
+    raise KeyError(field)
+
+
 def write(array, kind, path):
     vtk_to_numpy(array).astype(kind).tofile(path)
 
@@ -51,12 +60,16 @@ def main(order):
     image.SetSpacing(order["spacing"])
     image.GetPointData().SetScalars(numpy_to_vtk(samples))
 
+    pathlib.Path("/proc/self/clear_refs").write_text("5")  # resets the peak
+    before = own_status("VmRSS")
+    peak = None
     times = []
     for _ in range(order["runs"] + 1):
         mesh = None  # freed before the next run begins
         begin = time.perf_counter()
         mesh = surface_nets(image, order["labels"], order["passes"])
         times.append(1000 * (time.perf_counter() - begin))
+        peak = peak or own_status("VmHWM") - before + samples.nbytes
 
     folder = pathlib.Path(order["output"])
     write(mesh.GetPoints().GetData(), numpy.float32, folder / "points")
@@ -66,6 +79,7 @@ def main(order):
         "version": vtkVersion.GetVTKVersion(),
         "backend": vtkSMPTools.GetBackend(),
         "milliseconds": times[1:],
+        "bytes": peak,
     }))
 
 

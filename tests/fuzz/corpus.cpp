@@ -51,7 +51,10 @@ std::vector<std::string> nifti_files() {
 std::vector<std::string> label_texts() {
   return {"# Color table file x.ctbl\n3 soft_tissue 111 184 210 255\n4 (none) 0 0 0 0\n",
           "0 0 0 0 0 0 0 \"Clear Label\"\n2 255 0 0 1 1 1 \"Deep R\"\n",
-          "1 0.93 0.2 0 Frontal Pole\n", "1 Precentral_L 2001\r\n2 Precentral_R 2002\r\n"};
+          "1 0.93 0.2 0 Frontal Pole\n",
+          "1 Precentral_L 2001\r\n2 Precentral_R 2002\r\n",
+          R"({"labels": {"background": 0, "spleen": 1}})",
+          R"([{"labelValue": 1, "name": "spleen", "color": [0.9, 0.6, 1]}])"};
 }
 
 std::vector<std::string> nrrd_files() {

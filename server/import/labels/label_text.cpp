@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/text.h"
+#include "server/import/labels/label_json.h"
 #include "server/import/labels/label_table.h"
 
 namespace isomesh::import {
@@ -180,6 +181,8 @@ std::vector<LabelEntry> labels_of_bids(std::span<const std::string_view> lines) 
 std::vector<LabelEntry> labels_of_text(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  const std::string_view content = trimmed(text);
+  if (content.starts_with('{') || content.starts_with('[')) return labels_of_json(content);
   const std::vector<std::string_view> all = lines(text);
   if (!all.empty() && all.front().find('\t') != std::string_view::npos) {
     auto labels = labels_of_bids(all);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <span>
 #include <type_traits>
@@ -56,8 +57,58 @@ void replace_non_finite(std::span<std::byte> samples, SampleType type, double sm
   });
 }
 
-// Declared labels are certain; otherwise the samples may look like labels.
+// Converts in place, from the front: samples of the new type are no larger.
+void convert_whole(std::span<std::byte> samples, SampleType from, SampleType to) {
+  with_sample(from, [&](auto stored) {
+    with_sample(to, [&](auto whole) {
+      std::byte* target = samples.data();
+      for (std::size_t at = 0; at < samples.size(); at += sizeof(stored)) {
+        std::memcpy(&stored, samples.data() + at, sizeof(stored));
+        whole = static_cast<decltype(whole)>(stored);
+        std::memcpy(target, &whole, sizeof(whole));
+        target += sizeof(whole);
+      }
+    });
+  });
+}
+
+bool is_wide_integer(const SampleLayout& layout) {
+  return !layout.rescale &&
+         (layout.type == StoredType::kUint64 || layout.type == StoredType::kInt64);
+}
+
+// Labels are integers: labels of floats become some, and so do 64-bit integers that fit. Returns
+// true if the samples were converted.
+bool store_whole_numbers(const SampleLayout& layout, CanonicalWriter& writer, Volume& volume) {
+  if (is_integer(volume.type)) return false;
+  const std::span<std::byte> samples = writer.samples();
+  const auto type = volume::whole_type(samples, volume.type);
+  if (!type) return false;
+  if (!is_wide_integer(layout) && volume.labels.empty() &&
+      !volume::label_count(samples, volume.type, volume.dims)) {
+    return false;
+  }
+  convert_whole(samples, volume.type, *type);
+  volume.type = *type;
+  writer.shorten({volume.dims, volume.type, volume.geometry});
+  return true;
+}
+
+// Completes the note on labels, if there is one.
+void note_stored_type(const SampleLayout& layout, Volume& volume) {
+  const auto note =
+      std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
+  if (note == volume.notes.end()) return;
+  const std::string stored =
+      is_wide_integer(layout) ? "64-bit integers" : std::string(to_string(canonical_type(layout)));
+  note->detail += " The whole numbers, " + stored + " in the file, are now " +
+                  std::string(to_string(volume.type)) + '.';
+}
+
+// Declared labels are certain; otherwise the samples may look like labels. Only integers are
+// labels.
 void note_labels(std::span<const std::byte> samples, Volume& volume) {
+  if (!is_integer(volume.type)) return;
   const std::size_t told = volume.labels.size();
   const auto values = volume::label_count(samples, volume.type, volume.dims);
   if (told == 0 && !values) return;
@@ -84,7 +135,11 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
   volume.type = canonical_type(samples.layout);
   CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
   read_samples(samples.file, samples.offset, samples.layout, writer.samples());
-  return finish(writer, std::move(volume));
+  const bool is_converted = store_whole_numbers(samples.layout, writer, volume);
+  if (!is_integer(volume.type)) volume.labels.clear();
+  volume = finish(writer, std::move(volume));
+  if (is_converted) note_stored_type(samples.layout, volume);
+  return volume;
 }
 
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task) {
@@ -101,8 +156,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   if (source.layers)
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task.target);
-  // Labels are integers.
-  if (is_integer(canonical_type(payload.layout()))) volume.labels = source.labels;
+  volume.labels = source.labels;
   return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),
                          task.target);
 }

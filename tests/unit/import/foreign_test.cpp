@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -219,6 +220,61 @@ TEST(ForeignSamples, OfFewWholeValuesInRegionsLookLikeLabels) {
   const std::string mask = std::string(12, '\0') + std::string(12, '\1');
   EXPECT_THAT(codes_of(import_bytes(nifti({}, mask))), IsEmpty());
   EXPECT_THAT(codes_of(import_bytes(nifti({}, kSamples))), IsEmpty());
+}
+
+// Four regions of these values, as samples of the type.
+template <class Number>
+Outcome regions(const std::vector<Number>& values, NiftiFields fields = {}) {
+  fields.dim = {3, 6, 4, 1, 1, 1, 1, 1};
+  std::tie(fields.datatype, fields.bitpix) = nifti_type<Number>();
+  std::vector<Number> samples;
+  for (const Number value : values) samples.insert(samples.end(), 6, value);
+  return import_bytes(nifti(fields, bytes_of(samples)));
+}
+
+TEST(ForeignSamples, ThatAreLabelsBecomeIntegers) {
+  const Outcome bytes = regions<std::uint8_t>({0, 1, 2, 5});
+  const Outcome floats = regions<float>({-0.0F, 1, 2, 5});
+  EXPECT_EQ(floats.volume.type, SampleType::kUint8);
+  EXPECT_EQ(floats.volume.range, bytes.volume.range);
+  EXPECT_EQ(floats.volume.suggested_iso, bytes.volume.suggested_iso);
+  EXPECT_EQ(floats.volume.bytes, 24U);
+  EXPECT_EQ(floats.canonical, bytes.canonical);
+  ASSERT_THAT(codes_of(floats), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(floats.volume.notes[0].detail,
+              HasSubstr("The whole numbers, float32 in the file, are now uint8."));
+
+  const Outcome doubles = regions<double>({-5, 0, 70'000, 3});
+  EXPECT_EQ(doubles.volume.type, SampleType::kInt32);
+  EXPECT_EQ(samples_of<std::int32_t>(doubles)[12], 70'000);
+  const Outcome scaled = regions<std::uint16_t>({0, 1, 2, 5}, {.slope = 2});
+  EXPECT_EQ(scaled.volume.type, SampleType::kUint8);
+  EXPECT_EQ(samples_of<std::uint8_t>(scaled)[23], 10);
+  EXPECT_THAT(scaled.volume.notes.back().detail, HasSubstr("float32"));
+}
+
+TEST(ForeignSamples, ThatAreNoLabelsStayFloats) {
+  for (const std::vector<float>& values : std::vector<std::vector<float>>{
+           {0, 1, 2, 2.5F}, {0, 1, 2, 1e10F}, {0, 0, 1, 1}, {-1, 0, 1, 3e9F}}) {
+    EXPECT_EQ(regions(values).volume.type, SampleType::kFloat32) << values[3];
+  }
+  std::vector<float> gradient(24);
+  for (std::size_t at = 0; at < gradient.size(); ++at) gradient[at] = static_cast<float>(at);
+  const Outcome outcome = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(gradient)));
+  EXPECT_EQ(samples_of<float>(outcome), gradient);
+}
+
+TEST(ForeignSamples, Of64BitsBecomeIntegersThatFit) {
+  const Outcome labels = regions<std::int64_t>({0, 1, 2, 4'000'000'000});
+  EXPECT_EQ(labels.volume.type, SampleType::kUint32);
+  EXPECT_EQ(samples_of<std::uint32_t>(labels)[23], 4'000'000'000U);
+  ASSERT_THAT(codes_of(labels), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(labels.volume.notes[0].detail, HasSubstr("64-bit integers in the file"));
+  const Outcome mask = regions<std::uint64_t>({0, 0, 1, 1});
+  EXPECT_EQ(mask.volume.type, SampleType::kUint8);
+  EXPECT_THAT(codes_of(mask), IsEmpty());
+  EXPECT_EQ(regions<std::uint64_t>({0, 0, 1, std::uint64_t{1} << 32}).volume.type,
+            SampleType::kFloat64);
 }
 
 }  // namespace

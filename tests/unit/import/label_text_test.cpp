@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/import/labels/label_table.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/writers.h"
@@ -91,6 +92,41 @@ TEST(LabelText, OfOtherTextIsNone) {
   EXPECT_THAT(labels_of_text(many), IsEmpty());
 }
 
+TEST(LabelText, IsJsonOfNumbersAndNames) {
+  const auto organs = ElementsAre(entry(1, "spleen"), entry(2, "kidney_right"));
+  for (
+      const std::string text :
+      {R"({"1": "spleen", "2": "kidney_right"})",
+       R"({"labels": [{"labelValue": 2, "name": "kidney_right"}, {"labelValue": 1, "name": "spleen"}]})",
+       R"({"name": "x", "labels": {"1": "spleen", "2": "kidney_right"}, "training": [{"a": 1}]})",
+       "\xef\xbb\xbf \n{\"labels\": {\"spleen\": 1, \"kidney_right\": 2}}\n"}) {
+    EXPECT_THAT(label_table(labels_of_text(text)), organs) << text;
+  }
+  EXPECT_THAT(labels_of_text(R"([{"labelValue": 7, "name": "liver", "color": [1, 0.5, 0]},
+                                 {"name": "left", "labelValue": -9007199254740993}])"),
+              ElementsAre(entry(7, "liver", "#ff8000"), entry(-9007199254740993, "left")));
+}
+
+TEST(LabelText, OfOtherJsonIsNone) {
+  for (const std::string text :
+       {"{", "{}", "[]", "[1]", "[[]]", "{\"labels\": 3}", "{\"threshold\": 1}",
+        "{\"labels\": {\"liver\": 1.5}}", "{\"1\": \"\"}", "{\"a\": \"b\"}",
+        "{\"labels\": {\"tumour\": [1, 2]}}", "{\"liver\": {\"volume\": 3}}",
+        "{\"1\": \"a\\u0000b\"}", "{\"1\": \"R\xe9gion\"}",
+        "{\"labels\": {\"liver\": 9223372036854775808}}", "[{\"labelValue\": 1}]",
+        "[{\"name\": \"x\", \"labelValue\": true}]"}) {
+    EXPECT_THAT(labels_of_text(text), IsEmpty()) << text;
+  }
+  EXPECT_THAT(labels_of_text(std::string(1'000'000, '[')), IsEmpty());
+  std::string many = "{";
+  for (int at = 0; at < 65'536; ++at)
+    many += (at == 0 ? "\"" : ",\"") + std::to_string(at) + "\":\"a\"";
+  EXPECT_THAT(labels_of_text(many + '}'), IsEmpty());
+  // Two names of one label: it has one of them.
+  EXPECT_THAT(label_table(labels_of_text(R"({"labels": {"spleen": 1, "liver": 1}})")),
+              ElementsAre(entry(1, "liver")));
+}
+
 // --- Beside a volume -----------------------------------------------------------------------------
 
 constexpr std::string_view kTable = "1 liver 255 0 0 0\n5 spleen 0 0 255 0\n";
@@ -163,6 +199,13 @@ TEST(LabelsBeside, AreNotForImagesNorForFilesThatNameTheirOwn) {
              "Segment0_Name:=kidney\nSegment0_LabelValue:=2\nSegment0_Layer:=0\n");
   EXPECT_THAT(labels_in({{"seg.nrrd", own}, {"seg.txt", std::string(kTable)}}),
               ElementsAre(entry(2, "kidney")));
+}
+
+TEST(LabelsBeside, AreThoseOfAClassMap) {
+  EXPECT_THAT(labels_in({{"a/seg.nii", label_volume()},
+                         {"a/dataset.json", R"({"labels": {"liver": 1, "spleen": 5}})"},
+                         {"a/statistics.json", R"({"liver": {"volume": 6}})"}}),
+              ElementsAre(entry(1, "liver"), entry(5, "spleen")));
 }
 
 TEST(LabelsBeside, ThatAreTooLongAreNone) {

@@ -109,6 +109,17 @@ TEST(NiftiLabels, OfFractionsAreNone) {
   EXPECT_THAT(outcome.volume.labels, IsEmpty());
 }
 
+TEST(NiftiLabels, OfWholeNumbersAreKept) {
+  const NiftiFields fields = {.datatype = 16, .bitpix = 32};
+  std::vector<float> samples(24, 1);
+  samples[5] = 7;
+  const Outcome outcome =
+      import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false), bytes_of(samples)));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
+  EXPECT_EQ(outcome.volume.labels, two());
+}
+
 TEST(NiftiLabels, AreNotMoreThanSixteenBitsTellApart) {
   std::string labels;
   for (int at = 0; at < 66'000; ++at) labels += "<Label Key=\"" + std::to_string(at) + "\"/>";

@@ -47,6 +47,21 @@ TEST(Canonical, IsReadBackExactly) {
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(volume.samples().data()) % 4096, 0U);
 }
 
+TEST(Canonical, CanBecomeShorter) {
+  const TemporaryFolder folder;
+  CanonicalHeader header = small_header();
+  {
+    CanonicalWriter writer(folder / "volume", header);
+    const std::size_t size = writer.samples().size();
+    header.type = SampleType::kUint8;
+    writer.shorten(header);
+    EXPECT_EQ(writer.samples().size(), size / 2);
+    for (std::size_t at = 0; at < size / 2; ++at) writer.samples()[at] = static_cast<std::byte>(at);
+    EXPECT_THROW(writer.shorten(small_header()), Error);
+  }
+  EXPECT_EQ(read_file(folder / "volume"), written(folder, header));
+}
+
 TEST(Canonical, HasOneFormForOneVolume) {
   const TemporaryFolder folder;
   CanonicalHeader header = small_header();

@@ -4,9 +4,13 @@
 #include <limits>
 #include <random>
 #include <set>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "proto/samples.h"
 
 namespace isomesh::volume::test {
 namespace {
@@ -95,9 +99,43 @@ TEST(Labels, FlatImagesOfTooManyValuesAreNone) {
   EXPECT_EQ(labels_of(samples, {8, 1025, 1}), std::nullopt);
 }
 
-TEST(Labels, RealNumbersAreNoLabels) {
-  const std::vector<float> samples = {0, 0, 0, 1, 1, 1, 2, 2, 2};
+TEST(Labels, OfFloatsAreWholeNumbers) {
+  std::vector<float> samples = {0, 0, 0, 1, 1, 1, 2, 2, 2};
+  EXPECT_EQ(labels_of(samples, {9, 1, 1}), 3U);
+  samples[8] = 2.5;
   EXPECT_EQ(labels_of(samples, {9, 1, 1}), std::nullopt);
+}
+
+template <class Sample>
+std::optional<SampleType> whole_type_of(const std::vector<Sample>& samples) {
+  return whole_type(std::as_bytes(std::span(samples)), sample_type<Sample>());
+}
+
+TEST(WholeType, IsTheSmallestThatHoldsAllSamples) {
+  const std::vector<std::pair<std::vector<double>, SampleType>> cases = {
+      {{0, 255}, SampleType::kUint8},
+      {{-0.0, 3}, SampleType::kUint8},
+      {{-128, 127}, SampleType::kInt8},
+      {{0, 256}, SampleType::kUint16},
+      {{-1, 128}, SampleType::kInt16},
+      {{-32768, 32767}, SampleType::kInt16},
+      {{0, 65536}, SampleType::kUint32},
+      {{0x1p31}, SampleType::kUint32},
+      {{0xffffffffp0}, SampleType::kUint32},
+      {{-1, 32768}, SampleType::kInt32},
+      {{-0x1p31, 0x1p31 - 1}, SampleType::kInt32}};
+  for (const auto& [samples, type] : cases) EXPECT_EQ(whole_type_of(samples), type) << samples[0];
+  EXPECT_EQ(whole_type_of<float>({1, 70'000}), SampleType::kUint32);
+  EXPECT_EQ(whole_type_of<std::int32_t>({1, 200}), SampleType::kUint8);
+}
+
+TEST(WholeType, IsNoneOfOtherNumbers) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const double bad : {0.5, -1e-300, 0x1p32, -0x1p31 - 1, 1e300, kInfinity, -kInfinity, kNan}) {
+    EXPECT_EQ(whole_type_of<double>({1, bad, 2}), std::nullopt) << bad;
+  }
+  EXPECT_EQ(whole_type_of<double>({-1, 0x1p31}), std::nullopt);
 }
 
 TEST(LabelTable, IsAscendingAndPlain) {
