@@ -23,6 +23,7 @@ void visit(Is<OrderResult> auto& self, auto&& field) {
   field("pacs", self.pacs);
   field("format", self.format);
   field("label", self.label);
+  field("sop_class_uid", self.sop_class_uid);
   field("series_uid", self.series_uid);
   field("sop_instance_uid", self.sop_instance_uid);
   field("bytes", self.bytes);

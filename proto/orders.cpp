@@ -47,8 +47,9 @@ void check(const Json& json, const OrderRequest& request, RequestReader& reader)
     reader.add("source.instances", "is not a known member");
   }
   for (const SendTarget& target : request.send.value_or(std::vector<SendTarget>())) {
-    if (target.format != MeshFormat::kStl) {
-      reader.add("send.format", "must be \"stl\": no other format can be sent to a PACS");
+    if (!is_sendable(target.format)) {
+      reader.add("send.format",
+                 "must be \"stl\" or \"obj\": no other format can be sent to a PACS");
     }
   }
   for (const char* name : {"parameters", "send"}) {
@@ -63,6 +64,10 @@ void check(const Json& json, const OrderRequest& request, RequestReader& reader)
 bool is_final(OrderState state) {
   return state == OrderState::kSucceeded || state == OrderState::kFailed ||
          state == OrderState::kCancelled;
+}
+
+bool is_sendable(MeshFormat format) {
+  return format == MeshFormat::kStl || format == MeshFormat::kObj;
 }
 
 std::string_view to_string(OrderState value) {
@@ -135,7 +140,18 @@ std::vector<PacsStatus> pacs_from_json(std::string_view text) {
 }
 
 std::string to_record(const OrderWork& work) { return json_values::to_text(work); }
-Order order_from_record(std::string_view text) { return json_values::from_record<Order>(text); }
+Order order_from_record(std::string_view text) {
+  Json record = Json::parse(text, nullptr, false);
+  const Json::json_pointer results("/results");
+  if (!record.is_object() || !record.contains(results) || !record[results].is_array()) {
+    return json_values::from_record<Order>(text);
+  }
+  // Older versions made objects of one class only, and did not write it.
+  for (Json& result : record[results]) {
+    if (result.is_object()) result.emplace("sop_class_uid", kEncapsulatedStlStorage);
+  }
+  return json_values::from_record<Order>(record.dump());
+}
 OrderWork order_work_from_record(std::string_view text) {
   return json_values::from_record<OrderWork>(text);
 }

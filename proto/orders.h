@@ -38,10 +38,16 @@ struct OrderSource {
   bool operator==(const OrderSource&) const = default;
 };
 
+// SOP class of most objects that orders make: those of STL.
+inline constexpr std::string_view kEncapsulatedStlStorage = "1.2.840.10008.5.1.4.1.1.104.3";
+
+// True if DICOM objects are made from meshes of the format: stl, obj.
+bool is_sendable(MeshFormat format);
+
 // The destination and the format of a mesh.
 struct SendTarget {
   std::string pacs;
-  MeshFormat format = MeshFormat::kStl;  // the only format for DICOM objects
+  MeshFormat format = MeshFormat::kStl;  // is_sendable
 
   bool operator==(const SendTarget&) const = default;
 };
@@ -50,7 +56,8 @@ struct SendTarget {
 struct OrderResult {
   std::string pacs;
   MeshFormat format = MeshFormat::kStl;
-  std::optional<std::int64_t> label = {};  // of an order by labels
+  std::optional<std::int64_t> label = {};  // of an order by labels, for an object of one label
+  std::string sop_class_uid{kEncapsulatedStlStorage};
   std::string series_uid;
   std::string sop_instance_uid;
   std::uint64_t bytes = 0;

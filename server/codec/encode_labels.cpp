@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,19 +34,6 @@ std::array<double, 3> series_color(std::int64_t label) {
   return color;
 }
 
-// A unique title without blanks, which would separate group names.
-std::string group_of(const LabelSummary& label, std::set<std::string>& taken) {
-  std::string title = title_of(label);
-  std::ranges::replace_if(
-      title, [](char c) { return c == ' ' || c == '\t'; }, '_');
-  std::string group = title;
-  for (int more = 0; !taken.insert(group).second; ++more) {
-    group =
-        title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
-  }
-  return group;
-}
-
 }  // namespace
 
 std::string title_of(const LabelSummary& label) {
@@ -64,6 +50,30 @@ std::array<double, 3> color_of(const LabelSummary& label) {
     color[channel] = byte / 255.0;
   }
   return color;
+}
+
+std::string ObjGroups::of(const LabelSummary& label) {
+  std::string title = title_of(label);
+  std::ranges::replace_if(
+      title, [](char c) { return c == ' ' || c == '\t'; }, '_');
+  std::string group = title;
+  for (int more = 0; !taken_.insert(group).second; ++more) {
+    group =
+        title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
+  }
+  return group;
+}
+
+std::string mtl_material(const std::string& group, const LabelSummary& label) {
+  std::string text = "newmtl " + group + "\nKd";
+  for (const double channel : color_of(label)) {
+    std::array<char, 32> number = {};
+    text += ' ';
+    text.append(
+        number.data(),
+        std::to_chars(number.begin(), number.end(), channel, std::chars_format::fixed, 6).ptr);
+  }
+  return text + '\n';
 }
 
 double linear_of(double srgb) {
@@ -104,9 +114,10 @@ void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
     return write_obj_vertex(in_space(mesh.positions[v], frame.space), out);
   });
-  std::set<std::string> groups;
+  ObjGroups groups;
   for (std::size_t n = 0; n < runs.size(); ++n) {
-    const std::string line = "g " + group_of(surface.labels[n], groups) + '\n';
+    const std::string group = groups.of(surface.labels[n]);
+    const std::string line = "g " + group + "\nusemtl " + group + '\n';
     sink(std::as_bytes(std::span(line)));
     writer.write(runs[n].count, kMostObjFaceBytes,
                  [&](std::size_t t, std::byte* out) { return write_obj_face(runs[n].at(t), out); });

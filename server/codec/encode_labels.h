@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string>
 
@@ -48,9 +49,22 @@ void encode_labels_glb(const LabelledSurface& surface, const Provenance& provena
 void encode_labels_ply(const LabelledSurface& surface, const Frame& frame,
                        const mesh::Context& context, const Sink& sink);
 
-// OBJ as encode_obj writes it, with a group of faces per label, named by its title with blanks
-// replaced; equal titles get the label's value appended. Surfaces are complete, as in PLY. Throws
-// Error kCancelled.
+// Names the groups of an OBJ: a label's title with blanks replaced; equal titles get the label's
+// value appended. Names follow from the order of the calls: all labels, ascending.
+class ObjGroups {
+ public:
+  std::string of(const LabelSummary& label);
+
+ private:
+  std::set<std::string> taken_;
+};
+
+// A label's material in an MTL file: its diffuse colour, in sRGB as programs that write MTL do.
+std::string mtl_material(const std::string& group, const LabelSummary& label);
+
+// OBJ as encode_obj writes it, with a group of faces per label. A group uses the material of the
+// same name, but the file names no library (mtllib). Surfaces are complete, as in PLY. Throws Error
+// kCancelled.
 void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
                        const mesh::Context& context, const Sink& sink);
 

@@ -9,6 +9,11 @@ import peers
 from fixture import Loop
 
 
+def texts_kind(result):
+    """The end of the media type of an object's document."""
+    return {"4": b"obj", "5": b"mtl"}[result["sop_class_uid"][-1]]
+
+
 class Objects(Loop):
     def made(self, series, **more):
         daemon = self.daemon()
@@ -135,6 +140,56 @@ class Objects(Loop):
             self.assertEqual(self.value(path, "0042,0010"), [f"[Bone {segment['label']}]"])
             self.assertIn(f"[{instance}]", self.value(path, "0008,1155"))
             self.assertIn(f"[{uid}]", self.value(path, "0020,000e"))
+
+    def test_segments_as_an_obj_with_their_colours(self):
+        """One OBJ of all segments; its materials are an object before it, to which it refers."""
+        series = self.series()
+        uid, _, data = dicom.segmentation(series)
+        self.pacs.upload([data])
+        daemon = self.daemon()
+        body = {"source": {"pacs": "main", "study": series.study, "series": uid}, "rule": "bone",
+                "parameters": {"labels": "all"}, "send": [{"pacs": "main", "format": "obj"}]}
+        order = self.succeeded(daemon, daemon.order(body)["id"])
+        materials, mesh = order["results"]
+        self.assertEqual([each["sop_class_uid"][-6:] for each in (materials, mesh)], [".104.5", ".104.4"])
+        self.assertEqual(materials["series_uid"], mesh["series_uid"])
+        self.assertEqual(sorted(self.stored(series)),
+                         sorted(each["sop_instance_uid"] for each in order["results"]))
+        texts, paths = [], []
+        for result in (materials, mesh):
+            path = os.path.join(self.folder.name, result["sop_instance_uid"] + ".dcm")
+            with open(path, "wb") as file:
+                file.write(self.pacs.file(result["sop_instance_uid"]))
+            # The judge knows the modules, but of these classes only STL.
+            with open(path, "rb") as file, open(path + ".stl", "wb") as judged:
+                judged.write(file.read().replace(result["sop_class_uid"].encode(),
+                                                 (result["sop_class_uid"][:-1] + "3").encode())
+                             .replace(b"model/" + texts_kind(result), b"model/stl"))
+            self.assert_judged(path + ".stl")
+            paths.append(path)
+            texts.append(self.document(path))
+        self.assertEqual(self.value(paths[0], "0008,0016"), ["=EncapsulatedMTLStorage"])
+        self.assertEqual(self.value(paths[0], "0042,0012"), ["[model/mtl]"])
+        self.assertEqual(self.value(paths[1], "0008,0016"), ["=EncapsulatedOBJStorage"])
+        self.assertEqual(self.value(paths[1], "0042,0012"), ["[model/obj]"])
+        self.assertEqual(self.value(paths[1], "0068,7005"), ["[materials.mtl]"])
+        self.assertIn(f"[{materials['sop_instance_uid']}]", self.value(paths[1], "0008,1155"))
+        job = peers.call(daemon.port, "GET", f"/v1/jobs/{order['job']}/mesh.obj")[2].decode()
+        self.assertEqual(texts[1], "mtllib materials.mtl\n" + job)
+        used = re.findall("^usemtl (.*)$", texts[1], re.MULTILINE)
+        self.assertEqual(used, ["Skull", "Lesion"])
+        self.assertEqual(re.findall("^newmtl (.*)$", texts[0], re.MULTILINE), used)
+        self.assertEqual(len(re.findall("^Kd( [01]\\.[0-9]{6}){3}$", texts[0], re.MULTILINE)), 2)
+        again = self.succeeded(daemon, daemon.order(body)["id"])
+        self.assertEqual(again["results"], order["results"])
+
+    def document(self, path):
+        """The text that the object encapsulates, as dcmdump writes it."""
+        folder = path + ".raw"
+        os.mkdir(folder)
+        subprocess.run(["dcmdump", "+W", folder, path], check=True, capture_output=True)
+        with open(os.path.join(folder, os.listdir(folder)[0]), "rb") as file:
+            return file.read().rstrip(b"\0").decode()
 
     def codes(self, path):
         """The codes of the sequences of the object's own: value, scheme, meaning."""

@@ -1,6 +1,6 @@
 #include "server/hospital/c_store/sender.h"
 
-#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/hospital/objects/encapsulated_document.h"
 #include "server/net/connect.h"
 #include "server/process/dimse_message.h"
 
@@ -39,7 +39,7 @@ void check_stored(std::uint16_t status) {
   throw PacsFailure(PacsFault::kBusy, said);
 }
 
-void check_sent(const process::DimseSent& sent) {
+void check_sent(const process::DimseSent& sent, std::string_view sop_class) {
   switch (sent.end) {
     case DimseEnd::kResponded:
       return check_stored(sent.status);
@@ -48,7 +48,8 @@ void check_sent(const process::DimseSent& sent) {
     case DimseEnd::kBusy:
       throw PacsFailure(PacsFault::kBusy, "the PACS rejected the association for now");
     case DimseEnd::kNotAccepted:
-      throw PacsFailure(PacsFault::kBusy, "the PACS does not accept Encapsulated STL");
+      throw PacsFailure(PacsFault::kBusy,
+                        "the PACS does not accept " + std::string(dicom::name_of_class(sop_class)));
     case DimseEnd::kBroken:
       throw PacsFailure(PacsFault::kUnreachable, "the PACS ended the association");
     case DimseEnd::kTimeout:
@@ -91,7 +92,7 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
       .calling = settings_.calling_aet,
       .called = settings_.aet,
       .file = object.file.path,
-      .sop_class = std::string(dicom::kEncapsulatedStlStorage),
+      .sop_class = object.sop_class,
       .instance = object.place.instance,
       .timeout = settings_.timeout,
       .response_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
@@ -102,7 +103,7 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
       child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
   const process::DimseSent sent = sent_of(output);
   if (sent.end == DimseEnd::kUnreadable) processes_.renew();
-  check_sent(sent);
+  check_sent(sent, object.sop_class);
 }
 
 }  // namespace isomesh::c_store

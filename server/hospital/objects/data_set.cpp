@@ -21,7 +21,7 @@ void append_tag(Tag tag, std::string& text) {
 
 // Value representations with a 32-bit length.
 bool is_long(std::string_view vr) {
-  constexpr std::array<std::string_view, 5> kLong = {"OB", "OW", "SQ", "UN", "UT"};
+  constexpr std::array<std::string_view, 6> kLong = {"OB", "OW", "SQ", "UN", "UR", "UT"};
   return std::ranges::find(kLong, vr) != kLong.end();
 }
 

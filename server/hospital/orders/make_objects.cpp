@@ -5,80 +5,125 @@
 #include <cmath>
 #include <span>
 
+#include "base/sha256.h"
 #include "base/text.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
-#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/codec/encode_labels.h"
+#include "server/hospital/objects/encapsulated_document.h"
 #include "server/hospital/objects/uid.h"
 #include "server/jobs/library/label_pages.h"
 
 namespace isomesh::orders {
 namespace {
 
-// The bytes of one STL file within a blob.
-struct StlFile {
+// The document of one object: a text, then the bytes of a file within a blob.
+struct Document {
+  dicom::DocumentKind kind = dicom::DocumentKind::kStl;
+  MeshFormat format = MeshFormat::kStl;  // the format to send that it is made for
   std::optional<std::int64_t> label = {};
-  std::string name = {};  // name of the label
-  std::string blob;
+  std::string name = {};                     // name of the label
+  std::optional<std::int64_t> segment = {};  // the label, also of an OBJ that has no other
+  std::string text = {};
+  std::string blob = {};  // empty: the text is all
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
-  std::string sha256;
+  std::string sha256;  // of the mesh or the materials
+  std::string materials_uid = {};
+  std::int64_t number = 1;  // in its series
+
+  std::uint64_t size() const { return text.size() + bytes; }
 };
 
-std::vector<StlFile> stl_files_of(const Job& job, const store::BlobStore& blobs) {
-  std::vector<StlFile> files;
-  if (!job.mesh) return files;
-  const auto& stored = job.mesh->files;
-  if (const auto stl = stored.find(MeshFormat::kStl); stl != stored.end()) {
-    files.push_back(
-        {.blob = stl->second.sha256, .bytes = stl->second.bytes, .sha256 = stl->second.sha256});
-  }
-  const auto zip = stored.find(MeshFormat::kZip);
-  if (zip == stored.end()) return files;
+template <class Function>
+void for_each_label(const Job& job, const store::BlobStore& blobs, Function&& function) {
   const jobs::JobLabels labels(job, blobs);
   std::vector<LabelSummary> page = labels.after(std::nullopt);
   for (; !page.empty(); page = labels.after(page.back().label)) {
-    for (const LabelSummary& label : page) {
-      const auto stl = label.files.find(MeshFormat::kStl);
-      if (stl == label.files.end() || label.triangles == 0) continue;
-      files.push_back({.label = label.label,
-                       .name = label.name.value_or("Label " + std::to_string(label.label)),
-                       .blob = zip->second.sha256,
-                       .offset = stl->second.offset,
-                       .bytes = stl->second.bytes,
-                       .sha256 = stl->second.sha256});
-    }
+    for (const LabelSummary& label : page) function(label);
   }
-  return files;
+}
+
+std::vector<Document> stl_documents(const Job& job, const store::BlobStore& blobs) {
+  std::vector<Document> documents;
+  const auto& stored = job.mesh->files;
+  if (const auto stl = stored.find(MeshFormat::kStl); stl != stored.end()) {
+    documents.push_back(
+        {.blob = stl->second.sha256, .bytes = stl->second.bytes, .sha256 = stl->second.sha256});
+  }
+  const auto zip = stored.find(MeshFormat::kZip);
+  if (zip == stored.end()) return documents;
+  for_each_label(job, blobs, [&](const LabelSummary& label) {
+    const auto stl = label.files.find(MeshFormat::kStl);
+    if (stl == label.files.end() || label.triangles == 0) return;
+    documents.push_back({.label = label.label,
+                         .name = label.name.value_or("Label " + std::to_string(label.label)),
+                         .segment = label.label,
+                         .blob = zip->second.sha256,
+                         .offset = stl->second.offset,
+                         .bytes = stl->second.bytes,
+                         .sha256 = stl->second.sha256});
+  });
+  return documents;
+}
+
+// The materials first: the OBJ refers to them.
+std::vector<Document> obj_documents(const Job& job, const store::BlobStore& blobs) {
+  const auto obj = job.mesh->files.find(MeshFormat::kObj);
+  if (obj == job.mesh->files.end()) return {};
+  Document mesh = {.kind = dicom::DocumentKind::kObj,
+                   .format = MeshFormat::kObj,
+                   .blob = obj->second.sha256,
+                   .bytes = obj->second.bytes,
+                   .sha256 = obj->second.sha256};
+  if (!job.parameters.labels) return {mesh};
+  Document materials = {
+      .kind = dicom::DocumentKind::kMtl, .format = MeshFormat::kObj, .sha256 = {}, .number = 2};
+  codec::ObjGroups groups;
+  std::uint64_t count = 0;
+  for_each_label(job, blobs, [&](const LabelSummary& label) {
+    materials.text += codec::mtl_material(groups.of(label), label);
+    mesh.segment = ++count == 1 ? std::optional(label.label) : std::nullopt;
+  });
+  materials.sha256 = sha256_of(materials.text);
+  mesh.text = "mtllib " + std::string(dicom::kMaterialsUri) + '\n';
+  mesh.sha256 += materials.sha256;
+  return {materials, mesh};
+}
+
+bool is_sent_as(const store::OrderRecord& record, MeshFormat format) {
+  return std::ranges::find(record.order.send, format, &SendTarget::format) !=
+         record.order.send.end();
 }
 
 // Only the parameters that determine the mesh, not the other requested files.
-std::string canonical_parameters(MeshParameters parameters) {
-  parameters.formats = {MeshFormat::kStl};
+std::string canonical_parameters(MeshParameters parameters, MeshFormat format) {
+  parameters.formats = {format};
   parameters.draco = {};
   parameters.normals = false;
   return to_json(parameters);
 }
 
-std::string series_uid_of(const DicomIdentity& identity, const Job& job) {
+std::string series_uid_of(const DicomIdentity& identity, const Job& job, MeshFormat format) {
   return dicom::name_based_uid("series\n" + identity.study_uid + '\n' + identity.series_uid + '\n' +
-                               canonical_parameters(job.parameters) + '\n' + ISOMESH_VERSION);
+                               canonical_parameters(job.parameters, format) + '\n' +
+                               ISOMESH_VERSION);
 }
 
 std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& identity,
-                            const StlFile& file) {
+                            const Document& document) {
   std::vector<std::string> sources;
   for (const DicomInstance& instance : identity.instances) {
     sources.push_back(instance.sop_instance_uid);
   }
   std::ranges::sort(sources);
   std::string name =
-      "instance\n" + series_uid + '\n' + std::string(dicom::kEncapsulatedStlStorage) + '\n';
+      "instance\n" + series_uid + '\n' + std::string(dicom::sop_class_of(document.kind)) + '\n';
   for (const std::string& source : sources) name += source + '\n';
   // Two labels may have the same surface.
-  if (file.label) name += "label " + std::to_string(*file.label) + '\n';
-  return dicom::name_based_uid(name + file.sha256);
+  if (document.label) name += "label " + std::to_string(*document.label) + '\n';
+  return dicom::name_based_uid(name + document.sha256);
 }
 
 // Truncates to 64 characters, the limit of LO.
@@ -116,21 +161,21 @@ std::string description_of(const Job& job) {
   return in_short(text);
 }
 
-std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const StlFile& file) {
-  if (!file.label) return std::nullopt;
-  const auto found = std::ranges::find(identity.segments, *file.label, &DicomSegment::label);
+std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Document& document) {
+  if (!document.segment) return std::nullopt;
+  const auto found = std::ranges::find(identity.segments, *document.segment, &DicomSegment::label);
   if (found != identity.segments.end()) return *found;
   DicomSegment uncoded;
-  uncoded.label = *file.label;
+  uncoded.label = *document.segment;
   return uncoded;
 }
 
-void copy(const store::BlobReader& from, const StlFile& file, store::BlobWriter& to) {
+void copy(const store::BlobReader& from, const Document& document, store::BlobWriter& to) {
   std::vector<std::byte> buffer(std::size_t{1} << 20);
-  for (std::uint64_t at = 0; at < file.bytes;) {
+  for (std::uint64_t at = 0; at < document.bytes;) {
     const auto piece =
-        std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), file.bytes - at));
-    const std::size_t count = from.read_at(file.offset + at, piece);
+        std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), document.bytes - at));
+    const std::size_t count = from.read_at(document.offset + at, piece);
     if (count == 0) throw Error(ErrorCode::kInternal, "a stored mesh became shorter");
     to.write(piece.first(count));
     at += count;
@@ -141,38 +186,51 @@ void write(const std::string& text, store::BlobWriter& to) {
   to.write(std::as_bytes(std::span(text)));
 }
 
-// Throws if there is none.
-std::vector<StlFile> files_of_surface(const Job& job, const store::BlobStore& blobs) {
-  std::vector<StlFile> files = stl_files_of(job, blobs);
-  if (job.mesh && job.mesh->triangles > 0 && !files.empty()) return files;
+// All that the order sends. Throws if there is none.
+std::vector<Document> documents_of(const store::OrderRecord& record, const Job& job,
+                                   const store::BlobStore& blobs) {
+  std::vector<Document> documents;
+  if (job.mesh && job.mesh->triangles > 0) {
+    if (is_sent_as(record, MeshFormat::kStl)) documents = stl_documents(job, blobs);
+    if (is_sent_as(record, MeshFormat::kObj)) {
+      std::ranges::move(obj_documents(job, blobs), std::back_inserter(documents));
+    }
+  }
+  if (!documents.empty()) return documents;
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
 
 // Also sets the UIDs of `object`.
-dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job,
-                               const StlFile& file, const std::string& station_name,
-                               std::chrono::system_clock::time_point made, MadeObject& object) {
+dicom::Envelope envelope_of(const store::OrderRecord& record, const Job& job,
+                            const Document& document, const std::string& station_name,
+                            std::chrono::system_clock::time_point made, MadeObject& object) {
   const DicomIdentity& identity = record.work.identity.value();
-  object.label = file.label;
-  object.series_uid = series_uid_of(identity, job);
-  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, file);
-  const std::string title = file.label ? record.work.label + ' ' + file.name : record.work.label;
-  return dicom::make_envelope(
-      {.identity = identity,
-       .series_uid = object.series_uid,
-       .sop_instance_uid = object.sop_instance_uid,
-       .series_number = record.work.series_number.value_or(0),
-       .title = in_short(without_backslashes(title)),
-       .made = made,
-       .station_name = station_name,
-       .content_description = description_of(job),
-       .algorithm_parameters = without_backslashes(canonical_parameters(job.parameters)),
-       .segment = segment_of(identity, file)},
-      file.bytes);
+  object.format = document.format;
+  object.label = document.label;
+  object.sop_class_uid = dicom::sop_class_of(document.kind);
+  object.series_uid = series_uid_of(identity, job, document.format);
+  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, document);
+  const std::string title =
+      document.label ? record.work.label + ' ' + document.name : record.work.label;
+  return dicom::make_envelope({.kind = document.kind,
+                               .identity = identity,
+                               .series_uid = object.series_uid,
+                               .sop_instance_uid = object.sop_instance_uid,
+                               .series_number = record.work.series_number.value_or(0),
+                               .instance_number = document.number,
+                               .title = in_short(without_backslashes(title)),
+                               .made = made,
+                               .station_name = station_name,
+                               .content_description = description_of(job),
+                               .algorithm_parameters = without_backslashes(
+                                   canonical_parameters(job.parameters, document.format)),
+                               .segment = segment_of(identity, document),
+                               .materials_uid = document.materials_uid},
+                              document.size());
 }
 
-std::uint64_t bytes_of(const dicom::StlEnvelope& envelope, const StlFile& file) {
-  return envelope.before.size() + file.bytes + envelope.after.size();
+std::uint64_t bytes_of(const dicom::Envelope& envelope, const Document& document) {
+  return envelope.before.size() + document.size() + envelope.after.size();
 }
 
 // Additional text in the object of a simplified mesh.
@@ -211,14 +269,18 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
                                      std::chrono::system_clock::time_point made,
                                      store::BlobStore& blobs) {
   std::vector<MadeObject> objects;
-  for (const StlFile& file : files_of_surface(job, blobs)) {
+  std::string materials_uid;
+  for (Document& document : documents_of(record, job, blobs)) {
+    if (document.kind == dicom::DocumentKind::kObj) document.materials_uid = materials_uid;
     MadeObject object;
-    const dicom::StlEnvelope envelope = envelope_of(record, job, file, station_name, made, object);
-    const std::uint64_t bytes = bytes_of(envelope, file);
+    const dicom::Envelope envelope = envelope_of(record, job, document, station_name, made, object);
+    if (document.kind == dicom::DocumentKind::kMtl) materials_uid = object.sop_instance_uid;
+    const std::uint64_t bytes = bytes_of(envelope, document);
     if (bytes > most_bytes) throw_too_large(bytes, most_bytes, record.work);
     const auto writer = blobs.begin();
     write(envelope.before, *writer);
-    copy(*blobs.open(file.blob), file, *writer);
+    write(document.text, *writer);
+    if (!document.blob.empty()) copy(*blobs.open(document.blob), document, *writer);
     write(envelope.after, *writer);
     object.blob = writer->commit();
     objects.push_back(std::move(object));
@@ -232,15 +294,15 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
                                                 const store::BlobStore& blobs) {
   constexpr std::uint64_t kTriangleBytes = 50;
   double share = 1;
-  for (const StlFile& file : files_of_surface(job, blobs)) {
+  for (const Document& document : documents_of(record, job, blobs)) {
     MadeObject object;
-    const dicom::StlEnvelope envelope = envelope_of(record, job, file, station_name, {}, object);
-    const std::uint64_t bytes = bytes_of(envelope, file);
+    const dicom::Envelope envelope = envelope_of(record, job, document, station_name, {}, object);
+    const std::uint64_t bytes = bytes_of(envelope, document);
     if (bytes <= most_bytes) continue;
     const std::uint64_t over = bytes - most_bytes + kGrowthOfText;
-    if (over + kTriangleBytes > file.bytes) throw_too_large(bytes, most_bytes, record.work);
-    share =
-        std::min(share, static_cast<double>(file.bytes - over) / static_cast<double>(file.bytes));
+    if (over + kTriangleBytes > document.bytes) throw_too_large(bytes, most_bytes, record.work);
+    share = std::min(
+        share, static_cast<double>(document.bytes - over) / static_cast<double>(document.bytes));
   }
   if (share == 1) return std::nullopt;
   // With labels, the largest one must fit, and simplification may keep a larger fraction of it than
@@ -260,8 +322,7 @@ bool can_make_objects(const Job& job, const store::BlobStore& blobs) {
   return (!list || is_intact(list->sha256)) &&
          std::ranges::all_of(job.mesh->files, [&](const auto& file) {
            const auto& [format, entry] = file;
-           return (format != MeshFormat::kStl && format != MeshFormat::kZip) ||
-                  is_intact(entry.sha256);
+           return (!is_sendable(format) && format != MeshFormat::kZip) || is_intact(entry.sha256);
          });
 }
 

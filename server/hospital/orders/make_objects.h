@@ -16,7 +16,9 @@
 namespace isomesh::orders {
 
 struct MadeObject {
+  MeshFormat format = MeshFormat::kStl;  // of the targets that it is for
   std::optional<std::int64_t> label;
+  std::string sop_class_uid;
   std::string series_uid;
   std::string sop_instance_uid;
   store::Blob blob;
@@ -25,7 +27,8 @@ struct MadeObject {
 // Limit of objects of an order, over all PACS they are sent to: its record and its JSON list them.
 inline constexpr std::size_t kMostObjects = 500;
 
-// Makes an object from each STL file of the job: the only one, or one for each label. UIDs are
+// Makes the objects of all formats that the order sends. STL: one, or one for each label. OBJ: one
+// of all labels, after the object of their materials. UIDs are
 // derived from the content, so the same images with the same mesh always have the same UIDs. No
 // record names the blobs yet (BlobStore::mark_named). Throws Error kUnusableVolume for an empty
 // surface, kTooLarge if an object exceeds `most_bytes`, kOutOfSpace.

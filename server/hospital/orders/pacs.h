@@ -65,6 +65,7 @@ struct InstancePlace {
 
 struct OutgoingObject {
   InstancePlace place;
+  std::string sop_class;
   std::uint64_t bytes = 0;
   // Reads up to buffer.size() bytes from `offset`; may throw.
   std::function<std::size_t(std::uint64_t offset, std::span<std::byte> buffer)> read;

@@ -250,7 +250,11 @@ std::vector<SendTarget> read_send(Section& rule) {
     section.require("pacs", target.pacs);
     std::string format = "stl";
     section.read("format", format);
-    if (format != "stl") refuse(section.key_of("format"), "must be \"stl\"");
+    const auto known = from_string<MeshFormat>(format);
+    if (!known || !is_sendable(*known)) {
+      refuse(section.key_of("format"), "must be \"stl\" or \"obj\"");
+    }
+    target.format = *known;
     section.finish();
     targets.push_back(std::move(target));
   }

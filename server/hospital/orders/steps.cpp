@@ -43,14 +43,21 @@ void simplify(const OrderWork& work, JobParameters& parameters) {
   parameters.certify = true;
 }
 
+// An OBJ has all labels, and its materials are a second object.
 void check_count_of_objects(const Order& order, const Job& job) {
+  constexpr std::uint64_t kOfObj = 2;
   const std::uint64_t labels = job.mesh ? job.mesh->labels_count.value_or(1) : 0;
-  if (labels * order.send.size() <= kMostObjects) return;
+  std::uint64_t objects = 0;
+  for (const SendTarget& target : order.send) {
+    objects += target.format == MeshFormat::kObj ? kOfObj : labels;
+  }
+  if (objects <= kMostObjects) return;
   throw Error(ErrorCode::kTooLarge,
               "the mesh has " + std::to_string(labels) + " labels for " +
                   std::to_string(order.send.size()) +
                   " PACS, each an object of its own, but an order makes at most " +
-                  std::to_string(kMostObjects) + " objects; order fewer labels");
+                  std::to_string(kMostObjects) +
+                  " objects; order fewer labels, or send them as obj");
 }
 
 // Resets the list of instances, the images, and all results from them.
@@ -302,9 +309,11 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {
+      if (object.format != target.format) continue;
       record.order.results.push_back({.pacs = target.pacs,
                                       .format = target.format,
                                       .label = object.label,
+                                      .sop_class_uid = object.sop_class_uid,
                                       .series_uid = object.series_uid,
                                       .sop_instance_uid = object.sop_instance_uid,
                                       .bytes = object.blob.bytes});
@@ -371,6 +380,7 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
   try {
     receiver->store(
         {.place = place,
+         .sop_class = result.sop_class_uid,
          .bytes = blob->size(),
          .read = [&](std::uint64_t offset,
                      std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },

@@ -119,6 +119,20 @@ TEST_F(LabelFilesTest, GroupsOfLabelsThatAreNamedAlikeAreTold) {
   const std::string obj = encoded(MeshFormat::kObj);
   EXPECT_NE(obj.find("g a_b\n"), std::string::npos);
   EXPECT_NE(obj.find("g a_b-4\n"), std::string::npos);
+  EXPECT_NE(obj.find("usemtl a_b-4\n"), std::string::npos);
+}
+
+TEST_F(LabelFilesTest, MaterialsAreNamedLikeTheGroupsAndHaveTheLabelsColours) {
+  LabelSummary label;
+  label.label = 3;
+  label.name = "a b";
+  label.color = "#ff8000";
+  ObjGroups groups;
+  EXPECT_EQ(mtl_material(groups.of(label), label), "newmtl a_b\nKd 1.000000 0.501961 0.000000\n");
+  label.label = 4;
+  label.color.reset();
+  const std::string other = mtl_material(groups.of(label), label);
+  EXPECT_TRUE(other.starts_with("newmtl a_b-4\nKd 0.")) << other;
 }
 
 TEST_F(LabelFilesTest, ZipIsTheSameOnAnyNumberOfThreads) {

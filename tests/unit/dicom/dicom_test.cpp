@@ -5,7 +5,7 @@
 
 #include "proto/orders.h"
 #include "server/hospital/objects/data_set.h"
-#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/hospital/objects/encapsulated_document.h"
 #include "server/hospital/objects/uid.h"
 #include "tests/support/errors.h"
 
@@ -59,10 +59,11 @@ TEST(DataSet, IsCutAtATag) {
             data.bytes());
 }
 
-class Envelope : public testing::Test {
+class EnvelopeTest : public testing::Test {
  protected:
-  StlEnvelope made(std::uint64_t bytes) {
-    return make_envelope({.identity = identity_,
+  dicom::Envelope made(std::uint64_t bytes) {
+    return make_envelope({.kind = kind_,
+                          .identity = identity_,
                           .series_uid = "2.25.1",
                           .sop_instance_uid = "2.25.2",
                           .series_number = 9001,
@@ -71,7 +72,8 @@ class Envelope : public testing::Test {
                           .station_name = "here",
                           .content_description = "iso 1",
                           .algorithm_parameters = "{}",
-                          .segment = segment_},
+                          .segment = segment_,
+                          .materials_uid = materials_},
                          bytes);
   }
 
@@ -84,30 +86,32 @@ class Envelope : public testing::Test {
     return identity;
   }();
   std::optional<DicomSegment> segment_;
+  DocumentKind kind_ = DocumentKind::kStl;
+  std::string materials_;
 };
 
-TEST_F(Envelope, IsEvenHoweverLongTheMesh) {
+TEST_F(EnvelopeTest, IsEvenHoweverLongTheMesh) {
   for (const std::uint64_t bytes : {84U, 85U}) {
-    const StlEnvelope envelope = made(bytes);
+    const dicom::Envelope envelope = made(bytes);
     EXPECT_EQ((envelope.before.size() + bytes + envelope.after.size()) % 2, 0U);
     EXPECT_THAT(envelope.before.substr(128), testing::StartsWith("DICM"));
   }
   EXPECT_EQ(made(85).after.front(), '\0');
 }
 
-TEST_F(Envelope, HoldsWhatAnElementCanHold) {
+TEST_F(EnvelopeTest, HoldsWhatAnElementCanHold) {
   EXPECT_NO_THROW(made(kMostDocumentBytes));
   EXPECT_EQ(test::code_thrown_by([&] { made(kMostDocumentBytes + 1); }), ErrorCode::kTooLarge);
 }
 
-TEST_F(Envelope, WithoutAFrameOfReferenceMeshesOfASeriesShareOne) {
+TEST_F(EnvelopeTest, WithoutAFrameOfReferenceMeshesOfASeriesShareOne) {
   const std::string derived = name_based_uid("frame of reference\n1.2\n1.3");
   EXPECT_THAT(made(84).before, HasSubstr(derived));
   identity_.frame_of_reference_uid = "1.99";
   EXPECT_THAT(made(84).before, Not(HasSubstr(derived)));
 }
 
-TEST_F(Envelope, OfASegmentHasItsCodes) {
+TEST_F(EnvelopeTest, OfASegmentHasItsCodes) {
   EXPECT_THAT(made(84).before, HasSubstr("85040-4"));
   segment_ = DicomSegment{.label = 1,
                           .category = {},
@@ -119,8 +123,19 @@ TEST_F(Envelope, OfASegmentHasItsCodes) {
   EXPECT_THAT(before, Not(HasSubstr("85040-4")));
 }
 
+TEST_F(EnvelopeTest, OfAnObjRefersToItsMaterialsByUidAndName) {
+  EXPECT_THAT(made(84).before, Not(HasSubstr("materials.mtl")));
+  kind_ = DocumentKind::kObj;
+  materials_ = "2.25.3";
+  const Envelope envelope = made(84);
+  EXPECT_THAT(envelope.before, HasSubstr("1.2.840.10008.5.1.4.1.1.104.4"));
+  EXPECT_THAT(envelope.before, HasSubstr("1.2.840.10008.5.1.4.1.1.104.5"));
+  EXPECT_THAT(envelope.before, HasSubstr(std::string("UR\0\0\x0E\0\0\0materials.mtl ", 22)));
+  EXPECT_THAT(envelope.after, HasSubstr("model/obj"));
+}
+
 // A scanner that told nothing is no contributor.
-TEST_F(Envelope, NamesAScannerWhereThereIsOne) {
+TEST_F(EnvelopeTest, NamesAScannerWhereThereIsOne) {
   EXPECT_THAT(made(84).before, Not(HasSubstr("109101")));
   identity_.equipment.manufacturer = "Maker";
   EXPECT_THAT(made(84).before, HasSubstr("109101"));

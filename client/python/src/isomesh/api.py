@@ -796,7 +796,10 @@ OrderState = Literal['waiting', 'fetching', 'meshing', 'sending', 'succeeded', '
 
 class SendTarget(TypedDict):
     pacs: str
-    format: NotRequired[Literal['stl']]
+    #: stl makes one Encapsulated STL object, or one for each label. obj makes one Encapsulated OBJ
+    #: object of all labels. With labels, an Encapsulated MTL object of their colours comes before
+    #: it.
+    format: NotRequired[Literal['stl', 'obj']]
 
 
 class OrderRequestSource(TypedDict):
@@ -837,8 +840,10 @@ class OrderResult(TypedDict):
 
     pacs: str
     format: str
-    #: Only for an order by labels.
+    #: Only for an order by labels, and an object of one label.
     label: Optional[int]
+    #: Encapsulated STL, OBJ or MTL Storage.
+    sop_class_uid: str
     series_uid: str
     sop_instance_uid: str
     bytes: int

@@ -1,5 +1,6 @@
-#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/hospital/objects/encapsulated_document.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <ctime>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "proto/error.h"
+#include "proto/orders.h"
 #include "server/hospital/objects/data_set.h"
 #include "server/hospital/objects/uid.h"
 
@@ -15,6 +17,22 @@ namespace {
 
 constexpr std::string_view kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 constexpr Tag kEncapsulatedDocument = 0x00420011;
+
+struct KindRow {
+  DocumentKind kind;
+  std::string_view sop_class;
+  std::string_view name;
+  std::string_view media_type;
+};
+
+constexpr std::array kKinds = {
+    KindRow{DocumentKind::kStl, kEncapsulatedStlStorage, "Encapsulated STL", "model/stl"},
+    KindRow{DocumentKind::kObj, "1.2.840.10008.5.1.4.1.1.104.4", "Encapsulated OBJ", "model/obj"},
+    KindRow{DocumentKind::kMtl, "1.2.840.10008.5.1.4.1.1.104.5", "Encapsulated MTL", "model/mtl"}};
+
+const KindRow& row_of(DocumentKind kind) {
+  return *std::ranges::find(kKinds, kind, &KindRow::kind);
+}
 
 struct Moment {
   std::string date;  // DA
@@ -44,7 +62,7 @@ DataSet code_item(const DicomCode& code) {
 
 // Code of the kind of model: the segment's type, or else by the modality of the images (PS3.16, CID
 // 7061).
-std::optional<DicomCode> concept_of(const StlObject& object) {
+std::optional<DicomCode> concept_of(const DocumentObject& object) {
   if (object.segment && !object.segment->type.value.empty()) return object.segment->type;
   const std::string& modality = object.identity.modality;
   if (modality == "CT") return DicomCode{"85040-4", "LN", "CT 3D CAM model"};
@@ -70,7 +88,7 @@ void add_patient_and_study(const DicomIdentity& identity, DataSet& data) {
   data.set(0x00200010, "SH", identity.study_id);
 }
 
-void add_series_and_equipment(const StlObject& object, const Moment& made, DataSet& data) {
+void add_series_and_equipment(const DocumentObject& object, const Moment& made, DataSet& data) {
   const DicomIdentity& identity = object.identity;
   data.set(0x00080021, "DA", made.date);  // SeriesDate
   data.set(0x00080031, "TM", made.time);
@@ -91,23 +109,41 @@ void add_series_and_equipment(const StlObject& object, const Moment& made, DataS
   data.set(0x00181020, "LO", ISOMESH_VERSION);      // SoftwareVersions
 }
 
-void add_sources(const DicomIdentity& identity, DataSet& data) {
+DataSet reference_to(std::string_view sop_class, std::string_view instance) {
+  DataSet reference;
+  reference.set(0x00081150, "UI", sop_class);
+  reference.set(0x00081155, "UI", instance);
+  return reference;
+}
+
+// An item of ReferencedSeriesSequence.
+DataSet series_item(const std::string& series_uid, const std::vector<DataSet>& references) {
+  DataSet series;
+  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
+  series.set(0x0020000E, "UI", series_uid);
+  return series;
+}
+
+void add_references(const DocumentObject& object, DataSet& data) {
   const DataSet purpose = code_item({"121324", "DCM", "Source Image"});
   std::vector<DataSet> sources;
   std::vector<DataSet> references;
-  for (const DicomInstance& instance : identity.instances) {
-    DataSet reference;
-    reference.set(0x00081150, "UI", instance.sop_class_uid);
-    reference.set(0x00081155, "UI", instance.sop_instance_uid);
+  for (const DicomInstance& instance : object.identity.instances) {
+    DataSet reference = reference_to(instance.sop_class_uid, instance.sop_instance_uid);
     references.push_back(reference);
     reference.set_sequence(0x0040A170, {purpose});
     sources.push_back(std::move(reference));
   }
   data.set_sequence(0x00420013, sources);  // SourceInstanceSequence
-  DataSet series;
-  series.set_sequence(0x0008114A, references);  // ReferencedInstanceSequence
-  series.set(0x0020000E, "UI", identity.series_uid);
-  data.set_sequence(0x00081115, {series});  // ReferencedSeriesSequence
+  std::vector<DataSet> series = {series_item(object.identity.series_uid, references)};
+  if (!object.materials_uid.empty()) {
+    DataSet materials = reference_to(sop_class_of(DocumentKind::kMtl), object.materials_uid);
+    series.push_back(series_item(object.series_uid, {materials}));
+    materials.set(0x00687005, "UR",
+                  kMaterialsUri);                // RelativeURIReferenceWithinEncapsulatedDocument
+    data.set_sequence(0x0008114A, {materials});  // ReferencedInstanceSequence
+  }
+  data.set_sequence(0x00081115, series);  // ReferencedSeriesSequence
 }
 
 void add_scanner(const DicomEquipment& equipment, DataSet& data) {
@@ -122,11 +158,12 @@ void add_scanner(const DicomEquipment& equipment, DataSet& data) {
   data.set_sequence(0x0018A001, {item});  // ContributingEquipmentSequence
 }
 
-void add_document(const StlObject& object, const Moment& made, std::uint64_t bytes, DataSet& data) {
+void add_document(const DocumentObject& object, const Moment& made, std::uint64_t bytes,
+                  DataSet& data) {
   data.set(0x00080023, "DA", made.date);  // ContentDate
   data.set(0x00080033, "TM", made.time);
   data.set(0x0008002A, "DT", object.identity.acquisition_datetime);
-  data.set(0x00200013, "IS", "1");           // InstanceNumber
+  data.set(0x00200013, "IS", std::to_string(object.instance_number));
   data.set(0x00280301, "CS", "NO");          // BurnedInAnnotation
   data.set(0x00280302, "CS", "YES");         // RecognizableVisualFeatures
   data.set(0x00420010, "ST", object.title);  // DocumentTitle
@@ -136,11 +173,11 @@ void add_document(const StlObject& object, const Moment& made, std::uint64_t byt
   if (object.segment && !object.segment->region.value.empty()) {
     data.set_sequence(0x00082218, {code_item(object.segment->region)});  // AnatomicRegionSequence
   }
-  data.set(0x00420012, "LO", "model/stl");                       // MIMETypeOfEncapsulatedDocument
+  data.set(0x00420012, "LO", row_of(object.kind).media_type);    // MIMETypeOfEncapsulatedDocument
   data.set_long(0x00420015, static_cast<std::uint32_t>(bytes));  // EncapsulatedDocumentLength
 }
 
-void add_model(const StlObject& object, DataSet& data) {
+void add_model(const DocumentObject& object, DataSet& data) {
   data.set_sequence(0x004008EA, {code_item({"mm", "UCUM", "mm"})});  // MeasurementUnitsCodeSequence
   data.set(0x00687001, "CS", "NO");                                  // ModelModification
   data.set(0x00687002, "CS", "NO");                                  // ModelMirroring
@@ -155,9 +192,17 @@ void add_model(const StlObject& object, DataSet& data) {
 
 }  // namespace
 
-StlEnvelope make_envelope(const StlObject& object, std::uint64_t stl_bytes) {
-  if (stl_bytes > kMostDocumentBytes) {
-    throw Error(ErrorCode::kTooLarge, "The mesh has " + std::to_string(stl_bytes) +
+std::string_view sop_class_of(DocumentKind kind) { return row_of(kind).sop_class; }
+
+std::string_view name_of_class(std::string_view sop_class) {
+  const auto* row = std::ranges::find(kKinds, sop_class, &KindRow::sop_class);
+  if (row != kKinds.end()) return row->name;
+  throw Error(ErrorCode::kInternal, "an object of an unknown class");
+}
+
+Envelope make_envelope(const DocumentObject& object, std::uint64_t document_bytes) {
+  if (document_bytes > kMostDocumentBytes) {
+    throw Error(ErrorCode::kTooLarge, "The document has " + std::to_string(document_bytes) +
                                           " bytes, but a DICOM object holds at most " +
                                           std::to_string(kMostDocumentBytes) +
                                           ". Set \"triangles\" to simplify it.");
@@ -167,20 +212,20 @@ StlEnvelope make_envelope(const StlObject& object, std::uint64_t stl_bytes) {
   data.set(0x00080005, "CS", "ISO_IR 192");  // SpecificCharacterSet
   data.set(0x00080012, "DA", made.date);     // InstanceCreationDate
   data.set(0x00080013, "TM", made.time);
-  data.set(0x00080016, "UI", kEncapsulatedStlStorage);
+  const std::string_view sop_class = sop_class_of(object.kind);
+  data.set(0x00080016, "UI", sop_class);
   data.set(0x00080018, "UI", object.sop_instance_uid);
   add_patient_and_study(object.identity, data);
   add_series_and_equipment(object, made, data);
-  add_sources(object.identity, data);
+  add_references(object, data);
   add_scanner(object.identity.equipment, data);
-  add_document(object, made, stl_bytes, data);
+  add_document(object, made, document_bytes, data);
   add_model(object, data);
-  const auto padded = static_cast<std::uint32_t>(stl_bytes + stl_bytes % 2);
-  return {
-      .before = file_head(kEncapsulatedStlStorage, object.sop_instance_uid, kExplicitLittleEndian) +
-                data.bytes_before(kEncapsulatedDocument) +
-                element_head(kEncapsulatedDocument, "OB", padded),
-      .after = std::string(stl_bytes % 2, '\0') + data.bytes_after(kEncapsulatedDocument)};
+  const auto padded = static_cast<std::uint32_t>(document_bytes + document_bytes % 2);
+  return {.before = file_head(sop_class, object.sop_instance_uid, kExplicitLittleEndian) +
+                    data.bytes_before(kEncapsulatedDocument) +
+                    element_head(kEncapsulatedDocument, "OB", padded),
+          .after = std::string(document_bytes % 2, '\0') + data.bytes_after(kEncapsulatedDocument)};
 }
 
 }  // namespace isomesh::dicom
