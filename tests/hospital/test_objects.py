@@ -184,12 +184,12 @@ class Objects(Loop):
         self.assertEqual(again["results"], order["results"])
 
     def document(self, path):
-        """The text that the object encapsulates, as dcmdump writes it."""
-        folder = path + ".raw"
-        os.mkdir(folder)
-        subprocess.run(["dcmdump", "+W", folder, path], check=True, capture_output=True)
-        with open(os.path.join(folder, os.listdir(folder)[0]), "rb") as file:
-            return file.read().rstrip(b"\0").decode()
+        """The text that the object encapsulates: its element (0042,0011)."""
+        with open(path, "rb") as file:
+            data = file.read()
+        at = data.index(b"\x42\0\x11\0OB\0\0") + 8
+        length = int.from_bytes(data[at:at + 4], "little")
+        return data[at + 4:at + 4 + length].rstrip(b"\0").decode()
 
     def codes(self, path):
         """The codes of the sequences of the object's own: value, scheme, meaning."""
