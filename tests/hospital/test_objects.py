@@ -138,6 +138,7 @@ class Objects(Loop):
             self.assertEqual(codes["ConceptNameCodeSequence"], segment["type"])
             self.assertEqual(codes["AnatomicRegionSequence"], segment["region"])
             self.assertEqual(self.value(path, "0042,0010"), [f"[Bone {segment['label']}]"])
+            self.assertEqual(self.value(path, "0020,0013"), [f"[{result['label']}]"])
             self.assertIn(f"[{instance}]", self.value(path, "0008,1155"))
             self.assertIn(f"[{uid}]", self.value(path, "0020,000e"))
 

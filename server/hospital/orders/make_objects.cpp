@@ -63,7 +63,8 @@ std::vector<Document> stl_documents(const Job& job, const store::BlobStore& blob
                          .blob = zip->second.sha256,
                          .offset = stl->second.offset,
                          .bytes = stl->second.bytes,
-                         .sha256 = stl->second.sha256});
+                         .sha256 = stl->second.sha256,
+                         .number = static_cast<std::int64_t>(documents.size()) + 1});
   });
   return documents;
 }
