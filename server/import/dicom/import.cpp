@@ -103,6 +103,7 @@ bool write_stack(const Stack& stack, OpenFile& file, std::span<std::byte> target
 }
 
 Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const ImportTask& task) {
+  refuse_flat("The series", volume.dims);
   // Decode one slice before the disk space is allocated: a small stream may declare any number of
   // rows.
   std::vector<std::byte> first(stack.slices.front().image->layout.frame_bytes());

@@ -129,6 +129,10 @@ SourceVolume parse_numpy(const InputFile& file, const Companions& /*companions*/
     throw_unusable("The NumPy array's type " + in_quotes(header.type) +
                    " is not supported. A sample must be one real number.");
   }
+  if (header.shape.size() == 2) {
+    refuse_flat("The NumPy array",
+                volume_dims(std::vector{header.shape[1], header.shape[0], std::uint64_t{1}}));
+  }
   if (!is_shape_of_volume(header)) {
     throw_unusable("The NumPy array has the shape " + text_of(header.shape) +
                    ". A volume has three axes, or four of which the first holds several volumes.");

@@ -49,6 +49,7 @@ class Pages {
     layout_ = layout;
     const std::array<std::uint64_t, 3> sizes = {layout.width, layout.height, count_};
     described_.dims = volume_dims(sizes);
+    refuse_flat("The file", described_.dims);
     described_.layout.type = layout.type;
     check_limits(described_, task_.limits);
   }
@@ -79,18 +80,13 @@ Difference difference_of(const TiffMeaning& meaning) {
           }};
 }
 
-[[noreturn]] void throw_single() {
-  throw_unusable(
-      "The file holds one page, and a volume needs several. Send all pages in one folder, ZIP or "
-      "TAR.");
-}
-
 Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   const TiffMeaning meaning = tiff.meaning();
-  if (meaning.slices == 1) throw_single();
+  Pages pages(meaning.slices, task);
+  if (meaning.slices == 1)
+    tiff.read(0, pages.check(), pages.sink());  // refused, whatever is chosen
   SourceVolume source;
   choose_volume(meaning.channels * meaning.times, difference_of(meaning), task.options, source);
-  Pages pages(meaning.slices, task);
   for (std::uint64_t slice = 0; slice < meaning.slices; ++slice) {
     tiff.read(meaning.page_of(source.chosen.index, slice), pages.check(), pages.sink());
   }
@@ -132,9 +128,10 @@ bool has_pages(const std::filesystem::path& path) {
 Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
   if (files.size() == 1) {
     const InputFile file(files.front().path);
-    if (!is_tiff(file.text(0, kSniffBytes))) throw_single();
-    TiffFile tiff(file);
-    return read_pages(tiff, task);
+    if (is_tiff(file.text(0, kSniffBytes))) {
+      TiffFile tiff(file);
+      return read_pages(tiff, task);
+    }
   }
   std::ranges::sort(files, comes_before, &ImageFile::name);
   check_gaps(files);
@@ -145,7 +142,7 @@ Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
     try {
       read_page(InputFile(file.path), pages);
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::kUnusableVolume) throw;
+      if (error.code() != ErrorCode::kUnusableVolume || files.size() == 1) throw;
       throw error.with_detail(in_quotes(file.name) + ": " + error.what());
     }
   }

@@ -143,6 +143,7 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 }
 
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task) {
+  refuse_flat("The file", source.dims);
   Volume volume;
   volume.dims = source.dims;
   volume.geometry = usable_geometry(source, task.options);

@@ -28,8 +28,8 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 
 // Writes the canonical file of the volume `source`, whose samples are in `file` or in the data
 // files of `source`. Throws Error kInvalidParameter for the option `spacing` if the file has its
-// own, kUnusableVolume with a choice if neither has one, also if its geometry is invalid or its
-// samples cannot be decoded, kTooLarge beyond the task's limits.
+// own, kUnusableVolume with a choice if neither has one, also for a flat image, if its geometry
+// is invalid or its samples cannot be decoded, kTooLarge beyond the task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
 // Throws Error kInvalidParameter for the option `spacing` of a file that has its own.

@@ -44,6 +44,16 @@ void check_limits(const SourceVolume& volume, const SizeLimits& limits) {
   check_limits(volume.sample_count(), canonical_type(volume.layout), limits);
 }
 
+void refuse_flat(std::string_view what, const std::array<std::uint32_t, 3>& dims) {
+  for (const std::size_t axis : {2, 1, 0}) {
+    if (dims[axis] != 1) continue;
+    throw_unusable(std::string(what) + " is a flat image: it has 1 slice of " +
+                   std::to_string(dims[axis == 0 ? 1 : 0]) + " x " +
+                   std::to_string(dims[axis == 2 ? 1 : 2]) +
+                   " samples. A volume needs two slices or more, in one file, folder, ZIP or TAR.");
+  }
+}
+
 const std::filesystem::path& companion(const std::string& name, const Companions& companions) {
   const std::string reason = "The header names the data file " + in_quotes(name);
   const std::string path = std::filesystem::path(name).lexically_normal().generic_string();

@@ -125,6 +125,10 @@ struct SourceVolume {
 // Throws Error kTooLarge if the volume's canonical samples would exceed the limits.
 void check_limits(const SourceVolume& volume, const SizeLimits& limits);
 
+// Throws Error kUnusableVolume if `what`, as in "The file", has only one sample along an axis. Such
+// an image has no cells, so no surface at any iso-value.
+void refuse_flat(std::string_view what, const std::array<std::uint32_t, 3>& dims);
+
 // A header's data files, in its order. Each has the same part of `volume`'s samples, after skipping
 // `skip`. A single file may have less than a slice of trailing bytes, with a note in `volume`.
 // Throws Error kUnusableVolume for a missing companion, for a wrong size, and if the samples'

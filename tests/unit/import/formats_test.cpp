@@ -2,6 +2,7 @@
 
 #include <thread>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/unit/import/files.h"
@@ -9,6 +10,8 @@
 
 namespace isomesh::import::test {
 namespace {
+
+using ::testing::HasSubstr;
 
 // 4 x 3 x 2 int16, oblique axes, as every format tells it.
 struct SameVolume {
@@ -80,6 +83,21 @@ TEST(Formats, AreReadByManyThreadsAtOnce) {
       }
     });
   }
+}
+
+// In images_test.cpp and in dicom/ those of their formats.
+TEST(Formats, RefuseFlatImages) {
+  const std::string_view twelve = kSmallSamples.substr(0, 12);
+  for (const std::string& file : {nifti({.dim = {3, 4, 3, 1, 1, 1, 1, 1}}, twelve),
+                                  nifti({.dim = {2, 4, 3, 1, 1, 1, 1, 1}}, twelve),
+                                  nrrd(with(small_nrrd(), "sizes", "4 3 1"), twelve),
+                                  metaimage(with(small_metaimage(), "DimSize", "4 3 1"), twelve)}) {
+    EXPECT_EQ(import_bytes(file).error,
+              "The file is a flat image: it has 1 slice of 4 x 3 samples. A volume needs two "
+              "slices or more, in one file, folder, ZIP or TAR.");
+  }
+  EXPECT_THAT(import_bytes(nifti({.dim = {3, 1, 4, 3, 1, 1, 1, 1}}, twelve)).error,
+              HasSubstr("1 slice of 4 x 3 samples"));
 }
 
 }  // namespace

@@ -73,7 +73,7 @@ TEST(Tiff, PagesAreSlices) {
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{1, 2, 3}));
   EXPECT_EQ(outcome.sample_bytes(), kSamples);
   EXPECT_THAT(codes_of(outcome), Contains("space-assumed"));
-  EXPECT_THAT(import_bytes(tiff({kFirst})).error, HasSubstr("one page"));
+  EXPECT_THAT(import_bytes(tiff({kFirst})).error, HasSubstr("1 slice of 4 x 3 samples"));
 }
 
 TEST(Tiff, TheDescriptionGivesSpacingAndVolumes) {
@@ -114,7 +114,7 @@ TEST(Images, AreStackedInTheOrderOfTheirNumbers) {
     EXPECT_EQ(outcome.volume.dims, (Dims{4, 3, 2}));
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
     EXPECT_EQ(outcome.volume.ignored.size(), 1);
-    EXPECT_THAT(import_bytes(first).error, HasSubstr("one page"));
+    EXPECT_THAT(import_bytes(first).error, HasSubstr("1 slice of 4 x 3 samples"));
   }
 }
 

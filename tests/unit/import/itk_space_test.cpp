@@ -1,5 +1,6 @@
 // Random headers of NRRD and MetaImage: what they say about space is read as ITK reads it, to the
 // last bit, and refused where ITK refuses it.
+#include <algorithm>
 #include <random>
 #include <sstream>
 
@@ -59,10 +60,11 @@ std::string repeated(std::size_t count, std::string_view between, const Make& ma
   return text;
 }
 
-// A geometry is compared as it is kept: with unit vectors, or not at all where it is unusable.
+// A geometry is compared as it is kept: with unit vectors, or not at all where it is unusable, or
+// that of a flat image.
 std::optional<Geometry> kept(const std::optional<Geometry>& geometry,
                              const std::array<std::uint32_t, 3>& dims) {
-  if (!geometry) return std::nullopt;
+  if (!geometry || std::ranges::count(dims, 1U) > 0) return std::nullopt;
   const Geometry unit = volume::normalised(*geometry);
   if (volume::find_fault(dims, unit)) return std::nullopt;
   return unit;

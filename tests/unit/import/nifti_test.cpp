@@ -238,14 +238,6 @@ TEST(Nifti, PassesOverDimensionsOfOne) {
   EXPECT_TRUE(import_nifti({.dim = {3, 4, 3, 2, 0, -5, 9, 0}}).imported());
 }
 
-TEST(Nifti, ReadsFewerThanThreeDimensions) {
-  const Outcome outcome = import_bytes(
-      nifti({.dim = {2, 6, 4, 0, 0, 0, 0, 0}, .pixdim = {1, 1, 1, 0, 0, 0, 0, 0}, .sform_code = 0},
-            kSmallSamples));
-  ASSERT_EQ(outcome.error, "");
-  EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{6, 4, 1}));
-}
-
 TEST(Nifti, RefusesSizesThatCannotBe) {
   for (const std::int64_t bad : {0, -1, -32768}) {
     EXPECT_EQ(import_nifti({.dim = {3, 4, bad, 2, 1, 1, 1, 1}}).code, ErrorCode::kUnusableVolume);

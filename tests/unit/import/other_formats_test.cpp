@@ -84,14 +84,19 @@ TEST(NumPy, BothOrdersOfMemoryAreOneVolume) {
   EXPECT_NE(f.canonical, "");
 }
 
+TEST(NumPy, OfTwoAxesIsAFlatImage) {
+  EXPECT_THAT(import_bytes(npy(npy_header("|u1", false, "(6, 4)"), kSamples)).error,
+              HasSubstr("flat image: it has 1 slice of 4 x 6 samples"));
+}
+
 TEST(NumPy, OneVolumeAlongTheFirstAxisIsChosenInBothOrders) {
   ImportOptions second = kSpaced;
   second.volume = 1;
-  const std::string c = npy(npy_header("|u1", false, "(2, 1, 3, 4)"), kSamples);
+  const std::string c = npy(npy_header("|u1", false, "(2, 2, 3, 2)"), kSamples);
   EXPECT_EQ(import_bytes(c, {}, second).sample_bytes(), kSamples.substr(12));
-  const std::string f = npy(npy_header("|u1", true, "(2, 1, 3, 4)"), kSamples);
-  // The first index runs fastest, then y, then x.
-  EXPECT_EQ(import_bytes(f, {}, second).sample_bytes(), "bhntdjpvflrx");
+  const std::string f = npy(npy_header("|u1", true, "(2, 2, 3, 2)"), kSamples);
+  // The first index runs fastest, then z, then y, then x.
+  EXPECT_EQ(import_bytes(f, {}, second).sample_bytes(), "bnfrjvdphtlx");
 }
 
 TEST(NumPy, ReadsTypesInBothByteOrders) {
@@ -228,9 +233,11 @@ TEST(VtkLegacy, SkipsOtherArraysAndTakesCellsAlone) {
       false, "CELL_DATA 6\n" + field + "POINT_DATA 24\n" + scalars + bytes_of(points, true)));
   ASSERT_EQ(both.error, "");
   EXPECT_EQ(samples_of<std::int16_t>(both), points);
-  const Outcome cells = import_bytes(vtk_legacy(true, "CELL_DATA 6\n" + scalars + counted(6)));
+  std::string file = vtk_legacy(true, "CELL_DATA 12\n" + scalars + counted(12));
+  file.replace(file.find("4 3 2"), 5, "4 3 3");
+  const Outcome cells = import_bytes(file);
   ASSERT_EQ(cells.error, "");
-  EXPECT_EQ(cells.volume.dims, (Dims{3, 2, 1}));
+  EXPECT_EQ(cells.volume.dims, (Dims{3, 2, 2}));
   EXPECT_EQ(cells.volume.geometry.origin, (Vector{10.5, 21, 31.5}));
 }
 

@@ -127,16 +127,9 @@ std::string Stack::name(std::size_t place) const {
          std::to_string(slices.size());
 }
 
-void throw_flat(const std::string& what, std::size_t slices, const PixelLayout& layout) {
-  throw_unusable(what + " is a flat image: it has " + count_of(slices, "slice") + " of " +
-                 std::to_string(layout.columns) + " x " + std::to_string(layout.rows) +
-                 " samples. A volume needs slices at two positions or more.");
-}
-
 Stack make_stack(std::vector<Slice> slices) {
-  if (slices.size() < 2) {
-    throw_flat("The series", slices.size(), slices.front().image->layout);
-  }
+  const PixelLayout& layout = slices.front().image->layout;
+  if (slices.size() == 1) refuse_flat("The series", {layout.columns, layout.rows, 1});
   refuse_mixtures(slices);
   const std::vector<Placed> placed = placed_along_normal(slices);
   Stack stack;

@@ -34,11 +34,6 @@ struct Stack {
   std::string name(std::size_t place) const;
 };
 
-// Throws Error kUnusableVolume for images that all lie in one plane: there is no volume, however
-// many they are. `what` is their subject, such as "The series".
-[[noreturn]] void throw_flat(const std::string& what, std::size_t slices,
-                             const PixelLayout& layout);
-
 // Sorts slices by position along their normal, never by name or instance number. A tilted gantry
 // gives a sheared lattice: the third axis runs from slice to slice. Does not check frames of
 // reference (frame_of_reference.h).

@@ -73,8 +73,9 @@ double plane_distance(const std::vector<double>& gaps, const std::optional<doubl
 std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
                                      const std::optional<double>& told) {
   const std::vector<std::size_t> starts = position_starts(placed);
-  if (starts.size() < 2) {
-    throw_flat("The segmentation", 1, placed.front().slice.image->layout);
+  if (starts.size() == 1) {
+    const PixelLayout& layout = placed.front().slice.image->layout;
+    refuse_flat("The segmentation", {layout.columns, layout.rows, 1});
   }
   const std::vector<double> gaps = gaps_of(placed, starts);
   const double distance = plane_distance(gaps, told);
