@@ -152,7 +152,7 @@ TEST(ForeignMetaImage, SlopeAndOffsetAreApplied) {
 }
 
 TEST(ForeignMetaImage, OneOfSeveralVolumesIsChosen) {
-  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
+  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "2 3 2 2");
   for (const char* name : {"TransformMatrix", "Offset", "ElementSpacing"})
     lines = with(lines, name, "");
   const std::string file = metaimage(lines, kSamples);
@@ -214,8 +214,8 @@ TEST(ForeignSamples, ThatAreNoNumbersAreOutside) {
 
 TEST(ForeignSamples, OfFewWholeValuesInRegionsLookLikeLabels) {
   std::string labels;
-  for (const char value : {0, 1, 2, 5}) labels += std::string(6, value);
-  EXPECT_THAT(codes_of(import_bytes(nifti({.dim = {3, 6, 4, 1, 1, 1, 1, 1}}, labels))),
+  for (const char value : {0, 1, 2, 5}) labels += std::string(12, value);
+  EXPECT_THAT(codes_of(import_bytes(nifti({.dim = {3, 6, 2, 4, 1, 1, 1, 1}}, labels))),
               ElementsAre("looks-like-labels"));
   const std::string mask = std::string(12, '\0') + std::string(12, '\1');
   EXPECT_THAT(codes_of(import_bytes(nifti({}, mask))), IsEmpty());
@@ -225,10 +225,10 @@ TEST(ForeignSamples, OfFewWholeValuesInRegionsLookLikeLabels) {
 // Four regions of these values, as samples of the type.
 template <class Number>
 Outcome regions(const std::vector<Number>& values, NiftiFields fields = {}) {
-  fields.dim = {3, 6, 4, 1, 1, 1, 1, 1};
+  fields.dim = {3, 6, 2, 4, 1, 1, 1, 1};
   std::tie(fields.datatype, fields.bitpix) = nifti_type<Number>();
   std::vector<Number> samples;
-  for (const Number value : values) samples.insert(samples.end(), 6, value);
+  for (const Number value : values) samples.insert(samples.end(), 12, value);
   return import_bytes(nifti(fields, bytes_of(samples)));
 }
 
@@ -238,7 +238,7 @@ TEST(ForeignSamples, ThatAreLabelsBecomeIntegers) {
   EXPECT_EQ(floats.volume.type, SampleType::kUint8);
   EXPECT_EQ(floats.volume.range, bytes.volume.range);
   EXPECT_EQ(floats.volume.suggested_iso, bytes.volume.suggested_iso);
-  EXPECT_EQ(floats.volume.bytes, 24U);
+  EXPECT_EQ(floats.volume.bytes, 48U);
   EXPECT_EQ(floats.canonical, bytes.canonical);
   ASSERT_THAT(codes_of(floats), ElementsAre("looks-like-labels"));
   EXPECT_THAT(floats.volume.notes[0].detail,
@@ -246,10 +246,10 @@ TEST(ForeignSamples, ThatAreLabelsBecomeIntegers) {
 
   const Outcome doubles = regions<double>({-5, 0, 70'000, 3});
   EXPECT_EQ(doubles.volume.type, SampleType::kInt32);
-  EXPECT_EQ(samples_of<std::int32_t>(doubles)[12], 70'000);
+  EXPECT_EQ(samples_of<std::int32_t>(doubles)[24], 70'000);
   const Outcome scaled = regions<std::uint16_t>({0, 1, 2, 5}, {.slope = 2});
   EXPECT_EQ(scaled.volume.type, SampleType::kUint8);
-  EXPECT_EQ(samples_of<std::uint8_t>(scaled)[23], 10);
+  EXPECT_EQ(samples_of<std::uint8_t>(scaled)[47], 10);
   EXPECT_THAT(scaled.volume.notes.back().detail, HasSubstr("float32"));
 }
 
@@ -267,7 +267,7 @@ TEST(ForeignSamples, ThatAreNoLabelsStayFloats) {
 TEST(ForeignSamples, Of64BitsBecomeIntegersThatFit) {
   const Outcome labels = regions<std::int64_t>({0, 1, 2, 4'000'000'000});
   EXPECT_EQ(labels.volume.type, SampleType::kUint32);
-  EXPECT_EQ(samples_of<std::uint32_t>(labels)[23], 4'000'000'000U);
+  EXPECT_EQ(samples_of<std::uint32_t>(labels)[47], 4'000'000'000U);
   ASSERT_THAT(codes_of(labels), ElementsAre("looks-like-labels"));
   EXPECT_THAT(labels.volume.notes[0].detail, HasSubstr("64-bit integers in the file"));
   const Outcome mask = regions<std::uint64_t>({0, 0, 1, 1});

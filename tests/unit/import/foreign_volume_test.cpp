@@ -127,7 +127,9 @@ TEST_F(ForeignVolumes, StructuredPointsAreThoseOfVtk) {
   const std::vector<std::int16_t> points(numbers().begin(), numbers().begin() + 24);
   expect_same_file("a.vtk",
                    vtk_legacy(false, "POINT_DATA 24\n" + scalars + bytes_of(points, true) + "\n"));
-  expect_same_file("a.vtk", vtk_legacy(true, "CELL_DATA 6\n" + scalars + "1 2 3 4 5 6\n"));
+  expect_same_file(
+      "a.vtk",
+      vtk_legacy(true, "CELL_DATA 12\n" + scalars + "1 2 3 4 5 6 7 8 9 10 11 12\n", "4 3 3"));
 }
 
 TEST_F(ForeignVolumes, AfniIsThatOfNibabel) {

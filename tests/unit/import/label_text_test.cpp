@@ -133,8 +133,8 @@ constexpr std::string_view kTable = "1 liver 255 0 0 0\n5 spleen 0 0 255 0\n";
 
 std::string label_volume() {
   std::string samples;
-  for (const char value : {0, 1, 2, 5}) samples += std::string(6, value);
-  return nifti({.dim = {3, 6, 4, 1, 1, 1, 1, 1}}, samples);
+  for (const char value : {0, 1, 2, 5}) samples += std::string(12, value);
+  return nifti({.dim = {3, 6, 2, 4, 1, 1, 1, 1}}, samples);
 }
 
 std::vector<LabelEntry> labels_in(const std::vector<Member>& members,
@@ -194,7 +194,7 @@ TEST(LabelsBeside, AreNotForImagesNorForFilesThatNameTheirOwn) {
   EXPECT_THAT(image.volume.labels, IsEmpty());
   EXPECT_THAT(codes_of(image), IsEmpty());
   std::string own =
-      nrrd(with(with(small_nrrd(), "sizes", "6 4 1"), "type", "uint8"), label_volume().substr(352));
+      nrrd(with(with(small_nrrd(), "sizes", "6 2 4"), "type", "uint8"), label_volume().substr(352));
   own.insert(own.find("\n\n") + 1,
              "Segment0_Name:=kidney\nSegment0_LabelValue:=2\nSegment0_Layer:=0\n");
   EXPECT_THAT(labels_in({{"seg.nrrd", own}, {"seg.txt", std::string(kTable)}}),

@@ -54,13 +54,13 @@ TEST(MetaImage, IsReadInEveryTypeAndByteOrder) {
 }
 
 TEST(MetaImage, ReadsText) {
-  Lines lines = with(with(small_metaimage(), "BinaryData", "False"), "DimSize", "2 1 1");
+  Lines lines = with(with(small_metaimage(), "BinaryData", "False"), "DimSize", "2 2 2");
   lines = with(lines, "ElementType", "MET_SHORT");
-  EXPECT_EQ(samples_of<std::int16_t>(import_metaimage(lines, "-300 7\n")),
-            (std::vector<std::int16_t>{-300, 7}));
-  EXPECT_FALSE(import_metaimage(lines, "-300").imported());
-  EXPECT_FALSE(import_metaimage(lines, "-300 7 8").imported());
-  EXPECT_FALSE(import_metaimage(lines, "-300 70000").imported());
+  EXPECT_EQ(samples_of<std::int16_t>(import_metaimage(lines, "1 2 3 4 5 6\n-300 7\n")),
+            (std::vector<std::int16_t>{1, 2, 3, 4, 5, 6, -300, 7}));
+  EXPECT_FALSE(import_metaimage(lines, "1 2 3 4 5 6 -300").imported());
+  EXPECT_FALSE(import_metaimage(lines, "1 2 3 4 5 6 -300 7 8").imported());
+  EXPECT_FALSE(import_metaimage(lines, "1 2 3 4 5 6 -300 70000").imported());
 }
 
 // What may be unpacked follows from the header, not from what is accepted at most.

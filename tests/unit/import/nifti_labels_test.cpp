@@ -65,7 +65,7 @@ TEST(NiftiLabels, AreThoseOfCaret) {
 
 TEST(NiftiLabels, AreThoseOfTheVolume) {
   const std::string file =
-      with_extensions({.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, extension(caret(kTwo, "1"), 30, false));
+      with_extensions({.dim = {4, 2, 3, 2, 2, 1, 1, 1}}, extension(caret(kTwo, "1"), 30, false));
   EXPECT_EQ(import_bytes(file, {}, {.volume = 1}).volume.labels, two());
   EXPECT_THAT(import_bytes(file, {}, {.volume = 0}).volume.labels, IsEmpty());
 }

@@ -272,17 +272,20 @@ TEST(Nrrd, FieldsOfManyNumbersAreRefused) {
 }
 
 TEST(Nrrd, RefusesTextThatIsNotItsSamples) {
-  const Lines lines = with(with(small_nrrd(), "encoding", "ascii"), "sizes", "2 1 1");
-  EXPECT_TRUE(import_nrrd(lines, "1 2").imported());
-  EXPECT_TRUE(import_nrrd(lines, "\n 1,\n 2 \n").imported());
+  const Lines lines = with(with(small_nrrd(), "encoding", "ascii"), "sizes", "2 2 2");
+  const std::string six = "0 0 0 0 0 0 ";
+  EXPECT_TRUE(import_nrrd(lines, six + "1 2").imported());
+  EXPECT_TRUE(import_nrrd(lines, six + "\n 1,\n 2 \n").imported());
   for (const char* text : {"", "1", "1 2 3", "1 x", "1 256", "1 -1", "1 2.5", "1 nan", "1,2"}) {
-    EXPECT_EQ(import_nrrd(lines, text).code, ErrorCode::kUnusableVolume) << text;
+    EXPECT_EQ(import_nrrd(lines, six + text).code, ErrorCode::kUnusableVolume) << text;
   }
   EXPECT_FALSE(import_nrrd(lines, std::string(1 << 20, '1')).imported());
   const Lines hex_lines = with(lines, "encoding", "hex");
-  EXPECT_TRUE(import_nrrd(hex_lines, "0 1\nfF").imported());
+  EXPECT_TRUE(import_nrrd(hex_lines, "000000000000 0 1\nfF").imported());
   for (const char* text : {"", "00", "00 f", "000000", "00 0g"}) {
-    EXPECT_EQ(import_nrrd(hex_lines, text).code, ErrorCode::kUnusableVolume) << text;
+    EXPECT_EQ(import_nrrd(hex_lines, "000000000000" + std::string(text)).code,
+              ErrorCode::kUnusableVolume)
+        << text;
   }
 }
 

@@ -65,9 +65,10 @@ std::string cube(const CubeFields& fields, const std::string& numbers) {
   return file + "6 6.0 0.0 0.0 0.0\n" + fields.behind_atoms + numbers;
 }
 
-std::string vtk_legacy(bool is_text, const std::string& data) {
+std::string vtk_legacy(bool is_text, const std::string& data, const std::string& points) {
   return std::string("# vtk DataFile Version 3.0\ntitle\n") + (is_text ? "ASCII" : "BINARY") +
-         "\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\nSPACING 1 2 3\nORIGIN 10 20 30\n" + data;
+         "\nDATASET STRUCTURED_POINTS\nDIMENSIONS " + points +
+         "\nSPACING 1 2 3\nORIGIN 10 20 30\n" + data;
 }
 
 std::string afni_head(const std::vector<AfniAttribute>& attributes) {

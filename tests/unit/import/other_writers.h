@@ -46,8 +46,8 @@ struct CubeFields {
 };
 std::string cube(const CubeFields& fields, const std::string& numbers);
 
-// 4 x 3 x 2 points; `data` is what follows the header.
-std::string vtk_legacy(bool is_text, const std::string& data);
+// `points` is the number of points along x, y and z; `data` is what follows the header.
+std::string vtk_legacy(bool is_text, const std::string& data, const std::string& points = "4 3 2");
 
 // A header of 4 x 3 x 2 samples of one byte, 1 mm apart, with these attributes added or replaced:
 // name, type ("integer") and value.

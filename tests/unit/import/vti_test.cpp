@@ -43,14 +43,14 @@ TEST(Vti, IsReadInEveryTypeAndEncoding) {
 }
 
 TEST(Vti, ReadsText) {
-  const VtiFields fields{.form = VtiForm::kAscii, .type = "Int16", .extent = "0 1 0 0 0 1"};
-  EXPECT_EQ(samples_of<std::int16_t>(import_bytes(vti(fields, "-300 7\n 8 9"))),
-            (std::vector<std::int16_t>{-300, 7, 8, 9}));
-  EXPECT_FALSE(import_bytes(vti(fields, "-300 7 8")).imported());
-  EXPECT_FALSE(import_bytes(vti(fields, "-300 7 8 9 10")).imported());
-  EXPECT_FALSE(import_bytes(vti(fields, "-300 7 8 70000")).imported());
-  EXPECT_FALSE(import_bytes(vti(fields, "1 2 3 <!-- 4 --> 5")).imported());
-  EXPECT_FALSE(import_bytes(vti(fields, "1 2 3 &#52;")).imported());
+  const VtiFields fields{.form = VtiForm::kAscii, .type = "Int16", .extent = "0 1 0 1 0 1"};
+  EXPECT_EQ(samples_of<std::int16_t>(import_bytes(vti(fields, "-300 7\n 8 9 1 2 3 4"))),
+            (std::vector<std::int16_t>{-300, 7, 8, 9, 1, 2, 3, 4}));
+  EXPECT_FALSE(import_bytes(vti(fields, "-300 7 8 9 1 2 3")).imported());
+  EXPECT_FALSE(import_bytes(vti(fields, "-300 7 8 9 1 2 3 4 5")).imported());
+  EXPECT_FALSE(import_bytes(vti(fields, "-300 7 8 9 1 2 3 70000")).imported());
+  EXPECT_FALSE(import_bytes(vti(fields, "1 2 3 4 5 6 7 <!-- 8 --> 9")).imported());
+  EXPECT_FALSE(import_bytes(vti(fields, "1 2 3 4 5 6 7 &#56;")).imported());
 }
 
 constexpr std::array kCompressors = {"vtkZLibDataCompressor", "vtkLZ4DataCompressor",

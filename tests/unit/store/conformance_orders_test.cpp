@@ -174,7 +174,7 @@ TEST_P(OrderConformance, TheirEndIsToldOnce) {
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].job, record.order.id);
   EXPECT_THAT(told[0].body, HasSubstr("succeeded"));
-  EXPECT_THAT(told[0].body, testing::Not(HasSubstr("1.3")));
+  EXPECT_THAT(told[0].body, testing::Not(HasSubstr("\"1.3\"")));
 }
 
 TEST_P(OrderConformance, AreListedInPages) {

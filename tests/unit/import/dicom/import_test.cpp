@@ -395,8 +395,8 @@ TEST(DicomSeriesImport, GivesRandomSeriesBackExactly) {
   const std::array<std::string_view, 4> syntaxes = {kImplicit, kExplicit, kDeflate, kBigEndian};
   for (int round = 0; round < 150; ++round) {
     DicomSeries series;
-    series.columns = static_cast<unsigned>(pick(1, 9));
-    series.rows = static_cast<unsigned>(pick(1, 9));
+    series.columns = static_cast<unsigned>(pick(2, 9));
+    series.rows = static_cast<unsigned>(pick(2, 9));
     series.slices = static_cast<unsigned>(pick(2, 20));
     series.bits_allocated = 8U << pick(0, 2);
     series.bits_stored = static_cast<unsigned>(pick(1, static_cast<int>(series.bits_allocated)));
