@@ -48,8 +48,8 @@ struct NiftiFields {
 std::string nifti(const NiftiFields& fields) {
   std::string file(352, '\0');
   put<std::int32_t>(file, 0, 348);
-  const std::int16_t dim[] = {fields.axes, 4, 3,
-                              static_cast<std::int16_t>(fields.axes == 4 ? 1 : 2), 2};
+  const std::int16_t dim[] = {fields.axes, static_cast<std::int16_t>(fields.axes == 4 ? 2 : 4), 3,
+                              2, 2};
   for (std::size_t at = 0; at < std::size(dim); ++at) put(file, 40 + 2 * at, dim[at]);
   put(file, 70, fields.datatype);
   put(file, 72, fields.bits);

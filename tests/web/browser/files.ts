@@ -7,11 +7,11 @@ export function smallNrrd(fields: string[] = [], bytes: Buffer = samples): Buffe
   return Buffer.concat([Buffer.from(header.join('\n')), bytes]);
 }
 
-// Volumes of 4 x 3 x 1 samples.
-export function seriesNifti(bytes: Buffer = samples): Buffer {
+// Volumes of twelve samples each.
+export function seriesNifti(bytes: Buffer = samples, dims = [2, 3, 2]): Buffer {
   const header = Buffer.alloc(352);
   header.writeInt32LE(348, 0);
-  [4, 4, 3, 1, bytes.length / 12].forEach((size, at) => header.writeInt16LE(size, 40 + 2 * at));
+  [4, ...dims, bytes.length / 12].forEach((size, at) => header.writeInt16LE(size, 40 + 2 * at));
   header.writeInt16LE(2, 70);
   header.writeInt16LE(8, 72);
   for (let at = 0; at < 5; at += 1) header.writeFloatLE(1, 76 + 4 * at);

@@ -24,7 +24,7 @@ describe('a header', () => {
   const bytesOf = (file: Buffer | string): unknown => declaredBy(new Uint8Array(Buffer.from(file)));
 
   it('tells dimensions and bytes', () => {
-    expect(bytesOf(seriesNifti())).toEqual({ dims: [4, 3, 1, 2], bytes: 352 + 24, isElsewhere: false });
+    expect(bytesOf(seriesNifti())).toEqual({ dims: [2, 3, 2, 2], bytes: 352 + 24, isElsewhere: false });
     expect(bytesOf(nifti2())).toEqual({ dims: [4, 3, 2], bytes: 544 + 48, isElsewhere: false });
     const nrrd = smallNrrd();
     expect(bytesOf(nrrd)).toEqual({ dims: [4, 3, 2], bytes: nrrd.length, isElsewhere: false });

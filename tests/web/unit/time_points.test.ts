@@ -21,7 +21,7 @@ async function read(bytes: Buffer, chunk = bytes.length): Promise<Picture[]> {
 
 // Three volumes of 4 x 3 samples, each twice as bright as the one before.
 const first = [10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 12];
-const three = seriesNifti(Buffer.from([...first, ...first.map((value) => 2 * value), ...first]));
+const three = seriesNifti(Buffer.from([...first, ...first.map((value) => 2 * value), ...first]), [4, 3, 1]);
 
 describe('the volumes of a NIfTI file', () => {
   it('have a picture each, by one window, with the last row first', async () => {
