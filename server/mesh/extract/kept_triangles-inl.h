@@ -1,4 +1,4 @@
-// Which triangles of 64 cells are left where crossings are joined. Compiled once for each
+// Finds the triangles of 64 cells that are left where crossings are joined. Compiled once for each
 // instruction set, see slabs.cpp.
 #if defined(ISOMESH_KEPT_TRIANGLES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_KEPT_TRIANGLES_INL_H_
@@ -31,7 +31,7 @@ HWY_INLINE std::array<Word, 2> keep_triangles(const std::array<Word, 4>& inside,
   const auto [ma, mb, mc, md] = merged;
   const Word odd = a ^ b ^ c ^ d;
   const Word two = ((a | b | c | d) & ~(a & b & c & d)) & ~odd;
-  // Of two inside and two outside, the first triangle has the corners' edges first-first,
+  // With two corners inside and two outside, the first triangle has the corners' edges first-first,
   // first-second and second-second, so it vanishes where the first inside or the second outside
   // merges. The other one has the same of the second inside and the first outside.
   const Word lost_first = select(a, ma, select(b, mb, mc)) | select(d, select(c, mb, mc), md);
@@ -40,7 +40,7 @@ HWY_INLINE std::array<Word, 2> keep_triangles(const std::array<Word, 4>& inside,
   return {(odd & ~lost_only) | (two & ~lost_first), two & ~lost_second};
 }
 
-// Where at least two of three are.
+// The bits that at least two of the three words have.
 HWY_INLINE Word two_of(Word a, Word b, Word c) { return (a & b) | (c & (a | b)); }
 
 // `joined.at<a, b>()`: the cells whose crossing on the edge between corners a and b is joined at a.

@@ -48,7 +48,7 @@ struct LinkDirection {
   bool operator==(const LinkDirection&) const = default;
 };
 
-// What the rule says of a set of directions around a sample.
+// The result of the rule for a set of directions around a sample.
 class ClusterFacts {
  public:
   struct Parts {
@@ -79,7 +79,7 @@ class ClusterFacts {
   // Bit i: whether the components may clash with those of the neighbour in the earlier direction i.
   Directions risks() const { return field(36, 9); }
 
-  // Of one component: whether it may become a vertex if nothing in `forbidden` is crossed.
+  // True if the set is one component that may become a vertex if nothing in `forbidden` is crossed.
   bool may_join() const { return field(61, 1) != 0; }
   Directions forbidden() const { return field(18, 18); }
 
@@ -154,7 +154,8 @@ class Links {
   std::span<const Directions> below(unsigned parity) const { return link_of(parity).below; }
 
  private:
-  // Which places of a ring are in a set of directions, a bit each; looked up by halves of the set.
+  // The places of a ring that are in a set of directions, a bit each; looked up by halves of the
+  // set.
   struct OnRing {
     static constexpr unsigned kHalf = kMostDirections / 2;
 

@@ -32,7 +32,7 @@ class Nearness {
 
   std::size_t bytes() const { return bytes_; }
 
-  // Where bytes() is less than 4, and Rank has as many.
+  // For bytes() below 4 and a Rank of as many bytes.
   template <class Rank>
   Rank of_sample(T sample) const {
     return of_steps<Rank>(static_cast<std::int32_t>(sample) * parts_);
@@ -42,7 +42,7 @@ class Nearness {
     return of_steps<Rank>(eight_samples);
   }
 
-  // Where bytes() is 4.
+  // For bytes() of 4.
   std::int32_t of_value(double value) const {
     const auto distance = static_cast<float>(std::abs(value - iso_));
     // Its bits rise with a number that is not negative; they are moved down to where signed

@@ -1,4 +1,4 @@
-// What the walk is told of an iso-value's signs where the surface is regularised: each row has the
+// The signs at an iso-value for the walk of a regularised surface. Each row has the
 // vertices of its clusters before those of the edges that no cluster has. Compiled once for each
 // instruction set, see slabs.cpp.
 #if defined(ISOMESH_REGULAR_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -299,7 +299,7 @@ class RegularField : public SignField {
     }
   }
 
-  // Of the points of one cluster's edges, around the sample at x.
+  // The sum of the crossings on one cluster's edges, around the sample at x.
   struct Sum {
     StoredDouble4 points = {};
     double edges = 0;
@@ -312,8 +312,8 @@ class RegularField : public SignField {
   JoinedEdges<kEdgePlaces> joined_;
   std::array<EdgeSamples, std::size_t{2}* kClusterPlaces> ends_ = {};  // by parity and direction
   std::array<EdgeFrame, std::size_t{2}* kClusterPlaces> frames_ = {};
-  // Of the row that is numbered: the edges of its clusters, one after the other, as
-  // kClusterPlaces * x + direction, and the vertex that each becomes.
+  // The edges of the present row's clusters, one after the other, as kClusterPlaces * x +
+  // direction, and the vertex of each.
   std::vector<std::uint32_t> edges_;
   std::vector<std::uint32_t> numbers_;
   std::size_t found_ = 0;

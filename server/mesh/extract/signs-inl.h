@@ -1,5 +1,5 @@
-// Which samples are inside, one bit each, and the logic on 64 samples at a time that extraction at
-// an iso-value counts and walks with. Compiled once for each instruction set, see slabs.cpp.
+// The samples that are inside, one bit each, and the logic on 64 samples at a time that extraction
+// at an iso-value counts and walks with. Compiled once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_SIGNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_SIGNS_INL_H_
 #undef ISOMESH_SIGNS_INL_H_
@@ -69,7 +69,7 @@ inline unsigned count_in_tetrahedron(const CornerWords& corners,
   return static_cast<unsigned>(std::popcount(odd) + 2 * std::popcount(mixed & ~odd));
 }
 
-// What numbering a row leaves for the triangles of the layer: its crossed cells with their cases.
+// The crossed cells of a row and their cases, for the triangles of the layer.
 struct SignCells {
   Word crossed = 0;
   std::array<std::uint8_t, kWordBits> cases;
@@ -192,7 +192,7 @@ class SignCellWriter {
                  const EdgeOffsets& offsets)
       : splits_(splits), row_(row), offsets_(offsets) {}
 
-  // Of the cell at x, which is `bit` of the word that `cells` are of.
+  // Writes the triangles of the cell at x, which is bit `bit` of the word of `cells`.
   HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const SignCells& cells,
                              const std::uint32_t* places, Triangle* out) const {
     return write_case(splits_[row_.parity_at(x)].cases[cells.cases[bit]], places, offsets_, out);
@@ -204,8 +204,8 @@ class SignCellWriter {
   const EdgeOffsets& offsets_;
 };
 
-// What the walk is told of an iso-value's signs: those of the planes around the one that is worked
-// on, each classified once as z rises.
+// The signs at an iso-value for the walk: those of the planes around the present one, each
+// classified once as z rises.
 class SignField {
  public:
   using Marched = Extraction;

@@ -33,8 +33,8 @@ inline Dims marched_dims(const Dims& dims, bool close) {
 // The ways to split cells of even and odd parity, wound for the lattice.
 std::array<CellSplit, 2> splits_of(Scheme scheme, bool left_handed);
 
-// What is marched over. Samples are numbered with the phantoms, so the lattice's begin at `margin`.
-// Immutable while slabs are worked on.
+// The lattice that is marched over. Samples are numbered with the phantoms, so the lattice's begin
+// at `margin`. Immutable while slabs are worked on.
 struct Marching {
   Marching(const Dims& samples, const LatticeToSpace& map, Scheme the_scheme, bool close)
       : to_space(map),
@@ -56,7 +56,7 @@ struct Marching {
   std::array<CellSplit, 2> splits;
 };
 
-// What all slabs of an extraction at an iso-value share.
+// The data that all slabs of an extraction at an iso-value share.
 struct Extraction : Marching {
   // `smallest`: the smallest value that is inside.
   template <class T>
@@ -79,7 +79,7 @@ struct Extraction : Marching {
   bool regularize;
   std::unique_ptr<const SampleRows> samples;
   std::span<const ClusterLayer> clusters;
-  // Of cells of even parity and, if they differ, of odd parity.
+  // The triangles of cells of even parity and, if they differ, of odd parity.
   std::vector<PlacedTriangles> placed;
 };
 

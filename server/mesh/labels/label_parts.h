@@ -1,4 +1,4 @@
-// Which labels a sample belongs to.
+// The labels to which a sample belongs.
 #pragma once
 
 #include <algorithm>

@@ -13,14 +13,14 @@
 
 namespace isomesh::mesh {
 
-// Which triangles have each label on either side: 8 bytes a triangle and a label. Keeps nothing of
-// the surface. Immutable, so safe to read from several threads.
+// The triangles that have each label on either side. Takes 8 bytes for each triangle and label.
+// Keeps nothing of the surface. Immutable, so safe to read from several threads.
 class LabelTriangles {
  public:
   // Throws Error kTooLarge when 32 bits cannot number all triangles.
   explicit LabelTriangles(const SeparatingSurface& surface);
 
-  // Of the label of that number, from 1 on (see WallSides); in the order of the surface.
+  // The triangles of the label `number`, from 1 on (see WallSides), in the order of the surface.
   std::span<const std::uint32_t> of(std::size_t number) const {
     return triangles_.span().subspan(ends_[number - 1], ends_[number] - ends_[number - 1]);
   }
@@ -37,11 +37,11 @@ class LabelTriangles {
 void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
                    std::size_t number, Mesh& mesh);
 
-// Which of the walls' vertices extract_label takes for that label, in the order of its surface.
+// The vertices of the walls that extract_label takes for that label, in the order of its surface.
 std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
                                              const LabelTriangles& triangles, std::size_t number);
 
-// What one label's own surface is.
+// The measures of one label's own surface.
 struct LabelMeasure {
   std::int64_t label = 0;
   std::uint64_t vertices = 0;
@@ -52,13 +52,13 @@ struct LabelMeasure {
   bool is_closed() const { return topology.boundary_edges == 0; }
 };
 
-// Of each label, in their order. Takes one label's surface for each thread. The same for any number
-// of threads. Throws Error kCancelled.
+// Measures each label, in their order. Holds the surface of one label for each thread. The same for
+// any number of threads. Throws Error kCancelled.
 std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
                                          const LabelTriangles& triangles, const Context& context);
 
-// What all labels enclose together, in cubic millimetres: of a surface that is not closed as
-// Extent::volume_mm3 is. The same for any number of threads. Throws Error kCancelled.
+// The volume that all labels enclose together, in cubic millimetres. If the surface is not closed,
+// it is as Extent::volume_mm3. The same for any number of threads. Throws Error kCancelled.
 double enclosed_by_all(const SeparatingSurface& surface, const Context& context);
 
 }  // namespace isomesh::mesh

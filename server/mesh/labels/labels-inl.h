@@ -28,7 +28,7 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 struct LabelCells {
   Word crossed = 0;
   Word several = 0;  // more than two; of samples that own an edge of such a cell, too
-  // Of those with two: the corners of the larger label, whose surface is that of what is inside.
+  // For cells of two labels: the corners of the larger one, as if they were inside.
   std::array<std::uint8_t, kWordBits> cases;
 };
 
@@ -240,7 +240,7 @@ class LabelCellWriter {
         end_(triangles_ + surface.mesh.layer_triangles[z + 1]),
         sides_(surface.sides.data()) {}
 
-  // Of the cell at x, which is `bit` of the word that `cells` are of.
+  // Writes the triangles of the cell at x, which is bit `bit` of the word of `cells`.
   HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const LabelCells& cells,
                              const std::uint32_t* places, Triangle* out) const {
     if ((cells.several >> bit & 1) != 0) return write_several(x, places, out);
@@ -296,8 +296,8 @@ class LabelCellWriter {
   WallSides* sides_;
 };
 
-// What the walk is told of labels: those of the planes around the one that is worked on, each
-// looked up once as z rises.
+// The labels for the walk: those of the planes around the present one, each looked up once as z
+// rises.
 class LabelField {
  public:
   using Marched = Separation;

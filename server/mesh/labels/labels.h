@@ -1,4 +1,4 @@
-// Which labels a segmentation has, and which of them are to be separated.
+// The labels of a segmentation, and those that are to be separated.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace isomesh::mesh {
 
-// What the samples say of one label.
+// The samples of one label.
 struct LabelVoxels {
   std::int64_t label = 0;
   std::uint64_t voxels = 0;

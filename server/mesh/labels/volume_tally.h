@@ -12,14 +12,14 @@
 
 namespace isomesh::mesh {
 
-// What is missing in a tetrahedron at each corner of each of its triangles (wall_cases.h), in
-// voxels: owed to the label of the triangle's corner `back`.
+// The volume that is missing in a tetrahedron at each corner of each of its triangles
+// (wall_cases.h), in voxels. It is owed to the label of the triangle's corner `back`.
 using OwedVolumes = std::array<float, 12>;
 
 // For cells of one way of splitting.
 struct TallyCases {
   std::array<std::array<OwedVolumes, kPatterns>, 6> tetrahedra = {};
-  // Where each vertex lies before any are joined, from the cell's corner 0, in steps of the
+  // The position of each vertex before any are joined, from the cell's corner 0, in steps of the
   // lattice.
   std::array<std::array<float, 3>, 8 * kSlotPlaces> places = {};
 };
@@ -34,7 +34,7 @@ struct VolumeTally {
   SeparatingSurface& surface;
   const WallFans& fans;
   const std::array<TallyCases, 2>& cases;
-  // Of the map from space back to the lattice: index_of(p) is `origin` + the sum of p[k] * axes[k].
+  // The map from space back to the lattice: index_of(p) is `origin` + the sum of p[k] * axes[k].
   std::array<double, 3> origin;
   std::array<std::array<double, 3>, 3> axes;
   std::span<std::int64_t> units;  // by fan

@@ -71,7 +71,7 @@ struct WallCases {
   // For each set of axes along which a sample has a next one (bit 0: x), the set of its slots that
   // there are.
   std::array<std::uint32_t, 8> existing = {};
-  // Of each tetrahedron, in the order of CellSplit, by its pattern.
+  // The walls of each tetrahedron, in the order of CellSplit, by its pattern.
   std::array<std::array<TetrahedronWalls, kPatterns>, 6> tetrahedra = {};
 };
 

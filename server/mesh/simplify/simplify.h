@@ -21,10 +21,11 @@ struct SimplifyOptions {
   // No vertex and no centre of a triangle, of the surface as it was and as it becomes, is farther
   // than this from the other. Millimetres, more than 0. Infinite: nothing is measured.
   double max_error_mm = std::numeric_limits<double>::infinity();
-  // Where the mesh's vertices were before they were moved, in their order: the surface that the
-  // error is measured from. Empty: where they are. No vertex may have moved farther than the error.
+  // The positions of the mesh's vertices before smoothing, in their order. The error is measured
+  // from this surface. Empty: the present positions. No vertex may have moved farther than the
+  // error.
   std::span<const Vec3> before = {};
-  // What is aimed at; blocks give up about equal shares. 0: as few as the error allows.
+  // The target number; blocks remove about equal shares. 0: as few as the error allows.
   std::uint64_t triangles = 0;
 };
 
@@ -38,7 +39,7 @@ struct SimplificationEffect {
   std::uint64_t taken_back = 0;
   // Whether there are as few triangles as was aimed at; true where nothing was.
   bool reached_triangles = true;
-  // Where they are not: whether the surface's kind needs them all, whatever the error.
+  // True if the topology needs all triangles that are left, whatever the error.
   bool is_least = false;
 };
 
@@ -58,7 +59,7 @@ SimplificationEffect simplify(const SimplifyOptions& options, const Context& con
 
 // As above, for the walls between labels: each is simplified once, for both its sides, and keeps
 // them, and so is each line where walls meet, for all of them; the points where lines meet stay.
-// What holds of the mesh above holds of each label's own surface.
+// As above, for the surface of each label.
 SimplificationEffect simplify(const SimplifyOptions& options, const Context& context,
                               SeparatingSurface& walls);
 

@@ -24,8 +24,8 @@ inline Point measured_point(const SurfaceView& surface, std::size_t number) {
   return centre;
 }
 
-// Of the bound, what is asked for at first: a quadric's error is a mean, and what is left of the
-// lines where walls meet has the walls' own distance to come.
+// The share of the bound that the first proposal may use. A quadric's error is a mean, and the
+// junction curves lose the distance of their walls later.
 inline constexpr double kFirstError = 0.5;
 
 // Who measures again in single precision finds no more than the bound.
@@ -42,7 +42,7 @@ struct SurfaceBlock {
 
 struct BlockGoal {
   const Mesh& mesh;  // whose vertices are taken
-  // What the distances are from: the mesh's triangles, with its vertices as they were before.
+  // The surface that distances are measured from: the mesh's triangles at the positions before.
   SurfaceView original;
   const TriangleGrid* grid = nullptr;  // of the original; none where nothing is measured
   double max_error_mm = 0;

@@ -59,7 +59,7 @@ class Cubes {
  private:
   // Larger blocks have fewer seams, smaller ones stay in the cache and are sooner made again.
   static constexpr double kTrianglesPerBlock = 6'000;
-  // Of a cube's side, how near the seams of one round the next one looks.
+  // The width of the band around a round's seams that the next round looks at, in sides of a cube.
   static constexpr double kSeamWidth = 0.08;
   static constexpr double kMostCubesPerAxis = 64;
 

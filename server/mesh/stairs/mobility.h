@@ -1,4 +1,4 @@
-// Where walls are staircases; private to this folder.
+// Finds the parts of walls that are staircases; private to this folder.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct Mobility {
   std::vector<std::uint32_t> beside;  // others within five edges of a curve
 };
 
-// Of the walls as they start. Throws Error kCancelled.
+// For the walls at their start. Throws Error kCancelled.
 Mobility find_mobility(const WallShape& shape, const Context& context);
 
 }  // namespace isomesh::mesh

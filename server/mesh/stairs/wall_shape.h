@@ -53,7 +53,7 @@ class WallShape {
   std::size_t vertices() const { return start_.size(); }
   const WallFans& fans() const { return fans_; }
 
-  // Where the vertices were, and where they are now.
+  // The positions of the vertices at the start, and now.
   const std::vector<Lanes>& start() const { return start_; }
   std::vector<Lanes> at;
 
@@ -62,9 +62,9 @@ class WallShape {
   float largest_spacing() const { return largest_spacing_; }
   float smallest_spacing() const { return smallest_spacing_; }
 
-  // Where three walls or more meet, or one ends, or leaves a cap.
+  // True where three walls or more meet, or one ends, or leaves a cap.
   bool is_curve(std::size_t v) const { return (flags_[v] & kCurve) != 0; }
-  // In a cap, or in the border of the volume.
+  // True in a cap, and in the border of the volume.
   bool is_held(std::size_t v) const { return (flags_[v] & kAxes) != 0; }
 
   // The way without what would lead out of that.
@@ -102,7 +102,7 @@ class WallShape {
     return count;
   }
 
-  // Of the neighbours, of which there are some.
+  // The mean over the neighbours; there must be one.
   template <class Value>
   Value mean(std::size_t v, const std::vector<Value>& values) const {
     Value sum = {};
@@ -114,7 +114,7 @@ class WallShape {
     return sum / count;
   }
 
-  // Of a triangle, twice as long as its area.
+  // The normal of a triangle; its length is twice the area.
   Lanes normal(std::size_t v, const Spoke& spoke) const {
     return cross(at[spoke.next] - at[v], at[spoke.previous] - at[v]);
   }
