@@ -7,7 +7,7 @@
 
 namespace isomesh::mesh {
 
-// What a kernel needs from the job that it runs for; a default one cancels nothing and tells
+// The data that a kernel needs from its job; a default one cancels nothing and tells
 // nobody. Kernels look at `stop` once per slab of layers and throw Error kCancelled; what they have
 // written by then is indeterminate.
 struct Context {

@@ -32,7 +32,8 @@ std::uint32_t margin_for(const Metric& metric, double error_mm) {
   return 2 * (1 + steps / 2);  // even: a cell keeps its parity
 }
 
-// What rounding to the grid of the copies, and to the mesh's single precision, may move a place.
+// The distance by which rounding to the grid of the copies and to the mesh's single precision may
+// move a point.
 double rounding_of(const Dims& dims, const Metric& metric) {
   constexpr double kUnit = std::numeric_limits<float>::epsilon();
   const double samples = std::max({dims.x, dims.y, dims.z});

@@ -37,7 +37,7 @@ struct BoundedMesh {
   // How far the samples in single precision, which the copies were compared with, move the surface.
   // Part of the bound.
   double shift_mm = 0;
-  // Where each vertex is in the two copies, in millimetres.
+  // The position of each vertex in the two copies, in millimetres.
   std::vector<std::array<double, 3>> inside;
   std::vector<std::array<double, 3>> outside;
 

@@ -10,7 +10,7 @@
 
 namespace isomesh::mesh::bound {
 
-// What collapses know besides the tube.
+// The data for collapses besides the tube.
 struct CollapseSurroundings {
   const Field& field;
   const Metric& metric;

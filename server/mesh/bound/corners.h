@@ -1,4 +1,4 @@
-// Which triangles of a block are neighbours; private to this folder.
+// The neighbours of each triangle of a block; private to this folder.
 #pragma once
 
 #include <algorithm>

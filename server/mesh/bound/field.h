@@ -100,7 +100,7 @@ class PlaneCrossings {
   std::vector<Sample> samples_;
 };
 
-// Where F is zero between the ends, in numbers of samples.
+// The place between the ends at which F is zero, in numbers of samples.
 Vecd zero_between(const Field& field, const Crossing& crossing);
 
 // How far S is at most from the surface of the samples themselves, in millimetres: the farthest

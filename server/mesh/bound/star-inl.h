@@ -21,7 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::bound::HWY_NAMESPACE {
 
-// What collapses ask of a vertex of T, in millimetres but for `copies`.
+// The data of a vertex of T for collapses, in millimetres but for `copies`.
 struct Site {
   std::array<float, kLanes> copies;  // as copies_of; not Lanes, which allocators may misalign
   Vecf up;                           // the way to T+

@@ -44,7 +44,7 @@ unsigned pin(const StartSurface& surface, Vecd& place) {
   return planes;
 }
 
-// Where a vertex of the surface is, in numbers of samples.
+// The position of a vertex of the surface, in numbers of samples.
 Vecd place_of(const StartSurface& surface, std::size_t v) {
   const Vec3& at = surface.mesh.positions[v];
   Vecd place = surface.metric.index({at[0], at[1], at[2]});
@@ -261,8 +261,8 @@ class Starter {
     return field_.contains(p) ? sign * value_at(field_, p) : -1;
   }
 
-  // Of each triangle at fault the vertex that is at fault in most of them. False where one has all
-  // its vertices on lattice edges.
+  // Moves back, of each triangle at fault, the vertex that is at fault in most of them. Returns
+  // false if a triangle has all its vertices on lattice edges.
   bool step_back() {
     std::vector<std::uint32_t> count(tube_.vertices.size(), 0);
     for_layers([&](std::size_t layer) {

@@ -19,7 +19,7 @@
 
 namespace isomesh::mesh::bound {
 
-// What the tube is made around.
+// The surface around which the tube is made.
 struct StartSurface {
   const Field& field;
   std::span<const Crossing> crossings;

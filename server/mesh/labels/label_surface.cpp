@@ -11,7 +11,7 @@
 namespace isomesh::mesh {
 namespace {
 
-// Which of a range of vertices some triangles name, and their numbers without the others.
+// The vertices of a range that some triangles name, and their numbers without the others.
 class VertexChoice {
  public:
   VertexChoice(std::span<const Triangle> all, std::span<const std::uint32_t> triangles) {

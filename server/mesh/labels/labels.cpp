@@ -49,7 +49,7 @@ class LabelTable {
   std::vector<LabelVoxels> labels_;
 };
 
-// Where there are too many values for one row each.
+// For types with too many values to give each a row.
 template <class T>
 class LabelTable<T, false> {
  public:

@@ -38,7 +38,7 @@ Corners corners_of(const Slot& slot) { return set_of(std::span(slot.corners).fir
 
 using Slots = std::array<Slot, kSlots>;
 
-// What corner 0 owns is an edge, a face or a tetrahedron of one of its cell's tetrahedra.
+// The slots of corner 0: the edges, faces and tetrahedra, of its cell's tetrahedra, that it owns.
 Slots slots_of(const CellSplit& split) {
   Slots slots = {};
   for (unsigned direction = 1; direction < 8; ++direction) {

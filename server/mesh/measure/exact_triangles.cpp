@@ -69,7 +69,7 @@ class Plane {
     return std::abs(height) > bound ? sign_of(height) : exact_side_of(point);
   }
 
-  // Of three points.
+  // The sides on which three points lie.
   std::array<int, 3> sides_of(const Vertices& points) const {
     return {side_of(points[0]), side_of(points[1]), side_of(points[2])};
   }
@@ -162,8 +162,8 @@ bool meet_anywhere(const Vertices& a, const Vertices& b) {
   return any_edge_meets(a, sides_of_a, b) || any_edge_meets(b, sides_of_b, a);
 }
 
-// What two triangles with one common vertex, their first, have in common beside it is a segment
-// from there, which ends on the far side of one of them; or they touch there.
+// Two triangles share their first vertex. If they share more, it is a segment from there, which
+// ends on the far side of one of them; or they touch there.
 bool meet_beyond_vertex(const Vertices& a, const Vertices& b) {
   const auto far_side_meets = [](const Vertices& of, const Vertices& t) {
     const Plane plane(t);

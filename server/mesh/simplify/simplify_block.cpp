@@ -16,13 +16,13 @@ namespace {
 constexpr int kAttempts = 6;
 constexpr int kLevels = 4;
 constexpr double kLess = 0.5;
-// Where more attempts than this were wrong, much is held, or less was asked for: what is left then
-// is simplified once more.
+// After more wrong attempts than this, much is held or the aim was lowered. Then the rest is
+// simplified once more.
 constexpr std::uint32_t kFewRepeated = 1;
 
 using Flags = std::vector<std::uint8_t>;
 
-// What of a surface its simplification must not change.
+// The topology of a surface, which its simplification must not change.
 struct Shape {
   std::uint64_t boundary_edges = 0;
   std::int64_t euler = 0;
@@ -104,7 +104,7 @@ std::vector<std::uint32_t> lone_triangles(std::size_t vertices,
   return alone;
 }
 
-// Of a triangle without area, the corner that lies on the edge between the other two.
+// Returns the corner of a triangle without area that lies on the edge between the other two.
 std::size_t corner_on_edge(const LocalMesh& mesh, const Triangle& triangle) {
   std::array<double, 3> opposite;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -190,7 +190,7 @@ class BlockSimplifier {
       exempt_[v] = goal.mesh.is_on_line(mesh_.origin[v]) ? 1 : 0;
     }
     held_ = exempt_;
-    // What was no manifold before need not become one.
+    // A vertex that was not manifold before need not become so.
     before_ = look_at_fans(exempt_.size(), mesh_.triangles, exempt_, &held_);
     exempt_ = held_;
     for (const Triangle& triangle : mesh_.triangles) {
@@ -217,7 +217,7 @@ class BlockSimplifier {
     double kept = goal_.share;
     double error = kFirstError * goal_.max_error_mm;
     for (int level = 0; level < kLevels; ++level) {
-      // What had to be held for more may go for less.
+      // Vertices that had to be held for a larger error may go for a smaller one.
       held_ = held_first;
       for (int attempt = 0; attempt < kAttempts; ++attempt) {
         proposed_ = propose(mesh_, held_, error, static_cast<std::size_t>(std::floor(kept * all)));

@@ -70,7 +70,7 @@ class LineSimplifier : private EdgeCollapses {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
   static Edge edge(std::uint32_t a, std::uint32_t b) { return std::minmax(a, b); }
 
-  // Where not two triangles of one wall meet, a line is, or an end of the surface.
+  // An edge is on a line, or at an end of the surface, unless two triangles of one wall meet there.
   void find_lines() {
     is_at_end_.assign(mesh_.origin.size(), false);
     std::vector<std::pair<Edge, std::uint32_t>> edges;

@@ -18,7 +18,8 @@ namespace {
 
 // In three goes, so that what is small never shrinks by much before it gets its volume back.
 constexpr int kRounds = 3;
-// Of each, for an even spacing; times grow with its ratio, and degrees with the root of that.
+// Times and degrees of each filter, for an even spacing. Times grow with the ratio of the spacings,
+// degrees with the root of that.
 constexpr double kSmoothTime = 3;
 constexpr double kSmoothDegree = 4;
 constexpr double kSpreadTime = 12;
