@@ -55,7 +55,7 @@ int connected_to(const std::string& url, const std::string& from) {
   return connected(AF_INET, address, from);
 }
 
-// What the chunks of a body hold; as much of it as has come.
+// The contents of a body's chunks, as far as they have come.
 std::string joined(const std::string& chunks) {
   std::string bytes;
   for (std::size_t at = 0; at < chunks.size();) {

@@ -20,7 +20,7 @@ using namespace test;
 // What every operation may answer without saying so; the description's first words name them.
 const std::set<int> kCommon = {401, 403, 404, 405, 408, 414, 429, 431, 500, 503};
 
-// What needs another daemon, S3, a full disk or a long time; other tests see to it.
+// Answers that need another daemon, S3, a full disk or a long time; other tests cause them.
 const std::set<std::string> kElsewhere = {"307", "401", "403", "410",
                                           "429", "503", "507", "default"};
 
@@ -255,7 +255,7 @@ void probe_orders(Statuses& statuses, const Order& order, const std::string& bod
   statuses.probe("DELETE /v1/orders/{id}", one);
 }
 
-// What is asked of a volume whose samples the disk has spoilt.
+// Requests about a volume whose samples are damaged on the disk.
 void probe_damaged(Statuses& statuses, const Daemon& daemon) {
   const std::string id =
       volume_from_json(daemon.send("POST", "/v1/volumes?dims=2,2,2&type=uint8", "87654321").body)

@@ -12,7 +12,7 @@ namespace {
 using nlohmann::json;
 using Faults = std::vector<std::string>;
 
-// What says nothing about the value, and what is looked at beside another keyword.
+// Keywords that say nothing about the value, and those that are checked with another one.
 const std::set<std::string> silent_keywords = {"title",   "description", "example",   "examples",
                                                "default", "format",      "properties"};
 

@@ -26,7 +26,7 @@ class OpenApi {
   YAML::Node root_;
 };
 
-// What a YAML node says, as JSON.
+// A YAML node as JSON.
 nlohmann::json json_of(const YAML::Node& node);
 
 // The scalars of a sequence, as text.

@@ -30,7 +30,7 @@ class CallbackSecret : public testing::Test {
     return all;
   }
 
-  // Of every format, with everything that a mesh may carry.
+  // A mesh in every format, with everything that it may carry.
   static std::string everything() {
     return R"("normals": true, "formats": )" + json(formats()).dump();
   }

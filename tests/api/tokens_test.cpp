@@ -92,7 +92,7 @@ TEST_F(TokensTest, AnAdministratorErasesWhatItSees) {
   EXPECT_EQ(daemon_.get(volume, bearer(ct_)).status, 404);
 }
 
-// Of what is another's, not even that it is there is told.
+// Nothing tells that something of another owner exists.
 TEST_F(TokensTest, ATokenSeesItsOwnAloneAndAnAdministratorAll) {
   Client ct({.server = daemon_.url(), .token = ct_});
   const RawUpload sphere = sphere_upload();
@@ -204,7 +204,7 @@ TEST(TokenCommand, PrintsTheTokenAndItsLine) {
   EXPECT_EQ(run({ISOMESHD, "token", "add"}).status, 2);
 }
 
-// What `isomeshd token` says with that file.
+// The output of `isomeshd token` with that file.
 Finished token_command(std::vector<std::string> arguments, const std::string& file) {
   std::vector<std::string> command = {ISOMESHD, "token"};
   command.insert(command.end(), arguments.begin(), arguments.end());

@@ -111,7 +111,7 @@ class Placement {
     }
   }
 
-  // Of the edges with other than two triangles.
+  // The number of edges with other than two triangles.
   double length_of_curves() const {
     std::map<std::pair<std::uint32_t, std::uint32_t>, int> triangles;
     for (const mesh::Triangle& triangle : walls_.triangles) {

@@ -42,7 +42,7 @@ struct LabelQuality {
   std::optional<Volumes> volumes;
 };
 
-// Of ours with two smoothings, and of the peers that there are.
+// The figures of ours with two smoothings, and of the peers that are installed.
 std::vector<LabelQuality> measure_label_quality(const Samples& samples, const LabelPlan& plan);
 
 // An object for each.

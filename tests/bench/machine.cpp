@@ -46,7 +46,7 @@ std::string kernel() {
   return uname(&name) == 0 ? std::string(name.sysname) + ' ' + name.release : "unknown";
 }
 
-// Of the last minute; negative when it is not known.
+// The load of the last minute; negative if it is unknown.
 double load_average() {
   double average = 0;
   return getloadavg(&average, 1) == 1 ? average : -1;

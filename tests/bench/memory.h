@@ -40,7 +40,7 @@ inline constexpr const char* kPeerJobStage = "peer-pipeline";
 std::optional<PeakMemory> measure_memory(const std::string& stage, const std::string& size_or_file,
                                          int threads);
 
-// What that process does: prints one line for `measure_memory`. The exit status.
+// Runs in that process: prints one line for `measure_memory`. Returns the exit status.
 int run_memory_command(const std::string& stage, const std::string& size_or_file, int threads);
 
 }  // namespace isomesh::bench

@@ -18,7 +18,7 @@
 
 namespace isomesh::bench {
 
-// Which surface of a volume.
+// The surface of a volume that is measured.
 struct Surface {
   double iso = 0;
   Scheme scheme = Scheme::kSix;
@@ -57,7 +57,7 @@ const char* name_of(Encoding encoding);
 // True when it runs on more than one thread.
 bool is_parallel(Encoding encoding);
 
-// What a job answers.
+// The answer of a job.
 struct JobFigures {
   MeshSummary mesh;
   Timing timing;
@@ -91,7 +91,7 @@ class Stages {
   // of a job that gives none.
   void smooth(int passes, Smoothing smoothing = Smoothing::kLaplacian);
 
-  // What smoothing says that it takes beside the mesh, in bytes.
+  // The memory that smoothing says it needs beside the mesh, in bytes.
   std::uint64_t smoothing_memory(int passes) const;
   // Topology.
   void measure() const;
@@ -114,7 +114,7 @@ class Stages {
   std::span<const mesh::Vec3> positions() const { return mesh_.positions.span(); }
   std::span<const mesh::Triangle> triangles() const { return mesh_.triangles.span(); }
   const mesh::Mesh& mesh() const { return mesh_; }
-  // What the mesh alone takes.
+  // The memory of the mesh alone.
   std::uint64_t mesh_bytes() const;
 
  private:

@@ -15,7 +15,7 @@ namespace isomesh::bench {
 
 inline constexpr int kSurfaceNetsPasses = 16;  // the filter's own default
 
-// What to say where there is none.
+// The text if there is none.
 inline constexpr const char* kNoSurfaceNets =
     "SurfaceNets is left out: --surface-nets-root names no Debian 13 that has it.";
 

@@ -7,7 +7,7 @@
 
 namespace isomesh::bench {
 
-// What is timed, and what has to be done before each run without being timed; may be empty.
+// The function that is timed, and one that runs before it each time untimed; may be empty.
 struct Timed {
   std::function<void()> run;
   std::function<void()> prepare = nullptr;

@@ -59,7 +59,7 @@ class Soak : public FaultTest {
     return sample;
   }
 
-  // What a process, by its folder in /proc, has of all but the disk.
+  // The memory, threads and descriptors of a process, by its folder in /proc.
   static void add(const std::string& process, Sample& sample) {
     std::ifstream status(process + "/status");
     for (std::string line; std::getline(status, line);) {
@@ -74,7 +74,7 @@ class Soak : public FaultTest {
     }
   }
 
-  // What a client of each kind does once. Refusals are part of the load.
+  // One request of a client of each kind. Refusals are part of the load.
   void act(std::mt19937& random) {
     const auto one_of = [&](int count) {
       return std::uniform_int_distribution(0, count - 1)(random);

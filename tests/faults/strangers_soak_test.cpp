@@ -54,7 +54,7 @@ class StrangersSoak : public FaultTest {
     return seconds(std::stol(asked));
   }
 
-  // What one stranger does again and again, for some seconds each time at most.
+  // One attack of a stranger, who repeats it. Takes some seconds at most.
   using Deed = std::function<void(const std::stop_token& stop)>;
 
   // Some bytes a second are enough to go on.

@@ -26,7 +26,7 @@ class LogTest : public testing::Test {
     return testing::internal::GetCapturedStderr();
   }
 
-  // What a hostile client might have sent.
+  // Bytes that a hostile client might send.
   const std::string hostile_ = "a\"b=c\nd\r\x1b[2Je \\ \xff\xe2\x80\xae";
 };
 

@@ -28,7 +28,7 @@ TEST(Text, WhatNobodySeesIsFoundAndReplaced) {
   EXPECT_EQ(printable("a\tb"), "a" + kReplaced + "b");
 }
 
-// What is cut off in the midst of a character, or was never UTF-8, is left to whoever decodes it.
+// Text that ends within a character, or that never was UTF-8, is left to its decoder.
 TEST(Text, HalfACharacterIsNoControlCharacter) {
   for (const std::string half : {"\xc2", "\xef\xbf", "\xf0\x9f\xbf", "\xff"}) {
     EXPECT_FALSE(has_control_characters(half));

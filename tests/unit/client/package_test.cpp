@@ -33,7 +33,7 @@ std::string read_all(const UploadBody& body, std::size_t piece_bytes) {
   return text;
 }
 
-// What libarchive finds in it, in order.
+// The entries that libarchive finds in it, in order.
 std::vector<std::pair<std::string, std::string>> members_of(const std::string& tar) {
   std::vector<std::pair<std::string, std::string>> members;
   archive* reader = ::archive_read_new();

@@ -1,4 +1,4 @@
-// What libdraco makes of a Draco stream.
+// Draco streams as libdraco decodes them.
 #pragma once
 
 #include <string_view>

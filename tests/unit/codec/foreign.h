@@ -1,4 +1,4 @@
-// What readers that are not ours make of mesh files.
+// Mesh files as readers of other projects read them.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// What the 3MF Consortium's own library makes of 3MF files.
+// 3MF files as the 3MF Consortium's own library reads them.
 #pragma once
 
 #include <array>

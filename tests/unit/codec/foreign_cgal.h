@@ -1,4 +1,4 @@
-// What CGAL makes of mesh files that are text.
+// Mesh files of text as CGAL reads them.
 #pragma once
 
 #include <string>

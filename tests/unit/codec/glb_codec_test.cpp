@@ -1,4 +1,4 @@
-// What the surface in GLB is compressed by, and in how many primitives it is.
+// The compression of the surface in a GLB, and its number of primitives.
 #include <algorithm>
 #include <cmath>
 #include <map>

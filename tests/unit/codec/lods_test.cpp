@@ -149,7 +149,7 @@ TEST(Lods, HaveNormalsWhereTheyAreAskedFor) {
   }
 }
 
-// What cannot have fewer triangles has no coarser level: a triangle, a mesh that is all boundary.
+// A mesh that cannot lose triangles has no coarser level: a triangle, a mesh that is all boundary.
 TEST(Lods, ThatGainNothingAreLeftOut) {
   for (const auto& [name, mesh] : test::meshes_to_encode()) {
     SCOPED_TRACE(name);

@@ -75,7 +75,7 @@ TEST(Wait, TheQueryGoesBeforeThePreference) {
 
 // --- Digests
 
-// Of "hello".
+// The digest of "hello".
 constexpr const char* kHex = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
 const std::string kBase64 = "LPJNul+wow4m6DsqxbninhsWHlwfp0JecwQzYpOLmCQ=";
 

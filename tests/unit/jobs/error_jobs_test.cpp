@@ -118,7 +118,7 @@ TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
   }
 }
 
-// What cannot be proven is measured, and the certificate says why.
+// If the error cannot be proven, it is measured, and the certificate says why.
 TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
   const auto why = [&](auto change) {
     JobParameters parameters = parameters_of(volume_, 0);

@@ -153,7 +153,7 @@ TEST_F(JobProcessTest, AJobThatIsStoppedEndsAndTheNextOneRunsInTheSameProcess) {
   EXPECT_GT(make(process_, order_of(much, 50, 0)).summary.triangles, 0U);
 }
 
-// What cannot be interrupted is ended with its process.
+// A job that cannot be interrupted ends with its process.
 TEST_F(JobProcessTest, AJobThatDoesNotStopIsKilled) {
   const Volume sphere = add_sphere();
   std::stop_source stop;
@@ -298,7 +298,7 @@ TEST(JobMessage, AnotherFormIsRefused) {
 // Under the sanitizers memory is not limited.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
-// What a line of /proc/PID/limits says, in bytes.
+// The value of a line of /proc/PID/limits, in bytes.
 std::string soft_limit_of(pid_t process, const std::string& name) {
   const std::string limits = test::read_file("/proc/" + std::to_string(process) + "/limits");
   const std::size_t line = limits.find(name);

@@ -44,7 +44,7 @@ std::optional<BoundedMesh> simplified(const test::SampleVolume<T>& volume,
   return bound;
 }
 
-// What a stranger finds: exact distances of random points, both ways.
+// Exact distances of random points, both ways, by independent code.
 template <class T>
 void expect_within_by_scheme(const test::SampleVolume<T>& volume, const ExtractOptions& extract,
                              double error_mm) {

@@ -1,4 +1,4 @@
-// What server/mesh/measure/exact_triangles.h decides, decided by CGAL.
+// The decisions of server/mesh/measure/exact_triangles.h, made by CGAL.
 #pragma once
 
 #include <span>

@@ -107,7 +107,7 @@ TEST(LabelVolumes, FillTheBoxOfTheVoxels) {
   }
 }
 
-// What is in front of the union of all is the background.
+// The background is in front of the union of all labels.
 double volume_of_union(const SeparatingSurface& surface) {
   test::Surface outer;
   for (const Vec3& p : surface.mesh.positions) outer.points.push_back({p[0], p[1], p[2]});

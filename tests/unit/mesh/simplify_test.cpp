@@ -323,7 +323,7 @@ TEST(Simplify, KeepsWithinTheErrorOfWhereTheVerticesWere) {
   EXPECT_EQ(measure_topology(mesh, {}), measure_topology(extracted, {}));
 }
 
-// What smoothing makes of a speck may be a point.
+// Smoothing may shrink a speck to a point.
 TEST(Simplify, KeepsTrianglesWithoutAreaWhereTheyAre) {
   std::vector<Vec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   positions.insert(positions.end(), 4, {5, 5, 5});

@@ -220,7 +220,7 @@ TEST(SmoothByHand, AVertexMayHaveManyNeighbours) {
   EXPECT_EQ(moved.positions[3], mesh.positions[3]);
 }
 
-// What is linear stays linear: a plane's vertices move within the plane.
+// A linear function stays linear: a plane's vertices move within the plane.
 TEST(SmoothShape, APlaneStaysAPlane) {
   const test::Point normal = {2.0 / 7, 3.0 / 7, 6.0 / 7};
   const Mesh mesh = test::extracted(test::sample<float>(test::plane(normal, 9), {20, 18, 16}), {});

@@ -149,7 +149,7 @@ Place place_of(const Mesh& mesh, const Triangle& triangle, bool turned) {
   return place;
 }
 
-// What two labels share is in both of their own surfaces, turned over, to the bit.
+// A wall of two labels is in both of their own surfaces, turned over, to the bit.
 TEST_P(SmoothWalls, LeavesWallsShared) {
   const auto volume = label_cells(8, {24, 20, 22}, 10, 106);
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 8))) {

@@ -73,7 +73,7 @@ std::vector<LabelMeasure> measured(const SeparatingSurface& surface) {
   return measure_labels(surface, LabelTriangles(surface), {});
 }
 
-// What fans owe each label, in voxels.
+// The volume that fans owe each label, in voxels.
 std::map<std::int64_t, double> owed(const Labels& volume, const SeparateOptions& options,
                                     SeparatingSurface& surface) {
   const auto lattice = volume.lattice();

@@ -15,7 +15,7 @@ namespace {
 
 using test::mesh_of;
 
-// What the checks of the tests, which share no code, say of it.
+// The result of the tests' own checks, which share no code with the measured one.
 void expect_as_checked(const Mesh& mesh) {
   const test::TopologyFacts facts = test::topology_of(test::surface_of(mesh));
   const Topology topology = measure_topology(mesh, {});

@@ -429,7 +429,7 @@ TEST(JobBody, RefusesHalfOfASurrogatePairByItsMember) {
   EXPECT_THAT(fields_of(*renamed), ElementsAre("name"));
 }
 
-// What the parser cannot read stays unreadable.
+// Text that the parser cannot read stays unreadable.
 TEST(JobBody, RefusesBrokenEscapes) {
   for (const std::string broken : {R"(\u)", R"(\ud8)", R"(\ud80)", R"(\ud80g)", R"(\)"}) {
     const auto error = thrown_by([&] { parse_job_parameters(R"({"volume": ")" + broken + "\"}"); });

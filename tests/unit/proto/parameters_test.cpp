@@ -42,7 +42,7 @@ json body_with(std::string path, const json& value) {
   return body;
 }
 
-// What is wrong with that value; empty when nothing is.
+// The fault of that value; empty if there is none.
 std::string fault_of(const std::string& path, const json& value) {
   const auto error = test::thrown_by([&] { parse_job_parameters(body_with(path, value).dump()); });
   return error ? error->what() : "";

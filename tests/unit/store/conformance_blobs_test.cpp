@@ -20,7 +20,7 @@ using test::as_span;
 using test::code_thrown_by;
 using test::NamedBlobEngine;
 
-// Of "hello".
+// The digest of "hello".
 constexpr const char* kHelloKey =
     "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
 

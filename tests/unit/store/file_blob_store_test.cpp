@@ -18,7 +18,7 @@ namespace {
 using test::as_span;
 using test::code_thrown_by;
 
-// Of "hello".
+// The digest of "hello".
 constexpr const char* kHello = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
 
 // What files do beside what every store of blobs does (conformance_blobs_test.cpp).

@@ -1,4 +1,4 @@
-// What a power cut leaves of a folder.
+// The state of a folder after a power cut.
 #pragma once
 
 #include <cstddef>
