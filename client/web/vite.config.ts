@@ -14,6 +14,8 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 900,
+    // A phone waits longer for one more file than for a few kilobytes that it may not need.
+    rollupOptions: { output: { experimentalMinChunkSize: 40_000 } },
   },
   plugins: [thirdParty()],
   worker: { format: 'es', plugins: () => [thirdParty()] },
