@@ -7,9 +7,9 @@
 
 namespace isomesh::mesh {
 
-// The data that a kernel needs from its job; a default one cancels nothing and tells
-// nobody. Kernels look at `stop` once per slab of layers and throw Error kCancelled; what they have
-// written by then is indeterminate.
+// The services of the job that a kernel runs for: cancellation and progress. A default one never
+// cancels and reports to nobody. Kernels check `stop` once per slab of layers and throw Error
+// kCancelled. What they have written by then is indeterminate.
 struct Context {
   std::stop_token stop;
   // Called from several threads with the share of the kernel's work that is done, 0..1.

@@ -21,10 +21,10 @@ inline constexpr std::size_t kFlagBits = 64;  // of a word of Mesh::on_border
 // names only vertices of layers k and k+1, and work on a run of layers touches no others than those
 // next to it.
 //
-// As extraction at an iso-value leaves it, every vertex lies on one lattice edge and every lattice
-// edge carries at most one vertex; of a surface that is regularised, a vertex may be the mean of
-// those around a sample of its layer. The surface is an oriented manifold whose boundary, if it was
-// not closed, lies on the border of the volume.
+// After extraction at an iso-value, every vertex lies on one lattice edge and every lattice edge
+// carries at most one vertex. In a regularised surface, a vertex may be the mean of those around a
+// sample of its layer. The surface is an oriented manifold. Its boundary, if it was not closed,
+// lies on the border of the volume.
 struct Mesh {
   std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
   Buffer<Vec3> positions;
@@ -32,13 +32,13 @@ struct Mesh {
   std::vector<std::uint64_t> layer_vertices;   // layers + 1 offsets into positions
   std::vector<std::uint64_t> layer_triangles;  // layers + 1 offsets into triangles
 
-  // Of a surface that was closed: the vertices of its caps and of their rims, a bit each. They are
-  // all that lie on the border of the volume. Empty when it was not closed: then those are the
-  // vertices of its boundary.
+  // One bit per vertex: set if it lies on a cap or its rim. These are all the vertices on the
+  // border of the volume. Empty if the surface was not closed: then its boundary vertices are
+  // those.
   std::vector<std::uint64_t> on_border;
 
-  // Of the walls between several labels (separate.h): the vertices where more than two walls meet,
-  // a bit each. Empty of a surface that has one inside and one outside.
+  // One bit per vertex for walls between several labels (separate.h): set where more than two walls
+  // meet. Empty for a surface with one inside and one outside.
   std::vector<std::uint64_t> on_line;
 
   // A unit vector for each vertex by which it is shaded. Empty: normals.h has those of the

@@ -24,7 +24,8 @@ inline Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// As long as twice the triangle's area; exact but for a rounding, where corners are near.
+// The normal of a triangle; its length is twice the area. Exact up to one rounding if the corners
+// are near each other.
 inline Point normal_of(const Point& a, const Point& b, const Point& c) {
   return cross(minus(b, a), minus(c, a));
 }

@@ -32,8 +32,8 @@ std::uint32_t margin_for(const Metric& metric, double error_mm) {
   return 2 * (1 + steps / 2);  // even: a cell keeps its parity
 }
 
-// The distance by which rounding to the grid of the copies and to the mesh's single precision may
-// move a point.
+// How far rounding may move a place, in millimetres: to the copies' grid, and to the mesh's single
+// precision.
 double rounding_of(const Dims& dims, const Metric& metric) {
   constexpr double kUnit = std::numeric_limits<float>::epsilon();
   const double samples = std::max({dims.x, dims.y, dims.z});
@@ -76,7 +76,7 @@ void restore(const StartSurface& surface, const Components& components,
   tube.compact();
 }
 
-// Whether the tube is proven; gives it its lost components back, if that is what is wrong with it.
+// Returns true if the tube is proven. If only components are lost, restores them and tries again.
 bool is_proven(const StartSurface& surface, const Context& context, Tube& tube) {
   Components components;
   find_components(surface.mesh, context, components);

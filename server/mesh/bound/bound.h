@@ -45,7 +45,7 @@ struct BoundedMesh {
   double bound_at(std::span<const Vec3> places) const;
 };
 
-// Whether simplify_within proves anything about such a surface: one of five or six tetrahedra a
+// True if simplify_within can prove a bound for such a surface: one of five or six tetrahedra a
 // cell that is not regularised.
 bool has_bound(const ExtractOptions& options);
 

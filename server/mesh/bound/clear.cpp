@@ -23,8 +23,8 @@ double SixPlanes::value(const float* corner, const SampleSteps& steps, bool /*is
   const double high = std::max(a, std::max(b, c));
   const double low = std::min(a, std::min(b, c));
   const double middle = a + b + c - high - low;
-  // By the order of the coordinates: the first step of the way, and the last. Branches would be
-  // taken at random.
+  // The order of the coordinates selects the first and the last step. Branches would be
+  // unpredictable.
   const std::ptrdiff_t x_or_z = a >= c ? steps.x : steps.z;
   const std::ptrdiff_t y_or_z = b >= c ? steps.y : steps.z;
   const std::ptrdiff_t not_x = a >= c ? steps.z : steps.x;

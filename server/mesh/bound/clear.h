@@ -1,4 +1,4 @@
-// Whether F has one sign on a whole triangle: what every collapse asks; private to this folder.
+// Tests whether F has one sign on a whole triangle, for every collapse; private to this folder.
 //
 // F is linear on each piece that the tetrahedra cut out of a triangle. So its sign on the triangle
 // is that at the corners of the pieces. A corner of a piece lies where three planes meet, the
@@ -29,18 +29,18 @@ class Clear {
  public:
   explicit Clear(const Field& field);
 
-  // What at() is relative to from now on: a sample before `a`, which is within the volume.
-  // Returns that sample.
+  // Sets the origin of at() to a sample before `a`, which must be within the volume. Returns that
+  // sample.
   Vecf base(Vecf a);
   PlaneNumbers at(Vecf a) const { return Planes::numbers(a - base_); }
   double value(const PlaneNumbers& a) const { return value(Vecd{a.of[0], a.of[1], a.of[2]}); }
 
-  // Whether sign * F is positive: at a point, between two points, and between three, each without
-  // the ends and edges, which the others tell.
+  // True if sign * F is positive: at a point, along an edge, inside a triangle. Ends and edges are
+  // left out, since the other tests cover them.
   bool point(const PlaneNumbers& a, double sign);
   bool edge(const PlaneNumbers& a, const PlaneNumbers& b, double sign);
   bool inside(const PlaneNumbers& a, const PlaneNumbers& b, const PlaneNumbers& c, double sign);
-  // sign * F where the last of them found that it was not.
+  // The value of sign * F at which the last test failed.
   double failed() const { return failed_; }
 
   // The same at one corner: where the edge crosses the plane of that number of a family, and where

@@ -67,7 +67,7 @@ class Collapser {
   }
 
  private:
-  // The data that costs follow from, in a line of the cache.
+  // The data for computing costs, in one cache line.
   struct alignas(64) Node {
     Quadric quadric;  // about the place
     Vecf place;       // in millimetres, from the block's first vertex
@@ -119,7 +119,7 @@ class Collapser {
     put(a, std::max(at_least, bucket_of(best, nodes_[a].quadric.weight)));
   }
 
-  // For a case in which only that edge is new.
+  // Like push(), if only the edge to `b` is new.
   void push_edge(std::uint32_t a, std::uint32_t b, int at_least) {
     if (stays(a) || corners_.is_gone(a)) return;
     put(a, std::max(at_least, bucket_of(cost(a, b), nodes_[a].quadric.weight)));
@@ -193,7 +193,8 @@ class Collapser {
     return true;
   }
 
-  // Sets the neighbours of the new vertex: those of a alone, or of both.
+  // Builds the star of the new vertex: the neighbours of `a` alone, or of both ends. Returns false
+  // if there are too many.
   bool make_star(std::size_t k, bool both) {
     if (!corners_.make_loop(k, both, loop_)) return false;
     star_.clear();

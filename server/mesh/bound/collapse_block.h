@@ -10,7 +10,7 @@
 
 namespace isomesh::mesh::bound {
 
-// The data for collapses besides the tube.
+// The data that collapses need besides the tube.
 struct CollapseSurroundings {
   const Field& field;
   const Metric& metric;

@@ -1,8 +1,8 @@
 // Edge collapses that keep T+ inside S and T- outside; private to this folder.
 //
-// Which edges go first is told by quadrics (M. Garland, P. S. Heckbert, "Surface simplification
-// using quadric error metrics", SIGGRAPH 1997). They prove nothing: whether one may go is decided
-// by the signs of F on the new triangles of T+ and T- alone.
+// Quadrics decide which edges go first (M. Garland, P. S. Heckbert, "Surface simplification using
+// quadric error metrics", SIGGRAPH 1997). They prove nothing: only the signs of F on the new
+// triangles of T+ and T- decide whether an edge may go.
 #pragma once
 
 #include <cstdint>

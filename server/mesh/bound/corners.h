@@ -1,4 +1,4 @@
-// The neighbours of each triangle of a block; private to this folder.
+// The table of which triangles of a block are neighbours; private to this folder.
 #pragma once
 
 #include <algorithm>
@@ -71,8 +71,8 @@ class Corners {
   }
   const std::vector<std::uint32_t>& ring() const { return ring_; }
 
-  // Whether the vertex that was walked around may become ring()[k]. The link condition: no new
-  // edge may exist already, and none may join two vertices of the seam.
+  // Link condition: true if the vertex that was walked around may become ring()[k]. No new edge may
+  // exist already, and none may join two vertices of the seam.
   bool keeps_topology(std::size_t k) const {
     const std::uint32_t b = ring_[k];
     const std::uint32_t left = ring_[before(k)];

@@ -1,4 +1,4 @@
-// Whether T+ and T- lie around all components of S; private to this folder.
+// Tests whether T+ and T- lie around all components of S; private to this folder.
 #pragma once
 
 #include <cstdint>

@@ -143,7 +143,7 @@ class FastClear {
     if (!any((i <= last_i) & (first_j <= last_j))) return true;
     if (is_exact_) return clear_.inside(numbers(a), numbers(b), numbers(c), sign);
     const Lanes wide = most - least + 1;
-    // The error by rounding of an area, and then of F.
+    // Bounds on rounding errors: `flat` of an area, and `steep` / area of F.
     const Lanes flat = kAreaError * first(wide) * second(wide);
     const Lanes steep = kSteepest * 4 * flat * along(wide);
     const Lanes aw = along(a);

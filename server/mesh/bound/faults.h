@@ -1,5 +1,4 @@
-// Finds where a tube, from which simplification may start, is not clear of S; private to this
-// folder.
+// Finds where a tube that simplification may start from is not clear of S; private to this folder.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +20,8 @@ struct TubeStart {
   std::span<const std::uint8_t> is_unclear;  // by vertex: in T+ or T-
   std::span<const std::uint8_t> stepped;     // by vertex: on its lattice edge
 
-  // The image of a triangle of S in the tube. It is empty where two of its crossings are one
-  // vertex.
+  // The corners in the tube of triangle t of S. The triangle is empty if two of its crossings are
+  // one vertex.
   Triangle corners(std::size_t t) const {
     const auto& [a, b, c] = extracted[t];
     if (is_left_handed) return {vertex[a], vertex[b], vertex[c]};

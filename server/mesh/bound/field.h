@@ -39,7 +39,7 @@ struct Field {
     };
     return is_within(p.x, dims.x) && is_within(p.y, dims.y) && is_within(p.z, dims.z);
   }
-  // Whether a place is between the faces of the volume.
+  // True if a place is strictly between the faces of the volume.
   bool encloses(Vecf p) const {
     const auto is_between = [this](float x, std::uint32_t samples) {
       return x > static_cast<float>(margin) && x < static_cast<float>(samples - 1 - margin);
@@ -100,7 +100,7 @@ class PlaneCrossings {
   std::vector<Sample> samples_;
 };
 
-// The place between the ends at which F is zero, in numbers of samples.
+// The point between the ends where F is zero, in numbers of samples.
 Vecd zero_between(const Field& field, const Crossing& crossing);
 
 // How far S is at most from the surface of the samples themselves, in millimetres: the farthest

@@ -17,13 +17,13 @@ class OneSign {
  public:
   OneSign(const Field& field, double sign) : field_(field), sign_(sign) {}
 
-  // Whether sign * F is positive: at a place, which is outside of the volume if not; all along an
-  // edge between two such places; and all over a triangle whose edges are such.
+  // True if sign * F is positive. at(): at a place, false outside the volume. along(): all along an
+  // edge between two such places. within(): all over a triangle whose edges are such.
   bool at(Vecd p) const;
   bool along(Vecd p, Vecd q) const;
   bool within(Vecd a, Vecd b, Vecd c) const;
 
-  // All three of a triangle.
+  // All tests for a whole triangle.
   bool all_over(Vecd a, Vecd b, Vecd c) const {
     return at(a) && at(b) && at(c) && along(a, b) && along(b, c) && along(c, a) && within(a, b, c);
   }

@@ -14,7 +14,7 @@ struct Quadric {
   float c = 0;
   float weight = 0;
 
-  // Of a plane through the vertex; the normal's length is its weight.
+  // The quadric of a plane through the vertex; the normal's length is its weight.
   static Quadric of_plane(Vecf normal) {
     const float weight = length(normal);
     if (!(weight > 0)) return {};

@@ -21,7 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::bound::HWY_NAMESPACE {
 
-// The data of a vertex of T for collapses, in millimetres but for `copies`.
+// The data of a vertex of T that collapses need, in millimetres except for `copies`.
 struct Site {
   std::array<float, kLanes> copies;  // as copies_of; not Lanes, which allocators may misalign
   Vecf up;                           // the way to T+
@@ -126,7 +126,7 @@ class Star {
   static constexpr std::size_t kMost = 2 * Corners::kMostNeighbours;
   static constexpr float kLeastShape =
       0.02F;  // twice a triangle's area by its longest edge's square
-  // Of that square and the reach: single precision resolves less.
+  // The least rise, relative to that square times the reach. Single precision can resolve it.
   static constexpr float kLeastRise = 1e-6F;
   enum Way : std::size_t { kPlace, kUp, kDown };
 

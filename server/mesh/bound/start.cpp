@@ -261,8 +261,8 @@ class Starter {
     return field_.contains(p) ? sign * value_at(field_, p) : -1;
   }
 
-  // Moves back, of each triangle at fault, the vertex that is at fault in most of them. Returns
-  // false if a triangle has all its vertices on lattice edges.
+  // For each triangle at fault, steps back its vertex that is at fault in most triangles. Returns
+  // false if a triangle at fault has all its vertices on lattice edges.
   bool step_back() {
     std::vector<std::uint32_t> count(tube_.vertices.size(), 0);
     for_layers([&](std::size_t layer) {

@@ -19,7 +19,7 @@
 
 namespace isomesh::mesh::bound {
 
-// The surface around which the tube is made.
+// The surface that the tube is built around.
 struct StartSurface {
   const Field& field;
   std::span<const Crossing> crossings;

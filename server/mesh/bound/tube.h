@@ -59,9 +59,10 @@ inline bool is_wide(Vecf a, Vecf b) {
            std::abs(a.z - b.z) < kWidest);
 }
 
-// Whether the ways from T- to T and on to T+ rise from the triangle's front at each corner. T does
-// not turn back over an edge between such triangles. `planes`: the faces of the volume that all
-// corners stay in, a bit each: low x, high x, low y, ... There the front is to be inside.
+// True if, at each corner, the vectors from T- to T and from T to T+ point to the triangle's front.
+// T does not turn back over an edge between such triangles. `planes`: one bit for each face of the
+// volume that all corners stay in: low x, high x, low y, ... If any is set, the front must face the
+// inside of the volume.
 inline bool is_upright(const Vertex& a, const Vertex& b, const Vertex& c, unsigned planes) {
   constexpr double kLeast = 1e-10;
   const Vecd normal = cross(wide(b.p - a.p), wide(c.p - a.p));

@@ -79,8 +79,8 @@ class Metric {
     return 1 / std::max(length(back_x_), std::max(length(back_y_), length(back_z_)));
   }
   bool is_left_handed() const { return determinant_ < 0; }
-  // What to multiply a cross product of millimetres with, whose factors have the turn of one that
-  // points inward in numbers of samples.
+  // The factor for a cross product of vectors in millimetres: with it, the product points to the
+  // same side as in numbers of samples.
   float turn() const { return determinant_ < 0 ? -1.0F : 1.0F; }
 
  private:

@@ -62,7 +62,7 @@ class BccRegular {
   // For each sample of the row the slots whose edges some cluster has, after number_clusters.
   const std::uint32_t* row(std::uint32_t y, std::uint32_t z) const { return joined_.row(y, z); }
 
-  // As RegularField::number_clusters; `rows` are the numbers of the samples.
+  // Like RegularField::number_clusters; `rows` hold the numbers of the samples.
   std::uint32_t number_clusters(std::uint32_t y, std::uint32_t z,
                                 const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
                                 Mesh* mesh) {

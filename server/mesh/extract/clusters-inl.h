@@ -260,7 +260,8 @@ class ClusterWalk {
 
   enum class Which { kOwn, kCrossed };
 
-  // In which directions the samples' own crossings are, or all. Returns the samples that have any.
+  // Sets sets[d] to the samples with a crossing in direction d: their own, or any. Returns the
+  // samples that have one.
   HWY_INLINE Word gather(Which which, DirectionSets& sets) const {
     Word any = 0;
     const auto directions = links_.directions();
@@ -273,7 +274,7 @@ class ClusterWalk {
       const unsigned owner = directions[d].corner >> 1;
       Word bits = bits_of(*here_[owner]);
       if ((directions[d].corner & 1) != 0) bits = bits << 1 | bits_of(*before_[owner]) >> 63;
-      // With five tetrahedra the diagonals join even samples.
+      // In the five-way split, diagonals join only even samples.
       const bool is_diagonal = marched_.scheme == Scheme::kFive && (place & (place - 1)) != 0;
       if (is_diagonal) bits &= even_;
       sets[d] = bits;

@@ -8,7 +8,7 @@
 
 namespace isomesh::mesh {
 
-// The directions (links.h) in which a sample joins crossings, and flags.
+// The directions (links.h) whose crossings a sample joins, and flags.
 struct Joined {
   static constexpr std::uint32_t kSeveral = std::uint32_t{1} << 31;
   static constexpr std::uint32_t kJunction = std::uint32_t{1} << 30;
@@ -37,7 +37,7 @@ struct JoinedPoints {
   std::uint64_t centres = 0;
 };
 
-// The clusters of one plane's samples. Empty if there are none.
+// The joined crossings of one plane of samples. Empty if there are none.
 struct ClusterLayer {
   std::vector<JoiningWord> words;        // row by row
   std::vector<std::uint32_t> row_begin;  // how many words are before each row, and all
@@ -47,7 +47,7 @@ struct ClusterLayer {
   std::vector<JoinedPoints> points;
   std::vector<std::uint32_t> points_begin;  // how many those are before each row
 
-  // The numbers that vanish from the layer below, whose samples own some of the edges.
+  // How much vanishes from the layer below, whose samples own some of the edges.
   std::uint64_t vertices_below = 0;
   std::uint64_t triangles_below = 0;
 

@@ -51,7 +51,7 @@ struct SurfaceCount {
   std::uint64_t triangles() const { return layer_triangles.back(); }
 };
 
-// The sizes that the needed memory follows from.
+// The sizes from which memory use is estimated.
 struct SurfaceSize {
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;

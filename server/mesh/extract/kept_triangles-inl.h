@@ -1,4 +1,4 @@
-// Finds the triangles of 64 cells that are left where crossings are joined. Compiled once for each
+// Finds the triangles of 64 cells that are left after crossings are joined. Compiled once for each
 // instruction set, see slabs.cpp.
 #if defined(ISOMESH_KEPT_TRIANGLES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_KEPT_TRIANGLES_INL_H_
@@ -31,16 +31,17 @@ HWY_INLINE std::array<Word, 2> keep_triangles(const std::array<Word, 4>& inside,
   const auto [ma, mb, mc, md] = merged;
   const Word odd = a ^ b ^ c ^ d;
   const Word two = ((a | b | c | d) & ~(a & b & c & d)) & ~odd;
-  // With two corners inside and two outside, the first triangle has the corners' edges first-first,
-  // first-second and second-second, so it vanishes where the first inside or the second outside
-  // merges. The other one has the same of the second inside and the first outside.
+  // If two corners are inside and two outside, the first triangle has the crossings of the edges
+  // first-first, first-second and second-second (inside-outside). So it vanishes if the first
+  // inside or the second outside corner merges. The other triangle vanishes if the second inside or
+  // the first outside corner merges.
   const Word lost_first = select(a, ma, select(b, mb, mc)) | select(d, select(c, mb, mc), md);
   const Word lost_second = select(d, md, select(c, mc, mb)) | select(a, select(b, mc, mb), ma);
   const Word lost_only = ma | mb | mc | md;  // those that are not the odd corner have one crossing
   return {(odd & ~lost_only) | (two & ~lost_first), two & ~lost_second};
 }
 
-// The bits that at least two of the three words have.
+// The majority of three, bit by bit.
 HWY_INLINE Word two_of(Word a, Word b, Word c) { return (a & b) | (c & (a | b)); }
 
 // `joined.at<a, b>()`: the cells whose crossing on the edge between corners a and b is joined at a.

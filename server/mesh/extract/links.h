@@ -1,21 +1,20 @@
-// Which crossings around a sample may be joined into one vertex (G. M. Treece, R. W. Prager, A. H.
-// Gee, "Regularised marching tetrahedra", Computers & Graphics 23(4), 1999), by a rule that looks
-// at one sample and its neighbours alone; private to the kernels.
+// The rule for which crossings around a sample may be joined into one vertex (G. M. Treece, R. W.
+// Prager, A. H. Gee, "Regularised marching tetrahedra", Computers & Graphics 23(4), 1999). It looks
+// only at one sample and its neighbours; private to the kernels.
 //
-// The neighbours of a sample are its link, a triangulated sphere. A crossing belongs to that end of
-// its edge whose value is nearer to the iso-value, so a sample has a set of directions in which
-// crossings are its own. A connected component C of that set becomes one vertex if
-//  * C is not the whole link, and what it leaves of the link is connected;
-//  * for every direction p outside C that is crossed: on the ring of p, the neighbours of both p
-//  and
-//    the sample, C is nothing, or one run that leaves at least two places free;
+// The neighbours of a sample form its link, a triangulated sphere. A crossing belongs to the end of
+// its edge whose value is nearer to the iso-value. So each sample has a set of directions with
+// crossings of its own. A connected component C of that set becomes one vertex if
+//  * C is not the whole link, and the rest of the link is connected;
+//  * for every crossed direction p outside C: on the ring of p (the neighbours of both p and the
+//    sample), C is empty, or one run that leaves at least two places free;
 //  * for every neighbour on the same side that has such a component E: on the ring of that
-//    neighbour, what is in both C and E is nothing, or one run that leaves at least two places
-//    free. Otherwise the component of that sample goes that is later in the order of the samples,
-//    whatever becomes of the other.
-// The first two say that the crossings' patches make a disk which touches no patch around it twice,
-// the third the same of two disks next to each other. So the joined surface has the components, the
-// boundary and the genus of the surface that it comes from.
+//    neighbour, the intersection of C and E is empty, or one run that leaves at least two places
+//    free. Otherwise the later of the two samples loses its component, whatever becomes of the
+//    other.
+// Under the first two conditions, the patches of the crossings form a disk that touches no patch
+// around it twice. Under the third, the same holds for two adjacent disks. So the joined surface
+// keeps the components, the boundary and the genus of the original one.
 #pragma once
 
 #include <array>
@@ -79,7 +78,8 @@ class ClusterFacts {
   // Bit i: whether the components may clash with those of the neighbour in the earlier direction i.
   Directions risks() const { return field(36, 9); }
 
-  // True if the set is one component that may become a vertex if nothing in `forbidden` is crossed.
+  // For a set of one component: true if it may become a vertex when no direction in `forbidden` is
+  // crossed.
   bool may_join() const { return field(61, 1) != 0; }
   Directions forbidden() const { return field(18, 18); }
 
@@ -120,8 +120,8 @@ class Links {
     return facts;
   }
 
-  // Whether components `mine` of a sample and `theirs` of its neighbour in an earlier direction
-  // clash.
+  // True if components `mine` of a sample clash with `theirs` of its neighbour in an earlier
+  // direction.
   bool clash(unsigned parity, std::size_t direction, Directions mine, Directions theirs) const {
     const RingSets& ring = link_of(parity).ring_sets[direction - half()];
     return (ring.runs >> ring.both(mine, theirs) & 1) == 0;
@@ -154,8 +154,8 @@ class Links {
   std::span<const Directions> below(unsigned parity) const { return link_of(parity).below; }
 
  private:
-  // The places of a ring that are in a set of directions, a bit each; looked up by halves of the
-  // set.
+  // Maps a set of directions to the places of a ring that it contains, one bit each. The two halves
+  // of the set are looked up in tables.
   struct OnRing {
     static constexpr unsigned kHalf = kMostDirections / 2;
 

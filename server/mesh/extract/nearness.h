@@ -32,7 +32,7 @@ class Nearness {
 
   std::size_t bytes() const { return bytes_; }
 
-  // For bytes() below 4 and a Rank of as many bytes.
+  // Only if bytes() is less than 4; Rank must have bytes() bytes.
   template <class Rank>
   Rank of_sample(T sample) const {
     return of_steps<Rank>(static_cast<std::int32_t>(sample) * parts_);
@@ -42,7 +42,7 @@ class Nearness {
     return of_steps<Rank>(eight_samples);
   }
 
-  // For bytes() of 4.
+  // Only if bytes() is 4.
   std::int32_t of_value(double value) const {
     const auto distance = static_cast<float>(std::abs(value - iso_));
     // Its bits rise with a number that is not negative; they are moved down to where signed
@@ -73,8 +73,8 @@ class Nearness {
   Rank of_steps(std::int32_t at) const {
     const std::int32_t steps = at - first_inside_;
     const bool is_inside = steps >= 0;
-    // Of the values on its own side so many are nearer, and of those on the other side as many and
-    // a few more or less, as far as there are.
+    // `own` counts the nearer values on the same side. `others` counts those on the other side,
+    // before it is limited to the values that exist.
     const std::int32_t own = is_inside ? steps : -1 - steps;
     const std::int32_t others = own + (is_inside ? 1 - lead_ : lead_);
     const std::int32_t most = is_inside ? outside_ : inside_;

@@ -1,6 +1,6 @@
-// The signs at an iso-value for the walk of a regularised surface. Each row has the
-// vertices of its clusters before those of the edges that no cluster has. Compiled once for each
-// instruction set, see slabs.cpp.
+// The signs that the walk reads if the surface is regularised. In each row the vertices of clusters
+// come before those of edges that no cluster has. Compiled once for each instruction set, see
+// slabs.cpp.
 #if defined(ISOMESH_REGULAR_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_REGULAR_INL_H_
 #undef ISOMESH_REGULAR_INL_H_
@@ -31,7 +31,7 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 
 using RegularWords = JoinedWords<kEdgePlaces>;
 
-// As SignCells, with the edges of each sample that no cluster has.
+// SignCells, and for each sample the set of its edges that no cluster has.
 struct RegularCells : SignCells {
   BitBytes lone;
 };
@@ -179,7 +179,7 @@ class RegularField : public SignField {
     for (unsigned parity = 0; parity < 2; ++parity) {
       for (std::size_t d = 0; d < directions.size(); ++d) {
         const LinkDirection& direction = directions[d];
-        // As the edge's owner names it, for the same bits.
+        // Placed by the edge's owner, so that positions are identical to the bit.
         const unsigned owner = parity ^ (std::popcount(direction.corner) & 1U);
         const EdgeEnds ends = extraction.splits[owner].ends[direction.place];
         const std::ptrdiff_t to_owner = -sample_offset(extraction.inner, direction.corner);
@@ -299,7 +299,7 @@ class RegularField : public SignField {
     }
   }
 
-  // The sum of the crossings on one cluster's edges, around the sample at x.
+  // The sum of a cluster's crossings, relative to the sample at x, and their number.
   struct Sum {
     StoredDouble4 points = {};
     double edges = 0;
@@ -312,8 +312,8 @@ class RegularField : public SignField {
   JoinedEdges<kEdgePlaces> joined_;
   std::array<EdgeSamples, std::size_t{2}* kClusterPlaces> ends_ = {};  // by parity and direction
   std::array<EdgeFrame, std::size_t{2}* kClusterPlaces> frames_ = {};
-  // The edges of the present row's clusters, one after the other, as kClusterPlaces * x +
-  // direction, and the vertex of each.
+  // The edges of the current row's clusters, cluster by cluster, as kClusterPlaces * x + direction,
+  // and the vertex that each becomes.
   std::vector<std::uint32_t> edges_;
   std::vector<std::uint32_t> numbers_;
   std::size_t found_ = 0;

@@ -59,7 +59,7 @@ class SampleRows {
   virtual void nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin, std::size_t count,
                         std::byte* out) const = 0;
 
-  // As nearness(), of the centres of cells.
+  // Like nearness(), but for the centres of cells.
   virtual void centre_nearness(std::uint32_t y, std::uint32_t z, std::uint32_t begin,
                                std::size_t count, std::byte* out) const = 0;
 
@@ -75,10 +75,11 @@ class SampleRows {
   virtual void add_centres(std::uint32_t y, std::uint32_t z, std::uint32_t margin,
                            std::span<const std::uint64_t> uncertain, std::uint64_t* out) const = 0;
 
-  // As shares(), on the body-centred lattice, from the centre or the sample that names the edge.
+  // Like shares(), but on the body-centred lattice. Shares count from the centre or sample that
+  // names the edge.
   virtual void bcc_shares(const BccRowEdges& row, double* out) const = 0;
 
-  // As BorderPlacement::place. Only for a surface that is closed.
+  // Like BorderPlacement::place. Only for a closed surface.
   virtual BorderVertex place_at_border(const BorderSample& cell, const EdgeEnds& ends) const = 0;
 };
 

@@ -108,7 +108,7 @@ HWY_INLINE Word less(const Rank* a, const Rank* b) {
 #endif
 }
 
-// Whether the first of two samples is nearer. `bytes`: of a rank.
+// True if the first of two samples is nearer. `bytes`: the size of a rank.
 HWY_INLINE bool is_less(std::size_t bytes, const std::byte* a, const std::byte* b) {
   const auto less_as = [&](auto rank) {
     auto other = rank;

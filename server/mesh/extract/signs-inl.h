@@ -1,5 +1,6 @@
-// The samples that are inside, one bit each, and the logic on 64 samples at a time that extraction
-// at an iso-value counts and walks with. Compiled once for each instruction set, see slabs.cpp.
+// The samples' signs (set: inside), one bit each, and the logic on 64 samples at a time by which
+// extraction at an iso-value counts and walks. Compiled once for each instruction set, see
+// slabs.cpp.
 #if defined(ISOMESH_SIGNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_SIGNS_INL_H_
 #undef ISOMESH_SIGNS_INL_H_
@@ -69,7 +70,7 @@ inline unsigned count_in_tetrahedron(const CornerWords& corners,
   return static_cast<unsigned>(std::popcount(odd) + 2 * std::popcount(mixed & ~odd));
 }
 
-// The crossed cells of a row and their cases, for the triangles of the layer.
+// The crossed cells of a word and their cases, kept from numbering a row for writing triangles.
 struct SignCells {
   Word crossed = 0;
   std::array<std::uint8_t, kWordBits> cases;
@@ -192,7 +193,8 @@ class SignCellWriter {
                  const EdgeOffsets& offsets)
       : splits_(splits), row_(row), offsets_(offsets) {}
 
-  // Writes the triangles of the cell at x, which is bit `bit` of the word of `cells`.
+  // Writes the triangles of the cell at x, which is bit `bit` of the word that `cells` describes.
+  // Returns the end of the triangles.
   HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const SignCells& cells,
                              const std::uint32_t* places, Triangle* out) const {
     return write_case(splits_[row_.parity_at(x)].cases[cells.cases[bit]], places, offsets_, out);
@@ -204,8 +206,8 @@ class SignCellWriter {
   const EdgeOffsets& offsets_;
 };
 
-// The signs at an iso-value for the walk: those of the planes around the present one, each
-// classified once as z rises.
+// The signs that the walk reads: those of the planes around the current one. Each plane is
+// classified once, as z rises.
 class SignField {
  public:
   using Marched = Extraction;

@@ -33,8 +33,8 @@ inline Dims marched_dims(const Dims& dims, bool close) {
 // The ways to split cells of even and odd parity, wound for the lattice.
 std::array<CellSplit, 2> splits_of(Scheme scheme, bool left_handed);
 
-// The lattice that is marched over. Samples are numbered with the phantoms, so the lattice's begin
-// at `margin`. Immutable while slabs are worked on.
+// The lattice that is marched over. Phantoms are numbered too, so the lattice's own samples begin
+// at `margin`. Immutable while slabs are processed.
 struct Marching {
   Marching(const Dims& samples, const LatticeToSpace& map, Scheme the_scheme, bool close)
       : to_space(map),
@@ -56,7 +56,7 @@ struct Marching {
   std::array<CellSplit, 2> splits;
 };
 
-// The data that all slabs of an extraction at an iso-value share.
+// Data that all slabs of an extraction at an iso-value share.
 struct Extraction : Marching {
   // `smallest`: the smallest value that is inside.
   template <class T>

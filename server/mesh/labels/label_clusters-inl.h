@@ -78,7 +78,7 @@ class LabelClusters {
     return joins ? own | Joined::kJunction : 0;
   }
 
-  // What labels they have is looked up later.
+  // Any samples may clash: their labels are looked up later.
   static Word may_clash(std::size_t /*w*/, const GridSample& /*at*/, const GridSample& /*to*/,
                         int /*step*/) {
     return ~Word{0};

@@ -1,4 +1,4 @@
-// The labels to which a sample belongs.
+// The labels that a sample belongs to.
 #pragma once
 
 #include <algorithm>
@@ -51,7 +51,7 @@ class LabelParts {
     }
   }
 
-  // Whether the part belongs to the label of that number.
+  // True if the part belongs to label number `label`.
   bool belongs(PartNumber part, std::size_t label) const {
     if (members_.empty()) return part == label;
     return std::ranges::binary_search(members_[part], label);

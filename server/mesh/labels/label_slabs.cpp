@@ -1,4 +1,4 @@
-// As slabs.cpp, for labels.
+// The passes over slabs of labels, compiled like slabs.cpp.
 #include "server/mesh/labels/label_slabs.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -16,7 +16,7 @@ namespace isomesh::mesh {
 // Returns the scheme. Throws Error kInvalidParameter for one that labels do not have.
 Scheme scheme_of_labels(Scheme scheme);
 
-// What all slabs share whose labels are separated. Phantoms are background.
+// Data that all slabs share when labels are separated. Phantoms are background.
 struct Separation : Marching {
   template <class T>
   Separation(const Lattice<T>& lattice, const SeparateOptions& options)

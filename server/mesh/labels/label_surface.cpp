@@ -11,7 +11,7 @@
 namespace isomesh::mesh {
 namespace {
 
-// The vertices of a range that some triangles name, and their numbers without the others.
+// The vertices that some triangles name, renumbered from 0 in the same order.
 class VertexChoice {
  public:
   VertexChoice(std::span<const Triangle> all, std::span<const std::uint32_t> triangles) {

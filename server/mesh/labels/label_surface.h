@@ -13,14 +13,14 @@
 
 namespace isomesh::mesh {
 
-// The triangles that have each label on either side. Takes 8 bytes for each triangle and label.
-// Keeps nothing of the surface. Immutable, so safe to read from several threads.
+// The triangles that have each label on either side. Takes 8 bytes for each triangle and each
+// label. Does not refer to the surface afterwards. Immutable, so safe to read from several threads.
 class LabelTriangles {
  public:
   // Throws Error kTooLarge when 32 bits cannot number all triangles.
   explicit LabelTriangles(const SeparatingSurface& surface);
 
-  // The triangles of the label `number`, from 1 on (see WallSides), in the order of the surface.
+  // The triangles of label number `number`, from 1 on (see WallSides), in the surface's order.
   std::span<const std::uint32_t> of(std::size_t number) const {
     return triangles_.span().subspan(ends_[number - 1], ends_[number] - ends_[number - 1]);
   }
@@ -37,7 +37,7 @@ class LabelTriangles {
 void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
                    std::size_t number, Mesh& mesh);
 
-// The vertices of the walls that extract_label takes for that label, in the order of its surface.
+// The walls' vertices that extract_label takes for that label, in the order of its surface.
 std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
                                              const LabelTriangles& triangles, std::size_t number);
 
@@ -52,13 +52,13 @@ struct LabelMeasure {
   bool is_closed() const { return topology.boundary_edges == 0; }
 };
 
-// Measures each label, in their order. Holds the surface of one label for each thread. The same for
-// any number of threads. Throws Error kCancelled.
+// Measures each label's surface, in the order of the labels. Each thread holds one label's surface
+// at a time. The result is the same for any number of threads. Throws Error kCancelled.
 std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
                                          const LabelTriangles& triangles, const Context& context);
 
-// The volume that all labels enclose together, in cubic millimetres. If the surface is not closed,
-// it is as Extent::volume_mm3. The same for any number of threads. Throws Error kCancelled.
+// The volume that all labels enclose together, in cubic millimetres. For an open surface it is
+// defined as Extent::volume_mm3 is. The same for any number of threads. Throws Error kCancelled.
 double enclosed_by_all(const SeparatingSurface& surface, const Context& context);
 
 }  // namespace isomesh::mesh

@@ -28,11 +28,12 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 struct LabelCells {
   Word crossed = 0;
   Word several = 0;  // more than two; of samples that own an edge of such a cell, too
-  // For cells of two labels: the corners of the larger one, as if they were inside.
+  // For cells with two labels: the corners with the larger label. The surface is that of an
+  // iso-value with these corners inside.
   std::array<std::uint8_t, kWordBits> cases;
 };
 
-// Whether all of a slot's corners have different labels.
+// True if all corners of a slot have different labels.
 HWY_INLINE bool is_crossed(const Slot& slot, const std::array<PartNumber, 8>& labels) {
   const auto [a, b, c, d] = slot.corners;
   if (labels[a] == labels[b]) return false;
@@ -68,7 +69,7 @@ class LabelRow : public RowShape {
   }
 
   // The samples of word w that own a crossed edge; what is known of its cells goes to `cells`.
-  // Where a sample owns a face or a tetrahedron with a vertex, it owns a crossed edge too.
+  // A sample that owns a face or a tetrahedron with a vertex owns a crossed edge, too.
   Word describe(std::size_t w, LabelCells& cells) const {
     const CornerWords others = differing_corners(w);
     describe(w, others, cells);
@@ -151,7 +152,7 @@ class LabelRow : public RowShape {
   }
 
  protected:
-  // As list, but for the vertices in the slots `left_out`.
+  // Like list(), but without the vertices in the slots `left_out`.
   HWY_INLINE std::uint32_t* list_without(std::uint32_t left_out, std::size_t x, unsigned bit,
                                          const LabelCells& cells, std::uint32_t* next) const {
     const auto first = static_cast<std::uint32_t>(x * kSlotPlaces);
@@ -240,7 +241,8 @@ class LabelCellWriter {
         end_(triangles_ + surface.mesh.layer_triangles[z + 1]),
         sides_(surface.sides.data()) {}
 
-  // Writes the triangles of the cell at x, which is bit `bit` of the word of `cells`.
+  // Writes the triangles of the cell at x and their sides. The cell is bit `bit` of the word that
+  // `cells` describes. Returns the end of the triangles.
   HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const LabelCells& cells,
                              const std::uint32_t* places, Triangle* out) const {
     if ((cells.several >> bit & 1) != 0) return write_several(x, places, out);
@@ -296,8 +298,8 @@ class LabelCellWriter {
   WallSides* sides_;
 };
 
-// The labels for the walk: those of the planes around the present one, each looked up once as z
-// rises.
+// The labels that the walk reads: those of the planes around the current one. Each plane is looked
+// up once, as z rises.
 class LabelField {
  public:
   using Marched = Separation;

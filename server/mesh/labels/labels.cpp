@@ -49,7 +49,7 @@ class LabelTable {
   std::vector<LabelVoxels> labels_;
 };
 
-// For types with too many values to give each a row.
+// For types with too many values for a table with one row each.
 template <class T>
 class LabelTable<T, false> {
  public:

@@ -1,4 +1,4 @@
-// The labels of a segmentation, and those that are to be separated.
+// Finds the labels of a segmentation, and selects those to separate.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace isomesh::mesh {
 
-// The samples of one label.
+// The voxels of one label: their number, volume and extent.
 struct LabelVoxels {
   std::int64_t label = 0;
   std::uint64_t voxels = 0;

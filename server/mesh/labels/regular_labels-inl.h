@@ -69,7 +69,8 @@ class RegularLabelField : public LabelField {
     return {separation_, LabelField::row(y, z), offsets, z, surface};
   }
 
-  // As RegularField::number_clusters, for the slots of samples. Marks the vertices on lines, too.
+  // Like RegularField::number_clusters, but for the slots of samples. Also marks the vertices on
+  // junction curves.
   std::uint32_t number_clusters(std::uint32_t y, std::uint32_t z,
                                 const std::array<std::uint32_t*, 4>& rows, std::uint32_t vertex,
                                 SeparatingSurface* surface) {
@@ -117,7 +118,7 @@ class RegularLabelField : public LabelField {
   PlacedPoint placed(const StarPoint& point, unsigned parity) const {
     if (point.neighbours == 0) return {};
     const unsigned owner = (parity + static_cast<unsigned>(std::popcount(point.corner))) & 1;
-    // As the owner of the name places it, for the same bits.
+    // Placed by the owner of the name, so that positions are identical to the bit.
     const EdgeFrame frame = LabelField::frame(owner, point.slot);
     return {{static_cast<std::uint8_t>(point.corner >> 1),
              static_cast<std::uint8_t>(point.corner & 1), point.slot},
@@ -164,7 +165,7 @@ class RegularLabelField : public LabelField {
   const Separation& separation_;
   const Links& links_;
   JoinedRows<std::uint32_t> joined_;
-  // By parity, in the order of star_points.h.
+  // Indexed by parity; each list is in the order of star_points.h.
   std::array<std::vector<PlacedPoint>, 2> edges_;
   std::array<std::vector<PlacedPoint>, 2> faces_;
   std::array<std::vector<PlacedPoint>, 2> centres_;

@@ -38,14 +38,14 @@ struct SeparateOptions {
   Scheme scheme = Scheme::kSix;  // kFive or kSix; others throw Error kInvalidParameter
   bool close = false;            // cap labels where they meet the lattice's border
   bool regularize = false;       // join the vertices around a sample, see label_clusters-inl.h
-  // For labels that are not the samples of their own value: all values whose samples belong to the
-  // label. A value may belong to several labels: overlaps are separated from the rest.
+  // For labels that are not the samples of their own value: all values whose samples belong to
+  // them. One value may belong to several labels; what overlaps is separated from what does not.
   std::map<std::int64_t, std::vector<std::int64_t>> values = {};
 };
 
-// The two sides of a triangle, by the numbers of LabelParts. 0 is the background. 1 is the first of
-// SeparateOptions::labels, unless a label has other values. A triangle is counter-clockwise seen
-// from `front`, which is the smaller number. So the background is always in front.
+// The parts on the two sides of a triangle, by the numbers of LabelParts. 0 is the background; 1 is
+// the first of SeparateOptions::labels if none of them has other values. A triangle is
+// counter-clockwise seen from `front`, the smaller number. So the background is always in front.
 struct WallSides {
   PartNumber front = 0;
   PartNumber back = 0;

@@ -12,8 +12,8 @@
 
 namespace isomesh::mesh {
 
-// The volume that is missing in a tetrahedron at each corner of each of its triangles
-// (wall_cases.h), in voxels. It is owed to the label of the triangle's corner `back`.
+// For each wall triangle of a tetrahedron (wall_cases.h), the missing volume at each of its
+// corners, in voxels. It is owed to the label of the triangle's corner `back`.
 using OwedVolumes = std::array<float, 12>;
 
 // For cells of one way of splitting.
@@ -24,7 +24,7 @@ struct TallyCases {
   std::array<std::array<float, 3>, 8 * kSlotPlaces> places = {};
 };
 
-// By parity.
+// Returns the cases by parity.
 std::array<TallyCases, 2> make_tally_cases(Scheme scheme, const std::array<WallCases, 2>& walls);
 
 struct VolumeTally {
@@ -34,7 +34,7 @@ struct VolumeTally {
   SeparatingSurface& surface;
   const WallFans& fans;
   const std::array<TallyCases, 2>& cases;
-  // The map from space back to the lattice: index_of(p) is `origin` + the sum of p[k] * axes[k].
+  // The map from space back to the lattice: index_of(p) = origin + the sum of p[k] * axes[k].
   std::array<double, 3> origin;
   std::array<std::array<double, 3>, 3> axes;
   std::span<std::int64_t> units;  // by fan

@@ -38,7 +38,7 @@ Corners corners_of(const Slot& slot) { return set_of(std::span(slot.corners).fir
 
 using Slots = std::array<Slot, kSlots>;
 
-// The slots of corner 0: the edges, faces and tetrahedra, of its cell's tetrahedra, that it owns.
+// The edges, faces and tetrahedra of a split cell that its corner 0 owns.
 Slots slots_of(const CellSplit& split) {
   Slots slots = {};
   for (unsigned direction = 1; direction < 8; ++direction) {
@@ -136,7 +136,8 @@ class TetrahedronBuilder {
     walls_.walls[walls_.triangles++] = {{a.name, b.name, c.name}, corners_[back], corners_[front]};
   }
 
-  // As the tables for an iso-value have it, with the label of the first corner in front.
+  // Adds the walls between two labels, as the tables for an iso-value have them. The label of the
+  // first corner is in front.
   void add_two(const std::array<unsigned, 4>& classes) {
     Corners inside = 0;
     unsigned back = 0;

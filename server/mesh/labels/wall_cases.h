@@ -1,8 +1,8 @@
 // The walls between the labels in each tetrahedron of a cell; private to this folder.
 //
-// What is in a tetrahedron depends only on which of its four corners have the same label. With two
-// labels it is what tetrahedra.h has. Where a face has three different ones, walls meet in a point
-// of that face, and where a tetrahedron has four, in a centre of it:
+// The walls in a tetrahedron depend only on which of its four corners have the same label. With two
+// labels they are those of tetrahedra.h. In a face with three different labels, walls meet at a
+// point of that face. In a tetrahedron with four, they meet at a centre of it:
 //  * three labels, at corners a, a', b, c: one triangle between b and c, two between a and b and
 //    two between a and c, around the line from the point of face abc to that of face a'bc;
 //  * four labels: two triangles for each of the six pairs of corners, around the four lines from
@@ -51,8 +51,8 @@ struct TetrahedronWalls {
   std::array<WallTriangle, 12> walls = {};
 };
 
-// Which of a tetrahedron's corners have different labels: a bit for each of the pairs 01, 02, 03,
-// 12, 13 and 23.
+// A pattern tells which of a tetrahedron's corners have different labels: one bit for each of the
+// pairs 01, 02, 03, 12, 13 and 23.
 inline constexpr std::size_t kPatterns = 64;
 
 template <class Label>
@@ -69,9 +69,9 @@ std::array<unsigned, 4> classes_of(unsigned pattern);
 struct WallCases {
   std::array<Slot, kSlots> slots = {};  // of corner 0
   // For each set of axes along which a sample has a next one (bit 0: x), the set of its slots that
-  // there are.
+  // exist.
   std::array<std::uint32_t, 8> existing = {};
-  // The walls of each tetrahedron, in the order of CellSplit, by its pattern.
+  // The walls of each tetrahedron, in the order of CellSplit, then by pattern.
   std::array<std::array<TetrahedronWalls, kPatterns>, 6> tetrahedra = {};
 };
 

@@ -178,7 +178,7 @@ void WallFans::find_neighbors(const Context& context) {
 }
 
 std::uint64_t WallFans::bytes(std::uint64_t vertices, std::uint64_t triangles) {
-  // A vertex where three walls meet has three fans. A quarter of all vertices is many.
+  // A vertex where three walls meet has three fans. A quarter of all vertices is a high estimate.
   const std::uint64_t fans = vertices + vertices / 2;
   const std::uint64_t kept =
       fans * (sizeof(std::uint32_t) + sizeof(Wall) + 2 * sizeof(std::uint64_t)) +

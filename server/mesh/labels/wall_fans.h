@@ -33,7 +33,6 @@ class WallFans {
  public:
   static constexpr std::uint32_t kNone = UINT32_MAX;
 
-  // Has no vertices.
   WallFans() = default;
 
   // `is_cap` tells triangles of caps, which make walls of their own; it is called from several

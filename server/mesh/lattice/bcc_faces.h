@@ -89,7 +89,7 @@ constexpr std::array<unsigned, 4> bcc_corners(unsigned axis) {
   return {0, second, second | third, third};
 }
 
-// By axis and side.
+// Indexed by axis and BccSide.
 using BccFaces = std::array<std::array<BccFace, 3>, 3>;
 
 const BccFaces& bcc_faces(bool left_handed);

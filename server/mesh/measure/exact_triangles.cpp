@@ -69,7 +69,6 @@ class Plane {
     return std::abs(height) > bound ? sign_of(height) : exact_side_of(point);
   }
 
-  // The sides on which three points lie.
   std::array<int, 3> sides_of(const Vertices& points) const {
     return {side_of(points[0]), side_of(points[1]), side_of(points[2])};
   }
@@ -162,8 +161,8 @@ bool meet_anywhere(const Vertices& a, const Vertices& b) {
   return any_edge_meets(a, sides_of_a, b) || any_edge_meets(b, sides_of_b, a);
 }
 
-// Two triangles share their first vertex. If they share more, it is a segment from there, which
-// ends on the far side of one of them; or they touch there.
+// Two triangles share one vertex, the first of each. If they meet elsewhere, it is in a segment
+// from that vertex to the far side of one of them, or they touch at a far side.
 bool meet_beyond_vertex(const Vertices& a, const Vertices& b) {
   const auto far_side_meets = [](const Vertices& of, const Vertices& t) {
     const Plane plane(t);

@@ -10,7 +10,8 @@ namespace isomesh::mesh {
 // True if three positions are on one line, exactly.
 bool is_flat(std::span<const Vec3> positions, const Triangle& triangle);
 
-// As defined in self_intersections.h. The result means nothing if one of them is flat. Thread safe.
+// True if the triangles intersect as self_intersections.h defines it. The result means nothing if
+// one of them is flat. Thread safe.
 bool do_intersect(std::span<const Vec3> positions, const Triangle& a, const Triangle& b);
 
 }  // namespace isomesh::mesh

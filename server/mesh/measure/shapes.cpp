@@ -1,7 +1,7 @@
-// As in slabs.cpp, the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE is compiled once
-// for each instruction set. Triangles are loaded in blocks of separate arrays, so the compiler
-// vectorises the loops. The sums of a block have a fixed order, so results do not depend on the
-// vector width.
+// The code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE is compiled once for each
+// instruction set, as in slabs.cpp. Triangles are loaded in blocks of separate arrays, so the
+// compiler vectorises the loops. The sums of a block have a fixed order, so results do not depend
+// on the vector width.
 #include "server/mesh/measure/shapes.h"
 
 #include <algorithm>

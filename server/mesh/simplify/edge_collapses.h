@@ -32,14 +32,15 @@ class EdgeCollapses {
   // Ascending.
   Numbers neighbours(std::uint32_t v) const;
 
-  // Whether the vertices next to both ends of an edge are those of its own triangles, `gone`, each
-  // of one, and no edge is beyond both: then the surface stays of its kind.
+  // Link condition: collapsing the edge keeps the topology. The common neighbours of its ends must
+  // be the third corners of `gone`, all different. No triangle at `v` may have only `v` and such
+  // corners.
   bool links_meet_at_edge(std::uint32_t v, std::uint32_t into, const Numbers& gone) const;
 
   // The triangle as it is after a collapse.
   Triangle moved(std::uint32_t triangle, std::uint32_t v, std::uint32_t into) const;
 
-  // Whether no triangle that stays is turned far.
+  // True if no triangle in `kept` turns its normal far.
   bool stays_upright(std::uint32_t v, std::uint32_t into, const Numbers& kept) const;
 
   void collapse_edge(std::uint32_t v, std::uint32_t into, const Numbers& gone, const Numbers& kept);

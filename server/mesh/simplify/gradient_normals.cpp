@@ -39,7 +39,7 @@ class Gradient {
  private:
   using Sample = std::array<std::uint32_t, 3>;
 
-  // By sample along each axis, linear between the eight samples around.
+  // The change per sample along each axis, trilinear between the eight samples around.
   Point slopes_at(const Point& index) const {
     const std::array<std::uint32_t, 3> counts = {lattice_.dims.x, lattice_.dims.y, lattice_.dims.z};
     Sample first;

@@ -98,7 +98,7 @@ class Simplifier {
     return effect_;
   }
 
-  // The triangles that are left, and their sides.
+  // The remaining triangles, and their sides.
   std::vector<Triangle>& triangles() { return current_; }
   std::vector<WallSides>& sides() { return sides_; }
 
@@ -122,7 +122,7 @@ class Simplifier {
     return is_left_out ? kNoBlock : cubes_.at(centre, round);
   }
 
-  // The cube of each triangle.
+  // The cube of each triangle; kNoBlock if this round leaves the triangle out.
   std::vector<std::uint32_t> cubes_of_triangles(int round) const {
     std::vector<std::uint32_t> cubes(current_.size());
     constexpr std::size_t kPerTask = 1 << 15;
@@ -133,7 +133,7 @@ class Simplifier {
     return cubes;
   }
 
-  // The contents of each block.
+  // The triangles and measured points of each block.
   class Blocks {
    public:
     // `blocks`: of each triangle.
@@ -174,7 +174,7 @@ class Simplifier {
     std::vector<std::uint32_t> place_;  // of a triangle within its block
   };
 
-  // Simplifies the lines within cubes.
+  // Simplifies the junction curves within each cube.
   void simplify_lines_of(int round) {
     const std::vector<std::uint32_t> cubes = cubes_of_triangles(round);
     const std::vector<std::uint8_t> is_free = vertices_of_one_block(cubes);
@@ -355,10 +355,10 @@ class Simplifier {
       });
       (is_given_up ? effect_.taken_back : effect_.repeated) += blocks.size();
     }
-    // Faults from before the first round are not mended.
+    // Crowded edges that were there before the first round stay.
   }
 
-  // Puts the results of the blocks behind the triangles that are in none.
+  // Appends the blocks' results to the triangles that are in no block.
   void take(std::span<const std::uint32_t> blocks, const std::vector<SurfaceBlock>& results) {
     std::vector<Triangle> next;
     std::vector<WallSides> next_sides;
@@ -395,7 +395,7 @@ class Simplifier {
   std::optional<TriangleGrid> grid_;
   std::vector<Triangle> current_;
   std::vector<WallSides> sides_;  // of each triangle, where they are walls
-  // A near triangle for each measured point of the mesh; empty if nothing is measured.
+  // The triangle near each measured point of the mesh. Empty if nothing is measured.
   std::vector<std::uint32_t> homes_;
   SimplificationEffect effect_;
 };

@@ -12,17 +12,18 @@
 namespace isomesh::mesh {
 namespace {
 
-// Attempts with more and more vertices held, after which less is asked for, and how often.
+// Each level makes up to kAttempts attempts, with more vertices held each time. The next level
+// multiplies the error and the reduction by kLess.
 constexpr int kAttempts = 6;
 constexpr int kLevels = 4;
 constexpr double kLess = 0.5;
-// After more wrong attempts than this, much is held or the aim was lowered. Then the rest is
-// simplified once more.
+// After more failed attempts than this, many vertices are held or the request was lowered. The
+// result is then simplified once more.
 constexpr std::uint32_t kFewRepeated = 1;
 
 using Flags = std::vector<std::uint8_t>;
 
-// The topology of a surface, which its simplification must not change.
+// The topology that simplification must preserve.
 struct Shape {
   std::uint64_t boundary_edges = 0;
   std::int64_t euler = 0;
@@ -104,7 +105,7 @@ std::vector<std::uint32_t> lone_triangles(std::size_t vertices,
   return alone;
 }
 
-// Returns the corner of a triangle without area that lies on the edge between the other two.
+// The corner opposite the longest edge. In a triangle without area it lies on that edge.
 std::size_t corner_on_edge(const LocalMesh& mesh, const Triangle& triangle) {
   std::array<double, 3> opposite;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -190,7 +191,7 @@ class BlockSimplifier {
       exempt_[v] = goal.mesh.is_on_line(mesh_.origin[v]) ? 1 : 0;
     }
     held_ = exempt_;
-    // A vertex that was not manifold before need not become so.
+    // Vertices that are not manifold at the start are held, and exempt from later checks.
     before_ = look_at_fans(exempt_.size(), mesh_.triangles, exempt_, &held_);
     exempt_ = held_;
     for (const Triangle& triangle : mesh_.triangles) {
@@ -217,7 +218,7 @@ class BlockSimplifier {
     double kept = goal_.share;
     double error = kFirstError * goal_.max_error_mm;
     for (int level = 0; level < kLevels; ++level) {
-      // Vertices that had to be held for a larger error may go for a smaller one.
+      // A smaller reduction may work without the vertices that the previous level held.
       held_ = held_first;
       for (int attempt = 0; attempt < kAttempts; ++attempt) {
         proposed_ = propose(mesh_, held_, error, static_cast<std::size_t>(std::floor(kept * all)));

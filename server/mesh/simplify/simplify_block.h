@@ -24,11 +24,11 @@ inline Point measured_point(const SurfaceView& surface, std::size_t number) {
   return centre;
 }
 
-// The share of the bound that the first proposal may use. A quadric's error is a mean, and the
-// junction curves lose the distance of their walls later.
+// The first request, as a share of the bound. A quadric's error is only a mean. Junction curves
+// were simplified before, and the walls' own distance adds to theirs.
 inline constexpr double kFirstError = 0.5;
 
-// Who measures again in single precision finds no more than the bound.
+// Keeps a distance that is measured again in single precision within the bound.
 inline constexpr double kWithin = 1 - 1e-6;
 
 // Some triangles of a mesh on its way to fewer, and what has to stay near them.
@@ -42,7 +42,7 @@ struct SurfaceBlock {
 
 struct BlockGoal {
   const Mesh& mesh;  // whose vertices are taken
-  // The surface that distances are measured from: the mesh's triangles at the positions before.
+  // Distances are measured from this surface: the mesh's triangles with the original positions.
   SurfaceView original;
   const TriangleGrid* grid = nullptr;  // of the original; none where nothing is measured
   double max_error_mm = 0;
@@ -58,7 +58,7 @@ struct LocalMesh {
   LocalMesh(const Mesh& mesh, std::span<const Triangle> block);
 
   Point at(std::uint32_t vertex) const { return to_point(positions[vertex]); }
-  // With the vertices of the mesh.
+  // The same triangle in the mesh's vertex numbers.
   Triangle in_mesh(const Triangle& triangle) const {
     return {origin[triangle[0]], origin[triangle[1]], origin[triangle[2]]};
   }

@@ -47,7 +47,7 @@ class Cubes {
     return cube;
   }
 
-  // Whether a face between cubes of the round before is near.
+  // True if the point is near a face between cubes of the previous round.
   bool is_near_seam(const Point& point, int round) const {
     const double shift = round % 2 == 1 ? 0 : 0.5;
     return std::ranges::any_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t axis) {
@@ -59,7 +59,7 @@ class Cubes {
  private:
   // Larger blocks have fewer seams, smaller ones stay in the cache and are sooner made again.
   static constexpr double kTrianglesPerBlock = 6'000;
-  // The width of the band around a round's seams that the next round looks at, in sides of a cube.
+  // How near to a seam counts as near, as a share of a cube's side.
   static constexpr double kSeamWidth = 0.08;
   static constexpr double kMostCubesPerAxis = 64;
 

@@ -72,7 +72,7 @@ class LastSimplifier : private EdgeCollapses {
     bool operator>(const Candidate& other) const { return key() > other.key(); }
   };
 
-  // Whether the triangles around the vertex are one closed fan, of one wall.
+  // True if the triangles around the vertex form one closed fan within one wall.
   bool is_free(const Mesh& mesh, std::uint32_t v) const {
     if (sides_.empty() && mesh.is_on_line(mesh_.origin[v])) return false;
     std::vector<Corner> corners;

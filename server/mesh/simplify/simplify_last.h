@@ -20,7 +20,7 @@ namespace isomesh::mesh {
 void simplify_last(std::uint64_t triangles, const Context& context, const Mesh& mesh,
                    std::vector<Triangle>& current, std::vector<WallSides>& sides);
 
-// Whether the above would find nothing to collapse.
+// True if simplify_last would find no edge to collapse.
 bool is_least(const Mesh& mesh, const std::vector<Triangle>& current,
               const std::vector<WallSides>& sides);
 

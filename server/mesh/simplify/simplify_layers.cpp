@@ -45,7 +45,8 @@ std::vector<std::uint64_t> cut_layers(std::span<const std::uint64_t> layers,
   return begins;
 }
 
-// By their lowest vertices; those of the same one in the order that they had.
+// Sorts the triangles and their sides by lowest vertex; the sort is stable. Returns for each vertex
+// the number of triangles whose lowest vertex is smaller.
 std::vector<std::uint64_t> order(std::vector<Triangle>& triangles, std::vector<WallSides>& sides,
                                  std::size_t vertices) {
   std::vector<std::uint64_t> begins(vertices + 2, 0);

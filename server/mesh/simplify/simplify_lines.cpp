@@ -70,7 +70,8 @@ class LineSimplifier : private EdgeCollapses {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
   static Edge edge(std::uint32_t a, std::uint32_t b) { return std::minmax(a, b); }
 
-  // An edge is on a line, or at an end of the surface, unless two triangles of one wall meet there.
+  // Finds the edges of junction curves and of the surface's ends: all that do not have exactly two
+  // triangles of one wall.
   void find_lines() {
     is_at_end_.assign(mesh_.origin.size(), false);
     std::vector<std::pair<Edge, std::uint32_t>> edges;
@@ -95,8 +96,8 @@ class LineSimplifier : private EdgeCollapses {
     }
   }
 
-  // Whether the vertex is free, and around it are nothing but fans of triangles from one of its
-  // neighbours on the line to the other.
+  // True if the vertex is free and its triangles form only fans between its two neighbours on the
+  // junction curve.
   bool is_within_line(std::uint32_t v) const {
     if (!is_free_[v] || on_line_beside_[v].size() != 2) return false;
     const std::uint32_t from = on_line_beside_[v][0];
@@ -157,8 +158,8 @@ class LineSimplifier : private EdgeCollapses {
     return true;
   }
 
-  // Whether all that was near the triangles around the vertex is near those that stay, of the same
-  // wall, and these near the original. `moves` becomes which point has which triangle then.
+  // True if the remaining triangles are near the original, and each point of the vertex's triangles
+  // is near a remaining one of the same wall. Adds each point and its new triangle to `moves`.
   bool stays_near(std::uint32_t v, std::uint32_t into, const Numbers& gone, const Numbers& kept,
                   std::vector<std::pair<std::uint32_t, std::uint32_t>>& moves) {
     std::uint32_t guess = TriangleGrid::kNone;

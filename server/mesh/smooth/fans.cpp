@@ -182,7 +182,7 @@ HWY_INLINE Landing land(const FanMoves& moves, const Fan& fan, const Lanes3& tar
   const Lanes3 above = target - landing.at;
   const Lanes near = kNearSurface * fan.mean_length;
   landing.at = choose(dot(above, above) <= near * near, target, landing.at);
-  // As it will be stored.
+  // Rounds to the precision in which the position will be stored.
   landing.at = (fan.at + landing.at) - fan.at;
   const Lanes3 moved = landing.at + fan.at - gather(moves.extracted, fan.vertices);
   landing.is_there &= dot(moved, moved) <= splat(moves.max_displacement * moves.max_displacement);

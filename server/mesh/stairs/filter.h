@@ -8,10 +8,10 @@
 
 namespace isomesh::mesh {
 
-// Of a function of k, the eigenvalue of 1 - mean (0: constant, 2: the sign changes from each vertex
-// to the next): the coefficients c[j] of Chebyshev's polynomials T[j](1 - k) on [0, 2], so that
-// their sum is 1: what is constant stays. J. C. Mason, D. C. Handscomb, "Chebyshev Polynomials",
-// 2003.
+// Approximates a function of k, the eigenvalue of 1 - mean (0: constant, 2: the sign changes from
+// each vertex to the next). Returns the coefficients c[j] of the Chebyshev polynomials T[j](1 - k)
+// on [0, 2] (J. C. Mason, D. C. Handscomb, "Chebyshev Polynomials", 2003). Their sum is 1, so
+// constants are preserved.
 std::vector<float> diffusion_series(int degree, double time);  // exp(-time k)
 std::vector<float> flat_series(int degree, double time);       // (1 + time k) exp(-time k)
 

@@ -153,7 +153,7 @@ class Finder {
     }
     for_curves(
         [&](std::size_t v) { found_.calm[v] = 1 - clamped((junctions[v] - kNoisy) / kNoisy); });
-    // Noise on a curve is also noise in the triangles beside it.
+    // Noise on a curve also counts as noise in the triangles beside it.
     for (int step = 0; step < 2; ++step) {
       next = found_.calm;
       for_vertices([&](std::size_t v) {

@@ -1,4 +1,4 @@
-// Finds the parts of walls that are staircases; private to this folder.
+// Finds where walls are staircases; private to this folder.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace isomesh::mesh {
 
-// By vertex; all between 0 and 1.
+// One value per vertex for `moves`, `owes`, `spread` and `calm`, all between 0 and 1.
 struct Mobility {
   std::vector<float> moves;  // the share of a step of smoothing
   std::vector<float> owes;   // the share of an offset that puts volume back
@@ -21,7 +21,7 @@ struct Mobility {
   std::vector<std::uint32_t> beside;  // others within five edges of a curve
 };
 
-// For the walls at their start. Throws Error kCancelled.
+// Computes the mobility from the walls before they are moved. Throws Error kCancelled.
 Mobility find_mobility(const WallShape& shape, const Context& context);
 
 }  // namespace isomesh::mesh

@@ -16,10 +16,10 @@
 namespace isomesh::mesh {
 namespace {
 
-// In three goes, so that what is small never shrinks by much before it gets its volume back.
+// Several rounds, so that small structures never shrink much before they get their volume back.
 constexpr int kRounds = 3;
-// Times and degrees of each filter, for an even spacing. Times grow with the ratio of the spacings,
-// degrees with the root of that.
+// Diffusion times and polynomial degrees for an even spacing. series() multiplies times by the
+// spacing's ratio and degrees by its square root. The values for curves are not scaled.
 constexpr double kSmoothTime = 3;
 constexpr double kSmoothDegree = 4;
 constexpr double kSpreadTime = 12;

@@ -46,7 +46,7 @@ Lanes normal_of(const WallShape& shape, const std::array<std::uint32_t, 3>& corn
                shape.at[corners[2]] - shape.at[corners[0]]);
 }
 
-// Whether the cosine between two ways is less than that.
+// True if the cosine of the angle between two vectors is less than `cosine`.
 bool is_less(Lanes a, Lanes b, float cosine) { return dot(a, b) < cosine * length(a) * length(b); }
 
 // The triangles that may be folded: those that lie away from their corners' own normals.

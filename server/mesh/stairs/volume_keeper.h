@@ -8,9 +8,9 @@
 
 namespace isomesh::mesh {
 
-// The missing volume is divided by the area over which it may be spread, and averaged within the
-// wall. This gives an offset along the wall's normal. Averaging is the adjoint of spreading, so the
-// offsets times the areas are what was missing.
+// The missing volume is divided by the area that it may be spread over, and averaged within the
+// wall. The result is an offset along the wall's normal. Averaging is the adjoint of spreading, so
+// the offsets times the areas add up to the missing volume.
 class VolumeKeeper {
  public:
   // `missing`: by fan, what the wall's back lacks at the start, in cubic millimetres. `series`: how

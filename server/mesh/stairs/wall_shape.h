@@ -62,9 +62,9 @@ class WallShape {
   float largest_spacing() const { return largest_spacing_; }
   float smallest_spacing() const { return smallest_spacing_; }
 
-  // True where three walls or more meet, or one ends, or leaves a cap.
+  // True where three or more walls meet, or one ends, or one leaves a cap.
   bool is_curve(std::size_t v) const { return (flags_[v] & kCurve) != 0; }
-  // True in a cap, and in the border of the volume.
+  // In a cap, or in the border of the volume.
   bool is_held(std::size_t v) const { return (flags_[v] & kAxes) != 0; }
 
   // The way without what would lead out of that.
@@ -102,7 +102,7 @@ class WallShape {
     return count;
   }
 
-  // The mean over the neighbours; there must be one.
+  // The mean over the neighbours; there must be at least one.
   template <class Value>
   Value mean(std::size_t v, const std::vector<Value>& values) const {
     Value sum = {};
