@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kCertifyRuns = 3;
 
-// What a caller of the library has without anything of ours: one call on the whole surface.
+// Baseline without any code of ours: one call of meshoptimizer on the whole surface.
 Decimated meshoptimizer_alone(const mesh::SurfaceView& surface, std::size_t triangles) {
   Decimated result;
   result.positions.assign(surface.positions.begin(), surface.positions.end());

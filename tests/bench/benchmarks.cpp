@@ -69,7 +69,7 @@ struct StageCase {
   std::function<void(Stages&)> prepare = nullptr;
   int passes = 0;
   bool parallel = true;
-  // Whether the midpoint rule is timed too: on every volume, or only on the real one.
+  // The volumes on which the midpoint rule is timed too.
   enum class Midpoint { kNever, kRealVolume, kAlways } midpoint = Midpoint::kNever;
   bool regular = false;  // whether surfaces that are regularised are timed too
 

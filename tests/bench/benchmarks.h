@@ -10,7 +10,7 @@
 
 namespace isomesh::bench {
 
-// What a run of isomesh-bench is to measure.
+// Configuration of one run of isomesh-bench.
 struct Plan {
   std::optional<Samples> volume;           // the real one
   double iso = 0;                          // its iso-value

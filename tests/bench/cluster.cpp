@@ -172,7 +172,8 @@ double time_small_jobs(const std::function<Client(std::size_t node)>& client, st
   return median(times);
 }
 
-// What a second and a third daemon add, beside one on SQLite.
+// Measures the job throughput of one to three daemons on PostgreSQL, relative to one daemon on
+// SQLite.
 void measure_daemons(Postgres& postgres, const std::filesystem::path& program,
                      std::vector<Finding>& findings) {
   const double alone = [&] {

@@ -21,7 +21,8 @@ struct ShapeFigures {
   double outer_area = 0;  // of walls to the background
   double worst_outer_area = 0;
   double inner_area = 0;  // of walls between labels
-  // Of what a label encloses beside its voxels: the worst, and the extremes of the quotient.
+  // Volume enclosed by a label, relative to its voxels: the worst change, then the extremes of the
+  // quotient.
   double worst_volume = 0;
   double least_volume = 0;
   double most_volume = 0;

@@ -71,7 +71,7 @@ class NumberedSamples {
     return numbers_[(z * dims_.y + y) * dims_.x + x];
   }
 
-  // Of the corners of the cells from `low` to `high`.
+  // True if `is` holds at all corners of the cells from `low` to `high`, both included.
   template <class Is>
   bool all_of(const Cell& low, const Cell& high, Is is) const {
     for (std::size_t z = low[2]; z <= high[2] + std::size_t{1}; ++z) {
@@ -88,8 +88,8 @@ class NumberedSamples {
   std::vector<std::uint16_t> numbers_;
 };
 
-// Whether the point lies to the left of the line from `a` to `b`, seen against x. Of a line from
-// `b` to `a` it says the opposite, to the last bit: so a ray never slips between two triangles.
+// True if the point lies to the left of the line from `a` to `b`, seen from +x. Swapping `a` and
+// `b` gives exactly the opposite, so a ray never slips between two triangles.
 bool is_left(const Point& a, const Point& b, const Point& point) {
   const bool is_turned = b < a;
   const Point& from = is_turned ? b : a;
@@ -99,7 +99,7 @@ bool is_left(const Point& a, const Point& b, const Point& point) {
   return (side > 0) != is_turned;
 }
 
-// Whether the ray from the point along x crosses the triangle.
+// True if the ray from the point in the direction +x crosses the triangle.
 bool is_crossed(const std::array<Point, 3>& corners, const Point& point) {
   const auto& [a, b, c] = corners;
   const bool left = is_left(a, b, point);
@@ -113,7 +113,7 @@ bool is_crossed(const std::array<Point, 3>& corners, const Point& point) {
   return x > point[0];
 }
 
-// Which triangles a ray along x may cross: those whose bounds in y and z reach into the ray's
+// Finds the triangles that a ray along x may cross. Their bounds in y and z overlap the ray's
 // column.
 class Columns {
  public:

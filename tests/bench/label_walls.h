@@ -37,8 +37,8 @@ std::vector<Probe> probes_near_walls(const Samples& samples, std::span<const std
 struct Sharing {
   std::uint64_t points = 0;
   std::uint64_t points_within_labels = 0;
-  // Of the points within labels, those that are in no label's surface. Near the background a point
-  // in none is no gap.
+  // Points within labels that no label's surface contains. Near the background such a point is not
+  // a gap.
   std::uint64_t gaps = 0;
   std::uint64_t overlaps = 0;  // of all points, those that are in more than one
 };
@@ -46,8 +46,8 @@ struct Sharing {
 // The surface of each label must be closed.
 Sharing measure_sharing(const Walls& walls, std::span<const Probe> probes);
 
-// What each label's surface encloses, by its number less one; mm3. Triangles are counter-clockwise
-// seen from `front`.
+// Volumes in mm3 that the labels' surfaces enclose, indexed by the label's number minus one.
+// Triangles are counter-clockwise seen from `front`.
 std::vector<double> enclosed_volumes(const Walls& walls, std::size_t labels);
 
 }  // namespace isomesh::bench

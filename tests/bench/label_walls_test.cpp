@@ -1,4 +1,4 @@
-// What tells gaps from overlaps, and the peers for labels.
+// Tests of the counts of gaps and overlaps, and of the peers for labels.
 #include "tests/bench/label_walls.h"
 
 #include <cstdlib>

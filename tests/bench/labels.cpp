@@ -69,7 +69,7 @@ class LabelComparison {
     findings_.push_back({"labels/" + name, what + ", ms, " + which_, milliseconds(ms), "", ms, {}});
   }
 
-  // Where the time of a job goes.
+  // Adds the time of stair removal alone and of each stage of a job.
   void add_stages() {
     stages_.extract();
     add_alone("remove_stairs", "the stairs of all alone",

@@ -31,8 +31,8 @@ struct LabelQuality {
   std::string way;
   MeshSize size;
   Sharing sharing;
-  // What the surfaces enclose over what the voxels do, less one: of all labels, and of the one
-  // where it is worst. Not known of a way whose triangles have no winding.
+  // Enclosed volume divided by the volume of the voxels, minus one: for all labels together and for
+  // the worst. Unknown if the triangles have no winding.
   struct Volumes {
     double all = 0;
     double worst = 0;

@@ -34,7 +34,7 @@ Soup extract_soup(const Samples& samples, const Surface& surface);
 // The same triangles as soup.
 Soup soup_of(std::span<const mesh::Vec3> positions, std::span<const mesh::Triangle> triangles);
 
-// What the search for unique vertices leaves.
+// Result of the search for unique vertices.
 struct IndexedMesh {
   struct Entry {
     mesh::Vec3 position;

@@ -1,5 +1,5 @@
-// What a user would take instead of isomesh: VTK's filters and Draco in one call. In a program that
-// was built without VTK the class is there, but constructing one throws.
+// The alternatives to isomesh: VTK's filters, and Draco in one call. In a program built without VTK
+// the class exists, but its constructor throws.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@ namespace isomesh::bench {
 
 inline constexpr int kPeerSincPasses = 20;  // the filter's own default
 
-// Whether there are peers, and in one sentence which or why not.
+// peers_available() is true if the program was built with VTK. The description names the peers or
+// says why they are missing.
 bool peers_available();
 std::string peers_description();
 

@@ -87,7 +87,7 @@ std::span<const mesh::Vec3> positions_of(vtkPolyData* mesh) {
           static_cast<std::size_t>(points->GetNumberOfTuples())};
 }
 
-// Of all triangles, one after the other.
+// Point ids of all triangles, three for each, one triangle after the other.
 std::span<const long long> corners_of(vtkPolyData* mesh) {
   vtkCellArray* polys = mesh->GetPolys();
   if (!polys->IsStorage64Bit()) polys->ConvertTo64BitStorage();

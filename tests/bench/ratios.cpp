@@ -176,7 +176,7 @@ class Comparison {
     }
   }
 
-  // What the peers' pipeline does and no more: a job measures quality besides.
+  // Compares exactly the stages of the peers' pipeline; a job also measures quality.
   void compare_stages() {
     Peers peers(samples_, iso_);
     const Timed ours = {[&] {

@@ -62,7 +62,7 @@ Json row_of(const Subject& subject, const Surface& surface) {
           {"interpolation", to_string(surface.interpolation)}};
 }
 
-// What scheme and interpolation do to the mesh.
+// Measures how scheme and interpolation affect the mesh.
 Json measure_choices(const Subject& subject) {
   Json rows = Json::array();
   for (const Surface& surface : ways_to_extract(subject.levels.front().iso, false)) {

@@ -24,7 +24,7 @@ struct Subject {
   std::vector<Level> levels;
 };
 
-// What the report calls a surface: the volume's name and size, and the level.
+// Name of a surface in the report: the volume's name and size, and the level.
 std::string title_of(const Samples& samples, const Subject::Level& level);
 
 inline constexpr std::array kReportSections = {"service", "goals",   "paper",   "passes",

@@ -1,4 +1,4 @@
-// What isomesh-bench writes: tables as JSON, each an array of objects that have the same members.
+// Output of isomesh-bench: tables as JSON, each an array of objects that have the same members.
 #pragma once
 
 #include <string>

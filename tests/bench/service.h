@@ -1,5 +1,4 @@
-// What a user gets: a daemon of the benchmark's own, measured over HTTP, beside the peers in this
-// process.
+// Measures a daemon of the benchmark's own over HTTP, and the peers in this process.
 #pragma once
 
 #include <filesystem>

@@ -64,7 +64,8 @@ struct JobFigures {
   std::uint64_t bytes = 0;  // of all files
 };
 
-// What a job does between the samples in memory and the bytes of its files, which are counted.
+// A job's work from the samples in memory to the bytes of its files. run_job() only counts the
+// bytes.
 using MakeJob = std::function<MeshSummary(const jobs::SampleArray&, const jobs::MeshRequest&,
                                           std::span<const codec::Sink>, jobs::Progress&)>;
 JobFigures run_job(const Samples& samples, const MeshParameters& parameters, double iso,
@@ -99,8 +100,8 @@ class Stages {
   std::uint64_t encode(Encoding encoding) const;
   // A `drc` file with the parameters of a job that gives none.
   std::string drc() const;
-  // What a job does between the samples in memory and the bytes of its one file, disk left out. The
-  // number of bytes.
+  // Runs a job from the samples in memory to the bytes of its one file, without the disk. Returns
+  // the number of bytes.
   std::uint64_t run_job(int passes, MeshFormat format);
   // The same of a job that asks for more; the surface is this one's, whatever the parameters say.
   JobFigures run_job(const MeshParameters& parameters, bool certify);

@@ -40,7 +40,7 @@ double to_triangle(const Point& p, const Corners& t) {
   return std::min(least, std::abs(dot(normal, minus(p, t[0]))) / std::sqrt(dot(normal, normal)));
 }
 
-// Whether all corners are farther than `reach` along one axis.
+// True if all corners are farther than `reach` from `p` on the same side along one axis.
 bool is_beyond(const Point& p, const Corners& t, double reach) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto [low, high] = std::minmax({t[0][axis], t[1][axis], t[2][axis]});

@@ -26,7 +26,8 @@ namespace {
 using nlohmann::json;
 using test::GlbPrimitive;
 
-// Of the largest distance: half a step of twelve bits, and what rounding coordinates adds.
+// Tolerance relative to the largest distance: half a step of 12 bits, and the effect of rounded
+// coordinates.
 constexpr double kStep = 1.0 / 4095;
 
 Provenance with_distances() {
@@ -54,7 +55,7 @@ class Distances : public testing::Test {
     return bytes;
   }
 
-  // What each primitive says is what its own points measure.
+  // Expects the distances stored in each primitive to match those measured at its own points.
   void expect_measured(const std::vector<GlbPrimitive>& primitives, double tolerance) const {
     const mesh::TriangleGrid grid(extracted_, {});
     mesh::Buffer<float> measured;
@@ -68,7 +69,7 @@ class Distances : public testing::Test {
     }
   }
 
-  // Of the points' own rounding, and of the distances'.
+  // Covers the rounding of the points and of the distances.
   double tolerance() const {
     const mesh::TriangleGrid grid(extracted_, {});
     mesh::Buffer<float> measured;

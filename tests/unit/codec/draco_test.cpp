@@ -159,7 +159,7 @@ TEST(OwnDraco, EncodesLongStrips) {
   expect_ours(mesh_of(positions, triangles));
 }
 
-// What it cannot write it says, and libdraco takes it.
+// Our encoder returns nothing for surfaces that it cannot write; libdraco encodes those.
 TEST(OwnDraco, RefusesWhatItDoesNotCover) {
   const std::vector<mesh::Vec3> positions = {{0, 0, 0},  {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
                                              {0, -1, 0}, {2, 2, 2}, {3, 2, 2}, {2, 3, 2}};

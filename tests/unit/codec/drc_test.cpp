@@ -1,4 +1,4 @@
-// What is encoded is decoded by libdraco and by Debian's draco_decoder, which must be installed.
+// Tests of `drc` files, decoded by libdraco and by Debian's draco_decoder, which must be installed.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -21,7 +21,7 @@ void check(int result, const char* what) {
   }
 }
 
-// What a call puts behind its last argument.
+// Returns the handle that a call of lib3mf writes to its last argument.
 template <class Call, class... Arguments>
 Held object_of(const char* what, Call call, Arguments... arguments) {
   Handle* handle = nullptr;

@@ -100,7 +100,8 @@ class ExactLabels : public test::LabelFilesTest {
     return mesh;
   }
 
-  // Where a triangle begins, and in which order they are, is up to the encoder of labels.
+  // Makes lists of triangles comparable: the encoder of labels chooses first corners and triangle
+  // order.
   static std::vector<PlacedTriangle> ordered(std::vector<PlacedTriangle> triangles) {
     std::ranges::transform(triangles, triangles.begin(), test::turned);
     std::ranges::sort(triangles);

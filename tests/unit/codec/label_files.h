@@ -86,8 +86,8 @@ class LabelFilesTest : public testing::Test {
     return shared;
   }
 
-  // Of each pair of neighbours, as many places are in both sets as their wall has, or a few less
-  // where quantisation lets some coincide.
+  // Each pair of neighbours must share as many places as their wall has. Quantisation may merge 1 %
+  // of them.
   void expect_shared(const std::vector<Places>& decoded) const {
     std::size_t neighbours = 0;
     for (std::size_t a = 1; a <= kLabels; ++a) {

@@ -48,8 +48,8 @@ const std::string& sphere_with_lods() {
   return glb;
 }
 
-// What each of the file's meshes decodes to, welded, by readers that are not ours; the file has
-// neither an error nor a warning.
+// Decodes each mesh of the file with independent readers and welds its primitives. Throws if the
+// validator finds an error or a warning.
 std::vector<DecodedMesh> decoded_meshes(const std::string& glb) {
   const auto primitives = test::read_with_node(glb);
   std::vector<DecodedMesh> meshes;
@@ -70,7 +70,7 @@ std::set<mesh::Vec3> places_of(const DecodedMesh& mesh) {
   return {mesh.points.begin(), mesh.points.end()};
 }
 
-// Where the first of the mesh's bytes lie in the file's binary data.
+// Byte offset of the mesh's first Draco stream in the file's binary data.
 std::size_t begin_of(const json& document, const json& mesh) {
   const json& draco = mesh["primitives"][0]["extensions"]["KHR_draco_mesh_compression"];
   return document["bufferViews"][draco["bufferView"].get<std::size_t>()]["byteOffset"];

@@ -1,4 +1,4 @@
-// Whether a decoded mesh is the one that was encoded.
+// Checks that a decoded mesh is the one that was encoded.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Whether a Draco stream decodes to the mesh that was encoded.
+// Checks that a Draco stream decodes to the mesh that was encoded.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace isomesh::test {
 
-// What is wrong with the mesh that a stream decoded to; empty when nothing is. The triangles are to
-// be the same as a set with orientation, each corner where the grid has it to the bit, and the
-// points as many as the triangles of the mesh name, or more where `may_split` says that vertices of
-// several fans became several.
+// Describes how a decoded mesh differs from the encoded one; empty if it does not. Triangles are
+// compared in any order, with their orientation. Each corner must be exactly where the grid has it.
+// There must be as many points as vertices that triangles use. With kYes there may be more, because
+// vertices of several fans may be split.
 enum class MaySplit { kNo, kYes };
 std::string difference(const DecodedMesh& decoded, const mesh::Mesh& mesh, int position_bits,
                        MaySplit may_split = MaySplit::kNo);

@@ -99,7 +99,7 @@ TEST(ThreeMf, OfAnEmptySurfaceHasNoObject) {
 }
 
 TEST(ThreeMf, DoesNotDependOnTheTime) {
-  // Of ZIP, the earliest that it can tell: no time at all.
+  // The ZIP entry has the earliest time that ZIP can represent.
   const std::string file = encoded(test::meshes_to_encode().front().mesh, MeshFormat::k3mf);
   std::uint32_t time = 0;
   std::memcpy(&time, file.data() + 10, sizeof time);

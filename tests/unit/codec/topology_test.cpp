@@ -1,4 +1,4 @@
-// What encoders say of a mesh's topology, held against what is measured on the mesh itself.
+// Tests that the topology that encoders report equals the one measured on the mesh itself.
 #include "server/mesh/topology/topology.h"
 
 #include <optional>

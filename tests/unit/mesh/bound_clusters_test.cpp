@@ -14,8 +14,8 @@
 namespace isomesh::mesh::bound {
 namespace {
 
-// Where a regularised surface has its vertices: crossings that no cluster has, and the means of
-// those that one has.
+// Positions of a regularised surface's vertices: one per cluster, the mean of its crossings, then
+// all crossings without a cluster.
 std::vector<Vecd> vertices_of(const Field& field, const std::vector<Crossing>& crossings,
                               const Clusters& clusters) {
   std::vector<Vecd> places;

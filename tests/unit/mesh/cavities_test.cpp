@@ -55,8 +55,8 @@ TEST(Cavities, LeaveWhatIsOpen) {
   EXPECT_EQ(measure_topology(closed, {}).components, components);
 }
 
-// Which samples are outside and joined to the border by edges of the lattice between outside
-// samples: brute force, without any mesh.
+// One flag per sample: true if lattice edges between outside samples connect it to the border.
+// Computed by brute force, without a mesh.
 std::vector<bool> open_air(const test::SampleVolume<float>& volume) {
   const auto nx = std::int64_t{volume.dims.x};
   const auto ny = std::int64_t{volume.dims.y};

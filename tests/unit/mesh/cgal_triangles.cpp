@@ -32,8 +32,8 @@ Triangle shared_first(const Triangle& triangle, const Triangle& other) {
   return result;
 }
 
-// What two triangles with one common vertex have in common beside it is a segment from there, which
-// ends on the far side of one of them; or they touch there.
+// True if two triangles that share their first vertex also intersect elsewhere. Then one of them
+// intersects the edge of the other that is opposite that vertex.
 bool meet_beyond_vertex(std::span<const Vec3> positions, const Triangle& a, const Triangle& b) {
   const auto far_side = [&](const Triangle& t) {
     return Segment3(point_of(positions[t[1]]), point_of(positions[t[2]]));

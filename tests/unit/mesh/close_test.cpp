@@ -21,8 +21,8 @@ using test::minus;
 using test::SampleVolume;
 using test::Surface;
 
-// What every closed mesh is, besides the reference's: sound, without a boundary, and within the
-// volume's box, whose faces its caps lie in and face out of.
+// Checks what must hold for every closed mesh: it is sound, has no boundary and lies within the
+// volume's box. It has caps in the faces of the box if and only if it has border vertices.
 void expect_closed(const Mesh& mesh, const Dims& dims, const LatticeToSpace& map) {
   const Surface surface = test::surface_of(mesh);
   EXPECT_TRUE(test::is_sound(surface));
@@ -48,7 +48,7 @@ void expect_closed(const Mesh& mesh, const Dims& dims, const LatticeToSpace& map
     const auto is_in_face = [&](std::uint32_t v) {
       return std::abs(points[v][axis] - face) < kTolerance;
     };
-    // Of the surface itself, a triangle may have all its vertices on the border but not in one
+    // A triangle of the surface itself may have all its vertices on the border, but not in one
     // face.
     if (!is_in_face(a) || !is_in_face(b) || !is_in_face(c)) continue;
     ++caps;
@@ -189,7 +189,8 @@ TYPED_TEST(CloseFrom, EveryTypeIsTheReferencesSurface) {
                                          TypeParam{1}};
   const auto volume = test::noise(values, {66, 4, 4}, 10);
   expect_closed_reference_surfaces(volume, 0.5);
-  // Where even the lowest value is inside, phantoms are not.
+  // With this iso-value every sample is inside; only the phantom samples around the volume are
+  // outside.
   expect_closed_reference_surfaces(volume, static_cast<double>(Limits::lowest()));
 }
 

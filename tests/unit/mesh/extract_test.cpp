@@ -150,7 +150,7 @@ TEST(ExtractCancellation, OnTheWayEndsBothPasses) {
     EXPECT_EQ(test::code_thrown_by(
                   [&] { extract_surface(volume.lattice(), options, count, stops_writing, mesh); }),
               ErrorCode::kCancelled);
-    // What a cancelled job leaves behind does no harm to the next.
+    // A mesh left by a cancelled job does not affect the next extraction.
     extract_surface(volume.lattice(), options, count, {}, mesh);
     EXPECT_TRUE(test::same_bytes(mesh, test::extracted(volume, options)));
   }

@@ -81,7 +81,7 @@ TEST(LabelParts, LabelsThatOverlapAreWholeAndClosed) {
   }
 }
 
-// Where no third label is near, an overlapping label's surface is the one that it has alone.
+// An overlapping label keeps the surface that it has alone, except near a third label.
 TEST(LabelParts, AnOverlapLeavesTheSurfaceWhereItWas) {
   auto volume = test::constant<std::uint8_t>(0, {12, 9, 9});
   for (std::uint32_t k = 2; k < 7; ++k) {

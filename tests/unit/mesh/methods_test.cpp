@@ -1,4 +1,4 @@
-// What holds for every method of smoothing that smooth() knows, by the table of methods.
+// Tests that apply to every smoothing method in the table of methods that smooth() knows.
 #include "server/mesh/smooth/methods.h"
 
 #include <algorithm>

@@ -18,7 +18,7 @@
 
 namespace isomesh::mesh {
 
-// What a label can be.
+// Sample types that label volumes can have.
 using LabelTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
                                   std::uint32_t, std::int32_t>;
 

@@ -119,7 +119,7 @@ TEST(Shapes, AreThoseOfTheDefinition) {
   expect_shapes(test::extracted(test::noise<std::uint8_t>({0, 1, 2}, {9, 9, 9}, 2), {1}));
 }
 
-// Of what the definition says of all triangles, a sample keeps means and shares.
+// Means and histogram shares of the measured sample agree with those of all triangles.
 TEST(Shapes, OfManyTrianglesAreThoseOfASample) {
   const Mesh mesh =
       test::extracted(test::noise<std::int16_t>({-7, -2, 0, 1, 4, 9}, {61, 60, 59}, 4), {0.5});

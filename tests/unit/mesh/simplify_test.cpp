@@ -115,7 +115,7 @@ TEST(Simplify, KeepsNoiseOfItsKind) {
   }
 }
 
-// Where most proposals are wrong somewhere, what is right elsewhere is taken all the same.
+// Most proposals exceed the error somewhere. The places where they do not are still simplified.
 TEST(Simplify, LeavesFewerTrianglesOfNoiseTheMoreErrorItMayMake) {
   std::uint64_t last = ~std::uint64_t{0};
   for (const double error : {0.1, 0.2, 0.5}) {

@@ -203,7 +203,7 @@ TEST(SmoothWallsWithin, MovesNoVertexFarther) {
   }
 }
 
-// Where smoothing puts the vertices that lie in no face of the box of the samples and not beyond.
+// Smoothed positions of the vertices that were strictly inside the box of the samples.
 std::vector<Vec3> inner_smoothed(const test::SampleVolume<std::uint8_t>& volume,
                                  const SeparateOptions& options, const SmoothOptions& smoothing) {
   SeparatingSurface surface = separated(volume, options);
