@@ -89,8 +89,8 @@ TEST_F(BombsTest, JpegsThatTellBillionsOfSamplesAreRefused) {
     EXPECT_THAT(refusal_of(bomb).detail, matcher);
   };
   refused(60000, HasSubstr("more than can be decoded"));
-  // What could be decoded takes more memory than an import may have; under a sanitizer, where
-  // memory is not limited, it takes more time than it may.
+  // Decoding needs more memory than an import may use. Under a sanitizer memory is not limited;
+  // there it exceeds the time limit.
   refused(16000, AnyOf(HasSubstr("memory"), HasSubstr("corrupt"), HasSubstr("The import ended")));
 }
 

@@ -37,7 +37,7 @@ class Daemon {
   void terminate() { process_.send_signal(SIGTERM); }
   int wait() { return process_.wait(); }
   pid_t process_id() const { return process_.id(); }
-  // What it has written to standard error so far.
+  // Everything written to standard error so far.
   std::string errors() const { return process_.errors(); }
   bool ends_within(std::chrono::seconds longest) { return process_.ends_within(longest); }
 

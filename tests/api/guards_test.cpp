@@ -194,9 +194,9 @@ TEST_F(GuardsTest, ARequestNamesItsHost) {
   EXPECT_EQ(answer_to("GET /livez HTTP/1.0\r\n\r\n").status, 200);
 }
 
-// Whether a status comes before any of so many connections that have sent that can be given up:
-// whoever waits for one of them gets it later. Opening them may take as long on a busy machine, and
-// is tried again then, with other ones.
+// True if `path` responds before the daemon can give up any of `count` connections that sent
+// `bytes`. A later response might only have come because one of them was given up. Opening them can
+// take that long on a busy machine; then it tries again with new connections.
 bool answers_beside(const Daemon& daemon, const std::string& path, std::deque<Connection>& hanging,
                     std::size_t count, const std::string& bytes) {
   constexpr std::chrono::seconds kFirstGivenUp{10};

@@ -34,7 +34,7 @@ class Connection {
   bool send(std::string_view bytes) const;
   // Nothing more is sent; the server sees the end.
   void finish_sending() const;
-  // What comes first, at most some kilobytes; empty at the end.
+  // The first bytes that arrive, at most a few kilobytes; empty at the end.
   std::string receive_some() const;
   // Everything up to the end that the server makes, as an answer. The status is 0 when it is none.
   Answer receive() const;

@@ -1,4 +1,4 @@
-// What a person sees of a volume before starting a job.
+// Tests of what a user can see of a volume before starting a job.
 #include <numeric>
 #include <string>
 
@@ -82,7 +82,7 @@ TEST_F(InspectTest, LabelsAreCountedAndKeptByTheClient) {
   EXPECT_NE(daemon_.get(path + "?background=3").header("etag"), etag);
 }
 
-// Of eight samples both segments have two, and one of these is of both.
+// Each segment has two of the eight samples; one sample belongs to both.
 TEST_F(InspectTest, LabelsHaveTheNamesOfTheUpload) {
   const std::string file =
       "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: list domain domain domain\n"

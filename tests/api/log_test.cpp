@@ -1,4 +1,4 @@
-// What the daemon's log says, and what it must not.
+// Tests of what the daemon's log contains, and what it must not contain.
 #include <sstream>
 #include <string>
 #include <vector>

@@ -1,4 +1,5 @@
-// What a volume says about how it was read, and what a refusal offers, from the file to the mesh.
+// Tests of notes about how a volume was read, and of the options that errors offer, from file to
+// mesh.
 #include <functional>
 #include <map>
 
@@ -122,7 +123,7 @@ std::string sparse_segmentation() {
                element(0x7fe0, 0x10, "OW", halves(3 * 64)));
 }
 
-// Of one segment, in two planes.
+// A FRACTIONAL segmentation with one segment in two planes.
 std::string fractional_segmentation() {
   std::vector<std::string> frames;
   for (const char* z : {"0", "1"}) {
@@ -339,7 +340,8 @@ TEST_F(NotesTest, ARefusedUploadIsKeptForWhoWantsToChoose) {
   EXPECT_THAT(volume.notes, Contains(Field(&Note::code, "volume-chosen")));
   EXPECT_EQ(daemon_.send("POST", again + "&volume=0").status, 410);
 
-  // What nobody can help is not kept, and what is no volume can be described.
+  // An upload that no option can fix is not kept. Raw data is kept, because options can describe
+  // it.
   EXPECT_EQ(daemon_.send("POST", "/v1/volumes?keep=true", nrrd("", "few")).header("isomesh-upload"),
             "");
   const Answer raw = daemon_.send("POST", "/v1/volumes?keep=true", std::string(24, 'a'));

@@ -17,7 +17,8 @@ namespace {
 
 using namespace test;
 
-// What every operation may answer without saying so; the description's first words name them.
+// Statuses that every operation may return without declaring them; the description's first words
+// name them.
 const std::set<int> kCommon = {401, 403, 404, 405, 408, 414, 429, 431, 500, 503};
 
 // Answers that need another daemon, S3, a full disk or a long time; other tests cause them.

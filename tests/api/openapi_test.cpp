@@ -284,7 +284,7 @@ TEST_F(OpenApiTest, DefaultsAreThoseOfTheProgram) {
     const auto name = property.first.as<std::string>();
     const YAML::Node schema = api_.resolved(property.second);
     if (!schema["default"] || !schema["default"].IsScalar()) continue;
-    // What is left out where there is nothing to say is false then.
+    // Members that the JSON omits are false by default.
     const json value = defaults.contains(name) ? defaults[name] : json(false);
     EXPECT_EQ(schema["default"].as<std::string>(), value.is_string() ? value.get<std::string>()
                                                    : value.dump() == "1.0" ? "1"

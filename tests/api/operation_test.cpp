@@ -170,7 +170,7 @@ TEST(Configuration, IsToldWithoutAStart) {
           .output,
       told.output);
   EXPECT_FALSE(std::filesystem::exists(data));
-  // What it tells is such a file.
+  // The output is itself a valid configuration file.
   write_file(folder / "told.toml", told.output);
   const Finished again = run({ISOMESHD, "check", "--config", folder / "told.toml"});
   EXPECT_EQ(again.output, told.output) << again.errors;
@@ -321,7 +321,7 @@ TEST(Drain, AnIdleDaemonEndsAtOnceOnEitherSignal) {
   }
 }
 
-// Whether the job ended after the draining had begun, as the order of the log's lines tells.
+// True if the job ended after draining began, judged by the order of the log's lines.
 bool ended_while_draining(const Daemon& daemon, const std::string& job) {
   const std::string log = daemon.errors();
   const std::size_t draining = log.find("draining");

@@ -1,4 +1,4 @@
-// What every refusal must be.
+// Checks that a response is a complete problem document.
 #pragma once
 
 #include <string>

@@ -18,8 +18,8 @@ class OpenApi {
   YAML::Node resolved(const YAML::Node& node) const;
   YAML::Node schema(const std::string& name) const { return root_["components"]["schemas"][name]; }
 
-  // What is wrong with the value, each with where it is; empty when nothing is. A member that the
-  // schema does not name is wrong. Throws std::runtime_error for a keyword that is not known here.
+  // Faults of the value, each with its location; empty if it is valid. A member that the schema
+  // does not name is a fault. Throws std::runtime_error for a keyword that is not known here.
   std::vector<std::string> faults(const nlohmann::json& value, const YAML::Node& schema) const;
 
  private:

@@ -64,7 +64,7 @@ TEST_F(TokensTest, WhatTellsNothingIsOpen) {
   for (const std::string path : {"/livez", "/openapi.yaml"}) {
     EXPECT_EQ(daemon_.get(path).status, 200) << path;
   }
-  // Which waits for no slow check.
+  // /readyz does not wait for a slow check, so it may become ready later.
   EXPECT_TRUE(eventually([&] { return daemon_.get("/readyz").status == 200; }));
 }
 

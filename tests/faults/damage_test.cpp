@@ -1,4 +1,4 @@
-// What becomes of files that a disk has spoilt.
+// Tests of files that the disk has corrupted.
 #include <algorithm>
 #include <string>
 

@@ -49,7 +49,7 @@ class Kill : public FaultTest {
     url_ = daemon().url();
   }
 
-  // Whether the daemon lived until its end.
+  // True if the response is complete, that is, the daemon lived until its end.
   static bool is_whole(const Answer& answer) {
     const std::string length = answer.header("content-length");
     return answer.status != 0 && !length.empty() && std::stoull(length) == answer.body.size();

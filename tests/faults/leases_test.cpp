@@ -1,4 +1,4 @@
-// What becomes of jobs whose daemon dies, sleeps or is stopped while they run.
+// Tests of jobs whose daemon dies, is suspended or shuts down while they run.
 #include <algorithm>
 #include <set>
 #include <string>

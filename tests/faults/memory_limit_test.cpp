@@ -37,7 +37,7 @@ void expect_service_or_message(std::uint64_t mebibytes) {
   }
 }
 
-// Which thread finds no room depends on what the others have done by then.
+// Timing decides which thread runs out of memory.
 TEST(MemoryLimit, TheDaemonListensOrSaysWhyNot) {
   for (const std::uint64_t mebibytes : std::initializer_list<std::uint64_t>{
            60, 100, 150, 200, 220, 240, 260, 280, 300, 320, 350, 400, 450, 500, 600, 800, 1200}) {

@@ -1,4 +1,4 @@
-// What becomes of requests: many, the same, half, with a full queue or a full disk.
+// Tests of requests: many at once, repeated or cut short, with a full queue or a full disk.
 #include <atomic>
 #include <mutex>
 #include <set>

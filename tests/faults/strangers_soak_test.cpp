@@ -70,7 +70,7 @@ class StrangersSoak : public FaultTest {
     }
   }
 
-  // Of a job that runs for long enough.
+  // Follows the events of a job that runs long enough.
   void follow_events(const std::stop_token& stop) {
     const std::string id = submit(daemon(), long_, 50, "\"passes\": 1000").id;
     hold(256, request("GET", "/v1/jobs/" + id + "/events"), kStranger, stop);

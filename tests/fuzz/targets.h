@@ -1,5 +1,5 @@
-// What reads bytes of strangers, each as a function of bytes: for libFuzzer, and for the replay of
-// the corpora.
+// Readers of untrusted bytes, each as a function of bytes, for libFuzzer and for the replay of the
+// corpora.
 #pragma once
 
 #include <cstddef>

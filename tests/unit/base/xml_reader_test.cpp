@@ -34,7 +34,7 @@ class Notes : public XmlHandler {
   std::string places;
 };
 
-// Of a document that comes in pieces of so many bytes.
+// Reads the document in pieces of `piece` bytes.
 Notes notes_of(std::string_view document, std::size_t piece) {
   Notes notes;
   XmlReader reader(notes);

@@ -1,4 +1,4 @@
-// Which inputs are meshed each, and what their outputs are called.
+// Tests of which inputs are meshed separately, and of the names of their outputs.
 #include "client/cli/batch.h"
 
 #include <gmock/gmock.h>

@@ -116,7 +116,7 @@ TEST(Upload, DescribesRawSamplesInTheQuery) {
   EXPECT_THAT(target, HasSubstr("dims=2%2C3%2C4"));
 }
 
-// What a person sees who sends half a gigabyte without a token: the reason, not a broken pipe.
+// A large upload without a token fails with the server's reason, not with a broken pipe.
 TEST(Upload, HearsARefusalThatComesBeforeTheBodyWasTaken) {
   const std::string body = to_json(to_problem(Error(ErrorCode::kUnauthorized, "no token"), ""));
   test::SocketServer server([&](int socket) {

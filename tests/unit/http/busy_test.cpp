@@ -1,4 +1,4 @@
-// What holds while requests wait for threads, and answers for receivers.
+// Tests of requests that wait for threads, and of responses that wait for receivers.
 #include <future>
 #include <stdexcept>
 #include <string>
@@ -32,7 +32,7 @@ TEST_F(ConnectionsTest, NothingIsMadeForWhoeverHasGone) {
   EXPECT_EQ(runs_, 0);
 }
 
-// What changes something is done, whoever waits for the answer.
+// A request that changes something is carried out even if its client has disconnected.
 TEST_F(ConnectionsTest, WhatChangesSomethingIsDoneForWhoeverHasGone) {
   ASSERT_TRUE(open_with_busy_thread());
   Connection(url_).send(request("POST", "/do", "x"));

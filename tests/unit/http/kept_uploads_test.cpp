@@ -76,7 +76,7 @@ TEST(KeptUploads, GoWhenNobodyAsksForThem) {
   kept.find("a", name);
   clock.pass(minutes(1), kept);
   EXPECT_TRUE(eventually([&] { return !forgotten.is_there(); }));
-  // What goes in a round goes under one lock: by now it is over.
+  // All uploads of one round are removed under one lock, so the round is over by now.
   EXPECT_EQ(code_of(kept, "b", name), ErrorCode::kGone);
   EXPECT_TRUE(asked_for.is_there());
   clock.pass(minutes(2), kept);
@@ -150,7 +150,7 @@ TEST_F(KeptParts, OfWhoHasMostTheLongestIdleGivesWay) {
   EXPECT_NO_THROW(kept.find_partial("b", modest));
 }
 
-// Whether the thread or the next upload makes room first.
+// The result is the same whether the thread or the next upload makes room first.
 TEST_F(KeptParts, OfWhoHasMostBytesTheLongestIdleGivesWay) {
   KeptUploads kept({.part_bytes = 1000}, folder_.path());
   const std::string greedy = begun(kept, "a", 400)->name();

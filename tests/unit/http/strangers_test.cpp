@@ -49,7 +49,7 @@ TEST_F(StrangersTest, SilentStrangersTakeNobodysPlace) {
   EXPECT_EQ(slow.receive().body, "ok");
 }
 
-// What is wrong is told, and whoever does not go then is let go of; what others receive goes on.
+// Bad requests get an error and lingering connections are closed, while other downloads continue.
 TEST_F(StrangersTest, BadRequestsCutNobodysDownload) {
   ConnectionOptions few = options();
   few.connections = 64;

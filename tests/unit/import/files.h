@@ -36,7 +36,7 @@ class Folder {
 
 using volume::kHeaderBytes;
 
-// What came of an import: the volume and its canonical file, or why there is none.
+// Result of an import: the volume and its canonical file, or the error.
 struct Outcome {
   Volume volume;
   std::string canonical;  // bytes of the whole file

@@ -1,4 +1,4 @@
-// What programs of others write beside or against the formats' descriptions, and how it is read.
+// Tests of files by other programs that extend or violate the formats' descriptions.
 
 #include <cmath>
 #include <limits>

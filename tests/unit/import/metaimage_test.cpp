@@ -63,7 +63,7 @@ TEST(MetaImage, ReadsText) {
   EXPECT_FALSE(import_metaimage(lines, "1 2 3 4 5 6 -300 70000").imported());
 }
 
-// What may be unpacked follows from the header, not from what is accepted at most.
+// The header limits how much may be unpacked, not the general size limit.
 TEST(MetaImage, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
   const std::string bomb = gzip(metaimage(small_metaimage(), std::string(10'000'000, '\0')));
   EXPECT_THAT(import_bytes(bomb).error,

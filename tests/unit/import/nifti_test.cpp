@@ -234,7 +234,7 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
 
 TEST(Nifti, PassesOverDimensionsOfOne) {
   EXPECT_TRUE(import_nifti({.dim = {7, 4, 3, 2, 1, 1, 1, 1}}).imported());
-  // What lies beyond the dimensions that are told says nothing.
+  // Sizes beyond the stated number of dimensions are ignored.
   EXPECT_TRUE(import_nifti({.dim = {3, 4, 3, 2, 0, -5, 9, 0}}).imported());
 }
 

@@ -77,7 +77,7 @@ TEST(NrrdSegments, OfFractionsAreNoLabels) {
 }
 
 TEST(NrrdSegments, InLayersMayOverlap) {
-  // Of the eight samples 0 has the first alone, 1 the second, 2 both.
+  // Sample 0 is in the first segment alone, sample 1 in the second alone, and sample 2 in both.
   std::string first(8, '\0');
   std::string second(8, '\0');
   first[0] = first[2] = second[1] = second[2] = '\1';

@@ -203,7 +203,7 @@ TEST(Nrrd, TakesASingleComponentForNone) {
 TEST(Nrrd, NeverReadsAnotherFile) {
   for (const char* name : {"data file", "datafile", "Data File", "DATAFILE", "data  file"}) {
     EXPECT_THAT(import_with(name, "/etc/passwd").error, HasSubstr("names the data file")) << name;
-    // What follows a list are names, also where it looks like fields.
+    // The lines after LIST are file names, even if they look like fields.
     EXPECT_EQ(import_with(name, "LIST").code, ErrorCode::kUnusableVolume) << name;
   }
 }
@@ -238,7 +238,7 @@ TEST(Nrrd, RefusesHeadersThatContradictThemselves) {
   EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\n").error, HasSubstr("has no end"));
 }
 
-// What may be unpacked follows from the header, not from what is accepted at most.
+// The header limits how much may be unpacked, not the general size limit.
 TEST(Nrrd, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
   const std::string bomb = gzip(nrrd(small_nrrd(), std::string(10'000'000, '\0')));
   EXPECT_THAT(import_bytes(bomb).error, HasSubstr("The compressed file unpacks to more than"));

@@ -1,4 +1,4 @@
-// What a PACS sends: multipart/related and DICOM JSON.
+// Tests of the responses of a PACS: multipart/related and DICOM JSON.
 #include <string>
 #include <vector>
 

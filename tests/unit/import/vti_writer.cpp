@@ -60,7 +60,7 @@ std::string compressed(const VtiFields& f, std::string_view bytes) {
   return zlib(bytes);
 }
 
-// What stands ahead of an array's bytes, and they.
+// An encoded array: the header that precedes its bytes, and the bytes.
 struct Encoded {
   std::string header;
   std::string bytes;

@@ -44,7 +44,7 @@ class ErrorJobsTest : public test::JobsFixture {
     return run_pipeline(volume_, parameters, {}, blobs_, process_, {}, kSilent).mesh;
   }
 
-  // Of the formats that round coordinates.
+  // Decodes a file whose format rounds coordinates.
   codec::DecodedSurface decoded(const MeshSummary& mesh, MeshFormat format) {
     const std::string bytes = blob(mesh.files.at(format).sha256);
     return codec::decode(std::as_bytes(std::span(bytes)), format, space_of(format, {}), {});
@@ -67,7 +67,8 @@ class ErrorJobsTest : public test::JobsFixture {
   }
 
   // The surface as it is extracted.
-  // What a largest error is measured from; joined: without one.
+  // max_error_mm is measured from it. With `joined` it is the surface of a job without
+  // max_error_mm.
   Soup extracted(bool joined = false) {
     JobParameters parameters = parameters_of(volume_, 0);
     parameters.regularize = joined;

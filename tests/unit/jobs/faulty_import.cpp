@@ -57,7 +57,7 @@ void eat_memory() {
   for (;;) eaten.emplace_back(std::size_t{1} << 20, 'x');
 }
 
-// What a confined process can do and should not be able to.
+// Tries what a confined process must not be able to do, and returns the names of what succeeded.
 std::string escapes(const ImportOrder& order) {
   std::string found;
   const auto note = [&](bool done, const std::string& what) {

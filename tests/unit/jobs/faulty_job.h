@@ -1,4 +1,4 @@
-// What the stand-in for isomesh-job does wrong: the iso-value says.
+// Faults of the stand-in for isomesh-job, selected by the iso-value.
 #pragma once
 
 namespace isomesh::test {

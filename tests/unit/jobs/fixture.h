@@ -37,7 +37,7 @@ class JobsFixture : public testing::Test {
   // Noise whose surface is so large that smoothing it 1000 times takes many seconds.
   Volume add_much();
 
-  // Of the queue: what fails is tried again soon.
+  // Options of the job queue with a short retry delay.
   static store::JobStoreOptions options() {
     store::JobStoreOptions result;
     result.retry_delay = std::chrono::milliseconds(5);

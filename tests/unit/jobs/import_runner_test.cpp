@@ -102,8 +102,7 @@ TEST(ImportRunner, AnImportIsNotLostWithTheProcessThatWaitedForIt) {
   EXPECT_STREQ(faulty.run("escape").what(), "[]");
 }
 
-// Whether its order still reaches it or not: a stopped process takes it and is killed before it has
-// begun.
+// A stopped process is killed before it begins, whether or not its order has reached it.
 TEST(ImportRunner, AnImportIsNotLostWithAProcessThatDiesAsItIsTaken) {
   Faulty faulty(seconds(60), 1);
   ASSERT_TRUE(test::eventually([] { return test::children_of(::getpid()).size() == 2; }));

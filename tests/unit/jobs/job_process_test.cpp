@@ -37,7 +37,7 @@ class JobProcessTest : public test::JobsFixture {
     return order;
   }
 
-  // What the process makes; its bytes are in bytes_.
+  // Runs the order in the process; the bytes of its files go to bytes_.
   MadeMesh make(JobProcess& process, const JobOrder& order, const Report& report = kQuiet,
                 const std::stop_token& stop = {}) {
     bytes_.assign(order.parameters.formats.size(), "");

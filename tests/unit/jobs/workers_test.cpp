@@ -85,7 +85,8 @@ TEST_F(WorkersTest, AJobThatFindsNoDescriptorIsPutBackUncharged) {
   rlimit before = {};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
   const rlimit none = {3, before.rlim_max};
-  // What the sanitizer has not seen yet it looks at by a descriptor: so the log has been used.
+  // The sanitizer needs a descriptor for anything that it has not seen yet, so the log is used
+  // beforehand.
   log_info("no descriptors from now on");
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
   const Workers workers(threads(1), jobs_, volumes_, blobs_);

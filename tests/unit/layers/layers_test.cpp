@@ -12,8 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Which folders a layer may include besides itself; what those may include, it may too. A folder
-// that has rooms is, for who is not in it, all of them.
+// Folders that each layer may include besides itself; it may also include what those may include.
+// To a layer outside it, a folder stands for all its subfolders too.
 const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"base", {}},
     {"proto", {"base"}},

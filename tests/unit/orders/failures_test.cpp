@@ -1,4 +1,4 @@
-// What orders do when a step fails: how long they wait, what they say, and when they give up.
+// Tests of orders whose steps fail: how long they wait, what they report, and when they give up.
 #include "proto/error.h"
 #include "tests/unit/orders/fixture.h"
 

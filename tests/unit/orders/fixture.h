@@ -236,7 +236,7 @@ class OrdersTest : public test::JobsFixture {
     return until([&] { return get(id).state == state; });
   }
 
-  // Whether the order fails that often, each time after a pause that doubles.
+  // Expects the order to fail that often, each time after a pause that doubles.
   void fails_with_growing_pauses(const std::string& id, std::uint32_t times) {
     for (std::uint32_t attempts = 1; attempts <= times; ++attempts) {
       ASSERT_TRUE(until([&] { return get(id).attempts >= attempts; })) << attempts;

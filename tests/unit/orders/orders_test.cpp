@@ -16,7 +16,7 @@ TEST_F(OrdersTest, GoTheirWay) {
   EXPECT_TRUE(order.results.front().stored);
   EXPECT_EQ(order.attempts, 0U);
   EXPECT_EQ(main_->stores, 1);
-  // Whether or not it still lies there, no record keeps the object.
+  // No record names the object any more, whether or not its bytes still exist.
   EXPECT_FALSE(volumes_.names(order.results.front().sop_instance_uid));
 }
 
@@ -37,7 +37,7 @@ TEST_F(OrdersTest, TheirFirstQueryIsInTheAuditTrailWithItsOutcome) {
   EXPECT_THAT(outcomes_of_queries(prompt), ElementsAre("success"));
 }
 
-// What the images have is known, and so is why nothing was made of them.
+// The error names the iso-value and the range of the samples, which explain the empty surface.
 TEST_F(OrdersTest, AnEmptySurfaceIsToldWithTheRangeOfTheSamples) {
   const std::string id = submit();
   ASSERT_TRUE(finish_job(0));

@@ -30,7 +30,8 @@ int open_descriptors() {
   return count;
 }
 
-// What the kernel has given the program when it was started, and copies of it have too.
+// Random bytes that the kernel provides at program start (AT_RANDOM). Copies of the process have
+// the same.
 std::string random_of_this_program() {
   constexpr std::size_t kBytes = 16;
   return to_hex(std::span(reinterpret_cast<const std::uint8_t*>(::getauxval(AT_RANDOM)), kBytes));

@@ -41,7 +41,7 @@ std::chrono::steady_clock::time_point at_once() {
   return std::chrono::steady_clock::now() + std::chrono::milliseconds(20);
 }
 
-// What a copy says of itself when it is asked.
+// Sends the question to a copy and returns its reply.
 std::string answer_of(const Child& child, const std::string& question = "?") {
   child.send_last(question);
   return child.receive(4096, std::chrono::steady_clock::now() + seconds(60), {}).text;
@@ -53,7 +53,7 @@ Child told_to_hang(PreparedProcesses& prepared) {
   return child;
 }
 
-// Of those that this process may use.
+// Chooses the first processor that this process may use.
 void stay_on_one_processor() {
   cpu_set_t all;
   ::sched_getaffinity(0, sizeof(all), &all);

@@ -1,5 +1,5 @@
-// What confine takes away, seen from processes that are confined and end with the answer. How an
-// import fares in it is tested with the runner that starts imports.
+// Tests of what confinement forbids, in confined processes that exit with the result. Imports under
+// confinement are tested with the runner that starts them.
 #include "server/process/sandbox.h"
 
 #include <array>
@@ -42,7 +42,7 @@ class Sandbox : public testing::Test {
             .time = std::chrono::seconds(60)};
   }
 
-  // Whether `holds` is true in a process that is confined.
+  // True if `holds` returns true in a confined process.
   bool confined(const std::function<bool()>& holds) const { return confined(confinement(), holds); }
 
   static bool confined(const Confinement& confinement, const std::function<bool()>& holds) {

@@ -10,8 +10,8 @@
 namespace isomesh {
 namespace {
 
-// What the contract says about every code. A switch without default: the compiler names the code
-// that is missing here.
+// HTTP status of each code in the contract. The switch has no default, so that the compiler reports
+// a missing code.
 int status_in_the_contract(ErrorCode code) {
   switch (code) {
     case ErrorCode::kInvalidParameter:

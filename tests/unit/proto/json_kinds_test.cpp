@@ -1,4 +1,4 @@
-// What only some kinds of jobs tell: those by labels, and those whose error is bound or measured.
+// Tests of JSON members that only jobs by labels, or with a bounded or measured error, have.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -171,7 +171,7 @@ TEST(Parameters, AQueryHasAllButTheCallback) {
   EXPECT_EQ(parse_job_parameters(to_query(parameters), VolumeIn::kQuery), parameters);
 }
 
-// What a mesh may say of the job that made it.
+// A mesh's parameters omit what concerns only the job: volume, priority and callback.
 TEST(Parameters, AMeshsAreWithoutTheJobs) {
   JobParameters parameters;
   parameters.volume = "abc";

@@ -53,7 +53,7 @@ TEST_F(BelievedClockTest, DoubtsAStartFarAhead) {
   EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kAhead);
 }
 
-// What is used then would be the oldest of all once the clock is right.
+// If its time went back, data used meanwhile would seem the oldest of all once the clock is right.
 TEST_F(BelievedClockTest, NeverGoesBack) {
   BelievedClock clock = clock_from(wall_);
   const Time before = clock.now();

@@ -27,7 +27,7 @@ class BlobEngine {
   // A file on the disk on which the last store that was opened takes files over.
   virtual std::string write_file(std::string_view bytes) = 0;
 
-  // What is there beside blobs and files that are there for good.
+  // Everything in the store except blobs and permanent files.
   virtual std::vector<std::string> leftovers() = 0;
 };
 

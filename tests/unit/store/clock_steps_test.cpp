@@ -1,4 +1,4 @@
-// What is kept although the system's clock was wrong for a while.
+// Tests that data is kept although the system's clock was wrong for a while.
 #include <string>
 #include <vector>
 
@@ -62,7 +62,7 @@ class Life {
   }
   std::size_t forget_orders() { return orders_.forget(identity_.now() - kKeep); }
 
-  // What a round of housekeeping leaves of those.
+  // Runs one round of housekeeping and returns the ids that are left.
   std::vector<std::string> kept(const std::vector<std::string>& volumes,
                                 const std::vector<std::string>& jobs = {}) {
     RetentionOptions options;
@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(Days, ClockSteps,
                                   std::to_string(std::abs(step.param));
                          });
 
-// What was there, what is made and what is used while it is wrong, with and without a round of
+// Covers existing data, and data made or used while the clock is wrong, with and without
 // housekeeping meanwhile.
 TEST_P(ClockSteps, WhatIsMadeOrUsedWhileTheClockIsWrongIsKept) {
   for (const bool trust_clock : {false, true}) {

@@ -1,5 +1,5 @@
-// What several processes do that share the records of one database, besides jobs: tables, what is
-// not kept, orders, callbacks, and which blobs belong to a database.
+// Tests of several processes that share one database's records other than jobs: tables, retention,
+// orders, callbacks and blob ownership.
 #include <string>
 #include <thread>
 #include <vector>
@@ -137,7 +137,7 @@ TEST_F(ClusterTest, OneReceiverIsToldNoMoreAtATimeByAllNodes) {
 
 // --- Databases and blobs
 
-// Whether a daemon of that database starts with those blobs.
+// True if a daemon of that database starts with those blobs.
 bool belong(Database& database, BlobStore& blobs, bool adopt = false) {
   const auto code =
       code_thrown_by([&] { Identity(database, blobs, {.adopt = adopt}, seconds(1)); });

@@ -1,4 +1,4 @@
-// What several processes do that share the jobs of one database.
+// Tests of several processes that share the jobs of one database.
 #include <array>
 #include <chrono>
 #include <string>

@@ -1,4 +1,4 @@
-// What every store of blobs does.
+// Tests that every blob store must pass.
 #include <atomic>
 #include <chrono>
 #include <optional>
@@ -304,7 +304,7 @@ TEST_P(Blobs, WhatIsNamedIsNotErased) {
 INSTANTIATE_TEST_SUITE_P(Every, Blobs, testing::ValuesIn(test::all_blob_engines()),
                          test::name_of_blobs);
 
-// What several daemons do with one store.
+// Several daemons that share one store.
 class SharedBlobs : public Blobs {
  protected:
   void SetUp() override {

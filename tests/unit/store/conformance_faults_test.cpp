@@ -1,4 +1,4 @@
-// What every engine makes of leases that run out, failures, retries of requests and jobs alike.
+// Tests of expired leases, failures, retried requests, identical jobs and events on every engine.
 #include <chrono>
 #include <string>
 #include <thread>
@@ -86,7 +86,7 @@ TEST_P(FaultConformance, AReapedJobIsClaimedAgainAndItsLateWorkerIsRefused) {
   EXPECT_TRUE(jobs().finish(lease, some_mesh()));
 }
 
-// Whether it stood still or died, the service did that.
+// A worker that stalls or dies is a fault of the service, not of the job.
 TEST_P(FaultConformance, AJobThatLosesItsWorkersIsNeverCharged) {
   const std::string id = submit().id;
   for (int run = 1; run <= 12; ++run) {
@@ -107,7 +107,7 @@ TEST_P(FaultConformance, AJobThatLosesItsWorkersIsNeverCharged) {
   EXPECT_TRUE(jobs().finish(claimed(), some_mesh()));
 }
 
-// What the job itself has failed at stays counted.
+// Failures of the job itself still count as attempts.
 TEST_P(FaultConformance, ALostWorkerForgivesNoFailure) {
   const std::string id = submit().id;
   EXPECT_TRUE(jobs().finish(claimed(), failure(true)));

@@ -1,4 +1,4 @@
-// What every engine's jobs do, from submission to their end.
+// Tests of jobs on every engine, from submission to their end.
 #include <chrono>
 #include <set>
 #include <string>

@@ -1,4 +1,4 @@
-// What every engine's lists of jobs hold, and for whom.
+// Tests of job lists on every engine: their content, and which owner sees what.
 #include <chrono>
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// What every engine's store of orders and audit trail do.
+// Tests of the order store and the audit trail on every engine.
 #include <chrono>
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// What every engine's outbox does.
+// Tests of the outbox on every engine.
 #include <chrono>
 #include <string>
 #include <vector>
@@ -87,7 +87,7 @@ TEST_P(OutboxConformance, OutlivesARestart) {
   EXPECT_EQ(due[0].attempts, 1);
 }
 
-// What a job is besides changes no byte of its mesh: neither when it runs nor whom it tells.
+// Priority and callback change no byte of the mesh, so the key does not depend on them.
 TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
   JobParameters parameters;
   parameters.volume = "abc";

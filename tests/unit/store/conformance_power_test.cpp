@@ -1,4 +1,4 @@
-// What every engine has brought to the disk when it returns, and what it may lose.
+// Tests of what every engine has written to disk when it returns, and what it may lose.
 #include <span>
 #include <string>
 

@@ -1,4 +1,4 @@
-// What several threads do to any engine at a time.
+// Tests of concurrent threads on every engine.
 #include <algorithm>
 #include <atomic>
 #include <set>

@@ -1,4 +1,4 @@
-// What every engine's store of received instances does, and the orders that come of them.
+// Tests of the store of received instances on every engine, and of the orders made from them.
 #include <chrono>
 #include <string>
 #include <vector>

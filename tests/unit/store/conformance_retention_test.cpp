@@ -1,4 +1,4 @@
-// What retention leaves of any engine's jobs, volumes and blobs.
+// Tests of which jobs, volumes and blobs retention keeps on every engine.
 #include <string>
 #include <thread>
 #include <vector>

@@ -140,7 +140,7 @@ TEST_P(TurnConformance, NoOwnerWithWaitingJobsLagsByMoreThanALargestJobOfEach) {
   const auto largest = [](const std::string& owner) { return owner == "a" ? 100 : 10; };
   std::map<std::string, int> waiting;
   std::map<std::string, int> served;
-  // Of each pair, how far one was ahead of the other since both have jobs that wait.
+  // For each pair of owners: how far one was ahead of the other since both have waiting jobs.
   struct Lead {
     bool is_open = false;
     int least = 0;

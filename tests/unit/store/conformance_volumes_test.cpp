@@ -1,4 +1,4 @@
-// What every engine's volumes and blobs do.
+// Tests of volumes and blobs on every engine.
 #include <atomic>
 #include <string>
 #include <thread>

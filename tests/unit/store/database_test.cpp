@@ -140,7 +140,7 @@ TEST_F(DatabaseTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
     return SqlAuditTrail(database).verify();
   };
   EXPECT_EQ(check().entries, 0U);
-  // Of the version before, which had no digests.
+  // Entries as the previous version wrote them, without digests.
   add(3);
   tamper("UPDATE audit SET chain = NULL");
   EXPECT_EQ(check().entries, 3U);

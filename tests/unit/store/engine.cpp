@@ -56,7 +56,7 @@ class SqliteEngine : public Engine {
     std::filesystem::create_directories(place);
     if (options_.may_lose_power) {
       power_.emplace(place);
-      // What the last life left is on the disk.
+      // Sync everything that the previous run left.
       for (const auto& entry : std::filesystem::recursive_directory_iterator(place)) {
         if (entry.is_regular_file()) store::File::open(entry.path()).sync();
         if (entry.is_directory()) store::sync_folder(entry.path());
@@ -132,7 +132,7 @@ class PostgresEngine : public Engine {
     jobs_->reap();
   }
 
-  // Of the server, as far as it can be seen without its disk: it has no time to do anything.
+  // Simulates a power loss of the server by stopping it at once; its disk is not simulated.
   void lose_power() override {
     jobs_.reset();
     Postgres::shared().stop_at_once();

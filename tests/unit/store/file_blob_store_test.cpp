@@ -21,7 +21,7 @@ using test::code_thrown_by;
 // The digest of "hello".
 constexpr const char* kHello = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
 
-// What files do beside what every store of blobs does (conformance_blobs_test.cpp).
+// Tests specific to the file store; conformance_blobs_test.cpp has those of every blob store.
 class FileBlobStoreTest : public testing::Test {
  protected:
   Blob put(std::string_view text) {
@@ -143,7 +143,7 @@ TEST_F(FileBlobStoreTest, WhatWasHashedToBeAdoptedIsNotReadAgain) {
   EXPECT_FALSE(blobs_.is_intact(kHello, {}));
 }
 
-// Of one size, and so soon that the system's times of writing may be the same.
+// The new content has the same size, and it may have the same modification time.
 TEST_F(FileBlobStoreTest, WhatIsChangedRightAfterItsAdoptionIsReadAgain) {
   for (int n = 0; n < 50; ++n) {
     const std::string text = std::to_string(1000 + n);
@@ -191,7 +191,7 @@ TEST_F(Sweeping, WhatIsAskedForComesBack) {
   EXPECT_EQ(blob_files(), 2U);
 }
 
-// What is about to be named, however old its bytes look.
+// A blob that was just stored is about to be named, however old its file looks.
 TEST_F(Sweeping, LeavesWhatWasStoredSince) {
   put("hello");
   const auto long_ago = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);

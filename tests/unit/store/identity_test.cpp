@@ -127,7 +127,7 @@ TEST_F(IdentityTest, AStartThatWasCutShortIsNoMixUp) {
   EXPECT_EQ(refusal(), "");
 }
 
-// Of the version before there were marks.
+// The data folder of a version that had no marks yet.
 TEST_F(IdentityTest, AnUnmarkedFolderIsMarked) {
   live("one");
   std::filesystem::remove(root() / "blobs/identity");

@@ -1,4 +1,4 @@
-// What blobs in S3 do that no file does: a peer that fails, copies, and what is said in objects.
+// Tests specific to blobs in S3: a failing peer, local copies, and state that is kept in objects.
 #include <chrono>
 #include <memory>
 #include <string>

@@ -121,7 +121,7 @@ TEST(Canonical, IsCopiedOutOfItsFile) {
   EXPECT_EQ(some, (std::array{std::byte{20}, std::byte{21}, std::byte{22}, std::byte{23}}));
 }
 
-// Of a mapped one it would be a signal.
+// With a mapped file this would be a signal.
 TEST(Canonical, AFileThatIsCutMeanwhileIsDamaged) {
   const TemporaryFolder folder;
   written(folder, small_header());

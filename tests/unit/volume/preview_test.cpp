@@ -64,7 +64,7 @@ TEST_F(PreviewTest, ASmallVolumeStaysAsItIs) {
             "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nencoding: raw\n\n");
 }
 
-// Of five samples along x the last is alone in its block.
+// The last of the five samples along x is alone in its block.
 TEST_F(PreviewTest, BlocksBecomeTheirMeans) {
   CanonicalHeader header = header_of({5, 2, 3}, SampleType::kInt16);
   header.geometry.spacing = {0.5, 2, 1};

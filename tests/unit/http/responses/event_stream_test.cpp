@@ -102,7 +102,7 @@ TEST_F(EventStreamTest, ToAllJobsTellsOfEachThatItsViewerSees) {
   };
   EXPECT_TRUE(broadcaster_.publish(owned(1, EventKind::kProgress, "a", "me")));
   broadcaster_.publish(owned(2, EventKind::kStage, "b", "other"));
-  // What another job did in between hides no newer progress.
+  // An event of another job in between does not hide newer progress.
   broadcaster_.publish(owned(3, EventKind::kProgress, "a", "me"));
   broadcaster_.publish(owned(4, EventKind::kDone, "a", "me"));
   const std::string progress =

@@ -67,7 +67,7 @@ TEST_F(ListPageTest, KnowsItsLastPiece) {
   EXPECT_TRUE(usual.is_over());
 }
 
-// What goes while the page is sent leaves a shorter page.
+// Jobs that are removed while the page is sent make the page shorter.
 TEST_F(ListPageTest, EndsWithTheListThatHasBecomeShorter) {
   ListPage<Job> list = page(0, 1000);
   std::string text = *list.next();

@@ -20,7 +20,8 @@ using namespace dicom;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// What a series' samples must come out as; slices along the normal, as the lattice has them.
+// Samples that the series must be imported as. Slices are in order along the normal, as in the
+// lattice.
 template <class Sample>
 std::vector<Sample> expected_samples(const DicomSeries& series, bool from_last = false) {
   std::vector<Sample> samples;
@@ -198,7 +199,7 @@ TEST(DicomValues, AreWidenedOnlyWhenTheyMustBe) {
   EXPECT_EQ(wide.volume.type, SampleType::kInt32);
   EXPECT_EQ(samples_of<std::int32_t>(wide)[0], series.stored(0, 0, 0) - 1024);
 
-  // What a CT in 16 bits holds fits, though all that 16 bits can hold would not.
+  // The actual values of a 16-bit CT fit, although the full 16-bit range would not.
   NamedFiles files = changed(series, [&](DicomObject& object) {
     object.text(kRescaleSlope, "DS", "1").text(kRescaleIntercept, "DS", "-1024");
     std::string pixels;

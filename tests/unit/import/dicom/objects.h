@@ -78,7 +78,7 @@ struct DicomSeries {
     return {columns, rows, bits_allocated, bits_stored, high_bit, is_signed};
   }
 
-  // What is stored for a sample, the same in every run.
+  // The stored value of a sample, the same in every run.
   std::int64_t stored(std::uint32_t i, std::uint32_t j, std::uint32_t k) const;
 
   Vector3 position(std::uint32_t slice) const;

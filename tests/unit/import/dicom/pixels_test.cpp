@@ -209,7 +209,7 @@ TEST(DicomSyntaxes, ThatAreNotReadAreNamed) {
               HasSubstr("\"1.2.840.113619.5.2\""));
 }
 
-// What these tests write is DICOM for others, too.
+// GDCM independently reads the DICOM files that these tests write.
 TEST(DicomObjects, AreReadByGdcm) {
   const DicomSeries series;
   for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {

@@ -1,4 +1,4 @@
-// What some programs write that the standard does not know.
+// Tests of non-standard DICOM that some programs write.
 #include <functional>
 
 #include <gmock/gmock.h>

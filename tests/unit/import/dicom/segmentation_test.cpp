@@ -124,7 +124,7 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   for (unsigned place = 0; place < kSegmentSamples; ++place) {
     EXPECT_EQ(label_at(told, place, 1) + label_at(told, place, 3), 0);
   }
-  // What is told of the distance holds where positions agree with it, and these do not.
+  // The stated slice distance applies only if the positions agree with it, and here they do not.
   object.slice_distance = "1.5";
   EXPECT_EQ(import_labels(object).volume.dims[2], 3);
   // Without it the smallest gap is the distance.

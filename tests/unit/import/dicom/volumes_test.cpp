@@ -44,7 +44,7 @@ NamedFiles with_echoes() {
   return several([](DicomObject& object, std::uint32_t volume, std::uint32_t slice) {
     // Numbers are compared as such: 10.5 comes after 5.25.
     object.text(kEchoTime, "DS", volume == 0 ? "5.25" : volume == 1 ? "10.50" : "100");
-    // What changes from slice to slice tells nothing.
+    // Values that change from slice to slice do not distinguish volumes.
     object.text(kAcquisitionTime, "TM", std::to_string(100000 + slice * 7 + volume));
   });
 }
@@ -234,7 +234,7 @@ TEST(DicomFramesOfReference, ThatFormGroupsMayBeAccepted) {
   EXPECT_THAT(note_detail(accepted, NoteCode::kFrameOfReference), HasSubstr("The request accepts"));
 }
 
-// What is wrong with the lattice is never overlooked, and nothing else is offered then.
+// Errors of the lattice are never overlooked, and then no override is offered.
 TEST(DicomFramesOfReference, DoNotHideWhatIsMissing) {
   for (const auto& uid : {one_each, in_groups}) {
     NamedFiles files = with_frames_of_reference(uid);
