@@ -5,18 +5,23 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <utility>
 
 #include "server/mesh/bound/chunks.h"
 
 namespace isomesh::mesh::bound {
 namespace {
 
-constexpr int kAttempts = 5;
-constexpr double kTooNear = 1e-11;
+// Rays along each axis, first from the largest triangle of a component and then from the largest
+// ones of several groups: all points of one may lie in a plane with edges of T- or all over T+, as
+// in a cap of samples at the iso-value.
+constexpr unsigned kGroups = 5;
+constexpr unsigned kAttempts = 3 * (1 + kGroups);
+constexpr double kTooNear = 1e-11;  // more than what rounding moves a place
 
-// A ray from a point of a component along x; behind the volume's last face it goes on along y, and
-// behind that face's last edge along z. There S, T+ and T- are what they are in the face and at
-// its edge.
+// A ray from a point of a component along its first axis; behind the volume's last face it goes on
+// along the second, and behind that face's last edge along the third. There S, T+ and T- are what
+// they are in the face and at its edge. Places are in the order of these axes.
 struct Ray {
   Vecd from;
   std::uint32_t component = 0;
@@ -28,8 +33,9 @@ struct Ray {
   Ray& operator=(const Ray&) = delete;
   ~Ray() = default;
 
-  void cross(double distance) {
-    if (std::abs(distance) < kTooNear) is_too_near = true;
+  // `unsure`: how far from there it may be, at most.
+  void cross(double distance, double unsure = kTooNear) {
+    if (!(std::abs(distance) >= unsure)) is_too_near = true;
     if (distance > 0) ++crossed;
   }
   bool is_odd() const { return !is_too_near && (crossed & 1) != 0; }
@@ -44,18 +50,16 @@ struct Start {
 
 class Rays {
  public:
-  Rays(const Field& field, const Surfaces& surfaces)
+  // Of the starts' components, at most one each. `axis`: the first one; the others follow in cyclic
+  // order.
+  Rays(const Field& field, const Surfaces& surfaces, unsigned axis, std::vector<Start> starts)
       : surfaces_(surfaces),
-        columns_y_(field.dims.y),
-        begin_(std::size_t{field.dims.y} * field.dims.z + 1, 0),
-        ray_of_(surfaces.components.count, kNone),
-        last_x_(static_cast<float>(field.dims.x - 1)),
-        last_y_(static_cast<float>(field.dims.y - 1)) {}
-
-  void set(std::vector<Start> starts) {
-    std::ranges::fill(begin_, 0);
-    std::ranges::fill(ray_of_, kNone);
-    rays_.clear();
+        axis_(axis),
+        last_(turned({field.dims.x - 1.0, field.dims.y - 1.0, field.dims.z - 1.0})),
+        columns_y_(static_cast<std::size_t>(last_.y) + 1),
+        begin_(columns_y_ * (static_cast<std::size_t>(last_.z) + 1) + 1, 0),
+        ray_of_(surfaces.components.count, kNone) {
+    for (Start& start : starts) start.from = turned(start.from);
     std::ranges::sort(starts, {}, [&](const Start& start) { return column_of(start.from); });
     for (const Start& start : starts) {
       ++begin_[column_of(start.from) + 1];
@@ -93,7 +97,7 @@ class Rays {
       Ray& ray = rays_[index];
       cross_edge(place(a, side), place(b, side), ray);
       for (const std::uint32_t v : {a, b}) {
-        if (surfaces_.vertices[v].p.y == last_y_) ray.cross(place(v, side).z - ray.from.z);
+        if (place(v, &Vertex::p).y == last_.y) ray.cross(place(v, side).z - ray.from.z);
       }
     }
   }
@@ -105,29 +109,42 @@ class Rays {
   std::size_t column_of(Vecd p) const {
     return static_cast<std::size_t>(p.z) * columns_y_ + static_cast<std::size_t>(p.y);
   }
-  bool is_behind(std::uint32_t v) const { return surfaces_.vertices[v].p.x == last_x_; }
+  bool is_behind(std::uint32_t v) const { return place(v, &Vertex::p).x == last_.x; }
+  Vecd turned(Vecd p) const {
+    return axis_ == 0 ? p : axis_ == 1 ? Vecd{p.y, p.z, p.x} : Vecd{p.z, p.x, p.y};
+  }
   Vecd place(std::uint32_t v, Vecf Vertex::*side) const {
-    return wide(surfaces_.vertices[v].*side);
+    return turned(wide(surfaces_.vertices[v].*side));
   }
 
   static void cross(const std::array<Vecd, 3>& p, Ray& ray) {
+    std::array<Vecd, 3> at;
+    double reach = 0;  // of the triangle, from the ray
+    for (std::size_t i = 0; i < 3; ++i) {
+      at[i] = p[i] - ray.from;
+      reach = std::max({reach, std::abs(at[i].y), std::abs(at[i].z)});
+    }
+    // The smaller the triangle, the better its areas are known: it may be around a sample whose
+    // value is the iso-value.
+    const double least_sure = kTooNear * reach;
     std::array<double, 3> area;
     for (std::size_t i = 0; i < 3; ++i) {
-      const Vecd a = p[(i + 1) % 3] - ray.from;
-      const Vecd b = p[(i + 2) % 3] - ray.from;
+      const Vecd a = at[(i + 1) % 3];
+      const Vecd b = at[(i + 2) % 3];
       area[i] = a.y * b.z - a.z * b.y;
     }
     const auto [least, most] = std::ranges::minmax(area);
-    if (least < -kTooNear && most > kTooNear) return;
+    if (least < -least_sure && most > least_sure) return;
     for (const double each : area) {
-      if (std::abs(each) < kTooNear) {
+      if (!(std::abs(each) >= least_sure)) {
         ray.is_too_near = true;
         return;
       }
     }
-    ray.cross((area[0] * p[0].x + area[1] * p[1].x + area[2] * p[2].x) /
-                  (area[0] + area[1] + area[2]) -
-              ray.from.x);
+    const double whole = area[0] + area[1] + area[2];
+    const auto [low_x, high_x] = std::minmax({at[0].x, at[1].x, at[2].x});
+    ray.cross((area[0] * at[0].x + area[1] * at[1].x + area[2] * at[2].x) / whole,
+              kTooNear + 3 * least_sure * (high_x - low_x) / std::abs(whole));
   }
 
   static void cross_edge(Vecd a, Vecd b, Ray& ray) {
@@ -138,48 +155,62 @@ class Rays {
   }
 
   const Surfaces& surfaces_;
+  const unsigned axis_;
+  const Vecd last_;  // the volume's last sample
   const std::size_t columns_y_;
   std::vector<std::size_t> begin_;     // of each column's rays
   std::vector<std::uint32_t> ray_of_;  // of each component
   std::vector<Ray> rays_;
-  const float last_x_;
-  const float last_y_;
 };
 
-// Twice the area of a triangle of S, in voxels.
-double area_of(const Field& field, const Surfaces& surfaces, const Triangle& triangle) {
-  const auto place = [&](std::size_t i) {
-    return zero_between(field, surfaces.crossings[triangle[i]]);
-  };
-  const Vecd a = place(0);
-  return length(cross(place(1) - a, place(2) - a));
+// How well a ray from the triangle of S can be told from T+ and T-: its area, in voxels, and how
+// far it is from the samples, which T+ or T- may touch.
+double room_of(const Field& field, const Surfaces& surfaces, const Triangle& triangle) {
+  const auto crossing = [&](std::size_t i) { return surfaces.crossings[triangle[i]]; };
+  double off_samples = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double inside = field.values[crossing(i).inside];
+    const double outside = -field.values[crossing(i).outside];
+    off_samples = std::max(off_samples, std::min(inside, outside) / (inside + outside));
+  }
+  const Vecd a = zero_between(field, crossing(0));
+  return off_samples *
+         length(cross(zero_between(field, crossing(1)) - a, zero_between(field, crossing(2)) - a));
 }
 
-// A triangle of each component of S: the first large one, or the largest. Around a sample at the
-// iso-value others are too small to tell a ray from an edge.
-std::vector<std::uint32_t> starts_of(const Field& field, const Surfaces& surfaces) {
-  constexpr double kLarge = 0.02;
-  std::vector<double> largest(surfaces.components.count, -1);
+// A triangle of each of the components of S in `left`: the first with much room, or the one with
+// most. Around samples at the iso-value there is little. `group`: 0 for all triangles, or one of
+// kGroups parts of them.
+std::vector<std::uint32_t> starts_of(const Field& field, const Surfaces& surfaces,
+                                     std::span<const std::uint32_t> left, unsigned group) {
+  constexpr double kMuch = 0.005;
+  std::vector<double> most(surfaces.components.count, kMuch);
+  for (const std::uint32_t component : left) most[component] = -1;
   std::vector<std::uint32_t> starts(surfaces.components.count, kNone);
   for (std::uint32_t t = 0; t < surfaces.extracted.size(); ++t) {
     const std::uint32_t component = surfaces.components.of_vertex[surfaces.extracted[t][0]];
-    if (largest[component] > kLarge) continue;
-    const double area = area_of(field, surfaces, surfaces.extracted[t]);
-    if (!(area > largest[component])) continue;
-    largest[component] = area;
+    if (most[component] >= kMuch) continue;
+    if (group > 0 && t % kGroups != group - 1) continue;
+    const double room = room_of(field, surfaces, surfaces.extracted[t]);
+    if (!(room > most[component])) continue;
+    most[component] = room;
     starts[component] = t;
   }
   return starts;
 }
 
-// A random point of the triangle of each of the components.
+// A random point of the triangle of each of the components, which moves to `none` if it has none.
 std::vector<Start> cast(const Field& field, const Surfaces& surfaces,
                         std::span<const std::uint32_t> triangles,
-                        std::span<const std::uint32_t> left, std::mt19937& random) {
+                        std::span<const std::uint32_t> left, std::mt19937& random,
+                        std::vector<std::uint32_t>& none) {
   const auto share = [&] { return 0.1 + static_cast<double>(random() >> 8) / (1 << 24); };
   std::vector<Start> starts;
   for (const std::uint32_t component : left) {
-    if (triangles[component] == kNone) continue;  // nothing is there to be covered
+    if (triangles[component] == kNone) {
+      none.push_back(component);
+      continue;
+    }
     Vecd sum;
     double weight = 0;
     for (const std::uint32_t v : surfaces.extracted[triangles[component]]) {
@@ -198,22 +229,24 @@ std::vector<std::uint32_t> uncovered(const Field& field, const Surfaces& surface
                                      std::span<const Edge> border, const Context& context) {
   std::vector<std::uint32_t> left(surfaces.components.count);
   std::iota(left.begin(), left.end(), 0U);
-  Rays rays(field, surfaces);
-  const std::vector<std::uint32_t> triangles = starts_of(field, surfaces);
   std::mt19937 random(1);
-  for (int attempt = 0; attempt < kAttempts && !left.empty(); ++attempt) {
-    rays.set(cast(field, surfaces, triangles, left, random));
+  for (unsigned attempt = 0; attempt < kAttempts && !left.empty(); ++attempt) {
+    const std::vector<std::uint32_t> triangles = starts_of(field, surfaces, left, attempt / 3);
+    std::vector<std::uint32_t> still_left;
+    Rays rays(field, surfaces, attempt % 3,
+              cast(field, surfaces, triangles, left, random, still_left));
+    if (attempt < 3) still_left.clear();  // without any triangle: nothing is there to be covered
     for_each(context, surfaces.triangles.size(), [&](std::size_t t) {
       rays.cross(surfaces.triangles[t], &Vertex::in);
       rays.cross(surfaces.triangles[t], &Vertex::out);
     });
     rays.cross_behind(border, &Vertex::in);
     rays.cross_behind(border, &Vertex::out);
-    left.clear();
     for (const Ray& ray : rays.rays()) {
-      if (!ray.is_odd()) left.push_back(ray.component);
+      if (!ray.is_odd()) still_left.push_back(ray.component);
     }
-    std::ranges::sort(left);
+    std::ranges::sort(still_left);
+    left = std::move(still_left);
   }
   return left;
 }

@@ -99,6 +99,36 @@ TEST(BoundTest, KeepsAllOfAClosedSurfaceWithinTheError) {
   }
 }
 
+// A component that is hardly larger than a sample, most of whose triangles lie in the cap's plane.
+TEST(BoundTest, KeepsASampleAtTheIsoValueInEachFaceOfAClosedVolume) {
+  constexpr Dims kDims = {5, 6, 7};
+  for (const std::array<std::uint32_t, 3> at :
+       {std::array{0U, 2U, 3U}, std::array{4U, 3U, 2U}, std::array{2U, 0U, 3U},
+        std::array{2U, 5U, 3U}, std::array{2U, 3U, 0U}, std::array{2U, 3U, 6U},
+        std::array{0U, 0U, 3U}, std::array{4U, 5U, 6U}}) {
+    auto volume = test::constant<std::uint8_t>(10, kDims);
+    volume.at(at[0], at[1], at[2]) = 30;
+    expect_within_by_scheme(volume, {.iso = 30, .close = true}, 0.1);
+  }
+}
+
+TEST(BoundTest, ProvesSmallNoiseWithManySamplesAtTheIsoValue) {
+  std::mt19937 random(5);
+  const auto one_of = [&](std::uint32_t count) {
+    return static_cast<std::uint32_t>(random() % count);
+  };
+  for (int i = 0; i < 400; ++i) {
+    const Dims dims = {2 + one_of(6), 2 + one_of(6), 2 + one_of(6)};
+    const auto volume = test::noise<std::uint8_t>({0, 1, 1, 1, 2}, dims, random());
+    const ExtractOptions extract = {.iso = 2, .close = i % 3 != 0};
+    Mesh mesh = test::extracted(volume, extract);
+    const double error = std::array{0.02, 0.1, 0.5, 2.0}[one_of(4)];
+    const auto bound = simplified(volume, extract, {.max_error_mm = error}, mesh);
+    ASSERT_TRUE(bound) << i;
+    EXPECT_LE(bound->bound_mm, error) << i;
+  }
+}
+
 // Caps at samples that equal the iso-value leave five tetrahedra no room between T+ and T-.
 TEST(BoundTest, TellsWhyCapsOfFiveTetrahedraAreUnproven) {
   const auto noise = test::noise<std::uint8_t>({0, 1, 2, 3}, {7, 6, 5}, 5);
