@@ -1,6 +1,7 @@
 #include "server/jobs/making/certify_stage.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,9 @@
 
 namespace isomesh::jobs {
 namespace {
+
+// Of each surface, if the limit is proven. What is found is then only told beside it.
+constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 20;
 
 // Decodes the file of this format, or all labels' files of it, as other programs do.
 codec::DecodedSurface decoded(const KeptFiles& files, MeshFormat format,
@@ -83,7 +87,8 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
     const double begin = part * static_cast<double>(i);
     const mesh::Certificate measured =
         mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
-                      stage.part(begin, begin + part));
+                      stage.part(begin, begin + part),
+                      certificate.bound_mm ? kMostPointsBesideAProof : mesh::kAllPoints);
     if (i > 0 && measured.max_mm() <= certificate.found_mm) continue;
     certificate.file = formats[i];
     certificate.found_mm = measured.max_mm();

@@ -14,6 +14,9 @@ namespace {
 // threads.
 constexpr std::size_t kBlock = 2048;
 
+// Neighbouring points make good guesses, so what is measured of many points are runs.
+constexpr std::size_t kRun = 256;
+
 constexpr double kPercentile = 0.99;
 
 struct Sums {
@@ -22,18 +25,27 @@ struct Sums {
   float max = 0;
 };
 
-// The points of a surface in order: its vertices, then the centres of its triangles.
+// The points of a surface in order: its vertices, then the centres of its triangles. Of more than
+// `most`, every n-th run.
 class Points {
  public:
-  explicit Points(const SurfaceView& surface) : surface_(surface) {}
+  explicit Points(const SurfaceView& surface, std::size_t most = kAllPoints) : surface_(surface) {
+    const std::size_t all = surface.positions.size() + surface.triangles.size();
+    size_ = all;
+    if (all <= most) return;
+    const std::size_t runs = all / kRun;
+    const std::size_t most_runs = most / kRun;
+    step_ = (runs + most_runs - 1) / most_runs;
+    size_ = runs / step_ * kRun;
+  }
 
-  std::size_t vertices() const { return surface_.positions.size(); }
-  std::size_t size() const { return vertices() + surface_.triangles.size(); }
+  std::size_t size() const { return size_; }
 
-  Point operator[](std::size_t number) const {
-    if (number < vertices()) return to_point(surface_.positions[number]);
+  Point operator[](std::size_t measured) const {
+    const std::size_t number = measured + measured / kRun * (step_ - 1) * kRun;
+    if (number < surface_.positions.size()) return to_point(surface_.positions[number]);
     Point centre = {0, 0, 0};
-    for (const std::uint32_t vertex : surface_.triangles[number - vertices()]) {
+    for (const std::uint32_t vertex : surface_.triangles[number - surface_.positions.size()]) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         centre[axis] += surface_.positions[vertex][axis] / 3.0;
       }
@@ -43,6 +55,8 @@ class Points {
 
  private:
   const SurfaceView surface_;
+  std::size_t size_ = 0;
+  std::size_t step_ = 1;  // every so many runs one is measured
 };
 
 float distance_of(const Point& point, const TriangleGrid& to, std::uint32_t& guess) {
@@ -95,8 +109,8 @@ void measure_vertex_distances(const SurfaceView& from, const TriangleGrid& to,
 }
 
 DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to,
-                                 const Context& context) {
-  const Points points(from);
+                                 const Context& context, std::size_t most) {
+  const Points points(from, most);
   DistanceSummary summary;
   summary.points = points.size();
   if (summary.points == 0) return summary;
@@ -118,7 +132,8 @@ DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to
   return summary;
 }
 
-Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context) {
+Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context,
+                    std::size_t most) {
   // Each direction counts as half of the work.
   const auto half = [&](double begin) {
     Context part = {context.stop, nullptr};
@@ -128,8 +143,9 @@ Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const
     return part;
   };
   Certificate certificate;
-  certificate.from_mesh = measure_distance(mesh, TriangleGrid(reference, context), half(0));
-  certificate.from_reference = measure_distance(reference, TriangleGrid(mesh, context), half(0.5));
+  certificate.from_mesh = measure_distance(mesh, TriangleGrid(reference, context), half(0), most);
+  certificate.from_reference =
+      measure_distance(reference, TriangleGrid(mesh, context), half(0.5), most);
   return certificate;
 }
 

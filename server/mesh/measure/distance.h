@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <limits>
 
 #include "proto/mesh_summary.h"
 #include "server/mesh/buffer.h"
@@ -17,11 +19,14 @@ namespace isomesh::mesh {
 void measure_vertex_distances(const SurfaceView& from, const TriangleGrid& to,
                               const Context& context, Buffer<float>& distances);
 
-// All zero without points. If the other surface has no triangles, the distances are infinite and
-// the histogram is zero. Takes 4 bytes a point. Does not depend on the number of threads. Throws as
-// above.
+inline constexpr std::size_t kAllPoints = std::numeric_limits<std::size_t>::max();
+
+// Of the vertices and of the centres of the triangles. If these are more than `most`, which is 256
+// at least, of every n-th run of 256, at most `most` in total. All zero without points. If the other surface has no
+// triangles, the distances are infinite and the histogram is zero. Takes 4 bytes a point. Does not
+// depend on the number of threads. Throws as above.
 DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to,
-                                 const Context& context);
+                                 const Context& context, std::size_t most = kAllPoints);
 
 // Both directions: what is missing shows only from the reference, what was added only from the
 // mesh.
@@ -34,8 +39,9 @@ struct Certificate {
   bool operator==(const Certificate&) const = default;
 };
 
-// Takes the memory of the larger surface's grid (triangle_grid.h) and 4 bytes a point. Does not
-// depend on the number of threads. Throws as above, and kTooLarge.
-Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context);
+// `most`: points of each surface. Takes the memory of the larger surface's grid (triangle_grid.h)
+// and 4 bytes a point. Does not depend on the number of threads. Throws as above, and kTooLarge.
+Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context,
+                    std::size_t most = kAllPoints);
 
 }  // namespace isomesh::mesh

@@ -270,6 +270,23 @@ TEST(Distance, IsTheSameOnAnyNumberOfThreads) {
   EXPECT_GT(certificates[0].max_mm(), 0);
 }
 
+TEST(Distance, OfManyPointsIsMeasuredAtRunsOfThem) {
+  const Mesh from = ball(0.95, 40);
+  const Mesh to = ball(0.9, 40);
+  const TriangleGrid grid(to, {});
+  const DistanceSummary all = measure_distance(from, grid, {});
+  for (const std::size_t most : {256U, 1000U, 5000U}) {
+    ASSERT_LT(most, all.points);
+    const DistanceSummary some = measure_distance(from, grid, {}, most);
+    EXPECT_LE(some.points, most);
+    EXPECT_GT(2 * some.points, most - most % 256);
+    EXPECT_LE(some.max_mm, all.max_mm);
+    EXPECT_NEAR(some.mean_mm, all.mean_mm, 0.1 * all.mean_mm) << most;
+    EXPECT_EQ(std::reduce(some.histogram.begin(), some.histogram.end()), some.points);
+  }
+  EXPECT_EQ(measure_distance(from, grid, {}, all.points), all);
+}
+
 TEST(Distance, OfVerticesComesInTheirOrder) {
   const Mesh from = random_triangles(100, 1);
   const Mesh to = random_triangles(100, 2);
