@@ -125,7 +125,7 @@ TEST(LabelBody, HasAllItsLabels) {
 
 TEST(Report, IsWrittenFromWhatIsMeasured) {
   ReportPlan plan;
-  plan.sections = {"paper", "passes", "quality", "accuracy"};
+  plan.sections = {"paper", "passes", "quality", "lattices", "accuracy"};
   plan.head = Subject{synthetic_field(24), {{"skin", kFieldIso}, {"bone", kFieldIso + 1}}};
   plan.cubes = {12, 20};
   plan.paper_triangles = {20'000, 8'000};
@@ -146,6 +146,7 @@ TEST(Report, IsWrittenFromWhatIsMeasured) {
   const std::string text = test::read_file(folder / "REPORT.md");
   EXPECT_THAT(text, HasSubstr("| one thing | 2 ms | 4 ms | 0.50 | at most 0.40 | not reached |"));
   EXPECT_THAT(text, HasSubstr("| field-24 20x20x20, skin | 5 tetrahedra |"));
+  EXPECT_THAT(text, HasSubstr("| bcc (body-centred), regularised | optimize, 5 passes | "));
   EXPECT_THAT(text, HasSubstr("| E = 0.50 mm |"));
   EXPECT_THAT(text, HasSubstr("| 8^3 | 0.0 MiB | 0.0 MiB | - | 0.0 MiB |"));
   EXPECT_THAT(text, HasSubstr("`ch2` is missing"));

@@ -108,6 +108,9 @@ Json measure_schemes(const Subject& subject) {
       stages.extract();  // to warm up
       constexpr int kSchemeRuns = 7;
       const double ours_ms = median_ms({[&] { stages.extract(); }}, kSchemeRuns);
+      Stages joined(subject.samples, {.iso = level.iso, .scheme = scheme, .regularize = true});
+      joined.extract();
+      const double joined_ms = median_ms({[&] { joined.extract(); }}, kSchemeRuns);
       Soup soup;
       const double paper_ms = paper_generation_ms(subject.samples, level.iso, scheme, soup);
       rows.push_back({{"volume", title_of(subject.samples, level)},
@@ -115,6 +118,9 @@ Json measure_schemes(const Subject& subject) {
                       {"triangles", stages.size().triangles},
                       {"vertices", stages.size().vertices},
                       {"isomesh_ms", ours_ms},
+                      {"regularized_triangles", joined.size().triangles},
+                      {"regularized_vertices", joined.size().vertices},
+                      {"regularized_ms", joined_ms},
                       {"paper_ms", paper_ms},
                       {"peer_ms", if_measured(peer_ms)}});
     }
@@ -135,9 +141,13 @@ Json measure_unique(const Subject& head, std::span<const std::uint32_t> cubes) {
           time_ms({[&] { found = find_unique(soup, kPaperSubTables).vertices.size(); }});
       MeshSize peer;
       flying_edges_ms(cube, level.iso, &peer);
+      Stages joined(cube, {.iso = level.iso, .regularize = true});
+      joined.extract();
       rows.push_back({{"volume", title_of(cube, level)},
                       {"triangles", stages.size().triangles},
                       {"vertices", stages.size().vertices},
+                      {"regularized_triangles", joined.size().triangles},
+                      {"regularized_vertices", joined.size().vertices},
                       {"paper_vertices", found},
                       {"paper_ms", search_ms},
                       {"peer_triangles", peer.triangles},

@@ -6,6 +6,7 @@
 
 #include "tests/bench/accuracy.h"
 #include "tests/bench/ct_head.h"
+#include "tests/bench/lattices.h"
 #include "tests/bench/machine.h"
 #include "tests/bench/memory.h"
 #include "tests/bench/paper_tables.h"
@@ -264,6 +265,10 @@ Json measure_report(const ReportPlan& plan) {
       report.add("choices", [&] { return measure_choices(subject); });
       report.add("quality", [&] { return measure_quality(subject); });
     }
+  }
+  if (report.wants("lattices")) {
+    report.add("lattices", [] { return measure_lattices(ball_subject()); });
+    if (plan.brain) report.add("lattices", [&] { return measure_lattices(*plan.brain); });
   }
   if (report.wants("growth")) {
     for (const std::uint32_t size : plan.growth) {

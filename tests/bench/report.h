@@ -27,8 +27,8 @@ struct Subject {
 // Name of a surface in the report: the volume's name and size, and the level.
 std::string title_of(const Samples& samples, const Subject::Level& level);
 
-inline constexpr std::array kReportSections = {"service", "goals",   "paper",   "passes",
-                                               "growth",  "quality", "accuracy"};
+inline constexpr std::array kReportSections = {"service", "goals",    "paper",  "passes",
+                                               "quality", "lattices", "growth", "accuracy"};
 
 struct ReportPlan {
   std::vector<std::string> sections;  // of kReportSections; empty: all
