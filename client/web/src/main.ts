@@ -5,6 +5,7 @@ import './style/common.css';
 import './style/volumes.css';
 import './style/prepare.css';
 import './style/surface.css';
+import './style/labels.css';
 import './style/accuracy.css';
 import './style/jobs.css';
 import './style/compare.css';

@@ -81,6 +81,44 @@ describe('parameters', () => {
   });
 });
 
+describe('a drag of the iso-value', () => {
+  it('is one step to take back, however many values it passes', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(32, 12));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+    const line = await page.locator('.histogram .bars').boundingBox();
+    if (!line) throw new Error('the histogram is not shown');
+    await page.mouse.move(line.x + 0.5 * line.width, line.y + 30);
+    await page.mouse.down();
+    for (let step = 1; step <= 5; step += 1) {
+      await page.mouse.move(line.x + (0.5 + 0.05 * step) * line.width, line.y + 30);
+      // Longer than a step of typing.
+      await page.waitForTimeout(700);
+    }
+    await page.mouse.up();
+    await expect.poll(() => noted(page, 'iso')).not.toBe('100');
+    await page.getByRole('button', { name: 'Undo' }).click();
+    await expect.poll(() => noted(page, 'iso')).toBe('100');
+    await expect.poll(() => page.getByRole('button', { name: 'Undo' }).isVisible()).toBe(false);
+  });
+});
+
+describe('the jobs that are chosen to compare', () => {
+  it('are still chosen when a person comes back from the comparison', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(32, 12));
+    const ids: string[] = [];
+    for (const iso of [90, 110]) ids.push((await daemon.submit({ volume, iso, formats: ['glb'] }, 30)).id);
+    await page.goto(`${daemon.url}/#/jobs`);
+    const boxes = ids.map((id) => page.locator(`[data-job="${id}"]`).getByRole('checkbox'));
+    for (const box of boxes) await box.check();
+    await page.getByRole('button', { name: 'Compare' }).click();
+    await page.waitForURL(/#\/compare/);
+    await page.goBack();
+    for (const box of boxes) await expect.poll(() => box.isChecked()).toBe(true);
+  });
+});
+
 describe('a job that was left', () => {
   it('tells when it has ended, also after the page was loaded anew', async () => {
     const { browser } = at;

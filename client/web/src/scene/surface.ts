@@ -1,5 +1,4 @@
-// A surface in a canvas: blocks of triangles that come one by one, a camera around them, and what is
-// drawn over them. Draws when something changed, never for nothing.
+// A surface in a canvas: blocks of triangles that come one by one, a camera, and what is drawn over them. Draws when something changed.
 import { type Object3D, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3, Volume } from '../api/types';

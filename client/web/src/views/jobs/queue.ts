@@ -88,7 +88,7 @@ class Queue {
         'div',
         { class: 'section-head' },
         h('h1', {}, 'Jobs'),
-        h('span', { class: 'hint grow' }, 'Stat jobs run first, then routine, then bulk; within a priority the oldest runs first.'),
+        h('span', { class: 'hint grow' }, 'Stat jobs run first, then routine, then bulk. Within a priority, owners take turns.'),
         this.together,
         this.compare,
       ),
