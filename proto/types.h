@@ -34,8 +34,7 @@ std::size_t bytes_per_sample(SampleType type);
 bool is_integer(SampleType type);
 
 // The position of sample (i,j,k) is origin + direction * diag(spacing) * (i,j,k), in millimetres,
-// in DICOM's patient space (LPS). `direction` is row-major; its columns are the unit vectors of the
-// axes i, j, k.
+// LPS. `direction` is row-major; its columns are the unit vectors of the axes i, j, k.
 struct Geometry {
   std::array<double, 3> origin = {0, 0, 0};
   std::array<double, 3> spacing = {1, 1, 1};
@@ -269,8 +268,7 @@ struct JobParameters : MeshParameters {
   bool operator==(const JobParameters&) const = default;
 };
 
-// Parameters with the defaults of a job by labels. The structure's own defaults are those of a job
-// at an iso-value.
+// With the defaults of a job by labels; the structure's own are those of a job at an iso-value.
 JobParameters label_parameters(LabelChoice labels);
 
 // The space of a file's coordinates: GIFTI is RAS, GLB has a node of its own for it, other formats
@@ -374,8 +372,7 @@ struct Estimate {
   bool fits = false;               // true if one job may use that much memory
   double milliseconds = 0;         // of the run, without the time in the queue
   Queue queue;
-  // Ascending, of a job by labels. One by more than MeshSummary::kMostListedLabels has their
-  // number.
+  // Ascending, of a job by labels; only their number above MeshSummary::kMostListedLabels.
   std::vector<Label> labels = {};
   std::optional<std::uint64_t> labels_count = {};
 

@@ -1,9 +1,7 @@
-// Starting, listening, ending.
+// Starting, listening, and what a restart keeps.
 #include <algorithm>
 #include <csignal>
-#include <functional>
 #include <string>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -311,80 +309,6 @@ TEST(Restart, KeepsVolumesAndJobsAndSweepsTheRest) {
   EXPECT_EQ(daemon.client().wait(next.id).state, JobState::kSucceeded);
 }
 
-TEST(Drain, AnIdleDaemonEndsAtOnceOnEitherSignal) {
-  for (const int signal : {SIGTERM, SIGINT}) {
-    const TemporaryFolder folder;
-    Process process({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "data"});
-    process.first_line();
-    process.send_signal(signal);
-    EXPECT_EQ(process.wait(), 0);
-  }
-}
-
-// True if the job ended after draining began, judged by the order of the log's lines.
-bool ended_while_draining(const Daemon& daemon, const std::string& job) {
-  const std::string log = daemon.errors();
-  const std::size_t draining = log.find("draining");
-  return draining != std::string::npos && log.find(job, draining) != std::string::npos &&
-         log.find(job) > draining;
-}
-
-// Calls attempt(volume) with ever larger volumes until it is true. How long a job takes on a busy
-// machine is not known, and one that ends before the draining begins, or does not end while its
-// client waits, shows nothing.
-bool with_a_job_that_is_long_enough(const std::function<bool(const RawUpload& volume)>& attempt) {
-  for (std::uint32_t size = 12; size <= 150; size += size / 2) {
-    if (attempt(raw_upload(noise<std::uint8_t>({0, 100}, {size, size, size}, 11)))) return true;
-  }
-  return false;
-}
-
-TEST(Drain, LetsARunningJobFinish) {
-  EXPECT_TRUE(with_a_job_that_is_long_enough([](const RawUpload& volume) {
-    Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
-    const Job job =
-        submit(daemon, upload(daemon, volume), 50, R"("draco": {"speed": 10}, "passes": 200)");
-    EXPECT_TRUE(eventually([&] { return daemon.client().job(job.id).state != JobState::kQueued; }));
-    const Connection waiter(daemon.url());
-    waiter.send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
-    daemon.terminate();
-    const Answer answer = waiter.receive();
-    EXPECT_EQ(daemon.wait(), 0);
-    return ended_while_draining(daemon, job.id) && answer.status == 200 &&
-           job_from_json(answer.body).state == JobState::kSucceeded;
-  }));
-}
-
-TEST(Drain, AJobThatTakesTooLongIsPutBack) {
-  const TemporaryFolder folder;
-  Job job;
-  {
-    Daemon daemon(folder / "data", "127.0.0.1:0", {"--drain-seconds", "0"});
-    job = long_job(daemon);
-    EXPECT_EQ(daemon.stop(), 0);
-  }
-  const Daemon next(folder / "data", "127.0.0.1:0");
-  EXPECT_TRUE(eventually([&] { return next.client().job(job.id).state == JobState::kRunning; }));
-  next.client().cancel(job.id);
-}
-
-// Ctrl-C in a terminal is for the whole process group of the daemon.
-TEST(Drain, CtrlCCountsNoAttempt) {
-  const TemporaryFolder folder;
-  Job job;
-  {
-    Daemon daemon(folder / "data", "127.0.0.1:0", {"--drain-seconds", "1"}, {"setsid"});
-    job = long_job(daemon);
-    ASSERT_EQ(::kill(-daemon.pid(), SIGINT), 0);
-    EXPECT_EQ(daemon.wait(), 0);
-    EXPECT_THAT(daemon.errors(), HasSubstr("they are stopped and put back"));
-    EXPECT_THAT(daemon.errors(), testing::Not(HasSubstr("attempt 1 failed")));
-  }
-  const Daemon next(folder / "data", "127.0.0.1:0");
-  EXPECT_TRUE(eventually([&] { return next.client().job(job.id).state == JobState::kRunning; }));
-  next.client().cancel(job.id);
-}
-
 // A start that waits, here for a database that says nothing.
 TEST(Start, SigtermEndsItBeforeItListens) {
   const TemporaryFolder folder;
@@ -395,59 +319,6 @@ TEST(Start, SigtermEndsItBeforeItListens) {
   process.send_signal(SIGTERM);
   EXPECT_EQ(process.wait(), 0) << process.errors();
   EXPECT_EQ(process.output(), "");
-}
-
-TEST(Drain, IsNotReadyAndAcceptsNothing) {
-  Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
-  const Job job = long_job(daemon);
-  daemon.terminate();
-  ASSERT_TRUE(eventually([&] { return daemon.get("/readyz").status == 503; }));
-  EXPECT_EQ(daemon.get("/livez").status, 200);
-  // Nobody would run it any more.
-  EXPECT_TRUE(
-      is_problem(daemon.send("POST", "/v1/jobs",
-                             "{\"volume\": \"" + job.parameters.volume + "\", \"iso\": 50}"),
-                 ErrorCode::kUnavailable));
-  EXPECT_EQ(daemon.get("/v1/jobs/" + job.id).status, 200);
-  daemon.client().cancel(job.id);
-  EXPECT_EQ(daemon.wait(), 0);
-}
-
-TEST(Drain, FinishesTheMeshOfOneRequest) {
-  EXPECT_TRUE(with_a_job_that_is_long_enough([](const RawUpload& volume) {
-    Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
-    const Connection client(daemon.url());
-    client.send(
-        request("POST", "/v1/mesh?iso=50&speed=10&passes=200&" + volume.query, volume.bytes));
-    std::string job;
-    EXPECT_TRUE(eventually([&] {
-      const auto jobs = daemon.client().jobs().jobs;
-      if (!jobs.empty()) job = jobs[0].id;
-      return !jobs.empty() && jobs[0].state != JobState::kQueued;
-    }));
-    daemon.terminate();
-    const Answer answer = client.receive();
-    EXPECT_EQ(daemon.wait(), 0);
-    return ended_while_draining(daemon, job) && answer.status == 200;
-  }));
-}
-
-// It sends often enough that it is not given up for being slow, and would go on for minutes.
-TEST(Drain, ATricklingUploadDoesNotHoldItUp) {
-  Daemon daemon(std::vector<std::string>{"--drain-seconds", "0"});
-  const Connection connection(daemon.url());
-  connection.send(
-      "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000000\r\n\r\n");
-  ASSERT_TRUE(eventually([&] { return !files_below(daemon.data() / "scratch").empty(); }));
-  std::jthread trickle([&](const std::stop_token& stop) {
-    const std::string some(16'384, 'x');
-    while (!stop.stop_requested() && connection.send(some)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-  });
-  daemon.terminate();
-  EXPECT_TRUE(daemon.ends_within(kLongest));
-  trickle.request_stop();
 }
 
 }  // namespace

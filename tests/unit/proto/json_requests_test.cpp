@@ -166,10 +166,6 @@ TEST(JobBody, IsWhatToJsonWrites) {
   EXPECT_EQ(parse_job_parameters(to_json(parameters)), parameters);
 }
 
-TEST(JobBody, OtsuStandsForAnIso) {
-  EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": "otsu"})").iso, std::nullopt);
-}
-
 TEST(JobBody, WithoutALambdaTheSmoothingHasItsOwn) {
   EXPECT_EQ(parsed("").lambda, 1);
   EXPECT_EQ(parsed(R"("smoothing": "taubin")").lambda, row_of(Smoothing::kTaubin).lambda);
@@ -177,7 +173,8 @@ TEST(JobBody, WithoutALambdaTheSmoothingHasItsOwn) {
   EXPECT_EQ(parsed(R"("lambda": null)").lambda, 1);
 }
 
-TEST(JobBody, NullIsNoLimit) {
+TEST(JobBody, OtsuIsNoNumberAndNullNoLimit) {
+  EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": "otsu"})").iso, std::nullopt);
   EXPECT_EQ(parsed(R"("max_displacement_mm": null)").max_displacement_mm, std::nullopt);
 }
 
@@ -302,14 +299,11 @@ INSTANTIATE_TEST_SUITE_P(UnknownMembers, OneFault,
                                          Refused{R"("position_bits": 14)", "position_bits"},
                                          Refused{R"("draco": {"bits": 3})", "draco.bits"}));
 
-TEST(JobBody, AnIsoThatIsNoNumberIsRefused) {
+TEST(JobBody, AnIsoThatIsNoNumberAndAVolumeThatIsNoStringAreRefused) {
   for (const std::string iso :
        {"\"60\"", "\"Otsu\"", "\"\"", "null", "true", "[60]", "{}", "\"NaN\"", "\"inf\""}) {
     EXPECT_THAT(faults_in(R"({"volume": "a", "iso": )" + iso + "}"), ElementsAre("iso")) << iso;
   }
-}
-
-TEST(JobBody, AVolumeThatIsNoStringIsRefused) {
   for (const std::string volume : {"7", "null", "[\"a\"]", "{}"}) {
     EXPECT_THAT(faults_in(R"({"iso": 1, "volume": )" + volume + "}"), ElementsAre("volume"));
   }
@@ -340,9 +334,6 @@ TEST(JobBody, MessagesSayWhatIsAllowed) {
   EXPECT_EQ(detail(R"("priority": "x")"), R"(priority: must be "stat", "routine" or "bulk")");
   EXPECT_EQ(detail(R"("isovalue": 3)"), "isovalue: is not a known member");
 }
-
-// --- Hostile bodies
-// --------------------------------------------------------------------------------
 
 class HostileBody : public testing::TestWithParam<std::string> {};
 
