@@ -159,7 +159,8 @@ class Prepare {
   private listenToPage(): void {
     const { scope } = this;
     scope.onEnd(theme.subscribe(() => this.update()));
-    scope.listen(window, 'pointerdown', () => this.history.hold());
+    // Before what is pressed changes anything.
+    scope.listen(window, 'pointerdown', () => this.history.hold(), { capture: true });
     for (const end of ['pointerup', 'pointercancel'] as const) scope.listen(window, end, () => this.history.release());
     scope.listen(window, 'keydown', (event: KeyboardEvent) => {
       if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
