@@ -1,7 +1,6 @@
 #include "server/jobs/making/certify_stage.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,9 +14,6 @@
 
 namespace isomesh::jobs {
 namespace {
-
-// Of each surface, if the limit is proven. What is found is then only told beside it.
-constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 20;
 
 // Decodes the file of this format, or all labels' files of it, as other programs do.
 codec::DecodedSurface decoded(const KeptFiles& files, MeshFormat format,

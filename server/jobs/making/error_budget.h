@@ -1,6 +1,7 @@
 // The shares of a job's error.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "proto/types.h"
@@ -23,6 +24,13 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
 // vertices were moved by `moved_mm`, which enlarges the grid.
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
                        double moved_mm = 0);
+
+// The reason if the error is measured and not proven; null if a proof is tried, which covers the
+// whole surface that the samples define.
+const char* why_measured(const MeshParameters& parameters);
+
+// Of each surface, where the limit is proven. What is found is then only told beside it.
+inline constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 20;
 
 // The formats that a certificate measures, in the files' order: each that rounds coordinates, and
 // the first of the exact ones, which all hold the mesh itself.

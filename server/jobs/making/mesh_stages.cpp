@@ -49,16 +49,6 @@ Simplification::Bound bound_of(const MeshParameters& parameters,
   return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
 }
 
-// The reason if the job's error is measured and not proven; null otherwise. The proof covers the
-// whole surface that the samples define.
-const char* why_measured(const MeshParameters& parameters) {
-  if (parameters.labels) return "The proof is for one iso-value, and not for labels.";
-  if (numbered(parameters.scheme) == Scheme::kBcc) return "The proof is for schemes 5 and 6.";
-  if (parameters.fill_cavities) return "The proof is for surfaces without fill_cavities.";
-  if (!parameters.components.keeps_all()) return "The proof is for all components together.";
-  return nullptr;
-}
-
 // False if nothing can be proven; then the mesh is unchanged, and the certificate says why.
 bool simplify_within_error(const SampleArray& samples, const MeshRequest& request,
                            const Progress& progress, mesh::Mesh& mesh, MeshSummary& summary) {

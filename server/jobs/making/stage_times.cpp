@@ -22,7 +22,8 @@ constexpr double kMeasurePerTriangle = 3.0e-5;
 constexpr double kSimplifyPerTriangle = 5.0e-4;
 constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
 constexpr double kLevelsPerTriangle = 7.5e-4;
-constexpr double kCertifyPerTriangle = 1.0e-3;
+constexpr double kGridPerTriangle = 3.0e-4;  // of both surfaces, and of what intersects in one
+constexpr double kDistancePerPoint = 5.0e-4;
 
 double as_double(std::uint64_t count) { return static_cast<double>(count); }
 
@@ -46,8 +47,14 @@ double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters)
 
 double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
                   const MeshParameters& parameters) {
+  const bool is_proven = parameters.max_error_mm && why_measured(parameters) == nullptr;
+  const auto points = [&](const SurfaceSize& size) {
+    const double all = as_double(size.vertices + size.triangles);
+    return is_proven ? std::min(all, as_double(kMostPointsBesideAProof)) : all;
+  };
   const auto measured = static_cast<double>(measured_formats(parameters).size());
-  return measured * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
+  return measured * (kGridPerTriangle * as_double(surface.triangles + written.triangles) +
+                     kDistancePerPoint * (points(surface) + points(written)));
 }
 
 // Formats are written in parallel, so the slowest counts fully and the others by half.

@@ -52,6 +52,30 @@ describe('blocks', () => {
     expect(parts.reduce((sum, part) => sum + area(part), 0)).toBeCloseTo(area(whole), 1);
   });
 
+  it('shades sharp edges as edges, and nothing else', () => {
+    // A roof of two slopes with a ridge of five vertices, of which the ends are on the border.
+    const roof = (rise: number): Triangles => {
+      const positions: number[] = [];
+      for (let y = 0; y < 5; y += 1) positions.push(-1, y, 0, 0, y, rise, 1, y, 0);
+      const index: number[] = [];
+      for (let a = 0; a < 12; a += 3) {
+        index.push(a, a + 1, a + 4, a, a + 4, a + 3, a + 1, a + 2, a + 5, a + 1, a + 5, a + 4);
+      }
+      return { positions: new Float32Array(positions), index: new Uint32Array(index) };
+    };
+    const plain = prepare(roof(1));
+    expect(plain.positions.length).toBe(45);
+    expect(plain.normals[4 * 7]).toBe(0); // straight up
+    const sharp = prepare(roof(1), 0, true);
+    expect(sharp.positions.length).toBe(45 + 9);
+    expect(sharp.border).toEqual(plain.border);
+    const slopes = [7, 15, 16, 17].map((vertex) => Math.round((sharp.normals[4 * vertex] as number) / 1000));
+    expect(slopes.map(Math.abs)).toEqual([23, 23, 23, 23]); // 32.767 sin 45 degrees
+    expect(area(sharp)).toBeCloseTo(area(plain), 5);
+    expect(prepare(roof(0.2), 0, true).positions.length).toBe(45);
+    expect(prepare(sheet(20), 0, true).positions).toEqual(prepare(sheet(20)).positions);
+  });
+
   it('splits triangles that share no vertex', () => {
     const count = 70_000;
     const soup: Triangles = {

@@ -2,6 +2,7 @@
 // coarse copy for the time that it is turned.
 import type { Vec3 } from '../api/types';
 import { clustered, compacted, meanEdge, type Coarse } from './coarse';
+import { splitCreases } from './creases';
 
 export interface Triangles {
   positions: Float32Array<ArrayBuffer>;
@@ -179,12 +180,13 @@ export function boundsOf(positions: ArrayLike<number>): [Vec3, Vec3] {
   return [low, high];
 }
 
-// `cell` is the least size of the coarse copy's cells.
-export function prepare(triangles: Triangles, cell = 0): Block {
+// `cell` is the least size of the coarse copy's cells. `hasCreases`: sharp edges are shaded as such.
+export function prepare(whole: Triangles, cell = 0, hasCreases = false): Block {
+  const border = borderVertices(whole.index, whole.positions.length / 3);
+  const triangles = hasCreases ? splitCreases(whole, border, mostVertices) : whole;
   const { positions, index } = triangles;
   const sums = areaNormals(triangles);
   const normals = packedNormals(sums);
-  const border = borderVertices(index, positions.length / 3);
   const cells = { size: Math.max(cell, coarseness * meanEdge(triangles)), areByOctant: true };
   const borderNormals = new Float32Array(3 * border.length);
   border.forEach((vertex, i) => {

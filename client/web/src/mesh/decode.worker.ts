@@ -13,6 +13,8 @@ export interface DecodeRequest {
   distanceId: number | null;
   // The least size of the coarse copy's cells, in millimetres.
   cell: number;
+  // Whether sharp edges are shaded as such: those of labels, at their walls.
+  hasCreases: boolean;
 }
 
 export interface DecodeAnswer {
@@ -82,7 +84,7 @@ scope.onmessage = (event) => {
   const request = event.data;
   ready
     .then((draco) => {
-      const blocks = split(decode(draco, request)).map((part) => prepare(part, request.cell));
+      const blocks = split(decode(draco, request)).map((part) => prepare(part, request.cell, request.hasCreases));
       scope.postMessage({ id: request.id, blocks, error: '' }, buffersIn(blocks));
     })
     .catch((error: unknown) => {

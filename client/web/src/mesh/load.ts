@@ -118,7 +118,7 @@ export async function loadMesh(
   const decoding: Promise<void>[] = [];
   const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: DracoPrimitive | undefined): void => {
     const { positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
-    const done = decoders.decode(bytes, { positionId, distanceId, cell }, signal).then((blocks) => {
+    const done = decoders.decode(bytes, { positionId, distanceId, cell, hasCreases: part !== null }, signal).then((blocks) => {
       if (signal.aborted) return;
       listener.onBlocks(blocks, part, isCoarse);
     });
