@@ -1,6 +1,7 @@
 // A finished job's report on its mesh. Plain values.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -70,6 +71,15 @@ inline constexpr std::array kFormatRows = {
     FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .holds_all_labels = true},
     FormatRow{.format = MeshFormat::kGii, .name = "gii", .own_space = Space::kRas},
     FormatRow{.format = MeshFormat::kZip, .name = "zip", .is_zipped = false}};
+
+static_assert([] {
+  constexpr auto kFormats = static_cast<std::size_t>(MeshFormat::kZip) + 1;  // it stays the last
+  for (std::size_t number = 0; number < kFormats; ++number) {
+    if (std::ranges::count(kFormatRows, static_cast<MeshFormat>(number), &FormatRow::format) != 1)
+      return false;
+  }
+  return true;
+}());
 
 struct MeshFile {
   std::uint64_t bytes = 0;

@@ -88,6 +88,7 @@ const volumes = JSON.stringify(
   null,
   2,
 );
+const stages = JSON.stringify(components.schemas.Stage.enum.filter((name) => name !== 'done'));
 const whole = JSON.stringify(components.schemas.MeshFormat['x-hold-all-labels']);
 mkdirSync(folder, { recursive: true });
 write(
@@ -96,6 +97,9 @@ write(
 
 // One file of these holds all labels.
 export const wholeFormats: readonly string[] = ${whole};
+
+// The stages of a job, in their order.
+export const stages: readonly string[] = ${stages};
 
 // The formats in which volumes are uploaded.
 export const volumeFormats: readonly { name: string; title: string; suffixes: readonly string[] }[] = ${volumes};\n`,

@@ -170,6 +170,7 @@ void add_levels(const LabelledSurface& surface, double share, const Grid& grid,
   mesh::parallel_for(context, parts.size(), [&](std::size_t n) {
     mesh::Mesh mesh;
     extract_label(surface.walls, surface.triangles, n + 1, mesh);
+    if (parameters.normals) shade_label(surface.walls, surface.triangles, n + 1, quiet, mesh);
     const Distances own = parameters.distances ? of_label(of_walls, surface, n + 1) : Distances();
     parts[n].add_level(encode_level(share, mesh, own, grid, parameters, quiet));
   });

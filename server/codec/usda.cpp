@@ -203,6 +203,9 @@ void encode_labels_usda(const LabelledSurface& surface, const Provenance& proven
     const LabelSummary& label = surface.labels[n - 1];
     if (!surface.triangles.of(n).empty()) {
       extract_label(surface.walls, surface.triangles, n, mesh);
+      if (provenance.parameters.normals) {
+        shade_label(surface.walls, surface.triangles, n, quiet, mesh);
+      }
       const std::string metadata =
           "        customData = {\n            int64 label = " + std::to_string(label.label) +
           "\n        }\n        displayName = " + usd_string(title_of(label)) + '\n';

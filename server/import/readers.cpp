@@ -39,7 +39,8 @@ Volume parse_whole(const Input& input) {
 template <SourceVolume (*kParse)(const InputFile&, const Companions&, const ImportOptions&)>
 MostBytes most_plain_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::uint64_t kFooterBytes = std::uint64_t{16} << 20;
-  const SourceVolume volume = kParse(beginning, {}, task.options);
+  const Companions none;
+  const SourceVolume volume = kParse(beginning, none, task.options);
   check_limits(volume, task.limits);
   return {.file = volume.payload.offset + volume.most_encoded_bytes() + kHeadroomBytes +
                   (volume.has_footer ? kFooterBytes : 0)};

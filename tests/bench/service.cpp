@@ -21,9 +21,9 @@ namespace isomesh::bench {
 namespace {
 
 constexpr int kPasses = 5;
-constexpr Goal kExtractGoal = {0.5};
-constexpr Goal kDrcGoal = {0.35};
-constexpr Goal kGlbGoal = {0.3};
+constexpr Goal kExtractGoal = {0.7};
+constexpr Goal kDrcGoal = {0.2};
+constexpr Goal kGlbGoal = {0.15};
 constexpr Goal kSmallJobGoal = {8};  // milliseconds
 constexpr Goal kUploadGoal = {10};   // milliseconds
 constexpr std::uint32_t kSmallSize = 32;

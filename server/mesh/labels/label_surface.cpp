@@ -4,8 +4,10 @@
 #include <bit>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "server/mesh/measure/extent-inl.h"
+#include "server/mesh/measure/normals.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
@@ -149,6 +151,25 @@ void extract_label(const SeparatingSurface& surface, const LabelTriangles& trian
     const auto at = std::ranges::lower_bound(own, first);
     mesh.layer_triangles.push_back(static_cast<std::uint64_t>(at - own.begin()));
   }
+}
+
+void shade_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
+                 std::size_t number, const Context& context, Mesh& mesh) {
+  Buffer<Vec3> normals;
+  vertex_normals(mesh, context, normals);
+  std::vector<Vec3> outside(mesh.positions.size(), Vec3{0, 0, 0});
+  const std::span<const std::uint32_t> own = triangles.of(number);
+  for (std::size_t t = 0; t < own.size(); ++t) {
+    if (surface.sides[own[t]].front != 0) continue;
+    const Vec3 normal = area_normal(mesh, mesh.triangles[t]);
+    for (const std::uint32_t vertex : mesh.triangles[t]) {
+      for (std::size_t axis = 0; axis < 3; ++axis) outside[vertex][axis] += normal[axis];
+    }
+  }
+  for (std::size_t v = 0; v < outside.size(); ++v) {
+    outside[v] = outside[v] == Vec3{0, 0, 0} ? normals[v] : unit(outside[v]);
+  }
+  mesh.normals = std::move(outside);
 }
 
 std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,

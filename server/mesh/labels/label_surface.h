@@ -37,6 +37,12 @@ class LabelTriangles {
 void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
                    std::size_t number, Mesh& mesh);
 
+// Gives such a surface normals for shading: where it leaves the walls between labels, those of its
+// outside alone. The mean with a wall, which its neighbour hides, would be right for neither, and
+// edges would look dark. Thread safe for different meshes. Throws Error kCancelled.
+void shade_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
+                 std::size_t number, const Context& context, Mesh& mesh);
+
 // The walls' vertices that extract_label takes for that label, in the order of its surface.
 std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
                                              const LabelTriangles& triangles, std::size_t number);

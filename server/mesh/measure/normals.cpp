@@ -13,8 +13,27 @@ constexpr std::size_t kLayersPerSlab = 16;
 
 Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
-// Its length is twice the triangle's area.
-Vec3 normal_of(const Mesh& mesh, const Triangle& triangle) {
+// Writes the normals of these layers' vertices, which only triangles of the same layers and of the
+// one below name.
+void write_normals(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer,
+                   Vec3* normals) {
+  const std::size_t begin = mesh.layer_vertices[first_layer];
+  const std::size_t end = mesh.layer_vertices[end_layer];
+  std::fill(normals + begin, normals + end, Vec3{0, 0, 0});
+  for (const Triangle& triangle :
+       mesh.triangles_of(first_layer == 0 ? 0 : first_layer - 1, end_layer)) {
+    const Vec3 normal = area_normal(mesh, triangle);
+    for (const std::uint32_t vertex : triangle) {
+      if (vertex < begin || vertex >= end) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) normals[vertex][axis] += normal[axis];
+    }
+  }
+  for (std::size_t v = begin; v < end; ++v) normals[v] = unit(normals[v]);
+}
+
+}  // namespace
+
+Vec3 area_normal(const Mesh& mesh, const Triangle& triangle) {
   const Vec3& corner = mesh.positions[triangle[0]];
   const Vec3 u = mesh.positions[triangle[1]] - corner;
   const Vec3 v = mesh.positions[triangle[2]] - corner;
@@ -31,26 +50,6 @@ Vec3 unit(const Vec3& v) {
   return {static_cast<float>(x / length), static_cast<float>(y / length),
           static_cast<float>(z / length)};
 }
-
-// Writes the normals of these layers' vertices, which only triangles of the same layers and of the
-// one below name.
-void write_normals(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer,
-                   Vec3* normals) {
-  const std::size_t begin = mesh.layer_vertices[first_layer];
-  const std::size_t end = mesh.layer_vertices[end_layer];
-  std::fill(normals + begin, normals + end, Vec3{0, 0, 0});
-  for (const Triangle& triangle :
-       mesh.triangles_of(first_layer == 0 ? 0 : first_layer - 1, end_layer)) {
-    const Vec3 normal = normal_of(mesh, triangle);
-    for (const std::uint32_t vertex : triangle) {
-      if (vertex < begin || vertex >= end) continue;
-      for (std::size_t axis = 0; axis < 3; ++axis) normals[vertex][axis] += normal[axis];
-    }
-  }
-  for (std::size_t v = begin; v < end; ++v) normals[v] = unit(normals[v]);
-}
-
-}  // namespace
 
 void vertex_normals(const Mesh& mesh, const Context& context, Buffer<Vec3>& normals) {
   normals.resize_for_overwrite(mesh.positions.size());

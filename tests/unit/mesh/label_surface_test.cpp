@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/measure/normals.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/errors.h"
 #include "tests/support/nifti.h"
@@ -52,6 +53,45 @@ TEST(LabelSurface, IsSoundAndClosedWhateverTheLabelsAre) {
         }
       }
     }
+  }
+}
+
+// Two boxes side by side: the mean normal along the edge of their wall would lean to the neighbour.
+TEST(LabelSurface, IsShadedByItsOutsideWhereAWallBegins) {
+  auto volume = test::constant<std::uint8_t>(0, {14, 12, 12});
+  for (std::uint32_t z = 2; z < 10; ++z) {
+    for (std::uint32_t y = 2; y < 10; ++y) {
+      for (std::uint32_t x = 2; x < 12; ++x) volume.at(x, y, z) = x < 7 ? 1 : 2;
+    }
+  }
+  for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 2))) {
+    SCOPED_TRACE(describe(volume.dims, options));
+    const SeparatingSurface surface = separated(volume, options);
+    Mesh mesh = label_mesh(surface, 1);
+    Buffer<Vec3> means;
+    vertex_normals(mesh, {}, means);
+    shade_label(surface, LabelTriangles(surface), 1, {}, mesh);
+    ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+    double shaded = 0;
+    double mean = 0;
+    std::size_t on_edge = 0;
+    std::size_t on_wall = 0;
+    for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
+      const Vec3& p = mesh.positions[v];
+      if (p[0] < 6.2F || p[2] < 4 || p[2] > 8) continue;
+      if (p[1] > 9.2F) {
+        ++on_edge;
+        shaded += mesh.normals[v][1];
+        mean += means[v][1];
+      } else if (p[1] > 4 && p[1] < 8) {
+        ++on_wall;
+        EXPECT_GT(mesh.normals[v][0], 0.99F);
+      }
+    }
+    ASSERT_GT(on_edge, 2U);
+    EXPECT_GT(on_wall, 8U);
+    EXPECT_GT(shaded / static_cast<double>(on_edge), 0.8);
+    EXPECT_GT(shaded - mean, 0.05 * static_cast<double>(on_edge));
   }
 }
 

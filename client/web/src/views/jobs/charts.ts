@@ -1,4 +1,5 @@
 // Small charts of a job's numbers.
+import { stages as order } from '../../../generated/parameters';
 import type { Distribution, QualityStages } from '../../api/types';
 import { h, svg } from '../../ui/dom';
 import { formatMilliseconds, formatNumber } from '../../ui/format';
@@ -11,8 +12,6 @@ export interface Step {
   begin: number;
   duration: number;
 }
-
-const order = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
 
 // The stages that ran, one after the other; members that this page does not know come at the end.
 export function stepsOf(timing: Durations, more: Durations = {}): Step[] {

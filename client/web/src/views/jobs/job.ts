@@ -1,4 +1,5 @@
 // One job: its way, then its surface. #/jobs/ID
+import { stages } from '../../../generated/parameters';
 import { client } from '../../client';
 import { asApiError, errorOfProblem } from '../../api/problem';
 import { isFinal, type Job, type JobParameters, type Volume } from '../../api/types';
@@ -19,7 +20,6 @@ import { SlicesBeside } from './job_slices';
 import { LabelList } from '../labels/label_list';
 import { SurfacePane } from '../surface/surface_pane';
 
-const stages = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
 const noteDelay = 300;
 
 // The stages of this job.
