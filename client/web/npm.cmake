@@ -2,6 +2,7 @@
 # that of npm's own variable.
 set(version 10.9.4)  # of the last line that runs on Node 18
 set(hash 3a7506f37e85c1ba1021baad79f0cd9724748131f321fc117c4dc3ba235ec01be7327584a41d15117c01945560aa9373220628fcc1e1dddd877a5fe9b336a900)
+# npm has this address built in; here is no npm to ask.
 set(registry https://registry.npmjs.org)
 if(NOT "$ENV{npm_config_registry}" STREQUAL "")
   string(REGEX REPLACE "/+$" "" registry "$ENV{npm_config_registry}")

@@ -160,7 +160,7 @@ Distances of_label(const Distances& of_walls, const LabelledSurface& surface, st
   return own;
 }
 
-// Adds a coarser level to all parts, from simplified walls.
+// Adds a level to all parts, from the walls or simplified ones.
 void add_levels(const LabelledSurface& surface, double share, const Grid& grid,
                 const MeshParameters& parameters, const mesh::Context& context,
                 std::vector<GlbPart>& parts) {

@@ -29,7 +29,8 @@ double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh,
 // whole surface that the samples define.
 const char* why_measured(const MeshParameters& parameters);
 
-// Of each surface, where the limit is proven. What is found is then only told beside it.
+// A certificate measures no more points of each surface if the limit is proven: what is found is
+// then only told beside it.
 inline constexpr std::size_t kMostPointsBesideAProof = std::size_t{1} << 20;
 
 // The formats that a certificate measures, in the files' order: each that rounds coordinates, and

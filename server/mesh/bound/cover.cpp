@@ -50,8 +50,8 @@ struct Start {
 
 class Rays {
  public:
-  // Of the starts' components, at most one each. `axis`: the first one; the others follow in cyclic
-  // order.
+  // One ray for each start; no two starts are of one component. `axis`: the first one; the others
+  // follow in cyclic order.
   Rays(const Field& field, const Surfaces& surfaces, unsigned axis, std::vector<Start> starts)
       : surfaces_(surfaces),
         axis_(axis),

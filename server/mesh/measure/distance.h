@@ -21,9 +21,9 @@ void measure_vertex_distances(const SurfaceView& from, const TriangleGrid& to,
 
 inline constexpr std::size_t kAllPoints = std::numeric_limits<std::size_t>::max();
 
-// Of the vertices and of the centres of the triangles. If these are more than `most`, which is 256
-// at least, of every n-th run of 256, at most `most` in total. All zero without points. If the
-// other surface has no triangles, the distances are infinite and the histogram is zero. Takes 4
+// Measures at the vertices and the centres of the triangles. If these are more than `most`, which
+// is 256 at least, of every n-th run of 256, at most `most` in total. All zero without points. If
+// the other surface has no triangles, the distances are infinite and the histogram is zero. Takes 4
 // bytes a point. Does not depend on the number of threads. Throws as above.
 DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to,
                                  const Context& context, std::size_t most = kAllPoints);

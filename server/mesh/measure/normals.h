@@ -10,7 +10,7 @@ namespace isomesh::mesh {
 // The triangle's outward normal; its length is twice the area.
 Vec3 area_normal(const Mesh& mesh, const Triangle& triangle);
 
-// Of length 1, or (0, 0, 1) for a vector of length 0.
+// The vector scaled to length 1, or (0, 0, 1) if its length is 0.
 Vec3 unit(const Vec3& v);
 
 // Writes the unit normal of each vertex: mesh.normals, or the mean of its triangles' outward

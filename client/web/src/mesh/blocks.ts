@@ -35,9 +35,9 @@ const coarseness = 3.5;
 // About as many triangles does the coarse copy of a whole surface have at least.
 const coarseTriangles = 30_000;
 
-// Sums of the triangles' normals times twice their area, three a vertex.
-export function areaNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
-  const sums = new Float32Array(positions.length);
+// The triangles' normals times twice their area, three numbers each.
+function triangleNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
+  const normals = new Float32Array(index.length);
   for (let i = 0; i + 2 < index.length; i += 3) {
     const a = 3 * (index[i] as number);
     const b = 3 * (index[i + 1] as number);
@@ -51,14 +51,20 @@ export function areaNormals({ positions, index }: Triangles): Float32Array<Array
     const vx = (positions[c] as number) - ax;
     const vy = (positions[c + 1] as number) - ay;
     const vz = (positions[c + 2] as number) - az;
-    const nx = uy * vz - uz * vy;
-    const ny = uz * vx - ux * vz;
-    const nz = ux * vy - uy * vx;
-    for (const vertex of [a, b, c]) {
-      sums[vertex] = (sums[vertex] as number) + nx;
-      sums[vertex + 1] = (sums[vertex + 1] as number) + ny;
-      sums[vertex + 2] = (sums[vertex + 2] as number) + nz;
-    }
+    normals[i] = uy * vz - uz * vy;
+    normals[i + 1] = uz * vx - ux * vz;
+    normals[i + 2] = ux * vy - uy * vx;
+  }
+  return normals;
+}
+
+// Their sums at each vertex, three numbers each.
+function vertexSums({ positions, index }: Triangles, normals: Float32Array): Float32Array<ArrayBuffer> {
+  const sums = new Float32Array(positions.length);
+  for (let corner = 0; corner < index.length; corner += 1) {
+    const vertex = 3 * (index[corner] as number);
+    const triangle = corner - (corner % 3);
+    for (let axis = 0; axis < 3; axis += 1) sums[vertex + axis] = (sums[vertex + axis] as number) + (normals[triangle + axis] as number);
   }
   return sums;
 }
@@ -183,9 +189,10 @@ export function boundsOf(positions: ArrayLike<number>): [Vec3, Vec3] {
 // `cell` is the least size of the coarse copy's cells. `hasCreases`: sharp edges are shaded as such.
 export function prepare(whole: Triangles, cell = 0, hasCreases = false): Block {
   const border = borderVertices(whole.index, whole.positions.length / 3);
-  const triangles = hasCreases ? splitCreases(whole, border, mostVertices) : whole;
+  const ofTriangles = triangleNormals(whole);
+  const triangles = hasCreases ? splitCreases(whole, ofTriangles, border, mostVertices) : whole;
   const { positions, index } = triangles;
-  const sums = areaNormals(triangles);
+  const sums = vertexSums(triangles, ofTriangles);
   const normals = packedNormals(sums);
   const cells = { size: Math.max(cell, coarseness * meanEdge(triangles)), areByOctant: true };
   const borderNormals = new Float32Array(3 * border.length);

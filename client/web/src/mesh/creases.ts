@@ -7,17 +7,14 @@ const smoothest = Math.cos((50 * Math.PI) / 180);
 // Around most vertices no triangle is turned so far from the mean, and nothing has to be looked for.
 const near = Math.cos((25 * Math.PI) / 180);
 
-function unitNormals({ positions, index }: Triangles): Float32Array {
-  const normals = new Float32Array(index.length);
-  const at = (corner: number, axis: number): number => positions[3 * (index[corner] as number) + axis] as number;
-  for (let i = 0; i < index.length; i += 3) {
-    const [ux, uy, uz] = [0, 1, 2].map((axis) => at(i + 1, axis) - at(i, axis)) as [number, number, number];
-    const [vx, vy, vz] = [0, 1, 2].map((axis) => at(i + 2, axis) - at(i, axis)) as [number, number, number];
-    const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
-    const length = Math.hypot(x, y, z);
-    if (length > 0) normals.set([x / length, y / length, z / length], i);
+// The same with length 1, or 0 where a triangle has no area.
+function unit(normals: Float32Array): Float32Array {
+  const units = normals.slice();
+  for (let i = 0; i < units.length; i += 3) {
+    const length = Math.hypot(units[i] as number, units[i + 1] as number, units[i + 2] as number);
+    for (let axis = 0; axis < 3 && length > 0; axis += 1) units[i + axis] = (units[i + axis] as number) / length;
   }
-  return normals;
+  return units;
 }
 
 // The corners of each vertex, one after the other, and where those of a vertex begin.
@@ -49,19 +46,19 @@ function isFlat(normals: Float32Array, around: Uint32Array): boolean {
   return around.every((corner) => dot(normals, faceOf(corner), mean, 0) >= least);
 }
 
-// The triangles with a vertex of its own for each of their smooth sides. Vertices that are `fixed` stay one; no more are added than
-// make `most`.
-export function splitCreases(triangles: Triangles, fixed: Uint16Array, most: number): Triangles {
+// The triangles, whose normals are given, with a vertex of its own for each of their smooth sides. Vertices that are `fixed` stay one;
+// no more are added than make `most`.
+export function splitCreases(triangles: Triangles, ofTriangles: Float32Array, fixed: Uint16Array, most: number): Triangles {
   const { positions, distances } = triangles;
   const vertices = positions.length / 3;
-  const normals = unitNormals(triangles);
+  const normals = unit(ofTriangles);
   const { corners, begin } = cornersOf(triangles.index, vertices);
   const isFixed = new Uint8Array(vertices);
   for (const vertex of fixed) isFixed[vertex] = 1;
   const index = triangles.index.slice();
   const copied: number[] = [];
 
-  // Whether the triangles share an edge at the vertex of these corners.
+  // True if the triangles share an edge at the vertex of these corners.
   const areBeside = (a: number, b: number): boolean => {
     const other = (corner: number, step: number): number => triangles.index[faceOf(corner) + ((corner + step) % 3)] as number;
     return other(a, 1) === other(b, 2) || other(a, 2) === other(b, 1);

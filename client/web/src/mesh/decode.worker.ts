@@ -13,7 +13,7 @@ export interface DecodeRequest {
   distanceId: number | null;
   // The least size of the coarse copy's cells, in millimetres.
   cell: number;
-  // Whether sharp edges are shaded as such: those of labels, at their walls.
+  // True if sharp edges are shaded as such: those of labels, at their walls.
   hasCreases: boolean;
 }
 
