@@ -61,7 +61,10 @@ class Inheritance {
   pid_t start(const std::filesystem::path& program) const {
     std::string name = program.filename();
     const std::array<char*, 2> arguments = {name.data(), nullptr};
-    const std::array<char*, 1> environment = {nullptr};
+    // All symbols are found before main(): each copy of the program would look up again whatever
+    // it had not yet called.
+    std::string bind_now = "LD_BIND_NOW=1";
+    const std::array<char*, 2> environment = {bind_now.data(), nullptr};
     pid_t pid = -1;
     require_spawn(::posix_spawn(&pid, program.c_str(), &files_, &attributes_, arguments.data(),
                                 environment.data()),

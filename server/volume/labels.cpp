@@ -63,28 +63,30 @@ Neighbours neighbours_in(std::span<const Sample> line, Sample background) {
   constexpr std::size_t kBlock = 255;
   Neighbours found;
   for (std::size_t begin = 1; begin < line.size(); begin += kBlock) {
-    const std::size_t end = std::min(begin + kBlock, line.size());
-    std::uint8_t pairs = 0;
+    const std::size_t count = std::min(kBlock, line.size() - begin);
+    const Sample* at = line.data() + begin;
+    const Sample* before = at - 1;
     std::uint8_t same = 0;
-    for (std::size_t at = begin; at < end; ++at) {
-      const std::uint8_t is_same = line[at] == line[at - 1];
-      const std::uint8_t is_background = is_same & std::uint8_t{line[at] == background};
-      pairs += 1 - is_background;
-      same += is_same - is_background;
+    std::uint8_t empty = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto is_same = std::uint8_t{at[i] == before[i]};
+      same += is_same;
+      empty += is_same & std::uint8_t{at[i] == background};
     }
-    found.pairs += pairs;
-    found.same += same;
+    found.pairs += count - empty;
+    found.same += same - empty;
   }
   return found;
 }
 
 template <class Sample>
 std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::size_t row) {
-  Neighbours found;
-  for (std::size_t begin = 0; begin < samples.size(); begin += row) {
-    const Neighbours in_row = neighbours_in(samples.subspan(begin, row), samples.front());
-    found.pairs += in_row.pairs;
-    found.same += in_row.same;
+  // As one line, which is faster than row by row, without the pairs of two rows.
+  Neighbours found = neighbours_in(samples, samples.front());
+  for (std::size_t begin = row; begin < samples.size(); begin += row) {
+    const Neighbours apart = neighbours_in(samples.subspan(begin - 1, 2), samples.front());
+    found.pairs -= apart.pairs;
+    found.same -= apart.same;
   }
   if (static_cast<double>(found.same) < kFlat * static_cast<double>(found.pairs)) {
     return std::nullopt;

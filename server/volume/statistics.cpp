@@ -38,9 +38,24 @@ std::vector<std::uint64_t> count_samples(std::span<const Sample> samples, const 
 template <class Sample>
 std::vector<std::uint64_t> count_values(std::span<const Sample> samples, std::int64_t lowest,
                                         std::size_t bins) {
+  // Neighbours are often equal, and a processor adds to one place in memory only every few cycles.
+  // So neighbours are counted in tables of their own.
+  constexpr std::size_t kTables = 4;
+  constexpr std::size_t kPiece = std::size_t{1} << 30;  // counted without overflow
   std::vector<std::uint64_t> counts(bins);
-  for (const Sample sample : samples) {
-    ++counts[static_cast<std::size_t>(std::int64_t{sample} - lowest)];
+  std::vector<std::uint32_t> tables(kTables * bins);
+  const auto bin_of = [&](Sample sample) {
+    return static_cast<std::size_t>(std::int64_t{sample} - lowest);
+  };
+  for (; !samples.empty(); samples = samples.subspan(std::min(kPiece, samples.size()))) {
+    const auto piece = samples.first(std::min(kPiece, samples.size()));
+    std::ranges::fill(tables, 0);
+    std::size_t at = 0;
+    for (; at + kTables <= piece.size(); at += kTables) {
+      for (std::size_t i = 0; i < kTables; ++i) ++tables[i * bins + bin_of(piece[at + i])];
+    }
+    for (; at < piece.size(); ++at) ++tables[bin_of(piece[at])];
+    for (std::size_t i = 0; i < tables.size(); ++i) counts[i % bins] += tables[i];
   }
   return counts;
 }
