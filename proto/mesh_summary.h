@@ -38,6 +38,7 @@ enum class Space { kLps, kRas };  // directions of a file's x, y and z
 struct FormatRow {
   MeshFormat format;
   std::string_view name;
+  std::string_view title;  // for people
   // A job by labels writes one file of all labels, a file of each label in a ZIP, or both.
   bool holds_all_labels = false;
   bool is_zipped = true;
@@ -45,32 +46,40 @@ struct FormatRow {
 };
 
 inline constexpr std::array kFormatRows = {
-    FormatRow{.format = MeshFormat::kDrc, .name = "drc"},
+    FormatRow{.format = MeshFormat::kDrc, .name = "drc", .title = "Draco"},
     FormatRow{.format = MeshFormat::kGlb,
               .name = "glb",
+              .title = "GLB",
               .holds_all_labels = true,
               .is_zipped = false,
               .own_space = Space::kLps},
-    FormatRow{.format = MeshFormat::kStl, .name = "stl"},
-    FormatRow{.format = MeshFormat::kPly, .name = "ply", .holds_all_labels = true},
-    FormatRow{.format = MeshFormat::kObj, .name = "obj", .holds_all_labels = true},
-    FormatRow{
-        .format = MeshFormat::k3mf, .name = "3mf", .holds_all_labels = true, .is_zipped = false},
+    FormatRow{.format = MeshFormat::kStl, .name = "stl", .title = "STL"},
+    FormatRow{.format = MeshFormat::kPly, .name = "ply", .title = "PLY", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kObj, .name = "obj", .title = "OBJ", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::k3mf,
+              .name = "3mf",
+              .title = "3MF",
+              .holds_all_labels = true,
+              .is_zipped = false},
     FormatRow{.format = MeshFormat::kUsda,
               .name = "usda",
+              .title = "USD (text)",
               .holds_all_labels = true,
               .is_zipped = false,
               .own_space = Space::kLps},
     FormatRow{.format = MeshFormat::kUsdz,
               .name = "usdz",
+              .title = "USDZ",
               .holds_all_labels = true,
               .is_zipped = false,
               .own_space = Space::kLps},
-    FormatRow{.format = MeshFormat::kOff, .name = "off"},
-    FormatRow{.format = MeshFormat::kVtk, .name = "vtk", .holds_all_labels = true},
-    FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .holds_all_labels = true},
-    FormatRow{.format = MeshFormat::kGii, .name = "gii", .own_space = Space::kRas},
-    FormatRow{.format = MeshFormat::kZip, .name = "zip", .is_zipped = false}};
+    FormatRow{.format = MeshFormat::kOff, .name = "off", .title = "OFF"},
+    FormatRow{.format = MeshFormat::kVtk, .name = "vtk", .title = "VTK", .holds_all_labels = true},
+    FormatRow{.format = MeshFormat::kVtp, .name = "vtp", .title = "VTP", .holds_all_labels = true},
+    FormatRow{
+        .format = MeshFormat::kGii, .name = "gii", .title = "GIFTI", .own_space = Space::kRas},
+    FormatRow{
+        .format = MeshFormat::kZip, .name = "zip", .title = "ZIP of labels", .is_zipped = false}};
 
 static_assert([] {
   constexpr auto kFormats = static_cast<std::size_t>(MeshFormat::kZip) + 1;  // it stays the last

@@ -90,6 +90,7 @@ const volumes = JSON.stringify(
 );
 const stages = JSON.stringify(components.schemas.Stage.enum.filter((name) => name !== 'done'));
 const whole = JSON.stringify(components.schemas.MeshFormat['x-hold-all-labels']);
+const meshTitles = JSON.stringify(components.schemas.MeshFormat['x-titles'], null, 2);
 mkdirSync(folder, { recursive: true });
 write(
   'parameters.ts',
@@ -97,6 +98,9 @@ write(
 
 // One file of these holds all labels.
 export const wholeFormats: readonly string[] = ${whole};
+
+// What people call the formats of mesh files.
+export const meshFormatTitles: Readonly<Record<string, string>> = ${meshTitles};
 
 // The stages of a job, in their order.
 export const stages: readonly string[] = ${stages};

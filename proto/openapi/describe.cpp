@@ -363,6 +363,11 @@ std::string formats() {
       if (holds_all_labels(format)) whole.push_back(name_of(format));
     }
     yaml.line("x-hold-all-labels: " + in_brackets(whole));
+    yaml.under("x-titles", [&] {
+      for (const FormatRow& row : kFormatRows) {
+        yaml.line("'" + std::string(row.name) + "': " + std::string(row.title));
+      }
+    });
   });
   return yaml.str();
 }

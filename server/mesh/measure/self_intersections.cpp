@@ -1,6 +1,8 @@
 #include "server/mesh/measure/self_intersections.h"
 
 #include <algorithm>
+#include <span>
+#include <utility>
 
 #include "server/mesh/measure/exact_triangles.h"
 #include "server/mesh/measure/triangle_grid.h"
@@ -8,8 +10,6 @@
 
 namespace isomesh::mesh {
 namespace {
-
-constexpr std::size_t kTrianglesPerBlock = 4096;
 
 struct Box {
   Point low;
@@ -42,31 +42,48 @@ struct Box {
   }
 };
 
-// Pairs of a triangle in [begin, end) and one of a higher number.
-std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const TriangleGrid& grid,
-                                       std::size_t begin, std::size_t end) {
-  std::vector<IntersectingPair> pairs;
-  std::vector<std::uint32_t> near;
-  for (std::size_t t = begin; t < end; ++t) {
-    const Triangle& triangle = surface.triangles[t];
-    if (is_flat(surface.positions, triangle)) continue;
-    const Box box(surface, triangle);
-    near.clear();
-    grid.visit_near(box.low, box.high, [&](std::uint32_t other) {
-      if (other > t) near.push_back(other);
-    });
-    std::ranges::sort(near);
-    near.erase(std::unique(near.begin(), near.end()), near.end());
-    for (const std::uint32_t n : near) {
-      const Triangle& other = surface.triangles[n];
-      const Box other_box(surface, other);
-      if (!box.meets(other_box) || !do_intersect(surface.positions, triangle, other) ||
-          is_flat(surface.positions, other)) {
-        continue;
-      }
-      pairs.push_back({static_cast<std::uint32_t>(t), n, box.middle_with(other_box)});
-    }
+// Remembers some pairs that were looked at: nearly all pairs meet in several neighbouring cells.
+class SeenPairs {
+ public:
+  bool add(std::uint32_t first, std::uint32_t second) {
+    const std::uint64_t pair = std::uint64_t{first} << 32 | second;
+    constexpr std::uint64_t kMultiplier = 0x9E3779B97F4A7C15;
+    std::uint64_t& seen = seen_[pair * kMultiplier >> (64 - kBits)];
+    return std::exchange(seen, pair) != pair;
   }
+
+ private:
+  static constexpr unsigned kBits = 14;
+
+  std::vector<std::uint64_t> seen_ = std::vector<std::uint64_t>(std::size_t{1} << kBits);
+};
+
+// The pairs that are found in a part of the grid, some several times.
+std::vector<IntersectingPair> pairs_in(const TriangleGrid& grid, std::size_t part) {
+  const SurfaceView& surface = grid.surface();
+  std::vector<IntersectingPair> pairs;
+  SeenPairs seen;
+  std::span<const TriangleGrid::Entry> cell;
+  std::vector<Box> boxes;
+  const auto visit_cell = [&](std::span<const TriangleGrid::Entry> entries) {
+    cell = entries;
+    boxes.clear();
+    for (const TriangleGrid::Entry& entry : entries) {
+      boxes.emplace_back(surface, surface.triangles[entry.triangle]);
+    }
+  };
+  const auto visit_pair = [&](std::size_t i, std::size_t k) {
+    const auto [first, second] = std::minmax(cell[i].triangle, cell[k].triangle);
+    if (!boxes[i].meets(boxes[k]) || !seen.add(first, second)) return;
+    const Triangle& one = surface.triangles[first];
+    const Triangle& other = surface.triangles[second];
+    if (!do_intersect(surface.positions, one, other) || is_flat(surface.positions, one) ||
+        is_flat(surface.positions, other)) {
+      return;
+    }
+    pairs.push_back({first, second, boxes[i].middle_with(boxes[k])});
+  };
+  grid.visit_pairs(part, visit_cell, visit_pair);
   return pairs;
 }
 
@@ -74,22 +91,27 @@ std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const Triangl
 
 SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context) {
   const TriangleGrid grid(surface, context);
-  const std::size_t triangles = surface.triangles.size();
-  std::vector<std::vector<IntersectingPair>> blocks((triangles + kTrianglesPerBlock - 1) /
-                                                    kTrianglesPerBlock);
-  parallel_for(context, blocks.size(), [&](std::size_t b) {
-    blocks[b] = pairs_in(surface, grid, b * kTrianglesPerBlock,
-                         std::min(triangles, (b + 1) * kTrianglesPerBlock));
-  });
-  SelfIntersections result;
-  std::vector<std::uint32_t> named;
-  for (const std::vector<IntersectingPair>& pairs : blocks) {
-    result.pairs += pairs.size();
-    for (const IntersectingPair& pair : pairs) {
-      named.insert(named.end(), {pair.first, pair.second});
-      if (result.places.size() < SelfIntersections::kMostPlaces) result.places.push_back(pair);
-    }
+  std::vector<std::vector<IntersectingPair>> parts(grid.parts());
+  parallel_for(context, parts.size(),
+               [&](std::size_t part) { parts[part] = pairs_in(grid, part); });
+  std::vector<IntersectingPair> pairs;
+  for (std::vector<IntersectingPair>& part : parts) {
+    pairs.insert(pairs.end(), part.begin(), part.end());
+    part = {};
   }
+  const auto numbers_of = [](const IntersectingPair& pair) {
+    return std::pair(pair.first, pair.second);
+  };
+  std::ranges::sort(pairs, {}, numbers_of);
+  const auto repeated = std::ranges::unique(pairs, {}, numbers_of);
+  pairs.erase(repeated.begin(), repeated.end());
+
+  SelfIntersections result;
+  result.pairs = pairs.size();
+  const auto told = std::span(pairs).first(std::min(pairs.size(), SelfIntersections::kMostPlaces));
+  result.places.assign(told.begin(), told.end());
+  std::vector<std::uint32_t> named;
+  for (const IntersectingPair& pair : pairs) named.insert(named.end(), {pair.first, pair.second});
   std::ranges::sort(named);
   result.triangles =
       static_cast<std::uint64_t>(std::unique(named.begin(), named.end()) - named.begin());

@@ -35,7 +35,7 @@ struct SelfIntersections {
 // Triangles that name the same three vertices intersect. Triangles without area are skipped: they
 // are lines and no walls. Vertices at the same place with different numbers are different.
 //
-// Does not depend on the number of threads. Takes the memory of TriangleGrid, and 16 bytes a pair.
+// Does not depend on the number of threads. Takes the memory of TriangleGrid, and 32 bytes a pair.
 // Throws Error kUnusableVolume for a position that is not finite, kTooLarge as TriangleGrid, and
 // kCancelled.
 SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context);

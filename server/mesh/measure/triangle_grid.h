@@ -57,7 +57,34 @@ class TriangleGrid {
     descend(levels_.size() - 1, {0, 0, 0}, range, visit_cell);
   }
 
+  // Calls visit_cell(triangles) and visit_pair(i, k), with i < k, for the pairs among these that
+  // may meet in a cell: for all cells with more than one triangle of one of the parts. Triangles
+  // with a common point meet in some cell.
+  std::size_t parts() const { return slabs_.size(); }
+  template <class VisitCell, class VisitPair>
+  void visit_pairs(std::size_t part, VisitCell visit_cell, VisitPair visit_pair) const {
+    const Slab& slab = slabs_[part];
+    for (std::size_t cell = 0; cell + 1 < slab.begins.size(); ++cell) {
+      const std::span<const Entry> entries(slab.entries.data() + slab.begins[cell],
+                                           slab.entries.data() + slab.begins[cell + 1]);
+      if (entries.size() < 2) continue;
+      visit_cell(entries);
+      for (std::size_t i = 0; i + 1 < entries.size(); ++i) {
+        const std::uint32_t reached = reach_of(entries[i].box);
+        for (std::size_t k = i + 1; k < entries.size(); ++k) {
+          if (may_meet(reached, entries[k].box)) visit_pair(i, k);
+        }
+      }
+    }
+  }
+
   const SurfaceView& surface() const { return surface_; }
+
+  // A triangle in a cell.
+  struct Entry {
+    std::uint32_t triangle;
+    std::uint32_t box;
+  };
 
  private:
   using Cell = std::array<std::uint32_t, 3>;
@@ -86,10 +113,6 @@ class TriangleGrid {
   // and how far before the cell's end it ends.
   static constexpr std::uint32_t kFieldBits = 5;
   static constexpr std::uint32_t kSpareBits = 0b10000'10000'10000'10000'10000'10000;
-  struct Entry {
-    std::uint32_t triangle;
-    std::uint32_t box;
-  };
   // Some layers of words; the entries of their cells follow each other.
   struct Slab {
     std::vector<std::uint32_t> begins;  // cells + 1
@@ -111,6 +134,13 @@ class TriangleGrid {
   // The operands for comparing boxes: where the box ends, and where it begins.
   static std::uint32_t reach_in(const StepRange& box, const Cell& cell) {
     return box_in({box.high, box.low}, cell);
+  }
+  // The same of a box within the cell.
+  static std::uint32_t reach_of(std::uint32_t box) {
+    constexpr std::uint32_t kHalf = 3 * kFieldBits;
+    constexpr std::uint32_t kFields = kSpareBits - (kSpareBits >> (kFieldBits - 1));
+    const std::uint32_t opposite = ~box & kFields;
+    return opposite >> kHalf | (opposite << kHalf & kFields);
   }
   static bool may_meet(std::uint32_t reach, std::uint32_t box) {
     return (((reach | kSpareBits) - box) & kSpareBits) == kSpareBits;

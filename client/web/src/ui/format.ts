@@ -1,5 +1,5 @@
 // Numbers and times for people.
-import { volumeFormats } from '../../generated/parameters';
+import { meshFormatTitles, volumeFormats } from '../../generated/parameters';
 
 const plain = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
@@ -70,21 +70,9 @@ export function shortId(id: string): string {
   return id.length > 12 ? id.slice(-8) : id;
 }
 
-export const formatNames: Record<string, string> = {
-  glb: 'GLB',
-  drc: 'Draco',
-  stl: 'STL',
-  ply: 'PLY',
-  obj: 'OBJ',
-  '3mf': '3MF',
-  usda: 'USD (text)',
-  usdz: 'USDZ',
-  off: 'OFF',
-  vtk: 'VTK',
-  vtp: 'VTP',
-  gii: 'GIFTI',
-  zip: 'ZIP of labels',
-};
+export function meshFormatTitle(name: string): string {
+  return meshFormatTitles[name] ?? name;
+}
 
 export function volumeFormatTitle(name: string): string {
   return volumeFormats.find((format) => format.name === name)?.title ?? name;

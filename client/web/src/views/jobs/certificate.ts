@@ -2,7 +2,7 @@
 // openings.
 import type { DistanceSummary, Job, JobParameters, MeshSummary } from '../../api/types';
 import { button, h, svg, type Child } from '../../ui/dom';
-import { formatCount, formatNames, formatValue, millimetres } from '../../ui/format';
+import { formatCount, formatValue, meshFormatTitle, millimetres } from '../../ui/format';
 
 type Certificate = NonNullable<MeshSummary['certificate']>;
 type MakeVariant = (variant: Partial<JobParameters>) => void;
@@ -98,7 +98,7 @@ export function certificateBody(job: Job): HTMLElement | null {
   if (!certificate || job.mesh?.empty) return null;
   const allowed = job.parameters.max_error_mm;
   const isOne = Object.keys(job.mesh?.files ?? {}).length === 1;
-  const file = formatNames[certificate.file] ?? certificate.file;
+  const file = meshFormatTitle(certificate.file);
   return h(
     'div',
     { class: 'certificate' },

@@ -6,7 +6,7 @@ import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets'
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, type Child } from '../../ui/dom';
-import { formatBytes, formatCount, formatNames, formatNumber, formatValue } from '../../ui/format';
+import { formatBytes, formatCount, formatNumber, formatValue, meshFormatTitle } from '../../ui/format';
 import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
@@ -144,7 +144,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
   const make = async (format: MeshFormat): Promise<void> => {
     try {
       const variant = await submitVariant(job, { formats: withGlb([...job.parameters.formats, format]) });
-      tell(`A new job was started. It also makes ${formatNames[format] ?? format}.`);
+      tell(`A new job was started. It also makes ${meshFormatTitle(format)}.`);
       go(['jobs', variant.id]);
     } catch (error) {
       tellError(error);
@@ -160,7 +160,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
         return file
           ? [
               button(
-                h('span', {}, h('b', {}, formatNames[format] ?? format), ` ${formatBytes(file.bytes)}`),
+                h('span', {}, h('b', {}, meshFormatTitle(format)), ` ${formatBytes(file.bytes)}`),
                 () => void saveFile(file.href, name(format), file.bytes).catch(tellError),
                 { 'data-format': format },
               ),
@@ -174,7 +174,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
         { class: 'make' },
         h('span', { class: 'faint' }, 'Also make:'),
         ...missing.map((format) =>
-          button(formatNames[format] ?? format, () => void make(format), { class: 'chip' }),
+          button(meshFormatTitle(format), () => void make(format), { class: 'chip' }),
         ),
       ),
     exportActions(job, volume, makeVariant(job), (suffix) => fileNameOf(job, volume, suffix)),

@@ -3,7 +3,7 @@ import type { Job, LabelSummary, Volume } from '../../api/types';
 import { labelTitle, type LabelState } from '../../job/labels';
 import { fileNameOf } from '../../job/variants';
 import { button, checkbox, h } from '../../ui/dom';
-import { formatBytes, formatCount, formatNames, formatValue } from '../../ui/format';
+import { formatBytes, formatCount, formatValue, meshFormatTitle } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { saveFile } from '../../ui/save';
 import type { Scope } from '../../ui/signal';
@@ -107,9 +107,9 @@ export class LabelList {
   private downloads(label: LabelSummary, title: string): HTMLElement[] {
     return Object.entries(label.files ?? {}).map(([format, { bytes, href }]) =>
       button(
-        formatNames[format] ?? format,
+        meshFormatTitle(format),
         () => void saveFile(href, fileNameOf(this.job, this.volume, `-${label.label}.${format}`), bytes).catch(tellError),
-        { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${formatNames[format] ?? format}` },
+        { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${meshFormatTitle(format)}` },
       ),
     );
   }

@@ -1,7 +1,7 @@
 // The texts of a job's estimate.
 import type { Estimate } from '../../api/types';
 import { h } from '../../ui/dom';
-import { formatBytes, formatCount, formatMilliseconds, formatNames } from '../../ui/format';
+import { formatBytes, formatCount, formatMilliseconds, meshFormatTitle } from '../../ui/format';
 
 function warning(text: string): HTMLElement {
   return h('p', { class: 'warning' }, text);
@@ -9,7 +9,7 @@ function warning(text: string): HTMLElement {
 
 export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElement[] {
   const files = Object.entries(estimate.bytes).map(
-    ([format, bytes]) => `${formatNames[format] ?? format} ${formatBytes(bytes)}`,
+    ([format, bytes]) => `${meshFormatTitle(format)} ${formatBytes(bytes)}`,
   );
   const rows: [string, string][] = [
     ['Triangles', formatCount(estimate.triangles)],

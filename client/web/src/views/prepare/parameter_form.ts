@@ -17,7 +17,7 @@ import {
   type Value,
 } from '../../job/table';
 import { checkbox, field, h, segmented, uniqueId } from '../../ui/dom';
-import { formatNames, formatValue } from '../../ui/format';
+import { formatValue, meshFormatTitle } from '../../ui/format';
 import { errorSlider, type SliderHost } from './error_slider';
 
 export interface FormHost {
@@ -181,7 +181,7 @@ function formatsControl(parameter: Parameter, host: FormHost): Control {
   const chosen = new Set<MeshFormat>(host.job().formats);
   const box = (format: MeshFormat): HTMLElement =>
     checkbox(
-      formatNames[format] ?? format,
+      meshFormatTitle(format),
       chosen.has(format),
       (isOn) => {
         if (isOn) chosen.add(format);
