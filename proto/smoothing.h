@@ -64,7 +64,7 @@ inline constexpr std::array kSmoothings = {
                  .meaning = "For labels: no steps of voxels, and each label's own volume",
                  .more = "`labels` is for labels alone: it takes the steps of the voxels away, "
                          "keeps flat faces, and gives each label the volume of its voxels, to a "
-                         "few tenths of a percent.",
+                         "few tenths of a percent; of a few voxels, to some percent.",
                  .lambda_by_labels = 0.33,
                  .is_for_labels_only = true}};
 

@@ -110,6 +110,12 @@ constexpr Reader kReaders[] = {
      .sniff = is_hdf5,
      .parse = parse_whole<parse_hdf5>,
      .most_bytes = most_hdf5_bytes},
+    // Before images: the preamble of a DICOM file may be the header of a TIFF file (PS3.10, 7.1).
+    {.name = "dicom",
+     .content = Content::kSlices,
+     .sniff = is_dicom,
+     .parse = parse_dicom,
+     .most_bytes = most_dicom_bytes},
     {.name = "tiff",
      .content = Content::kPages,
      .sniff = is_tiff,
@@ -125,11 +131,6 @@ constexpr Reader kReaders[] = {
      .sniff = is_bmp,
      .parse = parse_image,
      .most_bytes = most_image_bytes},
-    {.name = "dicom",
-     .content = Content::kSlices,
-     .sniff = is_dicom,
-     .parse = parse_dicom,
-     .most_bytes = most_dicom_bytes},
     {.name = "archive", .content = Content::kFiles, .sniff = is_archive, .parse = parse_archive},
 };
 

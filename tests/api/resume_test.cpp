@@ -193,6 +193,24 @@ TEST_F(ResumeTest, DigestsAreChecked) {
   EXPECT_EQ(daemon_->send("PATCH", right, raw_.bytes.substr(2000), part(2000, true)).status, 201);
 }
 
+TEST_F(ResumeTest, DigestsOfAWholeBodyAreChecked) {
+  for (const std::string header : {"Content-Digest", "Repr-Digest"}) {
+    const auto send = [&](const std::string& of) {
+      return daemon_->send("POST", "/v1/volumes?" + raw_.query, raw_.bytes,
+                           {{"Upload-Complete", "?1"}, {header, digest_of(of)}});
+    };
+    EXPECT_TRUE(is_problem(send("other"), ErrorCode::kDigestMismatch)) << header;
+    EXPECT_LT(send(raw_.bytes).status, 300) << header;
+  }
+}
+
+TEST_F(ResumeTest, ALengthThatIsNoNumberIsRefused) {
+  for (const std::string length : {"-1", "abc", "99999999999999999999999"}) {
+    EXPECT_TRUE(blames(begin(with(kBegin, {{"Upload-Length", length}})), "Upload-Length"))
+        << length;
+  }
+}
+
 TEST_F(ResumeTest, WhoDidNotHearTheAnswerAsksAgain) {
   const std::string place = begun();
   const std::string again =
@@ -206,6 +224,7 @@ TEST_F(ResumeTest, WhoDidNotHearTheAnswerAsksAgain) {
     const Answer heard = daemon_->send("POST", again);
     EXPECT_EQ(heard.status, 200);
     EXPECT_EQ(volume_from_json(heard.body), volume_from_json(last.body));
+    EXPECT_TRUE(blames(daemon_->send("POST", again, "a body"), "upload"));
     EXPECT_EQ(daemon_->send("PATCH", place, "more", part(raw_.bytes.size(), true)).status, 400);
   }
 }

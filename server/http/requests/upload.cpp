@@ -1,10 +1,13 @@
 #include "server/http/requests/upload.h"
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "base/hex.h"
@@ -34,9 +37,12 @@ void check_length(const Request& request, std::uint64_t max_bytes, std::uint64_t
   if (request.content_length.value_or(0) > left) throw too_large(max_bytes);
 }
 
-Error other_digest() {
-  return {ErrorCode::kDigestMismatch, "the body's SHA-256 differs from the one in Content-Digest"};
+Error other_digest(const std::string& header) {
+  return {ErrorCode::kDigestMismatch, "the body's SHA-256 differs from the one in " + header};
 }
+
+// The headers that tell the SHA-256 of a whole body, which is a file here.
+constexpr std::array kDigestsOfAll = {"Content-Digest", "Repr-Digest"};
 
 Error incomplete(const BodyReader& body) {
   if (body.was_too_slow()) {
@@ -161,14 +167,18 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   refuse_encoded(request);
   check_length(request, limits.max_bytes);
   check_room(folder, request);
-  const std::optional<std::string> expected = sha256_of_content_digest(request);
   const bool is_form = request.is_form();
-  if (is_form && expected) {
-    throw invalid_parameter("Content-Digest",
-                            "is not supported with a form: send the file without a form");
+  std::map<std::string, std::string> expected;
+  for (const std::string header : kDigestsOfAll) {
+    const auto sha256 = sha256_of_digest(request, header);
+    if (!sha256) continue;
+    if (is_form) {
+      throw invalid_parameter(header, "is not supported with a form: send the file without a form");
+    }
+    expected.emplace(header, *sha256);
   }
   const auto write = [this](std::span<const std::byte> piece) { file_.write(piece); };
-  Receiver receiver(write, folder.reserve(), limits, stopping, expected.has_value());
+  Receiver receiver(write, folder.reserve(), limits, stopping, !expected.empty());
   const auto take = [&](std::string_view piece) { return receiver.take(piece); };
   const bool complete = is_form ? request.body->read_form(
                                       [&](const std::string& name, const std::string& file_name) {
@@ -177,7 +187,9 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
                                       take)
                                 : request.body->read(take);
   receiver.finish(*request.body, complete, is_form);
-  if (expected && receiver.digest() != *expected) throw other_digest();
+  for (const auto& [header, sha256] : expected) {
+    if (receiver.digest() != sha256) throw other_digest(header);
+  }
   body_ = {file_.path(),
            is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"))};
 }
@@ -196,7 +208,7 @@ void receive_part(PartialUpload& upload, const PartialLease& lease, const store:
   receiver.finish_part(*request.body, complete);
   if (expected && receiver.digest() != *expected) {
     upload.take_back(lease);
-    throw other_digest();
+    throw other_digest("Content-Digest");
   }
 }
 
@@ -216,7 +228,7 @@ std::string read_text(const Request& request, std::size_t max_bytes) {
   if (!fits) throw too_large(max_bytes);
   if (!complete) throw incomplete(*request.body);
   const auto expected = sha256_of_content_digest(request);
-  if (expected && sha256_of(text) != *expected) throw other_digest();
+  if (expected && sha256_of(text) != *expected) throw other_digest("Content-Digest");
   return text;
 }
 

@@ -31,8 +31,12 @@ std::optional<bool> boolean_in(const Request& request, std::string_view header) 
   return std::nullopt;
 }
 
-std::optional<std::uint64_t> number_in(const Request& request, std::string_view header) {
-  return whole_number(trimmed(request.header(header)));
+// Empty without the header.
+std::optional<std::uint64_t> bytes_in(const Request& request, const std::string& header) {
+  if (!request.has_header(header)) return std::nullopt;
+  const auto number = whole_number(trimmed(request.header(header)));
+  if (!number) throw invalid_parameter(header, "must be a number of bytes");
+  return number;
 }
 
 void tell_limits(const App& app, Response& response) {
@@ -76,7 +80,7 @@ void check_length(const App& app, std::optional<std::uint64_t> length, Response&
 
 // Receives one part of the body, which may be the first and may be empty.
 void receive(App& app, const Request& request, PartialUpload& upload, const PartialLease& lease) {
-  if (const auto length = number_in(request, kLength)) upload.tell_length(lease, *length);
+  if (const auto length = bytes_in(request, kLength)) upload.tell_length(lease, *length);
   if (request.content_length && boolean_in(request, kComplete).value_or(false)) {
     upload.tell_length(lease, lease.offset + *request.content_length);
   }
@@ -107,9 +111,9 @@ void append(App& app, const Request& request, Response& response) {
   }
   const auto is_last = boolean_in(request, kComplete);
   if (!is_last) throw_no_boolean();
-  const auto offset = number_in(request, kOffset);
+  const auto offset = bytes_in(request, kOffset);
   if (!offset) throw invalid_parameter(kOffset, "must be a number of bytes");
-  check_length(app, number_in(request, kLength), response);
+  check_length(app, bytes_in(request, kLength), response);
   const KeptUploads::Partial upload = upload_of(app, request);
   const auto place = place_for_upload(app, request);
   const std::optional<PartialLease> lease = upload->begin_lease(*offset);
@@ -142,7 +146,7 @@ bool begins_upload(const Request& request) {
 }
 
 void check_told_length(const Request& request, std::optional<std::uint64_t> bytes) {
-  const std::optional<std::uint64_t> told = number_in(request, kLength);
+  const std::optional<std::uint64_t> told = bytes_in(request, kLength);
   if (!bytes || !told || *told == *bytes || boolean_in(request, kComplete) != true) return;
   throw invalid_parameter(kLength, "is " + std::to_string(*told) + ", but the body has " +
                                        std::to_string(*bytes) + " bytes");
@@ -156,7 +160,7 @@ void begin_upload(App& app, const Request& request, Response& response) {
     throw Error(ErrorCode::kUnsupportedMedia,
                 "a form cannot be uploaded in parts: send the file without a form");
   }
-  const auto length = number_in(request, kLength);
+  const auto length = bytes_in(request, kLength);
   check_length(app, length, response);
   make_room_for(app, length.value_or(0));
   const auto place = place_for_upload(app, request);

@@ -28,9 +28,6 @@ bool is_to_be_kept(const Request& request) {
 // The request's body, or a kept upload.
 KeptBody body_of(App& app, const Request& request) {
   if (request.has_parameter("upload")) {
-    if (request.content_length.value_or(1) != 0) {
-      throw invalid_parameter("upload", "names a body that the service already has: send no body");
-    }
     std::string name(request.parameter("upload"));
     return {app.kept.find(owner_of(request), name), std::move(name)};
   }
@@ -87,6 +84,9 @@ std::set<std::string> upload_parameters() {
 // A client that missed the response to the last part asks by the upload's name.
 bool answer_what_it_became(App& app, const Request& request, Response& response) {
   if (!request.has_parameter("upload")) return false;
+  if (request.content_length.value_or(1) != 0) {
+    throw invalid_parameter("upload", "names a body that the service already has: send no body");
+  }
   const std::string volume =
       app.kept.became(owner_of(request), std::string(request.parameter("upload")));
   if (volume.empty()) return false;

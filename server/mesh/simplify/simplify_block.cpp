@@ -23,13 +23,40 @@ constexpr std::uint32_t kFewRepeated = 1;
 
 using Flags = std::vector<std::uint8_t>;
 
-// The topology that simplification must preserve.
+// The topology of a connected part that simplification must preserve. Each part is compared, since
+// a part that is lost changes the sums as much as a handle that is cut.
 struct Shape {
   std::uint64_t boundary_edges = 0;
   std::int64_t euler = 0;
+  std::uint32_t pieces = 0;  // it is in
 
   bool operator==(const Shape&) const = default;
 };
+
+// What is found around the vertices.
+struct Fans {
+  std::vector<Shape> shapes;         // of the part that is named as the vertex of this number
+  std::vector<std::uint32_t> count;  // of a vertex that is not in the middle of one fan
+};
+
+// For each vertex one of its connected part, the same for all of a part.
+std::vector<std::uint32_t> parts_of(std::size_t vertices, std::span<const Triangle> triangles) {
+  std::vector<std::uint32_t> parts(vertices);  // a smaller one of its part, or itself
+  std::iota(parts.begin(), parts.end(), 0U);
+  const auto part_of = [&](std::uint32_t vertex) {
+    while (parts[vertex] != vertex) vertex = parts[vertex] = parts[parts[vertex]];
+    return vertex;
+  };
+  for (const Triangle& triangle : triangles) {
+    for (const std::uint32_t vertex : triangle) {
+      const std::uint32_t a = part_of(triangle[0]);
+      const std::uint32_t b = part_of(vertex);
+      parts[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  for (std::uint32_t v = 0; v < vertices; ++v) parts[v] = part_of(v);
+  return parts;
+}
 
 // The triangles of each vertex.
 class TrianglesOfVertices {
@@ -57,14 +84,17 @@ class TrianglesOfVertices {
   std::vector<std::uint32_t> members_;
 };
 
-// Looks at the fans around all vertices. Marks in `faults`, where given, those that are not as a
-// manifold has them.
-Shape look_at_fans(std::size_t vertices, std::span<const Triangle> triangles, const Flags& exempt,
-                   Flags* faults) {
+// Looks at the fans around all vertices, and sums up the shapes of `parts`. Marks in `faults` those
+// that are not as a manifold has them.
+Fans look_at_fans(std::span<const std::uint32_t> parts, std::span<const Triangle> triangles,
+                  const Flags& exempt, Flags& faults) {
+  const std::size_t vertices = parts.size();
   const TrianglesOfVertices lists(vertices, triangles);
+  const std::vector<std::uint32_t> pieces = parts_of(vertices, triangles);
   std::vector<Corner> around;
-  Topology topology;
-  std::int64_t named = 0;
+  Fans fans = {std::vector<Shape>(vertices), std::vector<std::uint32_t>(vertices, 1)};
+  std::vector<std::int64_t> triangles_in(vertices);
+  for (const Triangle& triangle : triangles) ++triangles_in[parts[triangle[0]]];
   FanWalk walk;
   for (std::size_t v = 0; v < vertices; ++v) {
     around.clear();
@@ -73,19 +103,25 @@ Shape look_at_fans(std::size_t vertices, std::span<const Triangle> triangles, co
           static_cast<std::size_t>(std::ranges::find(triangles[t], v) - triangles[t].begin());
       around.push_back({triangles[t][(at + 1) % 3], triangles[t][(at + 2) % 3]});
     }
-    named += around.empty() ? 0 : 1;
-    if (around.empty() || walk.is_closed(around)) continue;
+    if (around.empty()) continue;
+    Shape& shape = fans.shapes[parts[v]];
+    ++shape.euler;
+    if (pieces[v] == v) ++shape.pieces;
+    if (walk.is_closed(around)) continue;
     Topology here;
-    check_vertex(around, here);
-    topology.boundary_edges += here.boundary_edges;
+    fans.count[v] = static_cast<std::uint32_t>(check_vertex(around, here));
+    shape.boundary_edges += here.boundary_edges;
     // Two triangles back to back enclose nothing, and no file need be able to hold them.
     const bool is_double = around.size() == 2 && here.boundary_edges == 0;
     const bool is_sound = here.manifold && here.oriented && !is_double;
-    if (faults != nullptr && exempt[v] == 0 && !is_sound) (*faults)[v] = 1;
+    if (exempt[v] == 0 && !is_sound) faults[v] = 1;
   }
-  const auto count = static_cast<std::int64_t>(triangles.size());
-  const auto boundary = static_cast<std::int64_t>(topology.boundary_edges);
-  return {topology.boundary_edges, named - (3 * count + boundary) / 2 + count};
+  for (std::size_t part = 0; part < vertices; ++part) {
+    Shape& shape = fans.shapes[part];
+    const auto boundary = static_cast<std::int64_t>(shape.boundary_edges);
+    shape.euler += triangles_in[part] - (3 * triangles_in[part] + boundary) / 2;
+  }
+  return fans;
 }
 
 // Triangles that share no edge with another one.
@@ -183,6 +219,7 @@ class BlockSimplifier {
         block_(block),
         squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),
         mesh_(goal.mesh, block.triangles),
+        parts_(parts_of(mesh_.positions.size(), mesh_.triangles)),
         exempt_(mesh_.positions.size(), 0),
         is_flat_(mesh_.positions.size(), 0),
         was_alone_(mesh_.positions.size(), 0),
@@ -192,7 +229,7 @@ class BlockSimplifier {
     }
     held_ = exempt_;
     // Vertices that are not manifold at the start are held, and exempt from later checks.
-    before_ = look_at_fans(exempt_.size(), mesh_.triangles, exempt_, &held_);
+    before_ = look_at_fans(parts_, mesh_.triangles, exempt_, held_);
     exempt_ = held_;
     for (const Triangle& triangle : mesh_.triangles) {
       if (mesh_.has_area(triangle)) continue;
@@ -257,17 +294,23 @@ class BlockSimplifier {
       const auto was_alone = [&](std::uint32_t vertex) { return was_alone_[vertex] != 0; };
       if (!std::ranges::all_of(proposed_[t], was_alone)) mark(proposed_[t]);
     }
-    const Shape after = look_at_fans(held_.size(), proposed_, exempt_, &faults_);
-    if (after.euler != before_.euler) mark_lost_parts();
+    const Fans after = look_at_fans(parts_, proposed_, exempt_, faults_);
+    for (std::size_t v = 0; v < faults_.size(); ++v) {
+      const bool is_lost = after.shapes[parts_[v]].pieces == 0;
+      const bool has_other_fans = exempt_[v] != 0 && !goal_.mesh.is_on_line(mesh_.origin[v]) &&
+                                  after.count[v] != before_.count[v];
+      if (is_lost || has_other_fans) faults_[v] = 1;
+    }
     if (goal_.grid != nullptr) {
       measure_points();
       measure_centres();
     }
     if (std::ranges::find(faults_, 1) == faults_.end()) {
-      if (after == before_) return true;
-      // It cannot be told where.
-      held_.assign(held_.size(), 1);
-      return false;
+      if (after.shapes == before_.shapes) return true;
+      // Where in the part cannot be told.
+      for (std::size_t v = 0; v < faults_.size(); ++v) {
+        if (after.shapes[parts_[v]] != before_.shapes[parts_[v]]) faults_[v] = 1;
+      }
     }
     hold_faults();
     return false;
@@ -275,28 +318,6 @@ class BlockSimplifier {
 
   void mark(const Triangle& triangle) {
     for (const std::uint32_t vertex : triangle) faults_[vertex] = 1;
-  }
-
-  // Parts of which no triangle is left.
-  void mark_lost_parts() {
-    std::vector<std::uint32_t> parts(held_.size());  // of each vertex a smaller one, or itself
-    std::iota(parts.begin(), parts.end(), 0U);
-    const auto part_of = [&](std::uint32_t vertex) {
-      while (parts[vertex] != vertex) vertex = parts[vertex] = parts[parts[vertex]];
-      return vertex;
-    };
-    for (const Triangle& triangle : mesh_.triangles) {
-      for (const std::uint32_t vertex : triangle) {
-        const std::uint32_t a = part_of(triangle[0]);
-        const std::uint32_t b = part_of(vertex);
-        parts[std::max(a, b)] = std::min(a, b);
-      }
-    }
-    Flags is_left(held_.size(), 0);
-    for (const Triangle& triangle : proposed_) is_left[part_of(triangle[0])] = 1;
-    for (std::uint32_t v = 0; v < held_.size(); ++v) {
-      if (is_left[part_of(v)] == 0) faults_[v] = 1;
-    }
   }
 
   // From the original to the proposal.
@@ -350,7 +371,8 @@ class BlockSimplifier {
   SurfaceBlock& block_;
   const double squared_bound_;
   const LocalMesh mesh_;
-  Shape before_;
+  const std::vector<std::uint32_t> parts_;
+  Fans before_;
   Flags exempt_;     // vertices whose fans were no manifold's
   Flags is_flat_;    // of triangles that had no area
   Flags was_alone_;  // of triangles that shared no edge

@@ -102,6 +102,9 @@ std::vector<float> VolumeKeeper::offsets(const WallShape& shape,
                                          std::vector<Lanes>& normals) const {
   constexpr float kLeastRoom = 0.02F;  // of the area
   constexpr float kLeastFacing = 0.3F;
+  // Up to this share of it the area is taken for that at the start. Labels of a few voxels grow
+  // more, and by that area they would shrink by too much in turn.
+  constexpr float kAlike = 0.6F;
   const WallFans& fans = shape.fans();
   std::vector<float> offsets(fans.size());
   std::vector<float> areas(fans.size());
@@ -118,7 +121,8 @@ std::vector<float> VolumeKeeper::offsets(const WallShape& shape,
     }
     normals[fan] = normal;
     areas[fan] = holds_curves_ && shape.is_curve(v) ? 0 : area;
-    const float room = std::max(room_[fan], kLeastRoom * areas[fan]);
+    const float grown = areas_[fan] > 0 ? std::max(1.0F, kAlike * area / areas_[fan]) : 1;
+    const float room = std::max(grown * room_[fan], kLeastRoom * areas[fan]);
     offsets[fan] = room > 0 ? missing / room : 0;
   });
   offsets = diffused(std::move(offsets), Way::kAverage);

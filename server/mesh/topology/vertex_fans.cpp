@@ -16,7 +16,7 @@ struct Neighbor {
 
 }  // namespace
 
-void check_vertex(std::span<const Corner> corners, Topology& topology) {
+std::size_t check_vertex(std::span<const Corner> corners, Topology& topology) {
   std::vector<Neighbor> neighbors;
   for (const Corner& corner : corners) {
     neighbors.push_back({.vertex = corner.next});
@@ -41,12 +41,16 @@ void check_vertex(std::span<const Corner> corners, Topology& topology) {
       if (neighbor.fan == other) neighbor.fan = joined;
     }
   }
-  for (const Neighbor& neighbor : neighbors) {
+  std::size_t fans = 0;
+  for (std::size_t n = 0; n < neighbors.size(); ++n) {
+    const Neighbor& neighbor = neighbors[n];
+    if (neighbor.fan == n) ++fans;
     if (neighbor.next + neighbor.previous > 2 || neighbor.fan != 0) topology.manifold = false;
     if (neighbor.next > 1 || neighbor.previous > 1) topology.oriented = false;
     // Counted at the vertex where the edge begins, and not at its end.
     if (neighbor.next == 1 && neighbor.previous == 0) ++topology.boundary_edges;
   }
+  return fans;
 }
 
 }  // namespace isomesh::mesh

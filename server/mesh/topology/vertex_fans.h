@@ -56,7 +56,7 @@ class FanWalk {
 };
 
 // Adds to `topology` the edges and fans of one vertex, by definition. A boundary edge is counted at
-// the vertex where it begins.
-void check_vertex(std::span<const Corner> corners, Topology& topology);
+// the vertex where it begins. Returns the number of fans.
+std::size_t check_vertex(std::span<const Corner> corners, Topology& topology);
 
 }  // namespace isomesh::mesh

@@ -39,6 +39,17 @@ TEST(Readers, KnowNrrdAndMetaImage) {
 
 TEST(Readers, KnowDicom) { EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), "dicom"); }
 
+// Its preamble may be the header of another format (PS3.10, 7.1).
+TEST(Readers, KnowDicomWhosePreambleIsOfAnImage) {
+  for (const std::string_view image :
+       {std::string_view("II*\0\x08\0\0\0", 8), std::string_view("MM\0*\0\0\0\x08", 8)}) {
+    std::string file(128, '\0');
+    file.replace(0, image.size(), image);
+    EXPECT_EQ(sniffed(file), "tiff");
+    EXPECT_EQ(sniffed(file + "DICM"), "dicom");
+  }
+}
+
 TEST(Readers, KnowDicomWithoutPreambleByItsFirstElements) {
   const DicomObject slice = DicomSeries{}.slice(0);
   for (const std::string_view syntax : {kExplicit, kImplicit}) {

@@ -90,6 +90,28 @@ std::map<std::int64_t, double> owed(const Labels& volume, const SeparateOptions&
   return sums;
 }
 
+// Their extracted surface, of a few triangles, has a fifth to a quarter of it.
+TEST(Stairs, GiveLabelsOfAFewVoxelsTheirVolume) {
+  const std::vector<std::vector<std::array<int, 3>>> shapes = {
+      {{4, 4, 4}},
+      {{5, 4, 4}},
+      {{4, 4, 4}, {5, 4, 4}, {4, 5, 4}},
+      {{4, 4, 4}, {5, 4, 4}, {4, 5, 4}, {5, 5, 4}, {4, 4, 5}, {5, 4, 5}, {4, 5, 5}, {5, 5, 5}}};
+  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+    for (const auto& voxels : shapes) {
+      auto volume = test::noise_between<std::uint8_t>(0, 0, {10, 10, 10}, 1);
+      for (const auto& [x, y, z] : voxels) {
+        volume.samples[static_cast<std::size_t>((z * 10 + y) * 10 + x)] = 1;
+      }
+      SeparateOptions options = joined(1, true);
+      options.scheme = scheme;
+      const double volume_mm3 = without_stairs(volume, options).effect.after.volume_mm3;
+      const auto expected = static_cast<double>(voxels.size());
+      EXPECT_NEAR(std::abs(volume_mm3), expected, 0.1 * expected);
+    }
+  }
+}
+
 TEST(MissingVolume, IsThatOfTheVoxelsLessWhatTheWallsEnclose) {
   for (const Geometry& geometry : {Geometry{}, test::oblique_left_handed_geometry()}) {
     Labels noise = label_noise(4, {15, 12, 13}, 71, geometry);
