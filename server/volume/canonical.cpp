@@ -21,7 +21,7 @@ namespace isomesh::volume {
 namespace {
 
 constexpr int kVersion = 1;
-// Of a larger file, pages may leave the memory before they are written.
+// Pages of a larger file may leave the memory before they are written.
 constexpr std::size_t kMostPopulated = std::size_t{1} << 30;
 
 template <std::size_t Size>

@@ -55,7 +55,9 @@ std::vector<std::uint64_t> count_values(std::span<const Sample> samples, std::in
       for (std::size_t i = 0; i < kTables; ++i) ++tables[i * bins + bin_of(piece[at + i])];
     }
     for (; at < piece.size(); ++at) ++tables[bin_of(piece[at])];
-    for (std::size_t i = 0; i < tables.size(); ++i) counts[i % bins] += tables[i];
+    for (std::size_t i = 0; i < kTables; ++i) {
+      for (std::size_t bin = 0; bin < bins; ++bin) counts[bin] += tables[i * bins + bin];
+    }
   }
   return counts;
 }

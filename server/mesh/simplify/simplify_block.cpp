@@ -33,7 +33,7 @@ struct Shape {
   bool operator==(const Shape&) const = default;
 };
 
-// What is found around the vertices.
+// The topology around the vertices.
 struct Fans {
   std::vector<Shape> shapes;         // of the part that is named as the vertex of this number
   std::vector<std::uint32_t> count;  // of a vertex that is not in the middle of one fan
@@ -307,7 +307,7 @@ class BlockSimplifier {
     }
     if (std::ranges::find(faults_, 1) == faults_.end()) {
       if (after.shapes == before_.shapes) return true;
-      // Where in the part cannot be told.
+      // The place within the part cannot be told.
       for (std::size_t v = 0; v < faults_.size(); ++v) {
         if (after.shapes[parts_[v]] != before_.shapes[parts_[v]]) faults_[v] = 1;
       }

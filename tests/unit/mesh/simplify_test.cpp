@@ -115,13 +115,13 @@ TEST(Simplify, KeepsNoiseOfItsKind) {
   }
 }
 
-// Where a part is lost and a handle is cut, sums over the surface stay what they were.
+// A lost part and a cut handle together leave the sums over the surface as they were.
 TEST(Simplify, KeepsEveryPartOfNoise) {
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix, Scheme::kBcc}) {
-    for (unsigned seed = 0; seed < 6; ++seed) {
+    for (const unsigned seed : {13U, 16U, 21U, 24U, 29U}) {  // each with such a case in a scheme
       SCOPED_TRACE(seed);
       const Mesh original =
-          test::extracted(test::noise_between<std::uint8_t>(0, 255, {11, 10, 9}, seed),
+          test::extracted(test::noise_between<std::uint8_t>(0, 255, {14, 13, 12}, seed),
                           {100.5, scheme, Interpolation::kLinear, true});
       Mesh mesh = test::copy_of(original);
       simplify({.max_error_mm = seed % 2 == 0 ? 1.5 : 3}, {}, mesh);
