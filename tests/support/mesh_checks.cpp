@@ -8,18 +8,10 @@
 #include <set>
 #include <sstream>
 
+#include "tests/support/points.h"
+
 namespace isomesh::test {
 namespace {
-
-Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
-double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-double length(const Point& a) { return std::sqrt(dot(a, a)); }
 
 // Disjoint sets of elements (union-find).
 class Groups {
@@ -328,6 +320,16 @@ Surface naively_smoothed(const Surface& surface, const std::vector<double>& shar
         result.points[v][axis] = static_cast<float>(last[v][axis] + share * (mean - last[v][axis]));
       }
     }
+  }
+  return result;
+}
+
+std::vector<bool> corners_of_flat(const std::vector<Point>& points,
+                                  const std::vector<mesh::Triangle>& triangles) {
+  std::vector<bool> result(points.size());
+  for (const auto& [a, b, c] : triangles) {
+    const Point normal = cross(minus(points[b], points[a]), minus(points[c], points[a]));
+    if (length(normal) < 2e-4) result[a] = result[b] = result[c] = true;
   }
   return result;
 }

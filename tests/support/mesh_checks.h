@@ -79,4 +79,8 @@ std::vector<std::vector<std::uint32_t>> free_neighbors(const Surface& surface);
 // kernels.
 Surface naively_smoothed(const Surface& surface, const std::vector<double>& shares);
 
+// Marks the corners of triangles with an area below 1e-4, which rounding may make zero.
+std::vector<bool> corners_of_flat(const std::vector<Point>& points,
+                                  const std::vector<mesh::Triangle>& triangles);
+
 }  // namespace isomesh::test

@@ -24,7 +24,7 @@ struct PipelineLimits {
 };
 
 // Increment whenever the same volume and parameters would give different bytes than before.
-inline constexpr const char* kMesherVersion = "15";
+inline constexpr const char* kMesherVersion = "16";
 
 // What stands for the mesher in the key of a result: its version, and the name of the back end
 // unless that is the default.

@@ -53,11 +53,13 @@ class LayerExtent {
     const TwoPoints apex = {{origin[0], origin[0]}, {origin[1], origin[1]}, {origin[2], origin[2]}};
     Double2 areas = {};
     Double2 volumes = {};
+    decltype(areas == 0) is_flat = {};
     const auto add_two = [&](const Triangle& first, const Triangle& second) {
       const auto at = TwoPoints::of(corner(first[0]), corner(second[0]));
       const TwoPoints normal = (TwoPoints::of(corner(first[1]), corner(second[1])) - at)
                                    .cross(TwoPoints::of(corner(first[2]), corner(second[2])) - at);
       const Double2 squares = normal.dot(normal);
+      is_flat |= squares == 0;
       areas += Double2{std::sqrt(squares[0]), std::sqrt(squares[1])};
       volumes += (at - apex).dot(normal);
     };
@@ -65,8 +67,11 @@ class LayerExtent {
     for (; t + 1 < triangles.size(); t += 2) add_two(triangles[t], triangles[t + 1]);
     if (t < triangles.size()) {
       const std::uint32_t any = triangles[t][0];
+      const auto second = is_flat[1];
       add_two(triangles[t], {any, any, any});  // a filler without area
+      is_flat[1] = second;
     }
+    has_flat_ |= (is_flat[0] | is_flat[1]) != 0;
     area_ += (areas[0] + areas[1]) / 2;
     volume_ += (volumes[0] + volumes[1]) / 6;
   }
@@ -75,6 +80,9 @@ class LayerExtent {
     low_ = position < low_ ? position : low_;
     high_ = position > high_ ? position : high_;
   }
+
+  // True if a triangle has no area.
+  bool has_flat() const { return has_flat_; }
 
   // Adds the sums of another layer. The caller adds layers in order.
   void add(const LayerExtent& other) {
@@ -93,9 +101,21 @@ class LayerExtent {
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   double area_ = 0;
   double volume_ = 0;
+  bool has_flat_ = false;
   Float4 low_ = {kInfinity, kInfinity, kInfinity, kInfinity};
   Float4 high_ = {-kInfinity, -kInfinity, -kInfinity, -kInfinity};
 };
+
+// True for the triangles that make has_flat() true.
+inline bool has_no_area(const Mesh& mesh, const Triangle& triangle) {
+  const auto corner = [&](std::size_t i) {
+    const Float4 position = load(mesh.positions[triangle[i]]);
+    return TwoPoints::of(position, position);
+  };
+  const TwoPoints at = corner(0);
+  const TwoPoints normal = (corner(1) - at).cross(corner(2) - at);
+  return normal.dot(normal)[0] == 0;
+}
 
 inline void add_triangles(const Mesh& mesh, std::size_t layer, LayerExtent& extent) {
   extent.add_triangles(mesh.triangles_of(layer, layer + 1), mesh.origin,

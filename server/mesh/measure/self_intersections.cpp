@@ -99,12 +99,10 @@ SelfIntersections find_self_intersections(const SurfaceView& surface, const Cont
     pairs.insert(pairs.end(), part.begin(), part.end());
     part = {};
   }
-  const auto numbers_of = [](const IntersectingPair& pair) {
-    return std::pair(pair.first, pair.second);
-  };
-  std::ranges::sort(pairs, {}, numbers_of);
-  const auto repeated = std::ranges::unique(pairs, {}, numbers_of);
-  pairs.erase(repeated.begin(), repeated.end());
+  std::ranges::sort(
+      pairs, {}, [](const IntersectingPair& pair) { return std::pair(pair.first, pair.second); });
+  // Clang 14 cannot compile std::ranges::unique of g++ 12.
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 
   SelfIntersections result;
   result.pairs = pairs.size();

@@ -100,7 +100,8 @@ class Smoother {
         slabs_(cut_slabs(mesh, plan_.slabs)),
         before_(mesh.layers()),
         after_(mesh.layers()),
-        displacements_(mesh.layers()) {
+        displacements_(mesh.layers()),
+        flat_(mesh.layers()) {
     for (const Step& step : options.steps) shares_.push_back(static_cast<float>(step.weight));
   }
 
@@ -132,7 +133,8 @@ class Smoother {
                          .extracted = plan_.rounds > 1 ? extracted_.data() : nullptr,
                          .before = number == 0 ? before_.data() : nullptr,
                          .after = is_last ? after_.data() : nullptr,
-                         .displacements = displacements_.data()};
+                         .displacements = displacements_.data(),
+                         .flat = flat_.data()};
 
     std::vector<LayerCopy> below(slabs_.size());
     std::vector<LayerCopy> above(slabs_.size());
@@ -145,14 +147,103 @@ class Smoother {
     parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
       sweep(round, slabs_[i], below[i], above[i], [&] { report_layer(); });
     });
-    if (is_last)
-      parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { measure_seam(i, after_); });
+    if (!is_last) return;
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { measure_seam(i, after_); });
+    restore_at_seams(below, above);
+    measure_moved();
+    nudge_flat();
+    measure_moved();
   }
 
   // Measures the triangles that name vertices of this slab and of the next.
   void measure_seam(std::size_t slab, std::vector<LayerExtent>& extents) {
     const auto layer = static_cast<std::size_t>(slabs_[slab].end) - 1;
     if (layer + 1 < mesh_.layers()) add_triangles(mesh_, layer, extents[layer]);
+  }
+
+  // Puts back the vertices that sweeps leave listed, and those of seams' triangles without area.
+  void restore_at_seams(const std::vector<LayerCopy>& below, const std::vector<LayerCopy>& above) {
+    for (std::size_t i = 0; i + 1 < slabs_.size(); ++i) {
+      const auto layer = static_cast<std::size_t>(slabs_[i].end) - 1;
+      if (after_[layer].has_flat()) list_flat(mesh_, layer, flat_.data());
+    }
+    const auto restore = [&](std::ptrdiff_t layer, const LayerCopy& copy) {
+      const auto index = static_cast<std::size_t>(layer);
+      const Vec3* extracted = plan_.rounds > 1 ? extracted_.data() + mesh_.layer_vertices[index]
+                                               : copy.layer(mesh_, layer);
+      put_back(extracted, index, mesh_, flat_[index], displacements_[index]);
+    };
+    for (std::size_t i = 0; i + 1 < slabs_.size(); ++i) {
+      restore(slabs_[i].end - 1, below[i + 1]);
+      restore(slabs_[i].end, above[i]);
+    }
+  }
+
+  // Measures again what vertices name that were moved after their layer was measured.
+  void measure_moved() {
+    parallel_for(quiet_, mesh_.layers(), [&](std::size_t layer) {
+      const bool is_last = layer + 1 == mesh_.layers();
+      if (!flat_[layer].were_moved && (is_last || !flat_[layer + 1].were_moved)) return;
+      after_[layer] = {};
+      for (auto v = mesh_.layer_vertices[layer]; v < mesh_.layer_vertices[layer + 1]; ++v) {
+        after_[layer].add_vertex(load(mesh_.positions[v]));
+      }
+      add_triangles(mesh_, layer, after_[layer]);
+    });
+    for (FlatVertices& flat : flat_) flat.were_moved = false;
+  }
+
+  // Beside slivers, which samples that equal the iso-value have around them, one corner that is put
+  // back can come to lie in line with two others that are not.
+  void nudge_flat() {
+    for (std::size_t layer = 0; layer < mesh_.layers(); ++layer) {
+      if (!after_[layer].has_flat()) continue;
+      for (const Triangle& triangle : mesh_.triangles_of(layer, layer + 1)) {
+        if (!has_no_area(mesh_, triangle)) continue;
+        for (const std::uint32_t vertex : triangle) {
+          const std::size_t of_vertex =
+              vertex < mesh_.layer_vertices[layer + 1] ? layer : layer + 1;
+          if (!nudge(vertex, of_vertex)) continue;
+          flat_[of_vertex].were_moved = true;
+          break;
+        }
+      }
+    }
+  }
+
+  // Moves the vertex by about the rounding of its position, such that its triangles have areas.
+  // Returns false if there is no such move, or if the vertex is not free.
+  bool nudge(std::uint32_t vertex, std::size_t layer) {
+    std::vector<Triangle> around;
+    std::int64_t next_minus_previous = 0;  // not 0 on the boundary of a manifold
+    for (const Triangle& triangle :
+         mesh_.triangles_of(layer - std::min<std::size_t>(layer, 1), layer + 1)) {
+      const std::size_t corner = std::ranges::find(triangle, vertex) - triangle.begin();
+      if (corner == triangle.size()) continue;
+      around.push_back(triangle);
+      next_minus_previous += std::int64_t{triangle[(corner + 1) % 3]} - triangle[(corner + 2) % 3];
+    }
+    if (next_minus_previous != 0 || mesh_.is_on_border(vertex) || mesh_.is_on_line(vertex)) {
+      return false;
+    }
+    float largest = 0;
+    for (const Triangle& triangle : around) {
+      for (const std::uint32_t corner : triangle) {
+        for (const float at : mesh_.positions[corner]) largest = std::max(largest, std::abs(at));
+      }
+    }
+    const Vec3 position = mesh_.positions[vertex];
+    for (const float step : {largest * 0x1p-22F, -largest * 0x1p-22F}) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        mesh_.positions[vertex][axis] = position[axis] + step;
+        if (std::ranges::none_of(around,
+                                 [&](const Triangle& t) { return has_no_area(mesh_, t); })) {
+          return true;
+        }
+        mesh_.positions[vertex] = position;
+      }
+    }
+    return false;
   }
 
   void report_layer() {
@@ -186,6 +277,7 @@ class Smoother {
   std::vector<LayerExtent> before_;
   std::vector<LayerExtent> after_;
   std::vector<LayerDisplacement> displacements_;
+  std::vector<FlatVertices> flat_;
   std::atomic<std::size_t> layers_done_ = 0;
 };
 

@@ -55,11 +55,12 @@ struct SmoothingEffect {
 
 // Smooths the mesh in place: an oriented manifold, or the walls between labels. Vertices on the
 // boundary stay; those of a closed surface on the border of the volume, too. So caps stay flat, and
-// closing a surface does not change the smoothing of its rest. Of walls (separate.h), a vertex on a
-// junction curve moves to the mean of its two neighbours along the curve, and the ends and
-// junctions of curves stay. So two labels still share their walls; enclosed volumes of
-// SmoothingEffect mean nothing then. The result does not depend on the number of threads. Throws
-// Error kCancelled; the positions are indeterminate then.
+// closing a surface does not change the smoothing of its rest. Where means leave a triangle without
+// area, its corners stay: components of a sample or two would shrink to a point. Of walls
+// (separate.h), a vertex on a junction curve moves to the mean of its two neighbours along the
+// curve, and the ends and junctions of curves stay. So two labels still share their walls; enclosed
+// volumes of SmoothingEffect mean nothing then. The result does not depend on the number of
+// threads. Throws Error kCancelled; the positions are indeterminate then.
 SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh);
 
 // An upper bound of the memory that `smooth` takes beside the mesh, in bytes, with the present

@@ -17,6 +17,8 @@ namespace {
 constexpr std::size_t kRingLayers = 3;
 // The layers whose triangles are being listed.
 constexpr std::size_t kLayersOfFans = 2;
+// The layers that a triangle names.
+constexpr std::size_t kLayersOfTriangles = 2;
 
 // The place of a position in every ring, in units of 8 bytes, which processors scale by themselves.
 using Place = std::uint32_t;
@@ -120,13 +122,6 @@ float length_of(Float4 lanes) {
   return std::sqrt(squares[0] + squares[1] + squares[2]);
 }
 
-double distance(const Vec3& a, const Vec3& b) {
-  const double x = double{a[0]} - b[0];
-  const double y = double{a[1]} - b[1];
-  const double z = double{a[2]} - b[2];
-  return std::sqrt(x * x + y * y + z * z);
-}
-
 // The point between `origin` and `position` at the distance `limit` from the origin. Each
 // coordinate is rounded towards the origin, so rounding never makes it farther.
 Float4 pulled_back(const Vec3& origin, Float4 position, double limit) {
@@ -168,6 +163,7 @@ class Sweep {
       rings_.back()[kRingLayers * width_] = Float4{};  // for places of no neighbour
     }
     moved_.resize_for_overwrite(width_);
+    if (round_.after != nullptr) kept_.resize_for_overwrite(kLayersOfTriangles * width_);
     links_.resize((steps_ + 1) * width_, Neighbors(place_of_zero()));
     fans_.resize(kLayersOfFans * width_);
     more_.resize(steps_ + 1);
@@ -206,6 +202,9 @@ class Sweep {
   Neighbors* links(std::ptrdiff_t layer) {
     return links_.data() + turn(layer, steps_ + 1) * width_;
   }
+  Vec3* kept(std::ptrdiff_t layer) {
+    return kept_.data() + turn(layer, kLayersOfTriangles) * width_;
+  }
   Fan* fans(std::ptrdiff_t layer) { return fans_.data() + turn(layer, kLayersOfFans) * width_; }
   std::vector<MoreNeighbor>& more_neighbors(std::ptrdiff_t layer) {
     return more_[turn(layer, steps_ + 1)];
@@ -225,10 +224,8 @@ class Sweep {
 
   // The layer's positions before the round; valid for the slab's own layers until their last step.
   const Vec3* unmoved(std::ptrdiff_t layer) const {
-    const std::uint64_t first = round_.first_vertex(layer);
-    if (slab_.contains(layer)) return round_.mesh.positions.data() + first;
-    const LayerCopy& copy = layer < slab_.begin ? below_ : above_;
-    return copy.positions.data() + (first - round_.first_vertex(copy.layers.begin));
+    if (slab_.contains(layer)) return round_.mesh.positions.data() + round_.first_vertex(layer);
+    return (layer < slab_.begin ? below_ : above_).layer(round_.mesh, layer);
   }
 
   const Vec3* extracted(std::ptrdiff_t layer) const {
@@ -388,20 +385,31 @@ class Sweep {
     Vec3* to = round_.mesh.positions.data() + round_.first_vertex(layer);
     LayerDisplacement displacement;
     LayerExtent* extent = round_.after == nullptr ? nullptr : &round_.after[layer];
+    if (extent != nullptr) std::copy_n(origin, count, kept(layer));
     for (std::size_t v = 0; v < count; ++v) {
       const Float4 moved = moved_[v];
       const Vec3 position = {moved[0], moved[1], moved[2]};
       if (extent != nullptr) {
         extent->add_vertex(moved);
-        const double way = distance(position, origin[v]);
-        displacement.sum += way;
-        displacement.largest = std::max(displacement.largest, way);
+        displacement.add(origin[v], position);
       }
       to[v] = position;
     }
     if (extent == nullptr) return;
     round_.displacements[layer] = displacement;
     measure(layer, round_.after);
+    if (slab_.contains(layer - 1)) restore(layer - 1);
+    if (layer + 1 == round_.layers()) restore(layer);
+  }
+
+  // Undoes the moves that left triangles without area, once all triangles of the layer are known.
+  void restore(std::ptrdiff_t layer) {
+    const auto index = static_cast<std::size_t>(layer);
+    if (round_.after[index].has_flat()) list_flat(round_.mesh, index, round_.flat);
+    const bool is_first = layer == slab_.begin && layer > 0;
+    const bool is_last = layer + 1 == slab_.end && slab_.end < round_.layers();
+    if (is_first || is_last) return;  // another slab's triangles name its vertices, too
+    put_back(kept(layer), index, round_.mesh, round_.flat[index], round_.displacements[index]);
   }
 
   const Round& round_;
@@ -413,6 +421,7 @@ class Sweep {
   std::size_t width_ = 0;              // the vertices of the largest layer
   std::vector<Buffer<Float4>> rings_;  // positions before each step
   Buffer<Float4> moved_;               // the positions of one layer after the last step
+  Buffer<Vec3> kept_;                  // extracted positions of layers that have been overwritten
   std::vector<Neighbors> links_;
   std::vector<Fan> fans_;
   std::vector<std::vector<MoreNeighbor>> more_;  // in the order of the vertices
@@ -420,6 +429,39 @@ class Sweep {
 };
 
 }  // namespace
+
+void LayerDisplacement::add(const Vec3& extracted, const Vec3& moved) {
+  const double x = double{moved[0]} - extracted[0];
+  const double y = double{moved[1]} - extracted[1];
+  const double z = double{moved[2]} - extracted[2];
+  const double way = std::sqrt(x * x + y * y + z * z);
+  sum += way;
+  largest = std::max(largest, way);
+}
+
+void list_flat(const Mesh& mesh, std::size_t layer, FlatVertices* flat) {
+  for (const Triangle& triangle : mesh.triangles_of(layer, layer + 1)) {
+    if (!has_no_area(mesh, triangle)) continue;
+    for (const std::uint32_t vertex : triangle) {
+      const bool is_next = vertex >= mesh.layer_vertices[layer + 1];
+      flat[is_next ? layer + 1 : layer].vertices.push_back(vertex);
+    }
+  }
+}
+
+void put_back(const Vec3* extracted, std::size_t layer, Mesh& mesh, FlatVertices& flat,
+              LayerDisplacement& displacement) {
+  if (flat.vertices.empty()) return;
+  const std::uint64_t first = mesh.layer_vertices[layer];
+  for (const std::uint32_t vertex : flat.vertices) {
+    mesh.positions[vertex] = extracted[vertex - first];
+  }
+  flat = {.vertices = {}, .were_moved = true};
+  displacement = {};
+  for (std::uint64_t vertex = first; vertex < mesh.layer_vertices[layer + 1]; ++vertex) {
+    displacement.add(extracted[vertex - first], mesh.positions[vertex]);
+  }
+}
 
 LayerRange with_halo(const Round& round, const LayerRange& slab, std::size_t steps) {
   const auto halo = static_cast<std::ptrdiff_t>(steps);
@@ -434,7 +476,7 @@ void sweep(const Round& round, const LayerRange& slab, const LayerCopy& below,
 
 std::uint64_t sweep_bytes_per_vertex(std::size_t steps) {
   return (kRingLayers * steps + 1) * sizeof(Float4) + (steps + 1) * sizeof(Neighbors) +
-         kLayersOfFans * sizeof(Fan);
+         kLayersOfFans * sizeof(Fan) + kLayersOfTriangles * sizeof(Vec3);
 }
 
 }  // namespace isomesh::mesh

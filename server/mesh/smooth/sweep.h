@@ -25,13 +25,36 @@ struct LayerRange {
 struct LayerCopy {
   LayerRange layers;
   std::vector<Vec3> positions;
+
+  const Vec3* layer(const Mesh& mesh, std::ptrdiff_t layer) const {
+    return positions.data() + (mesh.layer_vertices[layer] - mesh.layer_vertices[layers.begin]);
+  }
 };
 
 // Sums over one layer's vertices.
 struct LayerDisplacement {
   double sum = 0;
   double largest = 0;
+
+  void add(const Vec3& extracted, const Vec3& moved);
 };
+
+// The vertices of a layer that go back to where they were extracted, because a triangle of theirs
+// has no area after the last step: means put all corners of a component of a sample or two on one
+// point.
+struct FlatVertices {
+  std::vector<std::uint32_t> vertices;  // some several times
+  bool were_moved = false;              // after the layer was measured
+};
+
+// Adds the corners of triangles without area between the layer and the next. The caller lists those
+// on both sides of a layer before it puts any back.
+void list_flat(const Mesh& mesh, std::size_t layer, FlatVertices* flat);
+
+// Puts the layer's listed vertices back, and sums the displacements anew if there are any.
+// `extracted` holds its extracted positions.
+void put_back(const Vec3* extracted, std::size_t layer, Mesh& mesh, FlatVertices& flat,
+              LayerDisplacement& displacement);
 
 // The shared data of all slabs of a round.
 struct Round {
@@ -47,6 +70,8 @@ struct Round {
   LayerExtent* before;
   LayerExtent* after;
   LayerDisplacement* displacements;
+  // By layer: vertices of triangles that the last round leaves without area.
+  FlatVertices* flat;
 
   std::ptrdiff_t layers() const { return static_cast<std::ptrdiff_t>(mesh.layers()); }
   std::size_t steps() const { return shares.size(); }
@@ -58,8 +83,9 @@ LayerRange with_halo(const Round& round, const LayerRange& slab, std::size_t ste
 
 // Moves the vertices of the slab's layers by all steps of the round. `below` and `above` are copies
 // of the other layers of with_halo(round, slab, steps), which other slabs write meanwhile.
-// `on_layer` is called after each of the slab's layers, and may throw. Thread safe for different
-// slabs.
+// `on_layer` is called after each of the slab's layers, and may throw. In the last round, vertices
+// of triangles without area are put back, except those of layers beside another slab, which are
+// listed. Thread safe for different slabs.
 void sweep(const Round& round, const LayerRange& slab, const LayerCopy& below,
            const LayerCopy& above, const std::function<void()>& on_layer);
 
