@@ -132,6 +132,26 @@ bool BorderPlacement<T>::has_edge(const Sample& from, const Offset& offset) cons
   return std::ranges::min(offset) >= 0 || std::ranges::max(offset) <= 0;
 }
 
+// The least share of the diagonals from `inside`, in squares of the box's faces beside the edge to
+// `neighbor`, at which the surface crosses them; 1 without crossings.
+template <class T>
+double BorderPlacement<T>::nearest_diagonal_share(const Sample& inside,
+                                                  const Sample& neighbor) const {
+  double least = 1;
+  for (std::size_t face = 0; face < 3; ++face) {
+    if (inside[face] != neighbor[face] || outward(inside, face) == 0) continue;
+    const std::size_t along = inside[0] != neighbor[0] ? 0 : inside[1] != neighbor[1] ? 1 : 2;
+    const std::size_t across = 3 - face - along;
+    for (const std::int64_t side : {-1, 1}) {
+      Sample opposite = neighbor;
+      opposite[across] += side;
+      if (is_phantom(opposite) || is_inside(opposite)) continue;
+      least = std::min(least, contour_.share(value(inside), value(opposite)));
+    }
+  }
+  return least;
+}
+
 // The edge from `inside` to a phantom lies in the face of the box across `axis`. Its vertex would
 // coincide with those of the other edges from `inside` to phantoms beyond other faces (border.h).
 // One vertex stays on the face; this decides if this vertex moves off it. The one that stays is
@@ -166,6 +186,7 @@ typename BorderPlacement<T>::Point BorderPlacement<T>::cap_point(const Sample& i
   double share = 0;
   if (nearest != inside) {
     share = is_inside(nearest) ? 0.5 : contour_.share(value(inside), value(nearest)) / 2;
+    if (five_) share = std::min(share, nearest_diagonal_share(inside, nearest));
   }
   Offset to_phantom;
   Point point;
@@ -177,7 +198,8 @@ typename BorderPlacement<T>::Point BorderPlacement<T>::cap_point(const Sample& i
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::int64_t out = outward(inside, axis);
     if (out == 0 || to_phantom[axis] != 0 || !gives_way(inside, to_phantom, axis)) continue;
-    const double way = all_around_is_inside(inside) ? kWayWithinCap : least_way_;
+    const bool is_within = all_around_is_inside(inside) || all_around_is_inside(nearest);
+    const double way = is_within ? kWayWithinCap : least_way_;
     point[axis] -= static_cast<double>(out) * way;
   }
   return point;

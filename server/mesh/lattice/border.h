@@ -9,10 +9,13 @@
 //    triangulations of the border, and every triangle of it has an area;
 //  * half-way to the surface where `b` is outside, so that cap and surface meet in the surface's
 //    vertices alone.
-// At the edges and corners of the volume's box several vertices would coincide: those to the
-// phantoms beyond one face, beyond the other and beyond both. One stays, so the box is exact. The
-// others give way along the faces: by a fifth of the spacing if all around is inside, and by the
-// least that single precision resolves where the surface may be near.
+// With five tetrahedra, a cap's triangle has one vertex on each of two edges from `a` and may have
+// one on the diagonal between them, where the surface crosses it. So that the triangle does not
+// turn over, its vertices on the edges are no farther from `a`, as shares. At the edges and corners
+// of the volume's box several vertices would coincide: those to the phantoms beyond one face,
+// beyond the other and beyond both. One stays, so the box is exact. The others give way along the
+// faces: by a fifth of the spacing if all around is inside, and by the least that single precision
+// resolves where the surface may be near.
 #pragma once
 
 #include <array>
@@ -55,6 +58,7 @@ class BorderPlacement {
   std::int64_t outward(const Sample& sample, std::size_t axis) const;
   bool share_a_face(const Sample& a, const Sample& b) const;
   bool all_around_is_inside(const Sample& sample) const;
+  double nearest_diagonal_share(const Sample& inside, const Sample& neighbor) const;
   bool has_edge(const Sample& from, const Offset& offset) const;
   bool gives_way(const Sample& inside, const Offset& to_phantom, std::size_t axis) const;
   Point cap_point(const Sample& inside, const Sample& phantom) const;

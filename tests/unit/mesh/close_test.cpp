@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/extract/extract.h"
+#include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/points.h"
 #include "tests/support/shapes.h"
@@ -173,6 +174,21 @@ TEST(CloseNoise, WithSamplesThatEqualTheIsoValueIsTheReferencesSurface) {
       expect_closed_reference_surfaces(test::noise<std::uint8_t>({0, 1, 2}, dims, seed), 1);
       expect_closed_reference_surfaces(
           test::noise<float>({0, 1 - 0x1p-24F, 1, 1 + 0x1p-23F, 1 + 1e-5F, 2}, dims, seed), 1);
+    }
+  }
+}
+
+TEST(CloseNoise, DoesNotIntersectItself) {
+  for (const auto& [values, iso] :
+       {std::pair(std::vector<std::int16_t>{-700, -20, -3, 1, 40, 900}, 0.5),
+        std::pair(std::vector<std::int16_t>{0, 3, 4, 5, 6, 7}, 2.0),
+        std::pair(std::vector<std::int16_t>{0, 1, 2}, 1.0)}) {
+    const auto volume = test::noise(values, {20, 21, 22}, 5);
+    std::vector<ExtractOptions> all = all_options(iso, true);
+    all.push_back({iso, Scheme::kBcc, Interpolation::kLinear, true});
+    for (const ExtractOptions& options : all) {
+      const Mesh mesh = test::extracted(volume, options);
+      EXPECT_EQ(find_self_intersections(mesh, {}).pairs, 0U) << describe(volume.dims, options);
     }
   }
 }
