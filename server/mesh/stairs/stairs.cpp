@@ -28,6 +28,8 @@ constexpr double kCurveTime = 30;
 constexpr int kCurveDegree = 10;
 // No coordinate moves farther from the start, in samples: what is owed may have no other place.
 constexpr float kMostSamples = 1.5F;
+// Only held vertices come nearer to the border of the volume or to caps than this, in samples.
+constexpr float kBorderRoom = 0.1F;
 // More uneven than this a lattice leaves nothing to be evened out.
 constexpr double kMostRatio = 5;
 
@@ -60,12 +62,16 @@ class Remover {
     return diffusion_series(whole, time * ratio_);
   }
 
-  // Moves the vertex back until each coordinate is within so many samples of the start.
+  // Moves the vertex back until each coordinate is within so many samples of the start, and within
+  // the volume.
   void hold(std::size_t v, float samples) {
     for (int axis = 0; axis < 3; ++axis) {
       const float from = shape_.start()[v][axis];
-      const float most = samples * std::abs(shape_.spacing()[axis]);
-      shape_.at[v][axis] = std::clamp(shape_.at[v][axis], from - most, from + most);
+      const float sample = std::abs(shape_.spacing()[axis]);
+      const float low = std::min(from, shape_.low()[axis] + kBorderRoom * sample);
+      const float high = std::max(from, shape_.high()[axis] - kBorderRoom * sample);
+      shape_.at[v][axis] = std::clamp(shape_.at[v][axis], std::max(low, from - samples * sample),
+                                      std::min(high, from + samples * sample));
     }
   }
 

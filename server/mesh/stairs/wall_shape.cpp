@@ -32,6 +32,13 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
   flags_.resize(mesh.positions.size());
   // Caps lie half a step beyond the outermost samples, the ends of an open wall in them.
   const double beyond = closed_ ? 0.5 : 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float first = static_cast<float>(-beyond) * spacing_[axis];
+    const float last =
+        static_cast<float>(samples[static_cast<std::size_t>(axis)] - 1 + beyond) * spacing_[axis];
+    low_[axis] = std::min(first, last);
+    high_[axis] = std::max(first, last);
+  }
   for_runs(context, mesh.positions.size(), [&](std::size_t begin, std::size_t end) {
     constexpr double kNear = 1e-3;  // as single precision leaves it, far from the origin
     for (std::size_t v = begin; v < end; ++v) {

@@ -61,6 +61,9 @@ class WallShape {
   Lanes spacing() const { return spacing_; }
   float largest_spacing() const { return largest_spacing_; }
   float smallest_spacing() const { return smallest_spacing_; }
+  // Opposite corners of the box of the outermost samples or, if closed, of the caps.
+  Lanes low() const { return low_; }
+  Lanes high() const { return high_; }
 
   // True where three or more walls meet, or one ends, or one leaves a cap.
   bool is_curve(std::size_t v) const { return (flags_[v] & kCurve) != 0; }
@@ -133,6 +136,8 @@ class WallShape {
   Lanes spacing_ = {};
   float largest_spacing_ = 0;
   float smallest_spacing_ = 0;
+  Lanes low_ = {};
+  Lanes high_ = {};
   std::vector<Lanes> start_;
   std::vector<std::uint8_t> flags_;
   WallFans fans_;

@@ -283,6 +283,23 @@ TEST(Stairs, LeaveCapsFlatAndEndsInTheBorder) {
   }
 }
 
+TEST(Stairs, LeaveWallsWithinTheVolume) {
+  for (const Labels& volume :
+       {label_cells(7, {20, 17, 23}, 15, 5), label_noise(3, {20, 17, 23}, 3)}) {
+    for (const bool close : {false, true}) {
+      const double beyond = close ? 0.5 : 0;
+      const Smoothed smoothed = without_stairs(volume, joined(7, close));
+      for (const Vec3& position : smoothed.surface.mesh.positions) {
+        const std::array<float, 3> last = {19, 16, 22};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          ASSERT_GE(position[axis], -beyond);
+          ASSERT_LE(position[axis], last[axis] + beyond);
+        }
+      }
+    }
+  }
+}
+
 TEST(Stairs, AreTheSameToTheByteOnAnyNumberOfThreads) {
   const Labels volume = label_cells(12, {30, 33, 50}, 14, 9);
   const Smoothed first = without_stairs(volume, joined(12, true));
