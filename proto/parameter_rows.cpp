@@ -228,8 +228,9 @@ constinit const Parameter kPasses = {
     .help = "Number of smoothing passes.",
     .more =
         "Vertices on the surface's boundary stay where they are. For labels "
-        "the default is 10. `labels` smoothes once, whatever their number; "
-        "0 leaves the surface as it is extracted.",
+        "the default is 10. `labels` smoothes once, whatever their number, and moves "
+        "the boundary within the volume's border; 0 leaves the surface as it is "
+        "extracted.",
     .minimum = 0,
     .maximum = 1000,
     .by_labels = "10"};

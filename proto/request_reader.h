@@ -109,8 +109,10 @@ class RequestReader {
 
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
                    Scheme& value) {
-    const auto known =
-        from_string<Scheme>(json.is_string() ? json.get<std::string>() : json.dump());
+    std::string name = json.is_string() ? json.get<std::string>() : json.dump();
+    // A number with a point is the same number.
+    if (json.is_number() && name.ends_with(".0")) name.resize(name.size() - 2);
+    const auto known = from_string<Scheme>(name);
     if (!known || is_number(*known) == json.is_string())
       return add(path, "must be " + names_of<Scheme>());
     value = *known;

@@ -113,6 +113,13 @@ class Flaws {
     }
   }
 
+  // The member that is being parsed.
+  std::string path() const {
+    std::string path;
+    for (const Open& each : open_) path += (path.empty() ? "" : ".") + printable(each.name);
+    return path;
+  }
+
   const std::vector<std::string>& repeated() const { return repeated_; }
   const std::vector<std::string>& halves() const { return halves_; }
 
@@ -132,12 +139,6 @@ class Flaws {
     if (!open_.back().names.insert(name).second) repeated_.push_back(name);
     open_.back().name = name;
     see_text(name);
-  }
-
-  std::string path() const {
-    std::string path;
-    for (const Open& each : open_) path += (path.empty() ? "" : ".") + printable(each.name);
-    return path;
   }
 
   std::vector<Open> open_;
@@ -327,13 +328,20 @@ std::string text_of(const Json& value) {
 Json request_body(std::string_view body, RequestReader& reader) {
   Flaws flaws;
   const std::string text = without_half_pairs(body);
-  Json json = Json::parse(
-      text,
-      [&](int, Json::parse_event_t event, const Json& parsed) {
-        flaws.see(event, parsed);
-        return true;
-      },
-      false);
+  Json json;
+  try {
+    json = Json::parse(text, [&](int, Json::parse_event_t event, const Json& parsed) {
+      flaws.see(event, parsed);
+      return true;
+    });
+  } catch (const Json::out_of_range&) {
+    if (const std::string path = flaws.path(); !path.empty()) {
+      reader.add(path, "is a number that is too large");
+    }
+    reader.throw_if_any();
+  } catch (const Json::parse_error&) {
+    // Answered below, as what is JSON but no object.
+  }
   if (!json.is_object()) {
     throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
   }

@@ -429,6 +429,24 @@ TEST(JobBody, RefusesBrokenEscapes) {
   }
 }
 
+TEST(JobBody, NamesANumberThatIsTooLarge) {
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1e400})"), ElementsAre("iso"));
+  EXPECT_THAT(faults_in(R"({"volume": "a", "labels": "all", "label_values": {"1": [-1e999]}})"),
+              ElementsAre("label_values.1"));
+  const auto error = thrown_by([] { parse_job_parameters("[1e400]"); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(error->what(), HasSubstr("one JSON object"));
+}
+
+TEST(JobBody, TakesAWholeNumberWithAPoint) {
+  const JobParameters parameters =
+      parse_job_parameters(R"({"volume": "a", "iso": 1, "scheme": 5.0, "passes": 3.0})");
+  EXPECT_EQ(parameters.scheme, Scheme::kFive);
+  EXPECT_EQ(parameters.passes, 3);
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "scheme": 5.5})"), ElementsAre("scheme"));
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "scheme": "5.0"})"), ElementsAre("scheme"));
+}
+
 TEST(JobBody, RefusesALabelThatIsSpelledTwice) {
   EXPECT_THAT(
       faults_in(R"({"volume": "a", "labels": "all", "label_names": {"1": "b", "01": "c"}})"),

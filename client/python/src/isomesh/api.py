@@ -1027,8 +1027,8 @@ class JobOptions(TypedDict, total=False):
 
     passes
         Number of smoothing passes. Vertices on the surface's boundary stay where they are. For
-        labels the default is 10. labels smoothes once, whatever their number; 0 leaves the
-        surface as it is extracted.
+        labels the default is 10. labels smoothes once, whatever their number, and moves the
+        boundary within the volume's border; 0 leaves the surface as it is extracted.
 
     smoothing
         The smoothing method. laplacian: each pass moves every vertex towards the mean of its
