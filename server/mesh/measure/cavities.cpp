@@ -48,7 +48,7 @@ std::vector<Shell> shells_of(const Components& components, const Mesh& mesh) {
   return shells;
 }
 
-// A point of the triangle that almost certainly lies in no lattice plane of the vertices.
+// A point of the triangle, seldom in line with vertices.
 Point point_in(const Mesh& mesh, const Triangle& triangle) {
   constexpr std::array<double, 3> kWeights = {0.2718281828, 0.3141592654, 0.4140125518};
   Point point = {0, 0, 0};
@@ -63,6 +63,27 @@ Point point_in(const Mesh& mesh, const Triangle& triangle) {
 // Twice the area of the triangle (a, b, point) in the yz-plane.
 double area_at(const Point& a, const Point& b, const Point& point) {
   return (b[1] - a[1]) * (point[2] - a[2]) - (b[2] - a[2]) * (point[1] - a[1]);
+}
+
+// 1 if the edge passes the point at a larger y while z increases, -1 while z decreases. A point in
+// the plane of many triangles is in line with their edges. Vertices with its own z count as below
+// it, and edges through it as at a smaller y. So it is in one of the triangles beside an edge.
+int passes(const Point& from, const Point& to, const Point& point) {
+  if ((from[2] > point[2]) == (to[2] > point[2])) return 0;
+  const bool is_rising = to[2] > point[2];
+  const Point& low = is_rising ? from : to;
+  const Point& high = is_rising ? to : from;
+  if (!(area_at(low, high, point) > 0)) return 0;
+  return is_rising ? 1 : -1;
+}
+
+// The triangle's x where the ray in +x from the point meets it.
+double x_at(const Point& a, const Point& b, const Point& c, const Point& point) {
+  const double at_a = area_at(b, c, point);
+  const double at_b = area_at(c, a, point);
+  const double at_c = area_at(a, b, point);
+  const double all = at_a + at_b + at_c;
+  return all == 0 ? a[0] : (at_a * a[0] + at_b * b[0] + at_c * c[0]) / all;
 }
 
 // How often the ray from the point in +x leaves the walls minus how often it enters them; 0 if the
@@ -80,13 +101,8 @@ int crossings(const Point& point, const TriangleGrid& walls, double end_x,
     const Point a = to_point(walls.surface().positions[triangle[0]]);
     const Point b = to_point(walls.surface().positions[triangle[1]]);
     const Point c = to_point(walls.surface().positions[triangle[2]]);
-    const double at_a = area_at(b, c, point);
-    const double at_b = area_at(c, a, point);
-    const double at_c = area_at(a, b, point);
-    const bool is_hit = (at_a > 0 && at_b > 0 && at_c > 0) || (at_a < 0 && at_b < 0 && at_c < 0);
-    const double all = at_a + at_b + at_c;
-    if (is_hit && (at_a * a[0] + at_b * b[0] + at_c * c[0]) / all > point[0])
-      sum += all > 0 ? 1 : -1;
+    const int turns = passes(a, b, point) + passes(b, c, point) + passes(c, a, point);
+    if (turns != 0 && x_at(a, b, c, point) > point[0]) sum += turns;
   }
   return sum;
 }

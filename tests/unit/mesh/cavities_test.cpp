@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -93,23 +94,59 @@ std::vector<bool> open_air(const test::SampleVolume<float>& volume) {
   return is_open;
 }
 
+// Compares the mesh without cavities with that of the volume whose cavities are filled. Returns the
+// components that were left out.
+std::uint64_t expect_filled(test::SampleVolume<float> volume) {
+  Mesh mesh = extracted(volume, true);
+  const Dropped dropped = fill_cavities({}, mesh);
+  const std::vector<bool> is_open = open_air(volume);
+  for (std::size_t n = 0; n < is_open.size(); ++n) {
+    if (!is_open[n]) volume.samples[n] = std::max(volume.samples[n], 0.0F);
+  }
+  const Mesh solid = extracted(volume, true);
+  EXPECT_EQ(mesh.triangles.size(), solid.triangles.size());
+  EXPECT_EQ(measure_topology(mesh, {}), measure_topology(solid, {}));
+  EXPECT_NEAR(measure_extent(mesh, {}).volume_mm3, measure_extent(solid, {}).volume_mm3,
+              1e-3 * measure_extent(solid, {}).volume_mm3);
+  EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
+  return dropped.components;
+}
+
 TEST(Cavities, AreWhatIsOutsideAndNotJoinedToTheBorder) {
   for (const double outside : {0.2, 0.3, 0.4}) {
-    auto volume = test::noise_between<float>(-outside, 1 - outside, {23, 25, 27}, 11);
-    Mesh mesh = extracted(volume, true);
-    const Dropped dropped = fill_cavities({}, mesh);
-    EXPECT_GT(dropped.components, 3U);
-    const std::vector<bool> is_open = open_air(volume);
-    for (std::size_t n = 0; n < is_open.size(); ++n) {
-      if (!is_open[n]) volume.samples[n] = std::max(volume.samples[n], 0.0F);
-    }
-    const Mesh solid = extracted(volume, true);
-    EXPECT_EQ(mesh.triangles.size(), solid.triangles.size());
-    EXPECT_EQ(measure_topology(mesh, {}), measure_topology(solid, {}));
-    EXPECT_NEAR(measure_extent(mesh, {}).volume_mm3, measure_extent(solid, {}).volume_mm3,
-                1e-3 * measure_extent(solid, {}).volume_mm3);
-    EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
+    EXPECT_GT(expect_filled(test::noise_between<float>(-outside, 1 - outside, {23, 25, 27}, 11)),
+              3U);
   }
+}
+
+// Boxes of samples that are inside and outside by turns: their vertices lie in few planes, in line
+// with those of other components.
+TEST(Cavities, OfMasksAreWhatIsOutsideAndNotJoinedToTheBorder) {
+  std::mt19937 random(7);
+  std::uint64_t dropped = 0;
+  for (int volumes = 0; volumes < 60; ++volumes) {
+    SCOPED_TRACE(volumes);
+    auto volume = test::constant<float>(-1, {16, 16, 16});
+    for (std::uint32_t box = 0; box < 6; ++box) {
+      std::array<std::uint32_t, 3> low;
+      std::array<std::uint32_t, 3> high;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const bool is_nested = box < 3;
+        const std::uint32_t size = is_nested ? 13 - 4 * box - random() % 3 : 1 + random() % 3;
+        low[axis] = is_nested ? 1 + 2 * box : 1 + random() % (15 - size);
+        high[axis] = low[axis] + size;
+      }
+      for (std::uint32_t z = low[2]; z < high[2]; ++z) {
+        for (std::uint32_t y = low[1]; y < high[1]; ++y) {
+          for (std::uint32_t x = low[0]; x < high[0]; ++x) {
+            volume.at(x, y, z) = box % 2 == 0 ? 1 : -1;
+          }
+        }
+      }
+    }
+    dropped += expect_filled(volume);
+  }
+  EXPECT_GT(dropped, 30U);
 }
 
 TEST(Cavities, AreTheSameOnAnyNumberOfThreads) {
