@@ -9,6 +9,8 @@
 
 #include "proto/samples.h"
 #include "server/mesh/bound/chunks.h"
+#include "server/mesh/lattice/border.h"
+#include "server/mesh/lattice/placement.h"
 #include "server/mesh/lattice/tetrahedra.h"
 #include "server/mesh/parallel.h"
 
@@ -157,6 +159,9 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
     const auto number = static_cast<std::size_t>(at.x + inner.x * (at.y + inner.y * at.z));
     return static_cast<double>(lattice.samples[number]) - options.iso;
   };
+  // Vertices keep away from samples.
+  const double nearest = Placement::nearest_share(lattice.dims, lattice.to_space);
+  const double kept = field.margin == 0 ? nearest : nearest_on_border(nearest);
   std::vector<double> most(chunks_of(crossings.size()), of_caps);
   for_chunks(context, crossings.size(), [&](std::size_t begin, std::size_t end, std::size_t chunk) {
     for (const auto& [inside, outside] : crossings.subspan(begin, end - begin)) {
@@ -165,7 +170,8 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
       const double b = difference(outside);
       const double p = field.values[inside];
       const double q = field.values[outside];
-      const double moved = std::abs(a / (a - b) - p / (p - q));
+      const double placed = std::clamp(a / (a - b), kept, 1 - kept);
+      const double moved = std::abs(placed - p / (p - q));
       if (!(moved <= most[chunk])) most[chunk] = moved;
     }
   });

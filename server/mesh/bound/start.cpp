@@ -52,8 +52,23 @@ Vecd place_of(const StartSurface& surface, std::size_t v) {
   return place;
 }
 
+// The place on the edge from the sample inside to the one next to the phantom, which a vertex of a
+// cap gives way from (border.h).
+Vecd before_it_gave_way(const Field& field, const Crossing& crossing, const Vecd& place) {
+  const Vecd inside = field.place(crossing.inside);
+  const Vecd phantom = field.place(crossing.outside);
+  const auto within = [&](double coordinate, std::uint32_t samples) {
+    return std::clamp<double>(coordinate, field.margin, samples - 1.0 - field.margin);
+  };
+  const Vecd edge = Vecd{within(phantom.x, field.dims.x), within(phantom.y, field.dims.y),
+                         within(phantom.z, field.dims.z)} -
+                    inside;
+  const double squares = dot(edge, edge);
+  return squares > 0 ? inside + edge * (dot(place - inside, edge) / squares) : inside;
+}
+
 // T is where the vertex is, in a face of the volume, T+ nearer to the sample inside, and T-
-// straight outward.
+// straight outward. Beside the edge that the vertex gives way from, F may be negative.
 Vertex on_cap(const StartSurface& surface, std::size_t v) {
   Vecd place = place_of(surface, v);
   const unsigned planes = pin(surface, place);
@@ -62,12 +77,15 @@ Vertex on_cap(const StartSurface& surface, std::size_t v) {
            static_cast<double>(planes >> first & 1);
   };
   const Vecd way = {outward(0), outward(2), outward(4)};
-  const auto along = [&](const Vecd& direction, double most) {
+  const auto along = [&](const Vecd& from, const Vecd& direction, double most) {
     const double long_mm = std::max(length(surface.metric.mm(direction)), 1e-9);
-    return snap(place + direction * std::min(most, 0.5 * surface.reach_mm / long_mm));
+    return snap(from + direction * std::min(most, 0.5 * surface.reach_mm / long_mm));
   };
+  const Vecd on_edge = before_it_gave_way(surface.field, surface.crossings[v], place);
+  const bool is_near = length(surface.metric.mm(on_edge - place)) < 0.25 * surface.reach_mm;
+  const Vecd from = is_near ? on_edge : place;
   const Vecd inside = surface.field.place(surface.crossings[v].inside);
-  return {snap(place), along(inside - place, 1), along(way, 1e9)};
+  return {snap(place), along(from, inside - from, 1), along(place, way, 1e9)};
 }
 
 constexpr std::uint32_t kNone = ~std::uint32_t{0};

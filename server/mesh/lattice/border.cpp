@@ -12,6 +12,11 @@ namespace {
 constexpr double kContourWays = 8;
 constexpr double kWayWithinCap = 0.2;
 constexpr double kMostLeastWay = 0.25 / kContourWays;
+// Simplification puts vertices on a grid of 65536 places to a step, which keeps two apart that are
+// two places apart.
+constexpr double kLeastWay = 2.0 / 65536;
+
+double least_way(double nearest) { return std::clamp(nearest, kLeastWay, kMostLeastWay); }
 
 bool is_odd(std::int64_t number) { return (number & 1) != 0; }
 
@@ -21,6 +26,8 @@ std::array<std::int64_t, 3> corner_offset(unsigned corner) {
 
 }  // namespace
 
+double nearest_on_border(double nearest) { return kContourWays * least_way(nearest); }
+
 template <class T>
 BorderPlacement<T>::BorderPlacement(const Lattice<T>& lattice, const ExtractOptions& options,
                                     T smallest, const Placement& interior)
@@ -29,8 +36,8 @@ BorderPlacement<T>::BorderPlacement(const Lattice<T>& lattice, const ExtractOpti
       five_(options.scheme == Scheme::kFive),
       smallest_(smallest),
       interior_(interior),
-      least_way_(std::min(interior.nearest(), kMostLeastWay)),
-      contour_(options, kContourWays * least_way_) {}
+      least_way_(least_way(interior.nearest())),
+      contour_(options, nearest_on_border(interior.nearest())) {}
 
 template <class T>
 BorderVertex BorderPlacement<T>::place(const BorderSample& cell, const EdgeEnds& ends) const {

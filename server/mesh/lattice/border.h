@@ -27,6 +27,10 @@
 
 namespace isomesh::mesh {
 
+// The share of an edge in a face of the box that a closed surface keeps from samples, from that of
+// other edges, Placement::nearest().
+double nearest_on_border(double nearest);
+
 // In lattice indices; phantoms are at -1 and at the number of samples.
 using BorderSample = std::array<std::int64_t, 3>;
 

@@ -12,10 +12,12 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/measure/measure.h"
+#include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/smooth/smooth.h"
 #include "server/mesh/topology/topology.h"
 #include "tests/support/exact_distance.h"
 #include "tests/support/kernels.h"
+#include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::mesh {
@@ -65,6 +67,8 @@ void expect_within_by_scheme(const test::SampleVolume<T>& volume, const ExtractO
   EXPECT_EQ(is.manifold, was.manifold);
   EXPECT_EQ(is.oriented, was.oriented);
   EXPECT_EQ(is.boundary_edges, was.boundary_edges);
+  EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
+  EXPECT_EQ(find_self_intersections(mesh, {}).pairs, 0U);
 }
 
 template <class T>
