@@ -153,7 +153,7 @@ void revoke_tokens(const TokenRequest& request) {
   }
   if (revoked == 0) {
     throw invalid_parameter("name",
-                            request.name + " has no such token; `isomeshd token list` lists all");
+                            request.name + " has no such token; `isomeshd token list --tokens FILE` lists all");
   }
   if (left == 0) {
     throw invalid_parameter("name",

@@ -31,11 +31,14 @@ Error reason_of(const Job& job) {
   return {ErrorCode::kCancelled, "the job was cancelled"};
 }
 
-std::string why_empty(const MeshSummary& mesh, const std::optional<SampleRange>& range) {
+std::string why_empty(const Job& job, const std::optional<SampleRange>& range) {
+  const MeshSummary& mesh = *job.mesh;
   if (mesh.dropped.components > 0) return "all of its components were dropped";
-  if (!mesh.iso) return "the labels have no surface";
-  std::string reason = "the volume has no surface at the iso-value " + human_number(*mesh.iso);
-  if (range) {
+  const std::string nothing =
+      job.parameters.crop ? " no surface in the box of --crop" : " no surface";
+  if (!mesh.iso) return "the labels have" + nothing;
+  std::string reason = "the volume has" + nothing + " at the iso-value " + human_number(*mesh.iso);
+  if (range && !job.parameters.crop) {
     reason += "; its samples range from " + human_number((*range)[0]) + " to " +
               human_number((*range)[1]);
   }
@@ -74,8 +77,11 @@ void fetch_to_stdout(Client& client, const std::string& id, const Output& output
   const ScratchFile file(std::filesystem::temp_directory_path(), ".mesh");
   fetch(client, id, {file.path(), output.format}, bar, label);
   std::ifstream mesh(file.path(), std::ios::binary);
-  std::cout << mesh.rdbuf() << std::flush;
-  if (!std::cout) {
+  std::vector<char> block(std::size_t{1} << 20);
+  while (std::cout && (mesh.read(block.data(), std::ssize(block)) || mesh.gcount() > 0)) {
+    std::cout.write(block.data(), mesh.gcount());
+  }
+  if (!std::cout.flush() || mesh.bad()) {
     throw Error(ErrorCode::kInvalidParameter, "standard output cannot be written to");
   }
 }
@@ -117,7 +123,7 @@ int status_of(const Job& job, const Options& options, const std::string& subject
   }
   if (!job.mesh || !job.mesh->empty || options.allow_empty) return kDone;
   complain((subject.empty() ? "" : subject + ": ") +
-           "the surface is empty: " + why_empty(*job.mesh, range) + "; --allow-empty accepts that");
+           "the surface is empty: " + why_empty(job, range) + "; --allow-empty accepts that");
   return kRefused;
 }
 

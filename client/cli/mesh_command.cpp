@@ -17,6 +17,7 @@
 #include "client/cli/ids.h"
 #include "client/cli/report.h"
 #include "client/cli/text.h"
+#include "client/isomesh/package.h"
 #include "proto/json.h"
 
 namespace isomesh::cli {
@@ -280,10 +281,38 @@ int mesh_all(const Options& options, const std::vector<Input>& inputs, const std
   return worst;
 }
 
+// A mesh must not replace a file of a volume: .vtk, for one, is a format of both.
+void refuse_to_overwrite(const std::vector<Input>& inputs, const Options& options) {
+  std::vector<std::filesystem::path> sent;
+  for (const Input& input : inputs) {
+    for (const std::filesystem::path& path : input.files) {
+      std::error_code absent;
+      if (!std::filesystem::exists(path, absent)) continue;  // standard input, or a stored volume
+      try {
+        for (PackedFile& file : files_of_upload(path)) sent.push_back(std::move(file.path));
+      } catch (const Error&) {
+        // The upload of this input tells it.
+      }
+    }
+  }
+  for (const Input& input : inputs) {
+    for (const Output& output : filled(options.outputs, input.name)) {
+      std::error_code error;
+      if (!std::filesystem::exists(output.path, error)) continue;
+      for (const std::filesystem::path& file : sent) {
+        if (std::filesystem::equivalent(output.path, file, error)) {
+          wrong_usage("-o: the mesh would overwrite the volume " + file.string());
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 int mesh(const Options& options, const std::stop_token& stop) {
   const std::vector<Input> inputs = inputs_of(options);
+  refuse_to_overwrite(inputs, options);
   Leftovers leftovers(options);
   if (inputs.size() > 1) return mesh_all(options, inputs, stop, leftovers);
   return Run(options, stop, false, leftovers).input(inputs.front());

@@ -318,10 +318,13 @@ std::string job_report(const Job& job, const LengthUnit& unit) {
 }
 
 std::string note_text(const Note& note) {
-  constexpr std::string_view kMember = "\"labels\": \"all\"";
+  constexpr std::array<std::array<std::string_view, 2>, 2> kOptions = {
+      {{"\"labels\": \"all\"", "--labels all"}, {"nifti_form=", "--nifti-form "}}};
   std::string text = note.detail;
-  const std::size_t at = text.find(kMember);
-  if (at != std::string::npos) text.replace(at, kMember.size(), "--labels all");
+  for (const auto& [member, option] : kOptions) {
+    const std::size_t at = text.find(member);
+    if (at != std::string::npos) text.replace(at, member.size(), option);
+  }
   return text;
 }
 

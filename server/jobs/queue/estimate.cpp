@@ -66,7 +66,12 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
       stage_times(extracted, surface, samples, job.parameters, job.parameters.certify);
   for (std::size_t n = 0; n < kStages.size(); ++n) {
     const auto elapsed = kStages[n].elapsed;
-    if (elapsed != nullptr) add(stages_[n], job.timing.*elapsed, guessed.*elapsed);
+    if (elapsed == nullptr) continue;
+    // Jobs that a busy machine made many times slower say little about others.
+    constexpr double kMost = 4;
+    const double expected = stages_[n].factor() * guessed.*elapsed;
+    add(stages_[n], std::clamp(job.timing.*elapsed, expected / kMost, expected * kMost),
+        guessed.*elapsed);
   }
   if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
     add(share_, static_cast<double>(surface.triangles),

@@ -1,7 +1,13 @@
 #include "client/cli/commands.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <functional>
+#include <iostream>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -46,8 +52,8 @@ class Commands : public testing::Test {
       if (at_a_look_) at_a_look_();
       response.set_content(to_json(job_), "application/json");
     });
-    server_.http.Get("/v1/jobs/7/mesh.drc", [](const auto&, auto& response) {
-      response.set_content("mesh", "application/octet-stream");
+    server_.http.Get("/v1/jobs/7/mesh.drc", [this](const auto&, auto& response) {
+      response.set_content(mesh_, "application/octet-stream");
     });
     test::write_file(folder_ / "head.nii", "volume");
     options_.server = server_.start();
@@ -57,6 +63,7 @@ class Commands : public testing::Test {
   }
 
   Job job_ = test::finished_job("7", "mesh");
+  std::string mesh_ = "mesh";
   std::function<void()> at_a_look_;  // runs when the job is asked for
   test::TemporaryFolder folder_;
   test::FakeServer server_;
@@ -93,6 +100,35 @@ TEST_F(Commands, SeveralInputsHaveAMeshEach) {
   EXPECT_EQ(test::read_file(folder_ / "knee.drc"), "mesh");
   options_.json = true;
   EXPECT_EQ(std::ranges::count(outcome_of(options_).out, '\n'), 2);
+}
+
+// The first part of a large mesh fits into a pipe that nobody reads, as it does on a disk that is
+// nearly full.
+TEST_F(Commands, AMeshThatIsCutOffOnStandardOutputFails) {
+  mesh_.assign(std::size_t{4} << 20, 'm');
+  job_ = test::finished_job("7", mesh_);
+  options_.outputs = {{.path = "-", .format = MeshFormat::kDrc}};
+  std::array<int, 2> pipe = {};
+  ASSERT_EQ(::pipe2(pipe.data(), O_NONBLOCK | O_CLOEXEC), 0);
+  std::fflush(stdout);
+  const int kept = ::dup(STDOUT_FILENO);
+  ::dup2(pipe[1], STDOUT_FILENO);
+  testing::internal::CaptureStderr();
+  const int status = run(options_, {});
+  const std::string told = testing::internal::GetCapturedStderr();
+  std::cout.clear();
+  ::dup2(kept, STDOUT_FILENO);
+  for (const int file : {kept, pipe[0], pipe[1]}) ::close(file);
+  EXPECT_EQ(status, kRefused);
+  EXPECT_THAT(told, HasSubstr("standard output cannot be written to"));
+}
+
+TEST_F(Commands, AMeshDoesNotOverwriteAVolume) {
+  test::write_file(folder_ / "head.vtk", "volume");
+  options_.files = {folder_ / "head.vtk"};
+  options_.outputs = {{.path = folder_ / "{name}.vtk", .format = MeshFormat::kVtk}};
+  EXPECT_THROW(run(options_, {}), EarlyExit);
+  EXPECT_EQ(test::read_file(folder_ / "head.vtk"), "volume");
 }
 
 TEST_F(Commands, AnAddressThatIsNoneIsWrongUsage) {

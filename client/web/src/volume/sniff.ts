@@ -100,6 +100,7 @@ function unsent(status: 415 | 422, detail: string): ApiError {
 
 // The reason why the file is certainly not a volume; null if it may be one.
 async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
+  if (file.size === 0) return unsent(422, `${path} is empty.`);
   if (!(await mayBeVolume(file, path))) return unsent(415, `The first bytes of ${path} match no supported format.`);
   const head = await bytesOf(file, textBytes);
   const declared = declaredBy(head);

@@ -197,7 +197,7 @@ export const comparisons: readonly Comparison[] = [
       { scheme: 6, interpolation: 'midpoint' },
     ],
   },
-  { title: 'the three lattices', variants: [{ scheme: 6 }, { scheme: 5 }, { scheme: 'bcc' }] },
+  { title: 'the lattices', variants: [{ scheme: 6 }, { scheme: 5 }, { scheme: 'bcc' }] },
   { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
   {
     title: 'all methods of smoothing',

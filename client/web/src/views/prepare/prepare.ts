@@ -435,6 +435,7 @@ class Prepare {
     } catch (error) {
       const failure = asApiError(error);
       this.problem.replaceChildren(refusal(failure, failure.isUnreachable && button('Try again', () => void this.start())));
+      this.problem.scrollIntoView({ block: 'nearest' });
     } finally {
       this.isStarting = false;
       this.run.disabled = !this.isReady;
