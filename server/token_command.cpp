@@ -152,8 +152,8 @@ void revoke_tokens(const TokenRequest& request) {
     kept.push_back(line);
   }
   if (revoked == 0) {
-    throw invalid_parameter("name",
-                            request.name + " has no such token; `isomeshd token list --tokens FILE` lists all");
+    throw invalid_parameter(
+        "name", request.name + " has no such token; `isomeshd token list --tokens FILE` lists all");
   }
   if (left == 0) {
     throw invalid_parameter("name",

@@ -127,8 +127,26 @@ class QualitySmoother {
         .home = home_.data(),
         .max_displacement = static_cast<float>(options_.max_displacement_mm * kSurely)};
     for (std::size_t c = 0; c + 1 < slab.begin.size(); ++c) {
-      move_fans(moves, move,
-                std::span(slab.vertices).subspan(slab.begin[c], slab.begin[c + 1] - slab.begin[c]));
+      const auto vertices =
+          std::span(slab.vertices).subspan(slab.begin[c], slab.begin[c + 1] - slab.begin[c]);
+      move_fans(moves, move, vertices);
+      if (!options_.within.empty()) hold_within(vertices);
+    }
+  }
+
+  // Pulls vertices back that moved out of a half-space, or farther out than they were extracted.
+  void hold_within(std::span<const std::uint32_t> vertices) {
+    for (const std::uint32_t v : vertices) {
+      for (const HalfSpace& half : options_.within) {
+        const double start = dot(half.normal, to_point(extracted_[v])) - half.offset;
+        const double beyond =
+            dot(half.normal, to_point(mesh_.positions[v])) - half.offset - std::max(0.0, start);
+        if (beyond <= 0) continue;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          mesh_.positions[v][axis] =
+              static_cast<float>(mesh_.positions[v][axis] - beyond * half.normal[axis]);
+        }
+      }
     }
   }
 

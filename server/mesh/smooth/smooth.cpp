@@ -284,7 +284,8 @@ class Smoother {
 }  // namespace
 
 bool SmoothOptions::goes_outwards() const {
-  return std::ranges::any_of(steps, [](const Step& step) { return step.weight < 0; });
+  return std::ranges::any_of(
+      steps, [](const Step& step) { return step.move != Move::kMean || step.weight < 0; });
 }
 
 std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& dims, double wider) {

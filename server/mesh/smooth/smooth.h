@@ -35,10 +35,10 @@ struct SmoothOptions {
   AtCurves at_curves = AtCurves::kAlong;
   // No vertex is ever farther than this from its extracted position. Millimetres, 0 or more.
   double max_displacement_mm = std::numeric_limits<double>::infinity();
-  // Means keep free vertices within these. Steps away from the mean need it next to caps.
+  // Keeps free vertices within these. Steps other than to the mean need it next to caps.
   std::vector<HalfSpace> within = {};
 
-  // True if a step leads away from the mean.
+  // True if a step may lead away from the neighbours.
   bool goes_outwards() const;
 };
 

@@ -7,10 +7,9 @@
 #include <iostream>
 
 #include <fcntl.h>
-#include <unistd.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "proto/json.h"
 #include "tests/unit/client/support.h"

@@ -398,6 +398,26 @@ TEST(SmoothWithin, KeepsClosedSurfacesOnTheirSideOfTheCaps) {
   }
 }
 
+TEST(SmoothWithin, KeepsMovesAlongTheSurfaceOnTheirSideOfTheCaps) {
+  const ExtractOptions closed = {2, Scheme::kSix, Interpolation::kLinear, true};
+  for (const Smoothing smoothing : {Smoothing::kAngle, Smoothing::kOptimize}) {
+    double farthest_out = 0;
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      const auto volume = test::noise<std::uint8_t>({0, 1, 2, 3, 4}, {7, 9, 8}, seed);
+      SmoothOptions options = test::method_options(smoothing, 5);
+      EXPECT_TRUE(options.goes_outwards());
+      options.within = box_around(volume.lattice().to_space, volume.dims, 0);
+      for (const Vec3& p : smoothed(test::extracted(volume, closed), options).positions) {
+        for (const HalfSpace& half : options.within) {
+          farthest_out = std::max(farthest_out, half.normal[0] * p[0] + half.normal[1] * p[1] +
+                                                    half.normal[2] * p[2] - half.offset);
+        }
+      }
+    }
+    EXPECT_LT(farthest_out, 1e-6);
+  }
+}
+
 TEST(SmoothMemory, IsAFewLayersWhenTheVolumeIsDeep) {
   const test::ThreadCount two(2);
   const auto size = [](std::uint64_t layers, std::uint64_t vertices_each) {
