@@ -1,5 +1,6 @@
 #include "server/net/listener.h"
 
+#include <cerrno>
 #include <memory>
 #include <utility>
 
@@ -28,14 +29,36 @@ Descriptor bound(Descriptor socket, const sockaddr* address, socklen_t size) {
   return listens ? std::move(socket) : Descriptor();
 }
 
-Descriptor listening_at(const std::filesystem::path& path) {
-  // A killed daemon leaves its socket. It is certainly dead: the caller holds the lock of the data
-  // folder.
-  std::error_code error;
-  if (std::filesystem::is_socket(path, error)) std::filesystem::remove(path, error);
+sockaddr_un address_of(const std::filesystem::path& path) {
   sockaddr_un address = {};
   address.sun_family = AF_UNIX;
   path.string().copy(address.sun_path, sizeof address.sun_path - 1);
+  return address;
+}
+
+// A killed program leaves its socket, at which connections are refused.
+bool is_left_over(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_socket(path, error)) return false;
+  const sockaddr_un address = address_of(path);
+  const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  return socket.number() >= 0 &&
+         ::connect(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+             0 &&
+         errno == ECONNREFUSED;
+}
+
+// Tells the file of one program's socket from that of a later one at the same path.
+std::optional<FileIdentity> identity_of(const std::filesystem::path& path) {
+  struct stat status = {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return FileIdentity{status.st_dev, status.st_ino};
+}
+
+Descriptor listening_at(const std::filesystem::path& path) {
+  std::error_code error;
+  if (is_left_over(path)) std::filesystem::remove(path, error);
+  const sockaddr_un address = address_of(path);
   Descriptor socket =
       bound(Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)),
             reinterpret_cast<const sockaddr*>(&address), static_cast<socklen_t>(sizeof address));
@@ -84,12 +107,18 @@ Listener::Listener(Address address)
   if (socket_.number() < 0) {
     throw Error(ErrorCode::kUnavailable, "cannot listen on this address: is it already in use?");
   }
-  if (!address_.is_unix()) address_.port = port_of(socket_.number());
+  if (address_.is_unix()) {
+    file_ = identity_of(address_.unix_path);
+  } else {
+    address_.port = port_of(socket_.number());
+  }
 }
 
 Listener::~Listener() {
   std::error_code ignored;  // the next start removes leftovers
-  if (address_.is_unix()) std::filesystem::remove(address_.unix_path, ignored);
+  if (file_ && file_ == identity_of(address_.unix_path)) {
+    std::filesystem::remove(address_.unix_path, ignored);
+  }
 }
 
 std::string Listener::authority() const {

@@ -181,6 +181,10 @@ TEST_F(ResumeTest, DigestsAreChecked) {
       begin(with(kBegin, {{"Repr-Digest", digest_of("other")}})).header("location");
   EXPECT_TRUE(is_problem(daemon_->send("PATCH", wrong, raw_.bytes, part(0, true)),
                          ErrorCode::kDigestMismatch));
+  // Nothing of it stays to be asked for.
+  EXPECT_TRUE(
+      is_problem(daemon_->send("POST", "/v1/volumes?upload=" + wrong.substr(wrong.rfind('/') + 1)),
+                 ErrorCode::kGone));
   const std::string right =
       begin(with(kBegin, {{"Repr-Digest", digest_of(raw_.bytes)}})).header("location");
   const std::string half = raw_.bytes.substr(0, 2000);
@@ -202,6 +206,12 @@ TEST_F(ResumeTest, DigestsOfAWholeBodyAreChecked) {
     EXPECT_TRUE(is_problem(send("other"), ErrorCode::kDigestMismatch)) << header;
     EXPECT_LT(send(raw_.bytes).status, 300) << header;
   }
+  const std::string digest = digest_of(raw_.bytes);
+  EXPECT_LT(daemon_
+                ->send("POST", "/v1/volumes?" + raw_.query, raw_.bytes,
+                       {{"Content-Digest", digest}, {"Repr-Digest", digest}})
+                .status,
+            300);
 }
 
 TEST_F(ResumeTest, ALengthThatIsNoNumberIsRefused) {

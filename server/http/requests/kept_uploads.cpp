@@ -169,7 +169,9 @@ void KeptUploads::erase(Entries::iterator entry) {
 }
 
 void KeptUploads::make_room() {
-  const auto one = [](const Entry&) { return std::uint64_t{1}; };
+  const auto has_become = [](const Entry& entry) { return !entry.partial->note().volume.empty(); };
+  const auto unfinished = [&](const Entry& entry) { return has_become(entry) ? 0U : 1U; };
+  const auto finished = [&](const Entry& entry) { return has_become(entry) ? 1U : 0U; };
   const auto bytes = [](const Entry& entry) { return entry.partial->bytes(); };
   const auto make = [&](const std::function<std::uint64_t(const Entry&)>& weight,
                         std::uint64_t most) ISOMESH_REQUIRES(mutex_) {
@@ -181,7 +183,8 @@ void KeptUploads::make_room() {
       erase(next);
     }
   };
-  make(one, limits_.parts);
+  make(unfinished, limits_.parts);
+  make(finished, limits_.parts);
   make(bytes, limits_.part_bytes);
 }
 
@@ -193,9 +196,10 @@ KeptUploads::Entries::iterator KeptUploads::next_to_go(
   }
   const auto most =
       std::ranges::max_element(of_owner, {}, [](const auto& owner) { return owner.second; });
-  if (most == of_owner.end()) return kept_.end();
-  return std::ranges::find_if(
-      kept_, [&](const Entry& entry) { return entry.is_idle() && entry.owner == most->first; });
+  if (most == of_owner.end() || most->second == 0) return kept_.end();
+  return std::ranges::find_if(kept_, [&](const Entry& entry) {
+    return entry.is_idle() && entry.owner == most->first && weight(entry) > 0;
+  });
 }
 
 void KeptUploads::run(const std::stop_token& stop) {

@@ -24,8 +24,9 @@ struct KeptLimits {
   std::size_t each = 2;
   std::size_t all = 16;
 
-  // For resumable uploads: how long one waits for its next part, and the number and total size of
-  // idle ones. Beyond that, the least recently used one of the owner with the most is deleted.
+  // For resumable uploads: how long one waits for its next part, the number of those that are not
+  // complete and, apart from them, of those that have become volumes, and their total size. Beyond
+  // that, the least recently used idle one of the owner with the most is deleted.
   std::chrono::milliseconds part_time = std::chrono::hours(1);
   std::size_t parts = 64;
   std::uint64_t part_bytes = std::uint64_t{16} << 30;

@@ -87,9 +87,13 @@ void receive(App& app, const Request& request, PartialUpload& upload, const Part
   receive_part(upload, lease, app.services.folder, app.options.upload, app.stopping, request);
 }
 
-void check_digest(const PartialUpload& upload) {
-  const std::string expected = upload.note().sha256;
-  if (expected.empty() || store::digest_of(upload.body()->path).key == expected) return;
+// An upload with other bytes than announced never becomes complete: it is deleted.
+void check_digest(App& app, const Request& request, const PartialUpload& upload) {
+  const PartialNote note = upload.note();
+  const bool has_all = note.length.value_or(upload.bytes()) == upload.bytes();
+  if (note.sha256.empty() || !has_all) return;
+  if (store::digest_of(upload.body()->path).key == note.sha256) return;
+  app.kept.let_go(owner_of(request), upload.name());
   throw Error(ErrorCode::kDigestMismatch,
               "the upload's SHA-256 differs from the one in Repr-Digest");
 }
@@ -124,9 +128,9 @@ void append(App& app, const Request& request, Response& response) {
     response.status = 204;
     return;
   }
+  check_digest(app, request, *upload);
   upload->complete(*lease);
   response.set_header(kComplete, "?1");
-  check_digest(*upload);
   Request asked = request;
   asked.query = upload->note().query;
   answer_volumes(app, asked, response, {upload->body(), upload->name()});

@@ -150,6 +150,22 @@ TEST_F(KeptParts, OfWhoHasMostTheLongestIdleGivesWay) {
   EXPECT_NO_THROW(kept.find_partial("b", modest));
 }
 
+TEST_F(KeptParts, ThoseThatHaveBecomeVolumesTakeNoPlaceOfOthers) {
+  KeptUploads kept({.parts = 3}, folder_.path());
+  const std::string waiting = begun(kept, "a", 10)->name();
+  std::string last;
+  for (int n = 0; n < 10; ++n) {
+    const KeptUploads::Partial upload = begun(kept, "a", 10);
+    upload->complete(*upload->begin_lease(10));
+    last = upload->name();
+    kept.finish("a", last, "{}");
+  }
+  EXPECT_NO_THROW(kept.find_partial("a", waiting));
+  EXPECT_EQ(kept.became("a", last), "{}");
+  begun(kept, "a");
+  EXPECT_TRUE(eventually([&] { return files() <= 2 * 2 + 4; }));  // theirs are notes alone
+}
+
 // The result is the same whether the thread or the next upload makes room first.
 TEST_F(KeptParts, OfWhoHasMostBytesTheLongestIdleGivesWay) {
   KeptUploads kept({.part_bytes = 1000}, folder_.path());

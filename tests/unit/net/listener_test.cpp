@@ -48,6 +48,20 @@ TEST(Listener, AUnixSocketReplacesADeadOneAndIsRemoved) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
+TEST(Listener, AUnixSocketOfALivingProgramStays) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path path = folder / "socket";
+  const Address address = parse_address("unix:" + path.string());
+  {
+    const Listener living(address);
+    EXPECT_EQ(test::code_thrown_by([&] { Listener{address}; }), ErrorCode::kUnavailable);
+    EXPECT_TRUE(std::filesystem::exists(path));
+    std::filesystem::remove(path);
+    test::write_file(path, "another's");
+  }
+  EXPECT_TRUE(std::filesystem::exists(path));
+}
+
 TEST(Listener, AFileThatIsNoSocketStays) {
   const test::TemporaryFolder folder;
   test::write_file(folder / "file", "text");
