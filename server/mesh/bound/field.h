@@ -105,9 +105,8 @@ Vecd zero_between(const Field& field, const Crossing& crossing);
 
 // How far S is at most from the surface of the samples themselves, in millimetres: the farthest
 // that a crossing of F is from the vertex of theirs, which keeps away from samples, since both are
-// made of the same triangles. The caps of a
-// closed surface are where it leaves the volume: those of S are farther out by what F rises between
-// a sample and a phantom.
+// made of the same triangles. The caps of a closed surface are where it leaves the volume: those of
+// S are farther out by what F rises between a sample and a phantom.
 template <class T>
 double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
                 std::span<const Crossing> crossings, const Context& context);

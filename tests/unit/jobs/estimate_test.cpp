@@ -230,7 +230,7 @@ TEST(CostModel, OneSlowJobSaysLittle) {
   const double usual = learned({1, 1, 1, 1, 1});
   EXPECT_LT(learned({300, 1, 1, 1, 1}), 2.5 * usual);
   EXPECT_LT(learned({1, 1, 1, 1, 300}), 2.5 * usual);
-  // Where all are slow, it is learned all the same.
+  // A machine that makes all of them slow is learned all the same.
   EXPECT_GT(learned({30, 30, 30, 30, 30, 30, 30, 30}), 10 * usual);
 }
 
