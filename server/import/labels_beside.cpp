@@ -67,7 +67,7 @@ std::vector<LabelEntry> labels_of(const std::filesystem::path& path) {
 template <class IsWanted>
 std::vector<Table> tables_in(const Companions& companions, const IsWanted& is_wanted) {
   std::vector<Table> tables;
-  for (const auto& [name, path] : companions.files) {
+  for (const auto& [name, path] : companions.all()) {
     auto labels = labels_of(path);
     if (!labels.empty() && is_wanted(name)) tables.push_back({name, std::move(labels)});
   }
@@ -76,7 +76,7 @@ std::vector<Table> tables_in(const Companions& companions, const IsWanted& is_wa
 
 std::vector<std::string> stems_of_volumes(const Companions& companions) {
   std::vector<std::string> stems;
-  for (const auto& [name, path] : companions.files) {
+  for (const auto& [name, path] : companions.all()) {
     if (sniff(InputFile(path)) != nullptr) stems.push_back(stem_of(name));
   }
   return stems;
@@ -91,7 +91,7 @@ std::vector<Table> named_as(const std::string& stem, std::vector<Table> tables) 
 }
 
 std::vector<Table> tables_beside(const Companions& companions) {
-  const std::string stem = stem_of(companions.name);
+  const std::string stem = stem_of(companions.name());
   const auto is_own = [&](const std::string& name) { return begins_with(name, stem); };
   std::vector<Table> tables = tables_in(companions, is_own);
   if (tables.empty()) {

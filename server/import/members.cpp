@@ -54,9 +54,16 @@ class Members {
       : input_(input),
         folder_(input.task.scratch, "members-"),
         all_(unpack(input.path, folder_.path(), limits_of(input.task.limits),
-                    [&](const auto& beginning) { return most_of_slice(beginning, input.task); })) {}
+                    [&](const auto& beginning) { return most_of_slice(beginning, input.task); })) {
+    for (const ArchiveMember& member : all_) {
+      const std::filesystem::path name = member.name;
+      files_.emplace(name.lexically_normal().generic_string(), member.path);
+    }
+  }
 
   const std::vector<ArchiveMember>& all() const { return all_; }
+
+  Companions companions_of(const ArchiveMember& header) const { return {files_, header.name}; }
 
   // The files with a header's samples. Throws Error kUnusableVolume if they are missing.
   std::vector<std::filesystem::path> data_of(const FoundVolume& found) const;
@@ -68,23 +75,13 @@ class Members {
   const Input& input_;
   TemporaryFolder folder_;
   std::vector<ArchiveMember> all_;
+  ArchiveFiles files_;
 };
-
-Companions companions_of(const ArchiveMember& header, const std::vector<ArchiveMember>& members) {
-  const std::string_view folder = folder_of(header.name);
-  Companions companions{.name = std::string(base_of(header.name)), .files = {}};
-  for (const ArchiveMember& member : members) {
-    if (member.name == header.name || !member.name.starts_with(folder)) continue;
-    const std::filesystem::path below = member.name.substr(folder.size());
-    companions.files.emplace(below.lexically_normal().generic_string(), member.path);
-  }
-  return companions;
-}
 
 std::vector<std::filesystem::path> Members::data_of(const FoundVolume& found) const {
   std::vector<std::filesystem::path> data;
   const auto& [member, reader, doubles] = found;
-  const Companions companions = companions_of(member, all_);
+  const Companions companions = companions_of(member);
   for (const std::string& name :
        data_names_of(*reader, InputFile(member.path), companions, input_.task)) {
     data.push_back(companion(name, companions));
@@ -285,7 +282,7 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   const auto& [member, reader, doubles] = found;
   members.complete(found);
   Volume volume = read_input(*reader, {.path = member.path,
-                                       .companions = companions_of(member, members.all()),
+                                       .companions = members.companions_of(member),
                                        .task = input.task,
                                        .listener = input.listener});
   volume.name = std::string(base_of(member.name));
@@ -320,6 +317,11 @@ Volume read_stack(const Stack& stack, const Contents& contents, const Input& inp
                        std::to_string(stack.files.size()) + ' ' +
                            std::string(volume_format(stack.reader->name).title) +
                            (stack.files.size() == 1 ? " file" : " files")});
+  }
+  if (asked.empty() && choices.size() > volume::kMostChoices) {
+    throw_unusable("The archive holds " + std::to_string(choices.size()) +
+                   " volumes, more than the " + std::to_string(volume::kMostChoices) +
+                   " that one upload may have. Send it in parts, or choose one with member=NAME.");
   }
   std::string names;
   constexpr std::size_t kMost = 10;

@@ -17,8 +17,7 @@ void throw_overridable(NoteCode code, const std::string& reason) {
 }
 
 void throw_choice(const std::string& reason, std::vector<Choice> choices) {
-  constexpr std::size_t kMost = 1000;
-  choices.resize(std::min(choices.size(), kMost));
+  choices.resize(std::min(choices.size(), kMostChoices));
   throw Error(ErrorCode::kUnusableVolume, reason).with_remedy({.choices = std::move(choices)});
 }
 

@@ -1,6 +1,7 @@
 // Throws Error kUnusableVolume with a sentence as its reason.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,11 @@ namespace isomesh::volume {
 // not call it if the import's options accept `code`.
 [[noreturn]] void throw_overridable(NoteCode code, const std::string& reason);
 
-// Throws an error with choices. The reason states their number and their difference; the list is
-// truncated to a few hundred.
+// An error lists at most this many choices.
+inline constexpr std::size_t kMostChoices = 1000;
+
+// Throws an error with choices. The reason states their number and their difference; the list has
+// the first kMostChoices.
 [[noreturn]] void throw_choice(const std::string& reason, std::vector<Choice> choices);
 
 }  // namespace isomesh::volume

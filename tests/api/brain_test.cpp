@@ -47,8 +47,6 @@ TEST_P(Brain, HasTheKnownCountsInTheFileToo) {
 INSTANTIATE_TEST_SUITE_P(
     Schemes, Brain,
     testing::Values(Golden{"5", "--no-regularize", 4062210, 2033703, 2794653.2, 581722.6},
-                    Golden{"6", "--no-regularize", 5091320, 2544488, 2795793.9, 593150.7},
-                    Golden{"5", "--regularize", 1548420, 776808, 2795157.2, 573194.5},
                     Golden{"6", "--regularize", 1761096, 879376, 2796561.8, 580961.2}),
     [](const auto& golden) {
       const bool is_plain = golden.param.regularize[2] == 'n';

@@ -73,7 +73,8 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   const auto place = place_for_upload(app, request);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);
   const auto add = [&] {
-    return app.services.library.add(owner_of(request), file.body().path, options, file.body().name);
+    return app.services.library.add(owner_of(request), file.body().path, options, file.body().name,
+                                    party_of(request));
   };
   parameters.volume = counting_refusals(app, request, add).first.id;
   // A key belongs to one request: the same volume (by its id), the same parameters and this route

@@ -58,7 +58,7 @@ std::vector<UploadedVolume> imported(App& app, const Request& request, Response&
   try {
     std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
       return app.services.library.add_all(owner_of(request), body.file->path, options,
-                                          body.file->name);
+                                          body.file->name, party_of(request));
     });
     bool is_helped = false;
     for (const UploadedVolume& each : volumes) {

@@ -161,10 +161,10 @@ SourceVolume describe(const HeadAttributes& attributes, const ImportOptions& opt
 }
 
 std::string brick_name(const Companions& companions) {
-  const std::string& own = companions.name;
+  const std::string& own = companions.name();
   const std::string stem = own.substr(0, own.rfind('.'));
   for (const char* suffix : {".BRIK", ".BRIK.gz", ".BRIK.bz2", ".brik", ".brik.gz"}) {
-    if (companions.files.contains(stem + suffix)) return stem + suffix;
+    if (companions.find(stem + suffix) != nullptr) return stem + suffix;
   }
   throw_unusable(
       "The samples of the AFNI header (.HEAD) are in a .BRIK file, which is missing. Send both "

@@ -375,11 +375,11 @@ SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
 
 // The image file of a pair has the header's name with another suffix.
 std::string image_name(const Companions& companions) {
-  std::string_view own = companions.name;
+  std::string_view own = companions.name();
   if (lower(own).ends_with(".gz")) own.remove_suffix(3);
   const std::string stem(own.substr(0, own.rfind('.')));
   for (const char* suffix : {".img", ".img.gz", ".IMG"}) {
-    if (companions.files.contains(stem + suffix)) return stem + suffix;
+    if (companions.find(stem + suffix) != nullptr) return stem + suffix;
   }
   throw_unusable(
       "The samples of the NIfTI header (.hdr) are in an .img file, which is missing. Send both "

@@ -273,10 +273,10 @@ Described describe(const ParHeader& header, const ImportOptions& options) {
 }
 
 std::string rec_name(const Companions& companions) {
-  const std::string& own = companions.name;
+  const std::string& own = companions.name();
   const std::string stem = own.substr(0, own.rfind('.'));
   for (const char* suffix : {".REC", ".rec", ".Rec"}) {
-    if (companions.files.contains(stem + suffix)) return stem + suffix;
+    if (companions.find(stem + suffix) != nullptr) return stem + suffix;
   }
   throw_unusable(
       "The samples of the PAR header are in a .REC file, which is missing. Send both files in one "

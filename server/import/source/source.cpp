@@ -54,6 +54,34 @@ void refuse_flat(std::string_view what, const std::array<std::uint32_t, 3>& dims
   }
 }
 
+Companions::Companions(const ArchiveFiles& archive, const std::filesystem::path& member)
+    : archive_(&archive) {
+  const std::filesystem::path normal = member.lexically_normal();
+  name_ = normal.filename().string();
+  folder_ = normal.parent_path();
+}
+
+const std::filesystem::path* Companions::find(const std::filesystem::path& path) const {
+  if (archive_ == nullptr) return nullptr;
+  const std::filesystem::path whole = folder_ / path;
+  const std::string key = whole.lexically_normal().generic_string();
+  if (key == (folder_ / name_).generic_string()) return nullptr;
+  const auto found = archive_->find(key);
+  return found == archive_->end() ? nullptr : &found->second;
+}
+
+ArchiveFiles Companions::all() const {
+  ArchiveFiles companions;
+  if (archive_ == nullptr) return companions;
+  const std::string above = folder_.empty() ? "" : folder_.generic_string() + '/';
+  for (auto at = archive_->lower_bound(above);
+       at != archive_->end() && at->first.starts_with(above); ++at) {
+    const std::string path = at->first.substr(above.size());
+    if (path != name_) companions.emplace(path, at->second);
+  }
+  return companions;
+}
+
 const std::filesystem::path& companion(const std::string& name, const Companions& companions) {
   const std::string reason = "The header names the data file " + in_quotes(name);
   const std::string path = std::filesystem::path(name).lexically_normal().generic_string();
@@ -62,8 +90,7 @@ const std::filesystem::path& companion(const std::string& name, const Companions
                    ", which is outside the header's folder. Only files in that folder and its "
                    "subfolders are read.");
   }
-  const auto found = companions.files.find(path);
-  if (found != companions.files.end()) return found->second;
+  if (const auto* found = companions.find(path)) return *found;
   throw_unusable(reason + ", which is missing. Send both files in one ZIP or TAR.");
 }
 

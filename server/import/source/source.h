@@ -53,11 +53,31 @@ struct VtkEncoding {
   bool big_endian = false;
 };
 
-// The other files of the same archive.
-struct Companions {
-  std::string name;  // of the file itself, without folders; empty if it was uploaded alone
-  // The other files in its folder and subfolders, by their relative paths.
-  std::map<std::string, std::filesystem::path, std::less<>> files;
+// An archive's files, by their normal paths in it.
+using ArchiveFiles = std::map<std::string, std::filesystem::path, std::less<>>;
+
+// The other files of the same archive, in the file's folder and its subfolders. Cheap to make, as
+// an archive may have thousands of headers.
+class Companions {
+ public:
+  // None, for a file that was uploaded alone.
+  Companions() = default;
+  // `member` is the file's path in the archive; `archive` must outlive this object.
+  Companions(const ArchiveFiles& archive, const std::filesystem::path& member);
+
+  // The name of the file itself, without folders; empty if it was uploaded alone.
+  const std::string& name() const { return name_; }
+
+  // The companion with that path, relative to the folder; null if there is none.
+  const std::filesystem::path* find(const std::filesystem::path& path) const;
+
+  // All companions, by their relative paths.
+  ArchiveFiles all() const;
+
+ private:
+  const ArchiveFiles* archive_ = nullptr;
+  std::filesystem::path folder_;  // normal; empty at the top
+  std::string name_;
 };
 
 // Returns the companion of that name, with or without "./". Throws Error kUnusableVolume if it is

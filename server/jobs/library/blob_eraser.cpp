@@ -1,11 +1,14 @@
 #include "server/jobs/library/blob_eraser.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "base/log.h"
+#include "server/store/files/files.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -14,9 +17,39 @@ namespace {
 // the response to the deletion.
 constexpr std::chrono::milliseconds kPause{100};
 
+// Without a mark, the blob of a process that dies goes to quarantine first, as any file without a
+// record does. A deletion does not fail for that, for instance on a full disk.
+void mark(const std::filesystem::path& folder, const std::string& key) {
+  try {
+    if (!std::filesystem::exists(folder / key)) store::File::create(folder / key);
+    store::sync_folder(folder);
+  } catch (const std::exception& error) {
+    log_warning("the deletion of a volume's samples could not be noted: {}", error.what());
+  }
+}
+
+std::deque<std::string> marked_in(const std::filesystem::path& folder) {
+  std::deque<std::string> keys;
+  std::error_code absent;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, absent)) {
+    keys.push_back(entry.path().filename().string());
+  }
+  return keys;
+}
+
 }  // namespace
 
+BlobEraser::BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes,
+                       std::shared_mutex& coming, std::filesystem::path marks)
+    : blobs_(blobs),
+      volumes_(volumes),
+      coming_(coming),
+      marks_(std::move(marks)),
+      waiting_(marked_in(marks_)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
 void BlobEraser::erase(const std::string& key) {
+  mark(marks_, key);
   const Lock lock(mutex_);
   waiting_.push_back(key);
   changed_.notify_all();
@@ -39,14 +72,18 @@ void BlobEraser::run(const std::stop_token& stop) {
                       [this]() ISOMESH_REQUIRES(mutex_) { return hurries_ > 0; });
     const std::string key = waiting_.front();
     lock.unlock();
-    erase_now(key);
+    const bool is_done = erase_now(key);
     lock.lock();
     waiting_.pop_front();
+    if (is_done && std::ranges::count(waiting_, key) == 0) {
+      std::error_code ignored;  // the next start finds nothing to do
+      std::filesystem::remove(marks_ / key, ignored);
+    }
     changed_.notify_all();
   }
 }
 
-void BlobEraser::erase_now(const std::string& key) {
+bool BlobEraser::erase_now(const std::string& key) {
   try {
     // Freeing the bytes of a large blob takes long. Holding them until the lock is released keeps
     // others from waiting for it.
@@ -56,9 +93,11 @@ void BlobEraser::erase_now(const std::string& key) {
     // Another daemon may have stored the same blob at any time and be about to name it, so every
     // blob counts as recent.
     blobs_.erase_unnamed(std::span(&key, 1), store::Steady(), names);
+    return true;
   } catch (const std::exception& error) {
     log_error("the samples of a deleted volume could not be erased and are removed later: {}",
               error.what());
+    return false;
   }
 }
 

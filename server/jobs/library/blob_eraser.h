@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <filesystem>
 #include <shared_mutex>
 #include <string>
 #include <thread>
@@ -12,21 +13,21 @@
 namespace isomesh::jobs {
 
 // Erases the samples of deleted volumes in a thread of its own. So the response time of a deletion
-// reveals neither their size nor whether another owner still has them. Thread safe.
+// reveals neither their size nor whether another owner still has them. What it did not get to
+// before the process died, it erases after the next start. Thread safe.
 class BlobEraser {
  public:
   // `coming` is held shared while a blob and its record are added, and exclusively while a blob is
-  // erased. All arguments must outlive this object.
-  BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes, std::shared_mutex& coming)
-      : blobs_(blobs),
-        volumes_(volumes),
-        coming_(coming),
-        thread_([this](const std::stop_token& stop) { run(stop); }) {}
+  // erased. `marks` is a folder with an empty file for each queued blob. The other arguments must
+  // outlive this object.
+  BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes, std::shared_mutex& coming,
+             std::filesystem::path marks);
 
   // Erases all queued blobs first.
   ~BlobEraser() = default;
 
-  // Queues the blob. It is erased soon, unless a record names it by then.
+  // Queues the blob. It is erased soon, unless a record names it by then. To be called before its
+  // record is erased, with `coming` held exclusively until that has happened.
   void erase(const std::string& key);
 
   // Returns once all queued blobs are erased.
@@ -34,11 +35,13 @@ class BlobEraser {
 
  private:
   void run(const std::stop_token& stop);
-  void erase_now(const std::string& key);
+  // Returns false if it failed.
+  bool erase_now(const std::string& key);
 
   store::BlobStore& blobs_;
   const store::VolumeStore& volumes_;
   std::shared_mutex& coming_;
+  const std::filesystem::path marks_;
   Mutex mutex_;
   Condition changed_;
   std::deque<std::string> waiting_ ISOMESH_GUARDED_BY(mutex_);  // the first is being erased

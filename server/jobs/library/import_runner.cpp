@@ -88,24 +88,24 @@ process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::Impo
 }
 
 ImportRunner::ImportRunner(const RunnerOptions& options)
-    : options_(options), prepared_(options.program, options.at_once) {
+    : options_(options), places_(options.at_once), prepared_(options.program, options.at_once) {
   if (!process::has_landlock()) {
     log_warning("this kernel has no Landlock: imports and jobs could read this user's files");
   }
 }
 
-Volume ImportRunner::run(const process::ImportTask& task) {
+Volume ImportRunner::run(const process::ImportTask& task, const std::string& party) {
   // Checked here because a JSON message cannot carry non-finite numbers.
   if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
   const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
-  return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds})), task);
+  return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds}), party), task);
 }
 
 process::PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
   const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
   try {
     process::ImportReport report =
-        report_of(process::to_message(process::ResponseOrder{{file}, bounds}));
+        report_of(process::to_message(process::ResponseOrder{{file}, bounds}), "");
     if (report.error) throw *report.error;
     if (!report.response) throw_lying();
     return *std::move(report.response);
@@ -115,13 +115,9 @@ process::PeersResponse ImportRunner::read_response(const std::filesystem::path& 
   }
 }
 
-process::ImportReport ImportRunner::report_of(const std::string& message) {
-  take_place();
-  const struct Leave {
-    ImportRunner& runner;
-    ~Leave() { runner.give_place_back(); }
-  } leave{*this};
-
+process::ImportReport ImportRunner::report_of(const std::string& message,
+                                              const std::string& party) {
+  const ImportPlaces::Place place = places_.take(party, stop_.get_token());
   const auto deadline = Clock::now() + options_.bounds.time;
   // A process that died while idle has not touched the file. Several in a row are a defect.
   constexpr int kMostIdleDeaths = 3;
@@ -161,22 +157,6 @@ std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
 void ImportRunner::stop() {
   stop_.request_stop();
   prepared_.stop();
-}
-
-void ImportRunner::take_place() {
-  std::unique_lock lock(mutex_);
-  const bool free =
-      place_free_.wait(lock, stop_.get_token(), [&] { return running_ < options_.at_once; });
-  if (!free || stop_.stop_requested()) {
-    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-  }
-  ++running_;
-}
-
-void ImportRunner::give_place_back() {
-  const std::scoped_lock lock(mutex_);
-  --running_;
-  place_free_.notify_one();
 }
 
 }  // namespace isomesh::jobs

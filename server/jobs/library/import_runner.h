@@ -1,14 +1,13 @@
 // Runs each import in a sandboxed process of its own, which can read little but its one file.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
 
+#include "server/jobs/library/import_places.h"
 #include "server/process/import_message.h"
 #include "server/process/prepared.h"
 
@@ -30,11 +29,12 @@ class ImportRunner {
  public:
   explicit ImportRunner(const RunnerOptions& options);
 
-  // Imports as import_volume does, in a process used for this import only. The process has ended
+  // Imports as import_volume does, in a process used for this import only. `party` is whose turn it
+  // is (ImportPlaces). The process has ended
   // when this returns or throws, and leaves files only in the scratch folder. The returned volume
   // has been compared with the canonical file. Throws what import_volume throws; Error
   // kUnusableVolume if the process crashes or exceeds its bounds; kUnavailable after stop().
-  Volume run(const process::ImportTask& task);
+  Volume run(const process::ImportTask& task, const std::string& party = {});
 
   // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
   // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
@@ -46,17 +46,13 @@ class ImportRunner {
  private:
   // Sends `message` to a process and returns its report. The process has ended when this returns.
   // Throws as run() does if the report has neither a result nor an error.
-  process::ImportReport report_of(const std::string& message);
+  process::ImportReport report_of(const std::string& message, const std::string& party);
   // Returns nothing if the process ended before it began its work.
   std::optional<process::ImportReport> run_in(process::Child child, const std::string& message);
-  void take_place();
-  void give_place_back();
 
   const RunnerOptions options_;
   std::stop_source stop_;
-  std::mutex mutex_;
-  std::condition_variable_any place_free_;
-  std::size_t running_ = 0;
+  ImportPlaces places_;
   process::PreparedProcesses prepared_;
 };
 

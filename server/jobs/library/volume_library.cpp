@@ -21,9 +21,9 @@ std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const std::filesystem::path& upload,
                                            const process::ImportOptions& options,
-                                           const std::string& name) {
+                                           const std::string& name, const std::string& party) {
   const store::ScratchFolder scratch(folder_.scratch());
-  Volume volume = import_file(upload, options, scratch);
+  Volume volume = import_file(upload, options, party, scratch);
   if (!volume.name && !name.empty()) volume.name = name;
   return keep(owner, std::move(volume), scratch);
 }
@@ -32,20 +32,21 @@ std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& own
                                                           const std::filesystem::path& response,
                                                           const process::PeersSeries& series) {
   const store::ScratchFolder scratch(folder_.scratch());
-  Volume volume = import_file(response, {.peers = series}, scratch);
+  Volume volume = import_file(response, {.peers = series}, owner, scratch);
   if (!volume.dicom) throw Error(ErrorCode::kInternal, "images from a PACS have no DICOM identity");
   DicomIdentity identity = *volume.dicom;
   return {keep(owner, std::move(volume), scratch).first, std::move(identity)};
 }
 
 Volume VolumeLibrary::import_file(const std::filesystem::path& upload,
-                                  const process::ImportOptions& options,
+                                  const process::ImportOptions& options, const std::string& party,
                                   const store::ScratchFolder& scratch) {
   return runner_.run({.source = upload,
                       .scratch = scratch.path(),
                       .target = canonical_in(scratch),
                       .options = options,
-                      .limits = limits_});
+                      .limits = limits_},
+                     party);
 }
 
 std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume volume,
@@ -69,9 +70,10 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
 std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
                                                    const std::filesystem::path& upload,
                                                    const process::ImportOptions& options,
-                                                   const std::string& name) {
+                                                   const std::string& name,
+                                                   const std::string& party) {
   const auto add_one = [&](const process::ImportOptions& how) {
-    auto [volume, is_new] = add(owner, upload, how, name);
+    auto [volume, is_new] = add(owner, upload, how, name, party);
     return UploadedVolume{.member = how.member, .status = is_new ? 201 : 200, .volume = volume};
   };
   std::vector<Choice> members;
@@ -98,8 +100,9 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
 
 void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
   const std::scoped_lock lock(mutex_);
+  // The eraser waits for the lock, and leaves alone what a record still names then.
+  if (volumes_.contains(viewer, id)) eraser_.erase(id);
   volumes_.erase(viewer, id);
-  eraser_.erase(id);
 }
 
 }  // namespace isomesh::jobs

@@ -32,12 +32,13 @@ class VolumeLibrary {
         runner_(runner) {}
 
   // Imports an uploaded file in a process of its own. `name` is the client's name for the upload,
-  // used if the file contains no name. Second: false if the owner already had the same samples and
-  // geometry. Then the record stays unchanged, but the returned volume has the notes and ignored
-  // files of this upload. Throws what ImportRunner::run throws, and kOutOfSpace.
+  // used if the file contains no name; `party` takes turns with others (ImportPlaces). Second:
+  // false if the owner already had the same samples and geometry. Then the record stays unchanged,
+  // but the returned volume has the notes and ignored files of this upload. Throws what
+  // ImportRunner::run throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
-                              const std::string& name = {});
+                              const std::string& name = {}, const std::string& party = {});
 
   // Imports a series from a PACS response. Second: the patient, study and series according to the
   // images themselves; the record may be of an earlier upload of the same samples.
@@ -51,7 +52,7 @@ class VolumeLibrary {
   // member, and its error is thrown.
   std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
                                       const process::ImportOptions& options,
-                                      const std::string& name);
+                                      const std::string& name, const std::string& party);
 
   // Renames the owner's volume; an empty name removes it. Throws Error kNotFound, kGone.
   Volume rename(const std::string& owner, const std::string& id,
@@ -72,7 +73,7 @@ class VolumeLibrary {
  private:
   // Writes the canonical file of the upload into the scratch folder.
   Volume import_file(const std::filesystem::path& upload, const process::ImportOptions& options,
-                     const store::ScratchFolder& scratch);
+                     const std::string& party, const store::ScratchFolder& scratch);
   // Makes that file a blob, and adds the volume to the owner's records.
   std::pair<Volume, bool> keep(const std::string& owner, Volume volume,
                                const store::ScratchFolder& scratch);
@@ -86,7 +87,7 @@ class VolumeLibrary {
   // Held while a blob and its record are added or erased together. Additions share it, so that they
   // wait for the disk concurrently.
   std::shared_mutex mutex_;
-  BlobEraser eraser_{blobs_, volumes_, mutex_};
+  BlobEraser eraser_{blobs_, volumes_, mutex_, folder_.erasing()};
 };
 
 }  // namespace isomesh::jobs

@@ -300,9 +300,10 @@ std::optional<std::uint64_t> FileBlobStore::size(const std::string& key) const {
 }
 
 void FileBlobStore::erase(const std::string& key) {
-  const std::uint64_t bytes = size_of(path_of(key));
+  const std::filesystem::path place = found(key);
+  const std::uint64_t bytes = size_of(place);
   std::error_code ignored;
-  if (std::filesystem::remove(path_of(key), ignored)) room_.give(bytes);
+  if (std::filesystem::remove(place, ignored)) room_.give(bytes);
 }
 
 std::filesystem::path FileBlobStore::found(const std::string& key) const {

@@ -60,6 +60,7 @@ std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::strin
 bool FileBlobStore::take_out(const std::string& key, std::chrono::nanoseconds oldest_hold,
                              const Names& names) {
   if (held(oldest_hold).contains(key)) return false;
+  found(key);
   if (!put_aside(key)) return true;
   if (look_again(std::span(&key, 1), oldest_hold, names) > 0) return false;
   const std::filesystem::path aside = folders_.quarantine / key;

@@ -69,7 +69,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
   // Before anything is written: on a full disk this frees the necessary space.
   reserve_ =
       std::make_unique<Reserve>(root_ / "reserve", reserve.value_or(Reserve::usual_bytes(root_)));
-  make_folders({blobs(), quarantine(), scratch()});
+  make_folders({blobs(), quarantine(), scratch(), erasing()});
   sync_folder(root_);
 }
 

@@ -48,6 +48,8 @@ class DataFolder {
   std::filesystem::path quarantine() const { return root_ / "quarantine"; }
   std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
   std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
+  // Empty files, named like the blobs of deleted volumes that have not been erased yet.
+  std::filesystem::path erasing() const { return root_ / "erasing"; }
   // Multipart uploads, which outlive the process. Created by their owner.
   std::filesystem::path uploads() const { return root_ / "uploads"; }
   Reserve& reserve() const { return *reserve_; }

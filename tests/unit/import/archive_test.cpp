@@ -320,6 +320,21 @@ TEST(Archive, SeveralVolumesAreNamed) {
                  AllOf(HasSubstr("2 volumes"), HasSubstr("\"a.nii\", \"b/c.nii\"")));
 }
 
+// The first thousand alone would look like all of them.
+TEST(Archive, MoreVolumesThanOneUploadMayHaveAreRefused) {
+  std::vector<Member> members;
+  for (int n = 0; n < 1001; ++n) {
+    std::string samples = kSamples;
+    samples[0] = static_cast<char>(n);
+    samples[1] = static_cast<char>(n / 256);
+    members.push_back({"v" + std::to_string(n) + ".nrrd", nrrd(small_nrrd(), samples)});
+  }
+  EXPECT_THAT(import_bytes(zip(members)).error,
+              HasSubstr("holds 1001 volumes, more than the 1000 that one upload may have"));
+  members.pop_back();
+  EXPECT_THAT(import_bytes(zip(members)).error, HasSubstr("holds 1000 volumes. Choose one"));
+}
+
 TEST(Archive, WithoutAVolumeItIsUnsupported) {
   expect_refused({{"a.txt", "text"}, {"b.txt", "more"}}, HasSubstr("2 files"),
                  ErrorCode::kUnsupportedMedia);

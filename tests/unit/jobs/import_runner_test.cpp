@@ -2,6 +2,8 @@
 
 #include <csignal>
 #include <limits>
+#include <mutex>
+#include <semaphore>
 #include <set>
 #include <thread>
 
@@ -153,6 +155,40 @@ TEST(ImportRunner, StoppingEndsThoseThatRunAndThoseThatWait) {
   faulty.runner().stop();
   threads.clear();
   EXPECT_EQ(faulty.run("crash").code(), ErrorCode::kUnavailable);
+}
+
+// A client alone uses all places. When another one comes, it gets the next place that becomes free,
+// however many imports of the first wait.
+TEST(ImportPlaces, ALaterClientWaitsForOneImport) {
+  for (const std::size_t count : {1, 2, 3}) {
+    ImportPlaces places(count);
+    std::mutex mutex;
+    std::vector<std::string> begun;
+    const auto number_begun = [&] {
+      const std::scoped_lock lock(mutex);
+      return begun.size();
+    };
+    std::counting_semaphore<> may_end(0);
+    std::vector<std::jthread> threads;
+    const auto start = [&](const std::string& party) {
+      threads.emplace_back([&, party] {
+        const ImportPlaces::Place place = places.take(party, {});
+        {
+          const std::scoped_lock lock(mutex);
+          begun.push_back(party);
+        }
+        may_end.acquire();
+      });
+    };
+    for (std::size_t n = 0; n < count + 3; ++n) start("many");
+    ASSERT_TRUE(test::eventually([&] { return number_begun() == count && places.waiting() == 3; }));
+    start("other");
+    ASSERT_TRUE(test::eventually([&] { return places.waiting() == 4; }));
+    may_end.release();
+    ASSERT_TRUE(test::eventually([&] { return number_begun() == count + 1; }));
+    EXPECT_EQ(begun.back(), "other") << count;
+    may_end.release(static_cast<std::ptrdiff_t>(count) + 3);
+  }
 }
 
 TEST(ImportRunner, RawDescriptionsAreCheckedBeforeAnythingStarts) {

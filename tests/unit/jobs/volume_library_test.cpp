@@ -38,11 +38,11 @@ class VolumeLibraryTest : public test::JobsFixture {
   void erase_while_somebody_stores(const std::function<void(const Volume& volume)>& meanwhile) {
     const Volume volume = add_bytes(bytes_).first;
     std::shared_mutex coming;
-    BlobEraser eraser(blobs_, volumes_, coming);
+    BlobEraser eraser(blobs_, volumes_, coming, data_.erasing());
     {
       const std::shared_lock somebody_stores(coming);
-      volumes_.erase("", volume.id);
       eraser.erase(volume.id);
+      volumes_.erase("", volume.id);
       meanwhile(volume);
     }
     eraser.finish();
@@ -95,6 +95,38 @@ TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
   EXPECT_EQ(add_as("other", others), ErrorCode::kOutOfSpace);
   EXPECT_EQ(add_as("other", bytes_), ErrorCode::kOutOfSpace);
   EXPECT_EQ(add_as("", bytes_), std::nullopt);
+}
+
+// As after a process that died between the response and the erasing: the files stay.
+TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
+  const Volume erased = add_bytes(bytes_).first;
+  const Volume kept = add_bytes(std::string(bytes_.rbegin(), bytes_.rend())).first;
+  for (const Volume& volume : {erased, kept}) {
+    test::write_file(data_.erasing() / volume.id, "");
+  }
+  volumes_.erase("", erased.id);
+  EXPECT_EQ(blob_count(), 2U);
+  std::shared_mutex coming;
+  BlobEraser next(blobs_, volumes_, coming, data_.erasing());
+  next.finish();
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_NO_THROW(blobs_.path_of(kept.id));
+  EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
+}
+
+TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
+  const Volume volume = add_bytes(bytes_).first;
+  std::shared_mutex coming;
+  BlobEraser eraser(blobs_, volumes_, coming, data_.erasing());
+  {
+    const std::scoped_lock erasing(coming);
+    eraser.erase(volume.id);
+    EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
+    volumes_.erase("", volume.id);
+  }
+  eraser.finish();
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
 }
 
 // Whoever erases does not wait for the disk, which takes long for what is large and no time for
