@@ -96,6 +96,7 @@ Geometry geometry_of(const Vector3& origin, const std::array<Vector3, 3>& steps)
   geometry.origin = origin;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     geometry.spacing[axis] = length(steps[axis]);
+    if (geometry.spacing[axis] == 0) continue;  // it has no direction, and find_fault names it
     for (std::size_t row = 0; row < 3; ++row) {
       geometry.direction[row * 3 + axis] = steps[axis][row] / geometry.spacing[axis];
     }

@@ -208,6 +208,10 @@ class Unpacker {
       if (::archive_entry_is_encrypted(entry) != 0) {
         throw_unusable("The archive is encrypted. Send it without a password.");
       }
+      // A TAR is not compressed, but its files can be sparse.
+      if (reader_.is_tar() && ::archive_entry_sparse_count(entry) > 0) {
+        throw_unusable("The archive contains sparse files, which are not accepted.");
+      }
       if (is_regular(entry) && !is_hidden(name)) use(entry, name);
     }
   }
@@ -255,9 +259,8 @@ class Unpacker {
                                             std::to_string(limits_.max_bytes) +
                                             " bytes that are accepted.");
     }
-    // A TAR is not compressed, but its files can be sparse.
     if (reader_.is_tar() && total_ + further > file_.size()) {
-      throw_unusable("The archive contains sparse files, which are not accepted.");
+      throw_unusable("The archive is truncated: its members have more bytes than it has.");
     }
     if (total_ + further > most_unpacked_bytes(file_.size())) {
       throw_unusable("The archive unpacks to more than " + std::to_string(kMostUnpackedPerByte) +

@@ -396,6 +396,14 @@ TEST(Archive, SparseFilesAreRefused) {
   EXPECT_THAT(import_bytes(sparse_tar(50'000'000)).error, HasSubstr("sparse"));
 }
 
+TEST(Archive, ATruncatedTarIsRefusedAsSuch) {
+  const std::string file =
+      tar({{"head.nii", nifti({}, kSamples)}, {"other", std::string(5000, 'x')}});
+  for (const std::size_t bytes : {600, 900, 2000, 4000}) {
+    EXPECT_THAT(import_bytes(file.substr(0, bytes)).error, HasSubstr("runcated")) << bytes;
+  }
+}
+
 TEST(Archive, SomethingBehindATarIsRefused) {
   const std::string file = tar({{"head.nii", nifti({}, kSamples)}});
   EXPECT_TRUE(import_bytes(file + std::string(5120, '\0')).imported());

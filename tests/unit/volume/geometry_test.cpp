@@ -45,6 +45,13 @@ TEST(Geometry, IsRefusedByField) {
   EXPECT_EQ(faulty_field({.direction = {1, 1, 0, 0, 0, 0, 0, 0, 1}}), "direction");
 }
 
+TEST(Geometry, OfAStepWithoutALengthIsRefusedByItsSpacing) {
+  const Geometry geometry = geometry_of({0, 0, 0}, {{{0, 0, 0}, {0, 1, 0}, {0, 0, 1}}});
+  const auto fault = find_fault({2, 2, 2}, normalised(geometry));
+  ASSERT_TRUE(fault);
+  EXPECT_NE(fault->message.find("along i is 0 mm"), std::string::npos) << fault->message;
+}
+
 TEST(Geometry, IsRefusedWhereSinglePrecisionEnds) {
   EXPECT_EQ(faulty_field({.origin = {65000, 0, 0}}), "");
   EXPECT_EQ(faulty_field({.origin = {66000, 0, 0}}), "origin");
