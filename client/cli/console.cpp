@@ -129,7 +129,7 @@ int status_of(const Job& job, const Options& options, const std::string& subject
 
 void tell_notes(const Volume& volume, const std::string& subject) {
   for (const Note& note : volume.notes) {
-    complain((subject.empty() ? "" : subject + ": ") + "note: " + note_text(note) + " (" +
+    complain((subject.empty() ? "" : subject + ": ") + "note: " + with_options(note.detail) + " (" +
              note.code + ")");
   }
 }

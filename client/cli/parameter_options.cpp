@@ -13,6 +13,7 @@
 
 #include "base/text.h"
 #include "client/cli/option_values.h"
+#include "client/cli/text.h"
 #include "proto/parameters.h"
 #include "proto/presets.h"
 
@@ -375,7 +376,7 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
 }
 
 std::string in_options(const Error& error) {
-  if (error.fields().empty()) return error.what();
+  if (error.fields().empty()) return with_options(error.what());
   std::string text;
   for (const FieldError& fault : error.fields()) {
     text += (text.empty() ? "" : "; ") + option_of_field(fault.field) + ": " +

@@ -23,7 +23,7 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
                     Carrier carrier = Carrier::kBody);
 
 // The error's text with the options' names instead of the fields': "--max-error" for
-// "max_error_mm". A text without fields stays as it is.
+// "max_error_mm".
 std::string in_options(const Error& error);
 
 }  // namespace isomesh::cli

@@ -231,7 +231,7 @@ std::string volume_report(const Volume& volume) {
   }
   rows.push_back({"created", volume.created});
   for (const Note& note : volume.notes)
-    rows.push_back({"note", note_text(note) + " (" + note.code + ')'});
+    rows.push_back({"note", with_options(note.detail) + " (" + note.code + ')'});
   for (const IgnoredObject& object : volume.ignored) {
     rows.push_back({"ignored", object.name + ": " + object.reason});
   }
@@ -314,17 +314,6 @@ std::string job_report(const Job& job, const LengthUnit& unit) {
   std::string text = in_columns({Align::kLeft, Align::kLeft}, rows);
   if (is_final(job.state)) text += '\n' + timing_report(job.timing, {});
   if (job.mesh) text += '\n' + mesh_report(*job.mesh, unit);
-  return text;
-}
-
-std::string note_text(const Note& note) {
-  constexpr std::array<std::array<std::string_view, 2>, 2> kOptions = {
-      {{"\"labels\": \"all\"", "--labels all"}, {"nifti_form=", "--nifti-form "}}};
-  std::string text = note.detail;
-  for (const auto& [member, option] : kOptions) {
-    const std::size_t at = text.find(member);
-    if (at != std::string::npos) text.replace(at, member.size(), option);
-  }
   return text;
 }
 

@@ -32,9 +32,6 @@ std::string job_report(const Job& job, const LengthUnit& unit = length_unit({}))
 // The options that would resolve an error, one per line; empty if there are none.
 std::string remedy_report(const Remedy& remedy);
 
-// The note's detail, with the command's options instead of the API's members.
-std::string note_text(const Note& note);
-
 // The names of volumes by their ids; volumes without a name are left out.
 using VolumeNames = std::map<std::string, std::string>;
 

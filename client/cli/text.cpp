@@ -76,4 +76,20 @@ std::string in_columns(const std::vector<Align>& columns,
   return text;
 }
 
+std::string with_options(std::string text) {
+  constexpr std::array<std::array<std::string_view, 2>, 7> kOptions = {
+      {{"\"labels\": \"all\"", "--labels all"},
+       {"nifti_form=", "--nifti-form "},
+       {"member=NAME", "--member NAME"},
+       {"series=UID", "--series UID"},
+       {"volume=N", "--volume N"},
+       {"spacing=X,Y,Z", "--spacing X,Y,Z"},
+       {"dims (X,Y,Z) and type", "--dims X,Y,Z and --type"}}};
+  for (const auto& [parameter, option] : kOptions) {
+    const std::size_t at = text.find(parameter);
+    if (at != std::string::npos) text.replace(at, parameter.size(), option);
+  }
+  return text;
+}
+
 }  // namespace isomesh::cli

@@ -20,4 +20,8 @@ enum class Align { kLeft, kRight };
 std::string in_columns(const std::vector<Align>& columns,
                        const std::vector<std::vector<std::string>>& rows);
 
+// A text of the server, in which the command's options replace the API's parameters: "--member
+// NAME" for "member=NAME".
+std::string with_options(std::string text);
+
 }  // namespace isomesh::cli

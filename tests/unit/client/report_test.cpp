@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/cli/text.h"
 #include "proto/json.h"
 #include "tests/unit/client/support.h"
 
@@ -198,10 +199,14 @@ TEST(JobList, NamesTheVolumes) {
   EXPECT_THAT(list, HasSubstr("  0123456789ab\n"));
 }
 
-TEST(NoteText, NamesTheOptionInsteadOfTheMember) {
-  EXPECT_EQ(note_text({"looks-like-labels", "It has labels: mesh it with \"labels\": \"all\"."}),
+TEST(WithOptions, NamesTheOptionInsteadOfTheParameter) {
+  EXPECT_EQ(with_options("It has labels: mesh it with \"labels\": \"all\"."),
             "It has labels: mesh it with --labels all.");
-  EXPECT_EQ(note_text({"other", "as it is"}), "as it is");
+  EXPECT_EQ(with_options("Choose one with member=NAME: \"member=NAME.nii\"."),
+            "Choose one with --member NAME: \"member=NAME.nii\".");
+  EXPECT_EQ(with_options("If it holds raw samples, give their dims (X,Y,Z) and type."),
+            "If it holds raw samples, give their --dims X,Y,Z and --type.");
+  EXPECT_EQ(with_options("as it is"), "as it is");
 }
 
 TEST(JobJson, AddsWhatTheClientKnows) {

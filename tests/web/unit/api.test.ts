@@ -42,6 +42,7 @@ describe('errorOf', () => {
       expect(adviceFor(new ApiError(status, '', '')), String(status)).not.toBe('');
     }
     expect(adviceFor(new ApiError(400, '', ''))).toBe('');
+    expect(adviceFor(new ApiError(422, '', 'The data file is missing. Send both files in one ZIP.'))).toBe('');
   });
 });
 

@@ -87,6 +87,7 @@ export function adviceFor(error: ApiError): string {
     case 415:
       return 'Send the volume in a format that the server reads. Raw samples need a description.';
     case 422:
+      if (/\. (Add|Choose|Give|Send|Upload) /.test(error.detail)) return '';
       return 'Export the volume again from its source, or choose another one.';
     case 429:
     case 503:
