@@ -6,17 +6,25 @@
 #include <ctime>
 
 namespace isomesh {
+namespace {
+
+std::tm utc_of(std::chrono::system_clock::time_point time) {
+  const std::time_t seconds =
+      std::chrono::system_clock::to_time_t(std::chrono::floor<std::chrono::seconds>(time));
+  std::tm parts = {};
+  ::gmtime_r(&seconds, &parts);
+  return parts;
+}
+
+}  // namespace
 
 std::string timestamp() { return timestamp_of(std::chrono::system_clock::now()); }
 
 std::string timestamp_of(std::chrono::system_clock::time_point now) {
-  const std::time_t seconds =
-      std::chrono::system_clock::to_time_t(std::chrono::floor<std::chrono::seconds>(now));
   const auto fraction = std::chrono::duration_cast<std::chrono::milliseconds>(
                             now - std::chrono::floor<std::chrono::seconds>(now))
                             .count();
-  std::tm parts = {};
-  ::gmtime_r(&seconds, &parts);
+  const std::tm parts = utc_of(now);
   std::array<char, 20> text = {};
   std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
   std::array<char, 16> tail = {};
@@ -37,6 +45,13 @@ std::chrono::system_clock::time_point time_of(std::string_view timestamp) {
   parts.tm_mon -= 1;
   return std::chrono::system_clock::from_time_t(::timegm(&parts)) +
          std::chrono::milliseconds(milliseconds);
+}
+
+std::string http_date_of(std::chrono::system_clock::time_point time) {
+  const std::tm parts = utc_of(time);
+  std::array<char, 40> text = {};
+  std::strftime(text.data(), text.size(), "%a, %d %b %Y %H:%M:%S GMT", &parts);
+  return text.data();
 }
 
 }  // namespace isomesh

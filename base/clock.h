@@ -11,7 +11,10 @@ std::string timestamp();
 
 std::string timestamp_of(std::chrono::system_clock::time_point time);
 
-// The inverse; 1970 for an invalid text.
+// The inverse of timestamp_of; 1970 for an invalid text.
 std::chrono::system_clock::time_point time_of(std::string_view timestamp);
+
+// For a Date field (RFC 9110, 5.6.7): "Sun, 06 Nov 1994 08:49:37 GMT". Thread safe.
+std::string http_date_of(std::chrono::system_clock::time_point time);
 
 }  // namespace isomesh

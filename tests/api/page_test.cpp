@@ -11,6 +11,7 @@ namespace {
 
 using namespace test;
 using testing::HasSubstr;
+using testing::MatchesRegex;
 using testing::Not;
 using testing::StartsWith;
 
@@ -30,6 +31,14 @@ TEST_F(PageTest, IsServedWithAPolicyThatAllowsNothingFromElsewhere) {
   EXPECT_THAT(policy, HasSubstr("frame-ancestors 'none'"));
   EXPECT_THAT(policy, Not(HasSubstr("unsafe-inline")));
   EXPECT_THAT(policy, Not(HasSubstr("http")));
+}
+
+// RFC 9110, 6.6.1: caches and clients reckon ages by it.
+TEST_F(PageTest, AndEveryOtherResponseSaysTheTime) {
+  for (const std::string path : {"/", "/v1/volumes", "/nothing", "/v1/volumes?limit=x"}) {
+    EXPECT_THAT(daemon_.get(path).header("date"), MatchesRegex("[A-Z][a-z]{2}, [0-9]{2} .* GMT"))
+        << path;
+  }
 }
 
 TEST_F(PageTest, IsAskedForAgainAndNotSentAgain) {

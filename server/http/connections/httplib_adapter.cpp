@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <limits>
 #include <utility>
 
 #include <httplib.h>
+
+#include "base/clock.h"
 
 namespace isomesh::http {
 namespace {
@@ -185,6 +188,7 @@ class HttplibServer : public httplib::Server {
 
   void write_into(httplib::Response& out) {
     out.status = response_.status;
+    out.set_header("Date", http_date_of(std::chrono::system_clock::now()));
     out.set_header("X-Content-Type-Options", "nosniff");
     out.set_header("Cross-Origin-Resource-Policy", "same-origin");
     for (const auto& [name, value] : response_.headers) out.set_header(name, value);

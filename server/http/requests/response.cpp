@@ -1,5 +1,8 @@
 #include "server/http/requests/response.h"
 
+#include <chrono>
+
+#include "base/clock.h"
 #include "proto/json.h"
 
 namespace isomesh::http {
@@ -48,6 +51,7 @@ std::string refusal(const Error& error) {
   const std::string body = to_json(problem);
   std::string bytes =
       "HTTP/1.1 " + std::to_string(problem.status) + ' ' + problem.title +
+      "\r\nDate: " + http_date_of(std::chrono::system_clock::now()) +
       "\r\nCache-Control: no-store\r\nConnection: close\r\nContent-Type: " + kProblemType +
       "\r\nX-Content-Type-Options: nosniff\r\nCross-Origin-Resource-Policy: same-origin"
       "\r\nContent-Length: " +

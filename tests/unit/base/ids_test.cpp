@@ -67,5 +67,10 @@ TEST(Timestamp, IsRfc3339InUtcWithMilliseconds) {
   EXPECT_TRUE(std::ranges::is_sorted(stamps));
 }
 
+// The example of RFC 9110, 5.6.7.
+TEST(HttpDate, IsAsInTheStandard) {
+  EXPECT_EQ(http_date_of(time_of("1994-11-06T08:49:37.999Z")), "Sun, 06 Nov 1994 08:49:37 GMT");
+}
+
 }  // namespace
 }  // namespace isomesh
