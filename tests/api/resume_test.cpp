@@ -94,6 +94,17 @@ TEST_F(ResumeTest, PartsBecomeTheVolumeThatTheyAreTogether) {
   EXPECT_EQ(upload(*daemon_, raw_).id, volume.id);
 }
 
+TEST_F(ResumeTest, WhatItBecameIsToldUntilThatIsDeleted) {
+  const std::string place = begun();
+  ASSERT_EQ(daemon_->send("PATCH", place, raw_.bytes, part(0, true)).status, 201);
+  const std::string ask = "/v1/volumes?upload=" + place.substr(place.rfind('/') + 1);
+  const Answer again = daemon_->send("POST", ask);
+  ASSERT_EQ(again.status, 200) << again.body;
+  const std::string id = volume_from_json(again.body).id;
+  EXPECT_EQ(daemon_->send("DELETE", "/v1/volumes/" + id).status, 204);
+  EXPECT_TRUE(is_problem(daemon_->send("POST", ask), ErrorCode::kGone));
+}
+
 TEST_F(ResumeTest, TheFirstPartMayComeWithTheBeginning) {
   const Answer first = begin(kBegin, raw_.bytes.substr(0, 500));
   EXPECT_EQ(first.header("upload-offset"), "500");

@@ -90,7 +90,9 @@ bool answer_what_it_became(App& app, const Request& request, Response& response)
   const std::string volume =
       app.kept.became(owner_of(request), std::string(request.parameter("upload")));
   if (volume.empty()) return false;
-  response.set_header("Location", kVolumes + '/' + volume_from_json(volume).id);
+  const std::string id = volume_from_json(volume).id;
+  if (!app.services.volumes.contains(owner_of(request), id)) return false;  // it was deleted since
+  response.set_header("Location", kVolumes + '/' + id);
   answer_json(response, 200, volume);
   return true;
 }
