@@ -52,7 +52,7 @@ TEST_F(BlobsInS3, WhatIsStoredOutlivesTheMachine) {
 TEST_F(BlobsInS3, NothingIsLostWhileTheyDoNotAnswer) {
   start_with_peer();
   const Volume volume = small_volume();
-  EXPECT_EQ(readiness(), 200);
+  ASSERT_TRUE(eventually([&] { return readiness() == 200; }));
   peer_->fail("drop");
   EXPECT_TRUE(eventually([&] { return readiness() == 503; }));
   const int puts = peer_->count("PUT");
