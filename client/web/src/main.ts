@@ -19,7 +19,7 @@ import { WatchedJobs } from './job/watched';
 import { button, h, icon, isTyping } from './ui/dom';
 import { showHelp } from './ui/help';
 import { mountNotices, pendingRefusal, refusal, tell } from './ui/notices';
-import { currentRoute, go, hashOf, type Route } from './ui/route';
+import { currentRoute, go, hashOf, isVolumeList, type Route } from './ui/route';
 import { Scope } from './ui/signal';
 import { startTheme, toggleTheme } from './ui/theme';
 import { tokenButtons, watchToken } from './ui/token_dialog';
@@ -33,9 +33,9 @@ interface Place {
 }
 
 // Views are loaded when they are needed.
-function placeOf({ path }: Route): Place {
-  const [name, id] = path;
-  if (name === undefined || (name === 'volumes' && id === undefined)) {
+function placeOf(route: Route): Place {
+  const [name, id] = route.path;
+  if (isVolumeList(route)) {
     return { title: 'Volumes', show: async (scope) => (await import('./views/volumes/volumes')).volumesView(scope) };
   }
   if (name === 'volumes') return { title: 'New surface', show: async (...of) => (await import('./views/prepare/prepare')).prepareView(...of) };

@@ -22,6 +22,14 @@ export function seriesNifti(bytes: Buffer = samples, dims = [2, 3, 2]): Buffer {
   return Buffer.concat([header, bytes]);
 }
 
+// One volume with a qform that lies 5 mm beside the sform.
+export function twoFormNifti(): Buffer {
+  const bytes = seriesNifti(Buffer.from(samples).reverse().subarray(0, 12));
+  bytes.writeInt16LE(1, 252);
+  bytes.writeFloatLE(5, 268);
+  return bytes;
+}
+
 // An element of explicit little-endian DICOM.
 function element(group: number, tag: number, kind: string, value: string | Buffer): Buffer {
   let bytes = Buffer.from(value);

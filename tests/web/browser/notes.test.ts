@@ -1,6 +1,6 @@
 // What the daemon says about an upload, and what a person may answer.
 import { describe, expect, it } from 'vitest';
-import { ctSlice, samples, seriesNifti, smallNrrd } from './files';
+import { ctSlice, samples, seriesNifti, smallNrrd, twoFormNifti } from './files';
 import { drop, setup } from './support';
 
 const at = setup();
@@ -181,5 +181,26 @@ describe('a volume', () => {
     await page.goto(open);
     await rename('', byButton('Rename'));
     await expect.poll(() => title.innerText()).toBe(facts);
+  });
+});
+
+describe('a NIfTI file with two forms', () => {
+  it('can be read by the other one, and back', async () => {
+    const { daemon, page } = at;
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'forms.nii', bytes: twoFormNifti() }]);
+    await page.waitForURL(volumePage);
+    const [sform = ''] = volumePage.exec(page.url()) ?? [];
+    const note = page.locator('[data-note="forms-differ"]');
+    await expect.poll(() => note.innerText()).toContain('5.0 mm apart. The sform was used.');
+    await note.getByRole('button', { name: 'Use the qform' }).click();
+    await expect.poll(() => note.innerText()).toContain('The qform was used.');
+    expect(page.url()).not.toContain(sform);
+    await note.getByRole('button', { name: 'Use the sform' }).click();
+    await expect.poll(() => page.url()).toContain(sform);
+    // After the page has loaded anew it does not have the file.
+    await page.reload();
+    await expect.poll(() => note.innerText()).toContain('The sform was used.');
+    expect(await note.getByRole('button').count()).toBe(0);
   });
 });

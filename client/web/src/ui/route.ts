@@ -34,6 +34,10 @@ export function currentRoute(): Route {
   return parseRoute(window.location.hash);
 }
 
+export function isVolumeList({ path: [name, id] }: Route): boolean {
+  return name === undefined || (name === 'volumes' && id === undefined);
+}
+
 export function go(path: readonly string[], query?: URLSearchParams): void {
   writePending();
   window.location.hash = hashOf(path, query);

@@ -45,3 +45,8 @@ export function noteTexts(volume: Volume): string[] {
     code === 'looks-like-labels' && isInteger(volume) ? `${detail} The button "${eachLabel}" makes one surface for each label.` : detail,
   );
 }
+
+// The form that a note on a NIfTI file says would place the samples differently. Null: it names none.
+export function otherForm(detail: string): string | null {
+  return /\bnifti_form=(sform|qform)\b/.exec(detail)?.[1] ?? null;
+}

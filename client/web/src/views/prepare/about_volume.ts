@@ -4,8 +4,10 @@ import type { Volume } from '../../api/types';
 import { button, h } from '../../ui/dom';
 import { formatDims, volumeFormatTitle, formatSpacing, formatValue } from '../../ui/format';
 import { askText, tellError } from '../../ui/notices';
+import { go } from '../../ui/route';
 import { skippedText } from '../../volume/skipped';
-import { noteTexts, volumeName } from '../../volume/names';
+import { noteTexts, otherForm, volumeName } from '../../volume/names';
+import { uploads } from '../volumes/upload_panel';
 
 // Lists the skipped files of an upload, because a user may miss them.
 function ignoredNote(volume: Volume): HTMLElement | null {
@@ -19,6 +21,16 @@ function ignoredNote(volume: Volume): HTMLElement | null {
   );
 }
 
+// Reads the file once more by the form that was not used, and shows the progress where uploads are.
+function otherFormButton({ id }: Volume, detail: string): HTMLElement | false {
+  const form = otherForm(detail);
+  if (form === null || !uploads.hasFileOf(id)) return false;
+  return button(`Use the ${form}`, () => {
+    uploads.readAgain(id, { nifti_form: form });
+    go([]);
+  });
+}
+
 // Lists what the server decided or corrected when it read the upload.
 function notesOf(volume: Volume): HTMLElement | null {
   const { notes } = volume;
@@ -27,7 +39,9 @@ function notesOf(volume: Volume): HTMLElement | null {
   return h(
     'ul',
     { class: 'notes', 'aria-label': 'Notes' },
-    ...notes.map(({ code }, place) => h('li', { 'data-note': code }, texts[place])),
+    ...notes.map(({ code, detail }, place) =>
+      h('li', { 'data-note': code }, texts[place], ' ', code === 'forms-differ' && otherFormButton(volume, detail)),
+    ),
   );
 }
 

@@ -5,10 +5,11 @@ import { ApiError, asApiError, mayPass } from '../../api/problem';
 import type { RawDescription, UploadedVolume } from '../../api/types';
 import { button, h, icon } from '../../ui/dom';
 import { refusal, tell, tellError } from '../../ui/notices';
-import { hashOf } from '../../ui/route';
+import { currentRoute, go, hashOf, isVolumeList } from '../../ui/route';
 import { Signal } from '../../ui/signal';
 import { filesOfDrop, filesOfList, gather, type Gathered } from '../../volume/gather';
-import { volumeName } from '../../volume/names';
+import { noteTexts, volumeName } from '../../volume/names';
+import { skippedText } from '../../volume/skipped';
 import { faultOf } from '../../volume/sniff';
 import type { NamedFile } from '../../volume/tar';
 import { outcomeList, outcomeOf, type Outcome } from './outcomes';
@@ -26,22 +27,21 @@ interface Addition {
   outcomes?: readonly Outcome[];
 }
 
-// Called with the only volume of an upload, or with none after an upload of several, which stay listed here.
-type OnVolumes = (only: UploadedVolume | null) => void;
-
 const idle = '';
 
 // The whole page has one. An upload goes on while other views are shown; `state` says in a word what it does.
 export class UploadPanel {
   readonly element: HTMLElement;
   readonly state = new Signal<string>(idle);
-  // Null while the view that shows this panel is not there.
-  onVolumes: OnVolumes | null = null;
+  // Called after an upload whose volumes are not opened.
+  onStored: (() => void) | null = null;
   private readonly body = h('div', { class: 'drop-body' });
   private readonly queue = h('p', { class: 'upload-queue', role: 'status', hidden: true });
   private readonly fileInput = h('input', { type: 'file', multiple: true, hidden: true, 'data-pick': 'files' });
   private readonly folderInput = h('input', { type: 'file', webkitdirectory: true, hidden: true, 'data-pick': 'folder' });
   private running: AbortController | null = null;
+  // The last upload of one volume, for readAgain().
+  private last: { id: string; gathered: Gathered; choices: Choices } | null = null;
   private waiting: Gathered[] = [];
 
   constructor() {
@@ -72,6 +72,21 @@ export class UploadPanel {
     } else {
       void this.begin(gathered);
     }
+  }
+
+  // Whether readAgain() can: the files of other uploads are gone.
+  hasFileOf(id: string): boolean {
+    return this.last?.id === id;
+  }
+
+  // Reads the file of this volume once more, with these choices in addition to the earlier ones.
+  readAgain(id: string, choices: Choices): void {
+    if (this.last?.id !== id) return;
+    if (this.running) {
+      tell('Wait until the present upload has ended.');
+      return;
+    }
+    void this.send(this.last.gathered, { choices: { ...this.last.choices, ...choices } });
   }
 
   takeDrop(transfer: DataTransfer): void {
@@ -163,23 +178,28 @@ export class UploadPanel {
     } else if (uploaded.length > 1 || !first?.volume) {
       this.showOutcomes(uploaded.map((each) => outcomeOf(each, choices)), gathered);
     } else {
+      this.last = { id: first.volume.id, gathered, choices };
       this.showIdle();
       this.tellOf(first);
       this.goOn();
     }
   }
 
-  // To the view that shows this panel; elsewhere a note says that it is there.
-  private tellOf(only: UploadedVolume | null): void {
-    if (this.onVolumes && this.waiting.length === 0) {
-      this.onVolumes(only);
+  // Opens the volume if this panel is shown; elsewhere a note says that it was stored.
+  private tellOf({ status, volume }: UploadedVolume): void {
+    if (!volume) return;
+    const path = ['volumes', volume.id];
+    if (!isPanelShown() || this.waiting.length > 0) {
+      this.onStored?.();
+      tell(h('span', {}, h('a', { href: hashOf(path) }, volumeName(volume)), ' was uploaded.'));
       return;
     }
-    this.onVolumes?.(null);
-    if (only?.volume) {
-      const link = h('a', { href: hashOf(['volumes', only.volume.id]) }, volumeName(only.volume));
-      tell(h('span', {}, link, ' was uploaded.'));
+    // Its page shows the notes of the file that came first.
+    if (status === 200) {
+      const skipped = skippedText([volume]);
+      tell(['This volume is already stored.', ...noteTexts(volume), skipped && `${skipped}.`].filter(Boolean).join(' '));
     }
+    go(path);
   }
 
   private showFailed(error: unknown, gathered: Gathered, addition: Addition): void {
@@ -244,7 +264,7 @@ export class UploadPanel {
   private showQuestion(question: string, { name }: Gathered, lists: readonly HTMLElement[]): void {
     this.element.classList.remove('busy');
     this.state.value = 'Upload: your choice is needed';
-    if (!this.onVolumes) tell(h('a', { href: hashOf([]) }, `${name}: ${question}`));
+    if (!isPanelShown()) tell(h('a', { href: hashOf([]) }, `${name}: ${question}`));
     const asked = h('div', { role: 'status' }, h('h2', {}, question), h('p', {}, name));
     this.body.replaceChildren(asked, ...lists, h('div', { class: 'actions' }, this.otherButton()));
   }
@@ -252,7 +272,7 @@ export class UploadPanel {
   private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
     this.element.classList.remove('busy');
     this.state.value = 'Upload: your choice is needed';
-    if (!this.onVolumes) tellError(error);
+    if (!isPanelShown()) tellError(error);
     this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
     if (error.status === 415 && gathered.count === 1) {
       this.body.append(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
@@ -268,7 +288,7 @@ export class UploadPanel {
       outcomeList(outcomes, gathered.files, (_, choices) => void this.send(gathered, { choices, outcomes })),
       h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
     );
-    this.tellOf(null);
+    this.onStored?.();
     if (outcomes.every(({ volume }) => volume !== null)) this.goOn();
   }
 
@@ -282,6 +302,11 @@ export class UploadPanel {
       this.goOn();
     });
   }
+}
+
+// The address counts: the view that shows the panel may still be loading.
+function isPanelShown(): boolean {
+  return isVolumeList(currentRoute());
 }
 
 function withOutcome(outcomes: readonly Outcome[], choices: Choices, uploaded: UploadedVolume): Outcome[] {

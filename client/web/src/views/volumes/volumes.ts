@@ -1,17 +1,16 @@
 // The first view: upload, the volumes that are there, the last surfaces.
 import introPicture from '../../intro.webp';
 import { client } from '../../client';
-import type { Job, UploadedVolume, Volume } from '../../api/types';
+import type { Job, Volume } from '../../api/types';
 import { inWords, surfaceInWords } from '../../job/parameters';
 import { button, h } from '../../ui/dom';
 import { formatBytes, formatCount, formatSpacing, formatTime } from '../../ui/format';
 import { ask, askText, tell, tellError } from '../../ui/notices';
-import { go, hashOf } from '../../ui/route';
+import { hashOf } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../../volume/geometry';
 import { KnownVolumes } from '../../volume/known';
-import { noteTexts, volumeKind, volumeName } from '../../volume/names';
-import { skippedText } from '../../volume/skipped';
+import { volumeKind, volumeName } from '../../volume/names';
 import { uploads } from './upload_panel';
 import { VolumeSearch } from './volume_search';
 
@@ -203,8 +202,8 @@ class Home {
         this.surfaces,
       ),
     );
-    uploads.onVolumes = (only) => this.uploaded(only);
-    scope.onEnd(() => (uploads.onVolumes = null));
+    uploads.onStored = () => void this.refresh().catch(tellError);
+    scope.onEnd(() => (uploads.onStored = null));
   }
 
   // Shows what other users do: jobs at once, volumes some seconds later.
@@ -308,18 +307,5 @@ class Home {
   private erased(volume: string): void {
     this.older = this.older.filter(({ id }) => id !== volume);
     this.refresh().catch(tellError);
-  }
-
-  private uploaded(only: UploadedVolume | null): void {
-    if (!only?.volume) {
-      this.refresh().catch(tellError);
-      return;
-    }
-    // Its page shows the notes of the file that came first.
-    if (only.status === 200) {
-      const skipped = skippedText([only.volume]);
-      tell(['This volume is already stored.', ...noteTexts(only.volume), skipped && `${skipped}.`].filter(Boolean).join(' '));
-    }
-    go(['volumes', only.volume.id]);
   }
 }
