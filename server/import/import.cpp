@@ -1,5 +1,6 @@
 #include "server/import/import.h"
 
+#include <span>
 #include <string>
 
 #include "base/files.h"
@@ -8,12 +9,22 @@
 #include "server/import/other_formats.h"
 #include "server/import/peers/series.h"
 #include "server/import/readers.h"
+#include "server/import/source/gzip.h"
 
 namespace isomesh::import {
 namespace {
 
+// Inflated if it is compressed. Throws if that fails: a damaged file may be of a known format.
+std::string beginning_of(const InputFile& file) {
+  std::string head = file.text(0, kSniffBytes);
+  const auto bytes = std::as_bytes(std::span(head));
+  if (!is_gzip(bytes)) return head;
+  inflate_range(file, {0, file.size()}, kSniffBytes, [](std::span<const std::byte>) {});
+  return inflate_head(bytes, kSniffBytes);
+}
+
 [[noreturn]] void throw_unknown_format(const InputFile& file) {
-  if (const auto name = name_of_other_format(file.text(0, kSniffBytes))) {
+  if (const auto name = name_of_other_format(beginning_of(file))) {
     throw Error(ErrorCode::kUnsupportedMedia,
                 "This is " + std::string(*name) +
                     ", which cannot be read. Formats that can be read: " + volume_format_titles() +

@@ -143,5 +143,17 @@ TEST(Damage, WhatIsNoVolumeIsUnsupported) {
   }
 }
 
+TEST(Damage, InTheFirstCompressedBytesIsNotAnUnknownFormat) {
+  const std::string whole = gzip(nifti({.dim = {3, 4, 3, 2, 1, 1, 1, 1}}, kSmallSamples));
+  constexpr std::size_t kHeaderBytes = 10;  // of gzip
+  std::string corrupt = whole;
+  corrupt[kHeaderBytes] = '\x07';  // a block of a kind that does not exist
+  EXPECT_THAT(import_bytes(corrupt).error, testing::HasSubstr("corrupt"));
+  EXPECT_EQ(import_bytes(corrupt).code, ErrorCode::kUnusableVolume);
+  const std::string cut = whole.substr(0, kHeaderBytes + 2);
+  EXPECT_THAT(import_bytes(cut).error, testing::HasSubstr("truncated"));
+  EXPECT_EQ(import_bytes(cut).code, ErrorCode::kUnusableVolume);
+}
+
 }  // namespace
 }  // namespace isomesh::import::test
