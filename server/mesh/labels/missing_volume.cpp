@@ -43,21 +43,25 @@ double volume_of(const Corners& corners) {
   return std::abs(dot(way(1), cross(way(2), way(3)))) / 6;
 }
 
-// How much of the voxels of its corners a tetrahedron has. Of the six of Kuhn's split a quarter
-// each: the cells around a sample make it whole. Of the five, a corner whose edges are the cell's
-// own has its eighth of the cell in that tetrahedron alone.
+// How much of the voxels of its corners a tetrahedron has: of each, its share of the cell's eighth
+// around that corner. The tetrahedra of one cell have all of that eighth, so the shares are right
+// in the outermost cells, too. Of Kuhn's six, all have the ends of the cell's long diagonal, and
+// two each of the other corners. Of the five, one has a corner whose edges are the cell's own.
 std::array<double, 4> shares_of(const Corners& corners, Scheme scheme) {
-  const double volume = volume_of(corners);
   std::array<double, 4> shares;
-  shares.fill(volume / 4);
-  if (scheme != Scheme::kFive) return shares;
   for (std::size_t i = 0; i < 4; ++i) {
-    const bool is_apex = std::ranges::all_of(corners, [&](std::uint8_t other) {
-      return other == corners[i] || std::popcount(unsigned{other} ^ corners[i]) == 1;
-    });
-    if (!is_apex) continue;
-    shares.fill((volume - 0.125) / 3);
-    shares[i] = 0.125;
+    const auto edges_along = [&](int axes) {
+      return std::ranges::count_if(corners, [&](std::uint8_t other) {
+        return std::popcount(unsigned{other} ^ corners[i]) == axes;
+      });
+    };
+    if (scheme != Scheme::kFive) {
+      shares[i] = edges_along(3) == 1 ? 1 / 48.0 : 1 / 16.0;
+    } else if (edges_along(1) == 3) {
+      shares[i] = 1 / 8.0;
+    } else {
+      shares[i] = edges_along(1) == 1 ? 1 / 72.0 : 1 / 12.0;
+    }
   }
   return shares;
 }

@@ -17,10 +17,10 @@ namespace isomesh::mesh {
 
 // Returns, by fan and in voxels, the volume that the label at the wall's back lacks. Negative: it
 // has too much. `surface` must come from extract_walls with the same lattice, options and count,
-// and not have been moved since; `fans` are its own. For a closed surface, the cells between the
-// outermost samples and the caps count as exact, and so do vertices on the border. For the six
-// integer types of SampleType. The result is the same for any number of threads. Throws Error
-// kCancelled.
+// and not have been moved since; `fans` are its own. For a closed surface, what is missing between
+// the outermost samples and the caps is owed to vertices beside the caps, which stay flat; the
+// bevels of the volume's box count as exact. For the six integer types of SampleType. The result is
+// the same for any number of threads. Throws Error kCancelled.
 template <class T>
 Buffer<float> missing_volume(const Lattice<T>& lattice, const SeparateOptions& options,
                              const SurfaceCount& count, const WallFans& fans,

@@ -34,33 +34,98 @@ class TallyCellWriter {
     const unsigned parity = row_.parity_at(x);
     const CellSplit& split = separation_.splits[parity];
     const TallyCases& cases = tally_.cases[parity];
-    const bool has_phantoms = is_at_border(x, separation_.dims.x) ||
-                              is_at_border(y_, separation_.dims.y) ||
-                              is_at_border(z_, separation_.dims.z);
     const Double4 corner =
         Double4{static_cast<double>(x), static_cast<double>(y_), static_cast<double>(z_), 0} -
         static_cast<double>(separation_.margin);
+    const int borders = is_at_border(x, separation_.dims.x) + is_at_border(y_, separation_.dims.y) +
+                        is_at_border(z_, separation_.dims.z);
+    BorderCell border;
     for (std::size_t t = 0; t < split.tetrahedra; ++t) {
       const unsigned pattern = pattern_in(labels, split.corners[t]);
       const TetrahedronWalls& walls = separation_.walls[parity].tetrahedra[t][pattern];
       for (std::size_t i = 0; i < walls.triangles; ++i) {
         const WallTriangle& wall = walls.walls[i];
-        const double owed = has_phantoms ? 0 : cases.tetrahedra[t][pattern][i];
-        add(wall, {labels[wall.front], labels[wall.back]}, owed, corner, cases, places);
+        const Missing missing = missing_at(wall, {labels[wall.front], labels[wall.back]},
+                                           cases.tetrahedra[t][pattern][i], corner, cases, places);
+        if (borders == 0) {
+          for (std::size_t k = 0; k < 3; ++k) give(missing.fan(tally_, k), missing.volumes[k]);
+        } else {
+          border.triangles[border.size++] = missing;
+        }
       }
     }
+    if (border.size > 0) give_at_border(border, borders == 1);
     return out;
   }
 
  private:
+  // What the three corners of a triangle are owed by the part behind it.
+  struct Missing {
+    WallSides sides;
+    std::array<std::uint32_t, 3> vertices = {};
+    std::array<double, 3> volumes = {};
+
+    std::uint32_t fan(const VolumeTally& tally, std::size_t corner) const {
+      return tally.fans.find(vertices[corner], {sides, false});
+    }
+  };
+
+  struct BorderCell {
+    std::array<Missing, 6 * 12> triangles;  // of all tetrahedra
+    std::size_t size = 0;
+  };
+
   bool is_at_border(std::size_t at, std::uint32_t samples) const {
     return separation_.margin != 0 && (at == 0 || at + 2 == samples);
   }
 
-  void add(const WallTriangle& triangle, WallSides sides, double owed, Double4 corner,
-           const TallyCases& cases, const std::uint32_t* places) const {
+  // Caps stay flat and the edges of the volume's box bevelled. So what a cell beyond the samples
+  // lacks is owed to those of its vertices in the same wall that may move: within the samples, or
+  // else, beyond one face alone, where a wall leaves a cap.
+  void give_at_border(const BorderCell& cell, bool is_at_face) const {
     const Mesh& mesh = tally_.surface.mesh;
-    std::array<std::uint32_t, 3> vertices = {};
+    for (std::size_t first = 0; first < cell.size; ++first) {
+      const WallSides& sides = cell.triangles[first].sides;
+      double volume = 0;
+      std::array<std::uint32_t, 6 * 12 * 3> within;
+      std::array<std::uint32_t, 6 * 12 * 3> beyond;
+      std::size_t within_size = 0;
+      std::size_t beyond_size = 0;
+      bool is_done = false;
+      for (std::size_t i = 0; i < cell.size; ++i) {
+        const Missing& missing = cell.triangles[i];
+        if (!(missing.sides == sides)) continue;
+        is_done |= i < first;
+        for (std::size_t k = 0; k < 3; ++k) {
+          volume += missing.volumes[k];
+          const std::uint32_t fan = missing.fan(tally_, k);
+          if (fan == WallFans::kNone) continue;
+          if (!mesh.is_on_border(missing.vertices[k]))
+            within[within_size++] = fan;
+          else if (is_at_face)
+            beyond[beyond_size++] = fan;
+        }
+      }
+      if (is_done) continue;
+      if (within_size > 0) {
+        for (std::size_t i = 0; i < within_size; ++i) give(within[i], volume / within_size);
+      } else {
+        for (std::size_t i = 0; i < beyond_size; ++i) give(beyond[i], volume / beyond_size);
+      }
+    }
+  }
+
+  void give(std::uint32_t fan, double volume) const {
+    if (fan == WallFans::kNone) return;
+    std::atomic_ref(tally_.units[fan])
+        .fetch_add(static_cast<std::int64_t>(volume / VolumeTally::kUnit),
+                   std::memory_order_relaxed);
+  }
+
+  Missing missing_at(const WallTriangle& triangle, WallSides sides, double owed, Double4 corner,
+                     const TallyCases& cases, const std::uint32_t* places) const {
+    const Mesh& mesh = tally_.surface.mesh;
+    Missing missing;
     std::array<Double4, 3> before = {};
     std::array<Double4, 3> moved = {};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -68,31 +133,27 @@ class TallyCellWriter {
       const std::uint32_t vertex = places[offsets_[edge_name(name / kSlotPlaces, 0)] +
                                           static_cast<std::ptrdiff_t>(name % kSlotPlaces)];
       const std::array<float, 3>& place = cases.places[name];
-      vertices[i] = vertex;
+      missing.vertices[i] = vertex;
       before[i] = Double4{double{place[0]}, double{place[1]}, double{place[2]}, 0};
-      if (!mesh.is_on_border(vertex)) {
-        const Vec3& at = mesh.positions[vertex];
-        Double4 index = lanes(tally_.origin);
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          index += lanes(tally_.axes[axis]) * double{at[axis]};
-        }
-        moved[i] = index - corner - before[i];
+      const Vec3& at = mesh.positions[vertex];
+      Double4 index = lanes(tally_.origin);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        index += lanes(tally_.axes[axis]) * double{at[axis]};
       }
+      moved[i] = index - corner - before[i];
     }
     // Triangles are wound for space, which a left-handed lattice mirrors.
     const double hand = separation_.to_space.determinant() < 0 ? -1 : 1;
     const Double4 normal = swept_normal(before, moved) * hand;
     const bool is_swapped = sides.front > sides.back;
     if (is_swapped) std::swap(sides.front, sides.back);
+    missing.sides = sides;
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint32_t fan = tally_.fans.find(vertices[i], {sides, false});
-      if (fan == WallFans::kNone) continue;
       const Double4 product = moved[i] * normal;
-      const double missing = owed - (product[0] + product[1] + product[2]) / 3;
-      const double units = (is_swapped ? -missing : missing) / VolumeTally::kUnit;
-      std::atomic_ref(tally_.units[fan])
-          .fetch_add(static_cast<std::int64_t>(units), std::memory_order_relaxed);
+      const double volume = owed - (product[0] + product[1] + product[2]) / 3;
+      missing.volumes[i] = is_swapped ? -volume : volume;
     }
+    return missing;
   }
 
   static Double4 cross(Double4 a, Double4 b) {

@@ -18,6 +18,9 @@ constexpr int kBendSteps = 6;          // how far, in edges, a bend is felt
 constexpr float kBendLoss = 0.12F;     // with each
 constexpr int kCurveSteps = 4;
 constexpr float kCurveLoss = 0.2F;
+// A closed curve of fewer vertices is smoothed less, or it would shrink to a point: at this length
+// the strongest smoothing (stairs.cpp) leaves 0.95 of its radius.
+constexpr std::size_t kLongCurve = 39;
 constexpr int kCalmSteps = 4;    // along curves
 constexpr float kNoisy = 0.15F;  // the share of junctions among the vertices of a calm curve
 
@@ -165,13 +168,35 @@ class Finder {
     }
   }
 
+  // The number of vertices of a closed curve without junctions; for all others, kLongCurve.
+  std::size_t length_of_curve(std::size_t start) const {
+    std::size_t length = 0;
+    std::size_t previous = start;
+    std::size_t at = start;
+    do {
+      if (shape_.degree(at) != 2 || ++length == kLongCurve) return kLongCurve;
+      std::size_t next = at;
+      shape_.visit_neighbors(at, [&](std::uint32_t neighbor) {
+        if (next == at && (neighbor != previous || at == start)) next = neighbor;
+      });
+      previous = std::exchange(at, next);
+    } while (at != start);
+    return length;
+  }
+
+  // The damping by a series of a curve's lowest frequency grows with the square of its length.
+  float share_of_curve(std::size_t v) const {
+    const auto share = static_cast<float>(length_of_curve(v)) / kLongCurve;
+    return share * share;
+  }
+
   void combine() {
     constexpr float kOwedInNoise = 0.3F;
     for_vertices([&](std::size_t v) {
       const float calm = found_.calm[v];
       found_.owes[v] *= kOwedInNoise + (1 - kOwedInNoise) * calm;
       if (shape_.is_curve(v)) {
-        found_.moves[v] = shape_.degree(v) > 1 ? calm : 0;
+        found_.moves[v] = shape_.degree(v) > 1 ? calm * share_of_curve(v) : 0;
       } else if (shape_.is_held(v)) {
         found_.moves[v] = near_curve_[v] * calm;
       } else {

@@ -11,8 +11,8 @@
 //     uneven by as much as the wall needs in its direction.
 //  3. The missing volume is spread within each wall and put back as an offset along the wall's
 //     normal; so the sum over a wall is kept to first order.
-//  4. Curves where walls meet are smoothed along themselves, and then stay; walls get their volume
-//     back again, and triangles that fold over are straightened.
+//  4. Curves where walls meet are smoothed along themselves, short closed ones less, and then stay;
+//     walls get their volume back again, and triangles that fold over are straightened.
 // Neighbours share their walls after it as they did before, and what a vertex becomes depends only
 // on what is within a distance of it.
 #pragma once

@@ -112,6 +112,56 @@ TEST(Stairs, GiveLabelsOfAFewVoxelsTheirVolume) {
   }
 }
 
+// Cubes of `size` voxels in a volume of 20^3, at both ends of each axis and within.
+std::vector<Labels> cubes_at_borders(int size) {
+  std::vector<Labels> cubes;
+  constexpr int kSamples = 20;
+  const std::array<int, 3> starts = {0, 8, kSamples - size};
+  for (const int z : starts) {
+    for (const int y : starts) {
+      for (const int x : starts) {
+        auto volume = test::noise_between<std::uint8_t>(0, 0, {kSamples, kSamples, kSamples}, 1);
+        for (int i = 0; i < size * size * size; ++i) {
+          const int place = ((z + i / size / size) * kSamples + y + i / size % size) * kSamples + x;
+          volume.samples[static_cast<std::size_t>(place + i % size)] = 1;
+        }
+        cubes.push_back(std::move(volume));
+      }
+    }
+  }
+  return cubes;
+}
+
+TEST(Stairs, GiveLabelsAtTheBorderTheirVolume) {
+  const std::map<int, double> most_percent = {{1, 30}, {2, 8}, {3, 3}, {5, 2}, {8, 1}};
+  for (const auto& [size, most] : most_percent) {
+    const double expected = size * size * size;
+    for (const Labels& volume : cubes_at_borders(size)) {
+      const Smoothed smoothed = without_stairs(volume, joined(1, true));
+      EXPECT_NEAR(std::abs(smoothed.effect.after.volume_mm3), expected, expected * most / 100);
+    }
+  }
+}
+
+// The ends of open walls, and the edges of caps, are curves of a few vertices there.
+TEST(Stairs, LeaveShortCurvesTheirLength) {
+  for (const bool close : {false, true}) {
+    for (const Labels& volume : cubes_at_borders(1)) {
+      const Smoothed smoothed = without_stairs(volume, joined(1, close));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        float low = 100;
+        float high = -100;
+        for (const Vec3& position : smoothed.surface.mesh.positions) {
+          low = std::min(low, position[axis]);
+          high = std::max(high, position[axis]);
+        }
+        EXPECT_GT(high - low, 0.5F);
+        EXPECT_LT(high - low, 1.7F);
+      }
+    }
+  }
+}
+
 TEST(MissingVolume, IsThatOfTheVoxelsLessWhatTheWallsEnclose) {
   for (const Geometry& geometry : {Geometry{}, test::oblique_left_handed_geometry()}) {
     Labels noise = label_noise(4, {15, 12, 13}, 71, geometry);
