@@ -312,10 +312,14 @@ std::vector<std::string> par_data_names(const InputFile& /*file*/, const Compani
 
 MostBytes most_par_bytes(const InputFile& beginning, const ImportTask& task) {
   const ParHeader header = read_par_header(beginning.text(0, kMostParBytes));
-  const auto [volume, places] = describe(header, task.options);
+  const SourceVolume volume = describe(header, task.options).volume;
   check_limits(volume, task.limits);
   const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
-  const std::uint64_t most = *std::ranges::max_element(places) + 1;
+  // The REC also has the images of the volumes that were not chosen.
+  std::uint64_t most = 0;
+  for (const ImageRow& row : header.rows) {
+    most = std::max(most, whole(row[kPlace], "index of an image") + 1);
+  }
   return {.file = kMostParBytes + kHeadroomBytes, .data = most * slice + kHeadroomBytes};
 }
 

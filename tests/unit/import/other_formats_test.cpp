@@ -355,5 +355,19 @@ TEST(ParRec, AnInstantIsChosenAndMissingSlicesAreNamed) {
               HasSubstr("image 2 is missing"));
 }
 
+TEST(ParRec, TheFirstOfSeveralLargeVolumesIsRead) {
+  constexpr int kFarBehind = 200'000;  // images, more than the bound of a file has as headroom
+  const std::string samples = kSamples + std::string(std::size_t{12} * kFarBehind, 'x');
+  const Outcome outcome =
+      import_bytes(par_rec({{.slice = 1, .instant = 1, .place = 0},
+                            {.slice = 2, .instant = 1, .place = 1},
+                            {.slice = 1, .instant = 2, .place = kFarBehind},
+                            {.slice = 2, .instant = 2, .place = kFarBehind + 1}},
+                           samples),
+                   {}, {.volume = 0});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.sample_bytes(), kSamples);
+}
+
 }  // namespace
 }  // namespace isomesh::import::test
