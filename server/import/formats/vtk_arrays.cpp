@@ -120,6 +120,7 @@ void Scanner::read_attribute(const std::vector<std::string>& parts) {
     array.components = is_table ? 4 : number(parts[2]);
     if (is_table) array.tuples = number(parts[2]);
     array.type = "unsigned_char";
+    array.is_colors = true;
   } else {
     throw_unusable("The VTK file's keyword " + in_quotes(keyword) + " is unknown.");
   }

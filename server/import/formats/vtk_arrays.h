@@ -18,6 +18,7 @@ struct VtkArray {
   std::uint64_t tuples = 0;
   bool is_of_cells = false;
   bool is_scalars = false;   // by the keyword SCALARS
+  bool is_colors = false;    // bytes, which text has as fractions of 255
   std::uint64_t offset = 0;  // of its data in the file
 };
 

@@ -160,7 +160,7 @@ SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*compani
   volume.payload = {array->offset, file.size() - std::min(file.size(), array->offset)};
   volume.has_footer = true;
   if (header.is_text) {
-    volume.encoding = Encoding::kText;
+    volume.encoding = array->is_colors ? Encoding::kFractionText : Encoding::kText;
     volume.payload.bytes = text_bytes(file, array->offset);
   }
   return volume;

@@ -125,7 +125,21 @@ void decode_word(std::string_view word, StoredType type, Decoded& decoded) {
   });
 }
 
-void decode_text(const Part& part, ScratchFile& scratch) {
+// VTK writes colours in text as fractions and rounds them to bytes when it reads them.
+void decode_fraction(std::string_view word, StoredType /*type*/, Decoded& decoded) {
+  constexpr double kMost = 255;
+  const auto fraction = parse_double(word);
+  const double value = std::round(fraction.value_or(-1) * kMost);
+  if (!(value >= 0 && value <= kMost)) {
+    throw_unusable("The sample " + in_quotes(word) +
+                   " is not a number from 0 to 1, as COLOR_SCALARS are written in text.");
+  }
+  const auto byte = static_cast<std::byte>(value);
+  decoded.add({&byte, 1});
+}
+
+void decode_text(const Part& part, ScratchFile& scratch,
+                 void (*decode)(std::string_view, StoredType, Decoded&)) {
   constexpr std::size_t kLongestWord = 512;
   const InputFile& file = part.file;
   Decoded decoded(part.bytes, scratch);
@@ -139,7 +153,7 @@ void decode_text(const Part& part, ScratchFile& scratch) {
       throw_unusable("The samples are not numbers separated by white space.");
     }
     for (const std::string_view word : words(std::string_view(piece).substr(0, end))) {
-      if (word != ",") decode_word(word, part.type, decoded);
+      if (word != ",") decode(word, part.type, decoded);
     }
     rest = piece.substr(end);
   }
@@ -219,7 +233,9 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
     case Encoding::kBzip2:
       return decode_stream(part, scratch, unzip2_range);
     case Encoding::kText:
-      return decode_text(part, scratch);
+      return decode_text(part, scratch, decode_word);
+    case Encoding::kFractionText:
+      return decode_text(part, scratch, decode_fraction);
     case Encoding::kHex:
       return decode_hex(part, scratch);
     case Encoding::kHalf:

@@ -24,6 +24,7 @@ std::uint64_t SourceVolume::most_encoded_bytes() const {
   constexpr std::uint64_t kHexPerByte = 4;
   switch (encoding) {
     case Encoding::kText:
+    case Encoding::kFractionText:
       return sample_count() * chosen.count * kTextPerSample;
     case Encoding::kHex:
       return stored_bytes() * kHexPerByte;

@@ -36,10 +36,11 @@ enum class Encoding {
   kRaw,
   kDeflate,  // a gzip or zlib stream
   kBzip2,
-  kText,  // numbers separated by white space
-  kHex,   // pairs of hexadecimal digits; white space is ignored
-  kVtk,   // see VtkEncoding
-  kHalf,  // floats of 16 bits, which become float32
+  kText,          // numbers separated by white space
+  kFractionText,  // the same: numbers from 0 to 1 stand for the bytes 0 to 255
+  kHex,           // pairs of hexadecimal digits; white space is ignored
+  kVtk,           // see VtkEncoding
+  kHalf,          // floats of 16 bits, which become float32
 };
 
 // VTK's encoding of an array: a header of counts, then the bytes, optionally compressed in blocks;

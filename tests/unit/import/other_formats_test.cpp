@@ -226,6 +226,24 @@ TEST(VtkLegacy, ReadsPointsInTextAndBinary) {
   EXPECT_EQ(samples_of<std::uint8_t>(text)[23], 23);
 }
 
+// vtkStructuredPointsWriter writes bytes so.
+TEST(VtkLegacy, ColoursInTextAreFractionsOf255) {
+  const auto of = [](const std::string& last) {
+    std::string data = "POINT_DATA 24\nCOLOR_SCALARS s 1\n";
+    for (int at = 0; at < 23; ++at) data += std::to_string(at * 11 / 255.0) + ' ';
+    return import_bytes(vtk_legacy(true, data + last + "\nMETADATA\nINFORMATION 0\n\n"));
+  };
+  const Outcome outcome = of("1");
+  ASSERT_EQ(outcome.error, "");
+  const auto samples = samples_of<std::uint8_t>(outcome);
+  for (std::size_t at = 0; at < 23; ++at) EXPECT_EQ(samples[at], at * 11);
+  EXPECT_EQ(samples[23], 255);
+  EXPECT_THAT(of("1.01").error, HasSubstr("is not a number from 0 to 1"));
+  EXPECT_THAT(of("nan").error, HasSubstr("is not a number from 0 to 1"));
+  const std::string binary = "POINT_DATA 24\nCOLOR_SCALARS s 1\n" + kSamples;
+  EXPECT_EQ(import_bytes(vtk_legacy(false, binary)).sample_bytes(), kSamples);
+}
+
 TEST(VtkLegacy, SkipsOtherArraysAndTakesCellsAlone) {
   const std::string scalars = "SCALARS s short\nLOOKUP_TABLE default\n";
   const std::string field = "FIELD f 1\nv 3 2 float\n" + std::string(24, '\n') + "\n";
