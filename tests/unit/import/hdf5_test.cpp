@@ -60,6 +60,18 @@ TEST(Hdf5, MincStaysWholeIfItsRangeChangesNothing) {
   EXPECT_EQ(outcome.volume.geometry.direction, (std::array<double, 9>{0, 0, 1, -1, 0, 0, 0, 1, 0}));
 }
 
+TEST(Hdf5, MincHasUnits) {
+  const Outcome micrometres = import_bytes(minc({.units = "um"}, some_image()));
+  ASSERT_EQ(micrometres.error, "");
+  EXPECT_EQ(micrometres.volume.geometry.spacing, (Vector{0.001, 0.002, 0.003}));
+  EXPECT_EQ(micrometres.volume.geometry.origin, (Vector{-0.005, -0.006, 0.007}));
+  const Outcome pixels = import_bytes(minc({.units = "pixel"}, some_image()));
+  EXPECT_EQ(pixels.volume.geometry.spacing, (Vector{1, 2, 3}));
+  EXPECT_THAT(codes_of(pixels), testing::ElementsAre("unit-unknown"));
+  EXPECT_THAT(import_bytes(minc({.units = "furlong"}, some_image())).error,
+              HasSubstr("unit of length \"furlong\" is unknown"));
+}
+
 TEST(Hdf5, AnInstantIsChosen) {
   const Hdf5Image image = some_image();
   const MincFields series = {.order = "time,zspace,yspace,xspace",

@@ -107,6 +107,7 @@ std::string minc(const MincFields& fields, const Hdf5Image& image) {
     const hid_t axis = writer.group_with("minc-2.0/dimensions/" + name);
     Writer::attribute(axis, "start", std::vector{start_and_step[0]});
     Writer::attribute(axis, "step", std::vector{start_and_step[1]});
+    if (!fields.units.empty()) Writer::attribute(axis, "units", fields.units);
   }
   const std::string place = "minc-2.0/image/0/";
   const hid_t set =

@@ -23,6 +23,7 @@ struct MincFields {
   std::vector<double> valid_range = {-100, 100};
   std::vector<double> least = {-10, 0};  // of the real values of each slice, or of all
   std::vector<double> most = {10, 200};
+  std::string units = {};  // of all three axes
 };
 
 // x has steps of -1 from 5, y of 2 from 6, z of 3 from 7.
