@@ -34,7 +34,7 @@ class Pages {
   // `source` has everything but dims and type.
   Volume write(SourceVolume source) const {
     source.dims = described_.dims;
-    source.layout = described_.layout;
+    source.layout.type = described_.layout.type;
     source.chosen = {};
     return write_canonical(InputFile(samples_.path()), source, task_);
   }
@@ -92,6 +92,13 @@ Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   }
   source.has_spacing = meaning.spacing.has_value();
   if (meaning.spacing) source.geometry.spacing = *meaning.spacing;
+  source.layout.rescale = meaning.rescale;
+  if (meaning.rescale) {
+    source.notes.push_back(
+        note_of(NoteCode::kValuesRescaled,
+                "The samples were changed by the calibration of ImageJ in the TIFF's description. "
+                "Programs that ignore it show other values."));
+  }
   source.notes.push_back(lps_assumed("A TIFF image"));
   return pages.write(std::move(source));
 }

@@ -93,6 +93,51 @@ std::string_view described_value(std::string_view description, std::string_view 
   return {};
 }
 
+// From the description's unit along x, and those along y and z, which may differ.
+std::optional<std::array<double, 3>> imagej_spacing(std::string_view description,
+                                                    const TiffResolution& resolution) {
+  const std::string_view unit = described_value(description, "unit");
+  const auto between = positive(described_value(description, "spacing"));
+  if (unit.empty() || !between || !(resolution.x > 0) || !(resolution.y > 0)) return std::nullopt;
+  const auto length = [&](std::string_view name) {
+    const std::string_view own = described_value(description, name);
+    return length_of(own.empty() ? unit : own);
+  };
+  const auto x = length("unit");
+  const auto y = length("yunit");
+  const auto z = length("zunit");
+  if (!x || !y || !z) return std::nullopt;
+  return std::array{*x / resolution.x, *y / resolution.y, *z * *between};
+}
+
+// From stored values to those that ImageJ shows. Signed 16-bit images have one, too: they are
+// stored as unsigned ones.
+std::optional<Rescale> imagej_rescale(std::string_view description) {
+  constexpr std::int64_t kStraightLine = 0;
+  constexpr std::int64_t kNone = 20;
+  constexpr std::int64_t kOpticalDensity = 21;  // the only function without coefficients
+  const std::string_view function = described_value(description, "cf");
+  const auto code = parse_int64(function);
+  const std::string_view intercept = described_value(description, "c0");
+  const std::string_view slope = described_value(description, "c1");
+  if (function.empty() || code == kNone) return std::nullopt;
+  if (code != kOpticalDensity && (intercept.empty() || slope.empty())) return std::nullopt;
+  if (code != kStraightLine) {
+    throw_unusable(
+        "The values of the ImageJ TIFF are calibrated by its function " + in_quotes(function) +
+        ". Only a straight line (0) can be read. Convert the image to 32 bits in ImageJ, "
+        "which stores calibrated values.");
+  }
+  const Rescale rescale = {parse_double(slope).value_or(HUGE_VAL),
+                           parse_double(intercept).value_or(HUGE_VAL)};
+  if (!std::isfinite(rescale.slope) || !std::isfinite(rescale.intercept) || rescale.slope == 0) {
+    throw_unusable("The ImageJ TIFF's calibration of values, c0=" + printable(intercept) +
+                   " and c1=" + printable(slope) + ", is not a straight line.");
+  }
+  if (rescale.slope == 1 && rescale.intercept == 0) return std::nullopt;
+  return rescale;
+}
+
 TiffMeaning imagej_meaning(std::string_view description, const TiffResolution& resolution,
                            std::uint64_t pages) {
   TiffMeaning meaning;
@@ -101,12 +146,8 @@ TiffMeaning imagej_meaning(std::string_view description, const TiffResolution& r
   meaning.times = count_of(described_value(description, "frames"), 1);
   const std::uint64_t others = meaning.channels * meaning.times;
   meaning.slices = count_of(described_value(description, "slices"), pages / others);
-  const std::string_view unit = described_value(description, "unit");
-  const auto length = unit.empty() ? std::nullopt : length_of(unit);
-  const auto between = positive(described_value(description, "spacing"));
-  if (length && between && resolution.x > 0 && resolution.y > 0) {
-    meaning.spacing = {*length / resolution.x, *length / resolution.y, *length * *between};
-  }
+  meaning.spacing = imagej_spacing(description, resolution);
+  meaning.rescale = imagej_rescale(description);
   return meaning;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/notes.h"
+#include "server/import/source/stored_samples.h"
 
 namespace isomesh::import {
 
@@ -19,6 +20,7 @@ struct TiffMeaning {
   std::uint64_t times = 1;
   // Millimetres; empty unless all three are known.
   std::optional<std::array<double, 3>> spacing = {};
+  std::optional<Rescale> rescale = {};
 
   std::uint64_t pages() const { return slices * channels * times; }
   // The page of a slice in the volume of that index; channels count before times.
@@ -32,7 +34,8 @@ struct TiffResolution {
 };
 
 // Without a description that is understood, all pages are slices. Throws Error kUnusableVolume if
-// the description contradicts the number of pages.
+// the description contradicts the number of pages, or calibrates values by another function than a
+// straight line.
 TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
                          std::uint64_t pages);
 

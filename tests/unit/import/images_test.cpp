@@ -63,6 +63,31 @@ TEST(TiffMeaning, ImageJCountsChannelsFirst) {
   EXPECT_EQ(tiff_meaning("a scan", {72, 72}, 3).slices, 3);
 }
 
+TEST(TiffMeaning, ImageJHasUnitsOfEachAxis) {
+  const std::string begin = "ImageJ=1.53t\nimages=3\nslices=3\nunit=mm\nspacing=3000\n";
+  EXPECT_EQ(tiff_meaning(begin + "zunit=micron\n", {2, 4}, 3).spacing, (Vector{0.5, 0.25, 3}));
+  EXPECT_EQ(tiff_meaning(begin + "yunit=cm\nzunit=nm\n", {2, 4}, 3).spacing,
+            (Vector{0.5, 2.5, 0.003}));
+  EXPECT_FALSE(tiff_meaning(begin + "zunit=sec\n", {2, 4}, 3).spacing);
+}
+
+TEST(Tiff, ValuesAreCalibratedAsInImageJ) {
+  const auto of = [](const std::string& calibration) {
+    return import_bytes(tiff({kFirst, kSecond}, "ImageJ=1.53t\nimages=2\nslices=2\n" + calibration),
+                        {}, kSpaced);
+  };
+  const Outcome outcome = of("cf=0\nc0=-100\nc1=0.5\nvunit=Gray Value\n");
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(samples_of<float>(outcome)[0], static_cast<float>(kFirst[0]) * 0.5F - 100);
+  EXPECT_THAT(codes_of(outcome), Contains("values-rescaled"));
+  for (const char* same : {"cf=20\n", "cf=0\nc0=0\nc1=1\n", "cf=0\nvunit=none\n"}) {
+    EXPECT_EQ(of(same).sample_bytes(), kSamples) << same;
+  }
+  EXPECT_THAT(of("cf=7\nc0=1\nc1=2\nc2=3\nc3=4\n").error, HasSubstr("its function \"7\""));
+  EXPECT_THAT(of("cf=21\n").error, HasSubstr("Convert the image to 32 bits"));
+  EXPECT_THAT(of("cf=0\nc0=1\nc1=0\n").error, HasSubstr("is not a straight line"));
+}
+
 TEST(Tiff, PagesAreSlices) {
   const std::string file = tiff({kFirst, kSecond});
   EXPECT_THAT(import_bytes(file).error, HasSubstr("spacing=X,Y,Z"));
