@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "server/import/source/header_bytes.h"
 
@@ -21,9 +22,10 @@ struct Kind {
   bool is_analyze = false;
 };
 
-// Analyze has no magic number, so its header is checked more strictly: "extents" and "regular" as
-// in its manual, a known datatype with its bits, and sizes of one to seven axes.
-bool is_analyze(const HeaderBytes& fields) {
+// Analyze has no magic number, so its header is checked more strictly: a known datatype with its
+// bits, possible sizes of one to seven axes, and "regular" as in its manual. Some writers, such as
+// nibabel, leave out the last. Then the file must be a header alone, as Analyze's are.
+bool is_analyze(const HeaderBytes& fields, std::size_t bytes) {
   struct Row {
     int datatype;
     int bits;
@@ -33,8 +35,15 @@ bool is_analyze(const HeaderBytes& fields) {
   const auto is_its_type = [&](const Row& row) {
     return fields.at<std::int16_t>(70) == row.datatype && fields.at<std::int16_t>(72) == row.bits;
   };
-  return fields.at<char>(38) == 'r' && axes >= 1 && axes <= 7 &&
-         std::ranges::any_of(kTypes, is_its_type);
+  if (axes < 1 || axes > 7 || !std::ranges::any_of(kTypes, is_its_type)) return false;
+  if (fields.at<char>(38) == 'r') return true;
+  std::array<std::int16_t, 7> sizes = {};
+  fields.read<std::int16_t>(42, sizes);
+  std::array<float, 3> steps = {};
+  fields.read<float>(80, steps);
+  const auto used = std::span(sizes).first(static_cast<std::size_t>(axes));
+  return bytes == kNifti1Bytes && std::ranges::all_of(used, [](int size) { return size > 0; }) &&
+         std::ranges::all_of(steps, [](float step) { return std::isfinite(step); });
 }
 
 std::optional<Kind> kind_of(std::string_view head) {
@@ -47,7 +56,7 @@ std::optional<Kind> kind_of(std::string_view head) {
       if (magic == "n+1\0"sv || magic == "ni1\0"sv) {
         return Kind{Version::kOne, big_endian, magic == "ni1\0"sv};
       }
-      if (is_analyze(HeaderBytes(head, big_endian)))
+      if (is_analyze(HeaderBytes(head, big_endian), head.size()))
         return Kind{Version::kOne, big_endian, true, true};
     }
     if (size == kNifti2Bytes) {

@@ -36,7 +36,8 @@ struct NiftiHeader {
 };
 
 // True if a file of one of the three begins so. Analyze's header, without a magic number, is
-// recognised by its size field and by fields with few possible values.
+// recognised by its size field and by fields with few possible values, or by a size of 348 bytes.
+// So `head` must have more bytes of a larger file.
 bool begins_as_nifti(std::string_view head);
 
 // Throws Error kUnusableVolume.

@@ -192,6 +192,27 @@ TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
   EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3, 2, -1.5}));
 }
 
+// nibabel, for one, leaves the field "regular" empty.
+TEST(ForeignPairs, AnalyzeIsKnownWithoutRegular) {
+  const auto header = [](const NiftiFields& fields) { return nifti(fields, "").substr(0, 348); };
+  NiftiFields fields = {.magic = std::string(4, '\0'), .vox_offset = 0, .sform_code = 0};
+  for (const bool big_endian : {false, true}) {
+    fields.big_endian = big_endian;
+    const Outcome outcome = import_bytes(zip({{"a.hdr", header(fields)}, {"a.img", kSamples}}));
+    ASSERT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.sample_bytes(), kSamples);
+    EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
+  }
+  EXPECT_EQ(import_bytes(header(fields) + kSamples).code, ErrorCode::kUnsupportedMedia);
+  NiftiFields other_bits = fields;
+  other_bits.bitpix = 16;
+  EXPECT_EQ(import_bytes(header(other_bits)).code, ErrorCode::kUnsupportedMedia);
+  NiftiFields no_size = fields;
+  no_size.dim[2] = 0;
+  EXPECT_EQ(import_bytes(header(no_size)).code, ErrorCode::kUnsupportedMedia);
+  EXPECT_EQ(import_bytes(header(fields).substr(0, 347)).code, ErrorCode::kUnsupportedMedia);
+}
+
 TEST(ForeignSamples, ThatAreNoNumbersAreOutside) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
