@@ -261,13 +261,28 @@ Placement without_forms(const Vector3& spacing, SourceVolume& volume) {
   return placement;
 }
 
+// Many writers leave the field at 0 or at random, so nibabel and SPM ignore it, too.
+std::string ignored_orient(int orient) {
+  static constexpr const char* kNames[] = {"",
+                                           "coronal unflipped",
+                                           "sagittal unflipped",
+                                           "transverse flipped",
+                                           "coronal flipped",
+                                           "sagittal flipped"};
+  if (orient < 1 || orient >= static_cast<int>(std::size(kNames))) return {};
+  return " Its field \"orient\", " + std::to_string(orient) + " (" + kNames[orient] +
+         "), was ignored because many programs do not set it correctly.";
+}
+
 // Analyze's axes run left, front and up, and its images are centred, as programs that read them
 // assume.
-Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
+Placement analyze_placement(const NiftiHeader& header, const Vector3& spacing,
+                            SourceVolume& volume) {
   volume.notes.push_back(
       note_of(NoteCode::kSpaceAssumed,
               "An Analyze header does not say how its axes lie in the patient. The axes were "
-              "assumed to run to the left, to the front and up, with (0,0,0) in the middle."));
+              "assumed to run to the left, to the front and up, with (0,0,0) in the middle." +
+                  ignored_orient(header.analyze_orient)));
   Placement placement;
   placement.steps[0][0] = -spacing[0];
   placement.steps[1][1] = spacing[1];
@@ -309,7 +324,7 @@ Placement placement_of(const NiftiHeader& header, const ImportOptions& options,
       std::all_of(header.pixdim.begin() + 1, header.pixdim.begin() + 4, is_length);
   if (!takes_sform) {
     const Vector3 spacing = spacing_of(header, volume.dims);
-    if (header.is_analyze) return analyze_placement(spacing, volume);
+    if (header.is_analyze) return analyze_placement(header, spacing, volume);
     if (!has_qform) return without_forms(spacing, volume);
     const Placement qform = qform_of(header, spacing);
     if (has_sform) note_other_form(header, qform, sform_of(header), "qform", volume);

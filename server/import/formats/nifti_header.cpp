@@ -136,7 +136,10 @@ NiftiHeader read_nifti_header(std::string_view head) {
   header.bytes = kind->version == Version::kOne ? kNifti1Bytes : kNifti2Bytes;
   header.is_detached = kind->detached;
   header.is_analyze = kind->is_analyze;
-  if (kind->is_analyze) forget_what_is_no_analyze(header);
+  if (kind->is_analyze) {
+    header.analyze_orient = fields.at<std::uint8_t>(252);
+    forget_what_is_no_analyze(header);
+  }
   return header;
 }
 

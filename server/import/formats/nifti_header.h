@@ -17,6 +17,7 @@ inline constexpr std::size_t kNiftiHeaderBytes = 540;
 struct NiftiHeader {
   bool big_endian = false;
   bool is_analyze = false;   // an Analyze header, without a position in space
+  int analyze_orient = 0;    // the slices' direction in an Analyze header, by its manual
   bool is_detached = false;  // the samples are in another file
   std::int64_t bytes = 0;    // of the header
   std::array<std::int64_t, 8> dim = {};

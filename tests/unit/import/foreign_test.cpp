@@ -17,6 +17,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Vector = std::array<double, 3>;
 
 const std::string kSamples(kSmallSamples);
@@ -190,6 +191,11 @@ TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
   EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{2, 2, 3}));
   EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3, 2, -1.5}));
+  EXPECT_THAT(outcome.volume.notes[0].detail, Not(HasSubstr("orient")));
+  header[252] = 2;
+  const Outcome sagittal = import_bytes(zip({{"a.hdr", header}, {"a.img", kSamples}}));
+  EXPECT_EQ(sagittal.volume.geometry, outcome.volume.geometry);
+  EXPECT_THAT(sagittal.volume.notes[0].detail, HasSubstr("2 (sagittal unflipped), was ignored"));
 }
 
 // nibabel, for one, leaves the field "regular" empty.
