@@ -115,32 +115,52 @@ std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::st
   return files;
 }
 
-// The suffixes of a header and of its samples, of which a program writes either the one or the
-// other.
-const std::vector<std::string>* pair_suffixes(const std::string& suffix) {
-  static const std::vector<std::vector<std::string>> pairs = {
-      {".hdr", ".img", ".img.gz"},
-      {".HEAD", ".BRIK", ".BRIK.gz", ".BRIK.bz2"},
-      {".PAR", ".REC"},
-      {".par", ".rec"}};
-  const auto found = std::ranges::find_if(pairs, [&](const std::vector<std::string>& each) {
-    return suffix == each[0] || suffix == each[1];
-  });
-  return found == pairs.end() ? nullptr : &*found;
-}
+// The suffixes of a header and of its samples. A program writes one of each.
+struct PairSuffixes {
+  std::vector<std::string> header;
+  std::vector<std::string> samples;
+};
 
-// The header and the samples of a pair, from either of them.
-std::vector<PackedFile> pair_of(const fs::path& path, const std::vector<std::string>& suffixes) {
-  std::vector<PackedFile> files;
+// The header or the samples of a pair: `path` itself, or else the first that is beside it.
+std::vector<PackedFile> one_of(const fs::path& path, const std::string& stem,
+                               const std::vector<std::string>& suffixes) {
+  std::vector<fs::path> found;
   std::error_code error;
   for (const std::string& suffix : suffixes) {
-    fs::path one = path;
-    one.replace_extension(suffix);
-    if (one == path || fs::is_regular_file(one, error)) {
-      files.push_back({one.filename().string(), one});
+    const fs::path one = path.parent_path() / (stem + suffix);
+    if (one == path) return {{path.filename().string(), path}};
+    if (fs::is_regular_file(one, error)) found.push_back(one);
+  }
+  if (found.empty()) return {};
+  return {{found.front().filename().string(), found.front()}};
+}
+
+std::optional<std::string> stem_of(const std::string& name,
+                                   const std::vector<std::string>& suffixes) {
+  for (const std::string& suffix : suffixes) {
+    if (name.size() > suffix.size() && name.ends_with(suffix)) {
+      return name.substr(0, name.size() - suffix.size());
     }
   }
-  return files;
+  return std::nullopt;
+}
+
+// The header and the samples of a pair, from either of them. Empty for other names.
+std::vector<PackedFile> pair_of(const fs::path& path) {
+  static const std::vector<PairSuffixes> pairs = {{{".hdr", ".hdr.gz"}, {".img", ".img.gz"}},
+                                                  {{".HEAD"}, {".BRIK", ".BRIK.gz", ".BRIK.bz2"}},
+                                                  {{".PAR"}, {".REC"}},
+                                                  {{".par"}, {".rec"}}};
+  const std::string name = path.filename().string();
+  for (const auto& [header, samples] : pairs) {
+    auto stem = stem_of(name, header);
+    if (!stem) stem = stem_of(name, samples);
+    if (!stem) continue;
+    std::vector<PackedFile> files = one_of(path, *stem, header);
+    for (PackedFile& file : one_of(path, *stem, samples)) files.push_back(std::move(file));
+    return files;
+  }
+  return {};
 }
 
 // --- TAR (POSIX.1-2001, pax) ---------------------------------------------------------------------
@@ -204,11 +224,10 @@ std::string lead_of(const Member& member) {
 
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
   if (fs::is_directory(path)) return files_below(path);
-  const std::string own_suffix = path.extension().string();
-  const std::string suffix = lower(own_suffix);
+  const std::string suffix = lower(path.extension().string());
   if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
   if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");
-  if (const auto* suffixes = pair_suffixes(own_suffix)) return pair_of(path, *suffixes);
+  if (std::vector<PackedFile> pair = pair_of(path); !pair.empty()) return pair;
   return {{path.filename().string(), path}};
 }
 

@@ -126,6 +126,21 @@ TEST(UploadBody, OfAHeaderTakesItsDataAlong) {
   EXPECT_THAT(names("h.mhd", "ElementDataFile = 1% 1 2 1\n"), ElementsAre("h.mhd"));
 }
 
+TEST(UploadBody, OfAPairTakesBothFilesAlong) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"a.hdr", "a.img", "a.img.gz", "b.hdr.gz", "b.img.gz", "c.hdr.gz",
+                           "s+orig.HEAD", "s+orig.BRIK.gz"}) {
+    test::write_file(folder / name, "x");
+  }
+  EXPECT_THAT(names_of(folder / "a.hdr"), ElementsAre("a.hdr", "a.img"));
+  EXPECT_THAT(names_of(folder / "a.img"), ElementsAre("a.hdr", "a.img"));
+  EXPECT_THAT(names_of(folder / "a.img.gz"), ElementsAre("a.hdr", "a.img.gz"));
+  EXPECT_THAT(names_of(folder / "b.hdr.gz"), ElementsAre("b.hdr.gz", "b.img.gz"));
+  EXPECT_THAT(names_of(folder / "b.img.gz"), ElementsAre("b.hdr.gz", "b.img.gz"));
+  EXPECT_THAT(names_of(folder / "c.hdr.gz"), ElementsAre("c.hdr.gz"));
+  EXPECT_THAT(names_of(folder / "s+orig.BRIK.gz"), ElementsAre("s+orig.HEAD", "s+orig.BRIK.gz"));
+}
+
 TEST(UploadBody, DataThatIsNotThereIsNamed) {
   const test::TemporaryFolder folder;
   test::write_file(folder / "h.mhd", "ElementDataFile = absent.raw\n");

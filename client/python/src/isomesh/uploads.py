@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 _PIECE = 1 << 20
 _MOST_FILES = 20000  # as many as the server unpacks
 _LONGEST_HEADER = 1 << 20
-# A header and its samples; the others are the samples' other names.
+# The suffixes of a header and of its samples. A program writes one of each.
 _PAIRS = (
-    (".hdr", ".img", ".img.gz"),
-    (".HEAD", ".BRIK", ".BRIK.gz", ".BRIK.bz2"),
-    (".PAR", ".REC"),
-    (".par", ".rec"),
+    ((".hdr", ".hdr.gz"), (".img", ".img.gz")),
+    ((".HEAD",), (".BRIK", ".BRIK.gz", ".BRIK.bz2")),
+    ((".PAR",), (".REC",)),
+    ((".par",), (".rec",)),
 )
 
 
@@ -70,11 +70,19 @@ def _files_of(path: Path) -> List[Tuple[str, Path]]:
         return _header_and_data(path, "=", "elementdatafile")
     if suffix == ".nhdr":
         return _header_and_data(path, ":", "datafile")
-    for suffixes in _PAIRS:
-        if path.suffix in suffixes[:2]:
-            pair = [path.with_suffix(each) for each in suffixes]
-            return [(file.name, file) for file in pair if file.is_file()]
+    for header, samples in _PAIRS:
+        for suffix in header + samples:
+            stem = path.name[: -len(suffix)]
+            if stem and path.name.endswith(suffix):
+                pair = _one_of(path, stem, header) + _one_of(path, stem, samples)
+                return [(file.name, file) for file in pair]
     return [(path.name, path)]
+
+
+def _one_of(path: Path, stem: str, suffixes: Sequence[str]) -> List[Path]:
+    """The header or the samples of a pair: ``path`` itself, or else the first that is beside it."""
+    files = [path.with_name(stem + suffix) for suffix in suffixes]
+    return [path] if path in files else [file for file in files if file.is_file()][:1]
 
 
 def _files_below(folder: Path) -> List[Tuple[str, Path]]:
