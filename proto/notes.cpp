@@ -30,7 +30,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .is_in_mesh = true},
     {.code = NoteCode::kUnitUnknown,
      .name = "unit-unknown",
-     .meaning = "The file's unit is not a length. One unit was read as one millimetre.",
+     .meaning = "The file's unit is not a length, or the file gives no spacing. One unit was read "
+                "as one millimetre.",
      .is_in_mesh = true},
     {.code = NoteCode::kUnitAngstrom,
      .name = "unit-angstrom",

@@ -14,7 +14,7 @@ enum class NoteCode {
   kPixdimDiffers,        // NIfTI: the voxel sizes are not the lengths of the sform's steps
   kVolumeChosen,         // one of several volumes of the file
   kSpaceAssumed,         // the file does not define its axes in the patient
-  kUnitUnknown,          // the file's unit is not a length; taken as millimetres
+  kUnitUnknown,          // the file's unit is not a length; or no spacing; taken as millimetres
   kUnitAngstrom,         // coordinates are in angstrom, wherever millimetres are told
   kNonFiniteSamples,     // some samples are NaN or infinite; they are outside of any surface
   kTrailingBytes,        // the data is longer than the header says

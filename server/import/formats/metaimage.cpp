@@ -360,6 +360,8 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
     volume.payload = payload_of(file, header, volume);
   }
   volume.geometry = geometry_of_fields(fields, sizes.size());
+  volume.assumes_spacing =
+      optional(fields, "ElementSpacing").empty() && optional(fields, "ElementSize").empty();
   scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"), volume.notes);
   return volume;
 }

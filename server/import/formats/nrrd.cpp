@@ -304,6 +304,7 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
     volume.payload.bytes = file.size() - volume.payload.offset;
   }
   volume.geometry = nrrd_geometry(fields, sizes.all, options, volume.notes);
+  volume.assumes_spacing = !nrrd_has_spacing(fields, sizes.all);
   return volume;
 }
 

@@ -419,4 +419,11 @@ Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t
   return geometry;
 }
 
+bool nrrd_has_spacing(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes) {
+  return std::ranges::any_of(
+      lattice_axes(fields, sizes, space_dimension(fields)), [](const Axis& axis) {
+        return is_known(axis.spacing) || axis.has_direction() || has_extent(axis);
+      });
+}
+
 }  // namespace isomesh::import

@@ -49,4 +49,7 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
 Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
                        const ImportOptions& options, std::vector<Note>& notes);
 
+// False if no axis of the lattice has a spacing, a direction, or a min and a max.
+bool nrrd_has_spacing(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes);
+
 }  // namespace isomesh::import

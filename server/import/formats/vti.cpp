@@ -59,9 +59,10 @@ Extent extent_of(const VtiAttributes& attributes, std::string_view name) {
   return extent;
 }
 
-Geometry geometry_of_image(const VtiAttributes& image, const Extent& extent) {
+Geometry geometry_of_image(const VtiAttributes& image, const Extent& extent,
+                           const Vector3& default_spacing) {
   Geometry geometry;
-  geometry.spacing = numbers_of<3>(image, "Spacing", {1, 1, 1});
+  geometry.spacing = numbers_of<3>(image, "Spacing", default_spacing);
   geometry.direction = numbers_of<9>(image, "Direction", geometry.direction);
   geometry.origin = numbers_of<3>(image, "Origin", {0, 0, 0});
   // The file's origin is the position of index (0,0,0), which may be outside of the extent.
@@ -269,7 +270,9 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   check_components(array);
   SourceVolume volume;
   volume.dims = extent.dims;
-  volume.geometry = geometry_of_image(document.image, extent);
+  volume.assumes_spacing = attribute_of(document.image, "Spacing").empty();
+  volume.geometry =
+      geometry_of_image(document.image, extent, options.spacing.value_or(Vector3{1, 1, 1}));
   if (is_of_cells) move_to_cells(volume);
   choose_volume(1, {}, options, volume);
   volume.layout.type = type_of(array);

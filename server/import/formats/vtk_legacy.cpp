@@ -20,7 +20,7 @@ constexpr std::size_t kMostLegacyHeaderBytes = std::size_t{1} << 16;
 struct LegacyHeader {
   bool is_text = false;
   std::array<std::uint64_t, 3> points = {0, 0, 0};
-  Vector3 spacing = {1, 1, 1};
+  std::optional<Vector3> spacing;
   Vector3 origin = {0, 0, 0};
   std::uint64_t bytes = 0;  // up to the first line of data
 };
@@ -95,7 +95,8 @@ const VtkArray* scalars_of(const std::vector<VtkArray>& arrays, bool is_of_cells
   return found;
 }
 
-void take(const VtkArray& array, const LegacyHeader& header, SourceVolume& volume) {
+void take(const VtkArray& array, const LegacyHeader& header, const ImportOptions& options,
+          SourceVolume& volume) {
   if (array.components != 1) {
     throw_unusable("Each sample of the VTK file has " + std::to_string(array.components) +
                    " components. A sample must be one real number.");
@@ -107,11 +108,12 @@ void take(const VtkArray& array, const LegacyHeader& header, SourceVolume& volum
   }
   std::array<std::uint64_t, 3> sizes = header.points;
   volume.geometry.origin = header.origin;
-  volume.geometry.spacing = header.spacing;
+  volume.assumes_spacing = !header.spacing;
+  volume.geometry.spacing = header.spacing.value_or(options.spacing.value_or(Vector3{1, 1, 1}));
   for (std::size_t axis = 0; array.is_of_cells && axis < 3; ++axis) {
     if (sizes[axis] < 2) continue;
     --sizes[axis];
-    volume.geometry.origin[axis] += header.spacing[axis] / 2;
+    volume.geometry.origin[axis] += volume.geometry.spacing[axis] / 2;
   }
   volume.dims = volume_dims(sizes);
   if (array.tuples != volume.sample_count()) {
@@ -155,7 +157,7 @@ SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*compani
   if (array == nullptr) array = scalars_of(arrays, true);
   if (array == nullptr) throw_unusable("The VTK file has no array of single numbers.");
   SourceVolume volume;
-  take(*array, header, volume);
+  take(*array, header, options, volume);
   choose_volume(1, {}, options, volume);
   volume.payload = {array->offset, file.size() - std::min(file.size(), array->offset)};
   volume.has_footer = true;

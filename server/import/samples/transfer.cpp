@@ -5,9 +5,11 @@
 #include <cstring>
 #include <iterator>
 #include <span>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
+#include "base/text.h"
 #include "proto/error.h"
 #include "proto/samples.h"
 #include "server/import/samples/layers.h"
@@ -20,19 +22,32 @@ namespace {
 
 // The geometry of a file that has a spacing, or of the request's.
 Geometry spaced_geometry(const SourceVolume& source, const ImportOptions& options) {
-  if (source.has_spacing) {
-    refuse_spacing(options);
-    return source.geometry;
-  }
+  if (source.has_spacing && !source.assumes_spacing) refuse_spacing(options);
+  if (source.has_spacing && !options.spacing) return source.geometry;
   if (!options.spacing) {
     throw_choice(
         "The file does not say how far apart its samples are. Give the distances along x, y and z "
         "in millimetres: spacing=X,Y,Z.",
         {{"spacing", "1,1,1", "1 mm along x, y and z"}});
   }
-  Geometry geometry = source.geometry;
+  Geometry geometry = normalised(source.geometry);
   geometry.spacing = *options.spacing;
   return geometry;
+}
+
+void note_assumed_spacing(const SourceVolume& source, const ImportOptions& options,
+                          Volume& volume) {
+  const std::string_view code = describe(NoteCode::kUnitUnknown).name;
+  if (!source.assumes_spacing || options.spacing ||
+      std::ranges::find(volume.notes, code, &Note::code) != volume.notes.end()) {
+    return;
+  }
+  const Vector3& spacing = volume.geometry.spacing;
+  volume.notes.push_back(
+      note_of(NoteCode::kUnitUnknown,
+              "The file does not say how far apart its samples are. " + to_text(spacing[0]) + ", " +
+                  to_text(spacing[1]) + " and " + to_text(spacing[2]) +
+                  " mm along x, y and z were assumed. spacing=X,Y,Z gives other distances in mm."));
 }
 
 Geometry usable_geometry(const SourceVolume& source, const ImportOptions& options) {
@@ -153,6 +168,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   const Payload payload(file, source, task.scratch);
   check_limits(source, task.limits);
   volume.notes = source.notes;
+  note_assumed_spacing(source, task.options, volume);
   std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
   if (source.layers)
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,

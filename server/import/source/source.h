@@ -130,6 +130,9 @@ struct SourceVolume {
   std::vector<DataFile> data_files;
   // Without a spacing, the request must give one; `geometry` then has steps of 1.
   bool has_spacing = true;
+  // The file gives no spacing, and `geometry` has the default of its format. The request may give
+  // another one.
+  bool assumes_spacing = false;
   Geometry geometry;
   std::vector<Note> notes;
   std::vector<LabelEntry> labels;       // see label_table()

@@ -94,6 +94,27 @@ TEST(MetaImage, KnowsTheOtherNamesOfItsFields) {
   EXPECT_EQ(import_with("ElementSize", "2 3 4").volume.geometry.spacing, (Vector3{1, 1, 1}));
 }
 
+TEST(MetaImage, TakesASpacingIfItHasNone) {
+  const ImportOptions spaced = {.spacing = Vector3{1, 2, 3}};
+  // The steps of this matrix are not of length 1, which the given spacing replaces.
+  const Lines lines =
+      with(with(small_metaimage(), "ElementSpacing", ""), "TransformMatrix", "2 0 0 0 1 0 0 0 1");
+  const std::string none = metaimage(lines, kSmallSamples);
+  const Outcome assumed = import_bytes(none);
+  ASSERT_EQ(assumed.error, "");
+  ASSERT_THAT(codes_of(assumed), testing::ElementsAre("unit-unknown"));
+  EXPECT_THAT(assumed.volume.notes[0].detail, HasSubstr("2, 1 and 1 mm"));
+  const Outcome given = import_bytes(none, {}, spaced);
+  ASSERT_EQ(given.error, "");
+  EXPECT_EQ(given.volume.geometry.spacing, (Vector3{1, 2, 3}));
+  EXPECT_THAT(codes_of(given), testing::IsEmpty());
+  for (const char* own : {"ElementSpacing", "ElementSize"}) {
+    const std::string file = metaimage(with(lines, own, "1 1 1"), kSmallSamples);
+    EXPECT_EQ(import_bytes(file, {}, spaced).code, ErrorCode::kInvalidParameter) << own;
+    EXPECT_THAT(codes_of(import_bytes(file)), testing::IsEmpty()) << own;
+  }
+}
+
 TEST(MetaImage, HonoursItsUnit) {
   EXPECT_EQ(import_with("DistanceUnits", "um").volume.geometry.spacing,
             (Vector3{0.001, 0.001, 0.001}));

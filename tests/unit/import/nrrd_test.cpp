@@ -135,6 +135,28 @@ TEST(Nrrd, HonoursItsUnits) {
   EXPECT_THAT(import_with("space units", "\"ell\" \"ell\" \"ell\"").error, HasSubstr("ell"));
 }
 
+TEST(Nrrd, TakesASpacingIfItHasNone) {
+  const ImportOptions spaced = {.spacing = Vector3{1, 2, 3}};
+  const Lines plain =
+      with(with(with(small_nrrd(), "space", ""), "space directions", ""), "space origin", "");
+  const std::string none = nrrd(plain, kSmallSamples);
+  const Outcome assumed = import_bytes(none);
+  ASSERT_EQ(assumed.error, "");
+  EXPECT_EQ(assumed.volume.geometry.spacing, (Vector3{1, 1, 1}));
+  ASSERT_THAT(codes_of(assumed), testing::ElementsAre("unit-unknown"));
+  EXPECT_THAT(assumed.volume.notes[0].detail, HasSubstr("spacing=X,Y,Z"));
+  const Outcome given = import_bytes(none, {}, spaced);
+  ASSERT_EQ(given.error, "");
+  EXPECT_EQ(given.volume.geometry.spacing, (Vector3{1, 2, 3}));
+  EXPECT_THAT(codes_of(given), testing::IsEmpty());
+  for (const Lines& own : {small_nrrd(), with(plain, "spacings", "1 1 1"),
+                           with(with(plain, "axis mins", "0 0 0"), "axis maxs", "4 3 2")}) {
+    const std::string file = nrrd(own, kSmallSamples);
+    EXPECT_EQ(import_bytes(file, {}, spaced).code, ErrorCode::kInvalidParameter);
+    EXPECT_THAT(codes_of(import_bytes(file)), testing::IsEmpty());
+  }
+}
+
 TEST(Nrrd, RefusesSpacingsThatCannotBe) {
   for (const char* directions :
        {"(1,0,0) (0,nan,0) (0,0,1)", "(1,0,0) none (0,0,1)", "(1,0,0) (0,0,0) (0,0,1)",

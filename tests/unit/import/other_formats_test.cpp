@@ -18,6 +18,7 @@ using std::string_literals::operator""s;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 using Vector = std::array<double, 3>;
 using Dims = std::array<std::uint32_t, 3>;
 
@@ -242,6 +243,33 @@ TEST(VtkLegacy, ColoursInTextAreFractionsOf255) {
   EXPECT_THAT(of("nan").error, HasSubstr("is not a number from 0 to 1"));
   const std::string binary = "POINT_DATA 24\nCOLOR_SCALARS s 1\n" + kSamples;
   EXPECT_EQ(import_bytes(vtk_legacy(false, binary)).sample_bytes(), kSamples);
+}
+
+TEST(VtkLegacy, TakesASpacingIfItHasNone) {
+  std::string file = vtk_legacy(true, "CELL_DATA 12\nSCALARS s short\n" + counted(12), "4 3 3");
+  EXPECT_EQ(import_bytes(file, {}, kSpaced).code, ErrorCode::kInvalidParameter);
+  const std::string own = "\nSPACING 1 2 3";
+  file.erase(file.find(own), own.size());
+  const Outcome assumed = import_bytes(file);
+  EXPECT_EQ(assumed.volume.geometry.spacing, (Vector{1, 1, 1}));
+  EXPECT_THAT(codes_of(assumed), Contains("unit-unknown"));
+  const Outcome given = import_bytes(file, {}, kSpaced);
+  ASSERT_EQ(given.error, "");
+  EXPECT_EQ(given.volume.geometry.spacing, (Vector{1, 2, 3}));
+  EXPECT_EQ(given.volume.geometry.origin, (Vector{10.5, 21, 31.5}));
+}
+
+TEST(Vti, TakesASpacingIfItHasNone) {
+  std::string file = vti({.form = VtiForm::kBinary, .spacing = "1 2 3"}, kSamples);
+  EXPECT_EQ(import_bytes(file, {}, kSpaced).code, ErrorCode::kInvalidParameter);
+  const Outcome own = import_bytes(file);
+  const std::string attribute = " Spacing=\"1 2 3\"";
+  file.erase(file.find(attribute), attribute.size());
+  EXPECT_THAT(codes_of(import_bytes(file)), Contains("unit-unknown"));
+  const Outcome given = import_bytes(file, {}, kSpaced);
+  ASSERT_EQ(given.error, "");
+  EXPECT_EQ(given.volume.geometry, own.volume.geometry);
+  EXPECT_THAT(codes_of(given), Not(Contains("unit-unknown")));
 }
 
 TEST(VtkLegacy, SkipsOtherArraysAndTakesCellsAlone) {
