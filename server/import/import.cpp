@@ -28,7 +28,7 @@ std::string beginning_of(const InputFile& file) {
     throw Error(ErrorCode::kUnsupportedMedia,
                 "This is " + std::string(*name) +
                     ", which cannot be read. Formats that can be read: " + volume_format_titles() +
-                    ", or a ZIP or TAR of one.");
+                    ", or a ZIP or TAR of one, also compressed with gzip.");
   }
   throw Error(ErrorCode::kUnsupportedMedia,
               "The file is not " + volume_format_titles() +

@@ -42,13 +42,13 @@ constexpr Signature kSignatures[] = {
     {"AVI "sv, "a video (AVI)", 8},
     {"ftyp"sv, "a video or image (MP4)", 4},
     {"%PDF-"sv, "a PDF document"},
-    {"7z\xbc\xaf\x27\x1c"sv, "a 7-Zip archive; ZIP and TAR can be read"},
-    {"Rar!\x1a\x07"sv, "a RAR archive; ZIP and TAR can be read"},
+    {"7z\xbc\xaf\x27\x1c"sv, "a 7-Zip archive"},
+    {"Rar!\x1a\x07"sv, "a RAR archive"},
     {"\xfd"
      "7zXZ"sv,
-     "compressed with xz; gzip, ZIP and TAR can be read"},
-    {"\x28\xb5\x2f\xfd"sv, "compressed with Zstandard; gzip, ZIP and TAR can be read"},
-    {"BZh"sv, "compressed with bzip2; gzip, ZIP and TAR can be read"},
+     "a file compressed with xz"},
+    {"\x28\xb5\x2f\xfd"sv, "a file compressed with Zstandard"},
+    {"BZh"sv, "a file compressed with bzip2"},
 };
 
 }  // namespace

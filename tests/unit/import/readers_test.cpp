@@ -119,6 +119,10 @@ TEST(Readers, AreThoseOfTheTableOfFormats) {
 TEST(Readers, NameFilesOfOtherPrograms) {
   EXPECT_THAT(import_bytes("ZISRAWFILE and more").error,
               testing::StartsWith("This is a CZI file of Zeiss, which cannot be read."));
+  const std::string bzip2 = import_bytes("BZh91AY and more").error;
+  EXPECT_THAT(bzip2, testing::StartsWith("This is a file compressed with bzip2, which cannot be "
+                                         "read. Formats that can be read: "));
+  EXPECT_THAT(bzip2, testing::EndsWith("or a ZIP or TAR of one, also compressed with gzip."));
   EXPECT_THAT(import_bytes("\xff\xd8\xff and more").error, testing::HasSubstr("a JPEG image"));
 }
 
