@@ -374,6 +374,9 @@ void check_intent(const NiftiHeader& header) {
       "This is a CIFTI-2 file: a matrix of values of a brain's vertices and voxels, not a volume.");
 }
 
+// NIFTI_INTENT_LABEL.
+constexpr int kIntentLabel = 1002;
+
 // Everything except the location of the samples.
 SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   SourceVolume volume;
@@ -383,6 +386,7 @@ SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   check_is_lattice(volume.dims);
   volume.layout = {type_of(header), header.big_endian, rescale_of(header)};
   choose_volume(volumes_beyond(sizes), difference_of(header), options, volume);
+  volume.are_labels = header.intent == kIntentLabel;
   volume.encoding = Encoding::kRaw;
   volume.geometry = lps_geometry(header, options, volume);
   return volume;

@@ -94,12 +94,12 @@ bool is_wide_integer(const SampleLayout& layout) {
 
 // Labels are integers: labels of floats become some, and so do 64-bit integers that fit. Returns
 // true if the samples were converted.
-bool store_whole_numbers(const SampleLayout& layout, CanonicalWriter& writer, Volume& volume) {
+bool store_whole_numbers(const PlainSamples& plain, CanonicalWriter& writer, Volume& volume) {
   if (is_integer(volume.type)) return false;
   const std::span<std::byte> samples = writer.samples();
   const auto type = volume::whole_type(samples, volume.type);
   if (!type) return false;
-  if (!is_wide_integer(layout) && volume.labels.empty() &&
+  if (!is_wide_integer(plain.layout) && !plain.are_labels && volume.labels.empty() &&
       !volume::label_count(samples, volume.type, volume.dims)) {
     return false;
   }
@@ -109,10 +109,20 @@ bool store_whole_numbers(const SampleLayout& layout, CanonicalWriter& writer, Vo
   return true;
 }
 
+auto find_labels_note(Volume& volume) {
+  return std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
+}
+
+Note labels_note(const std::string& reason) {
+  return note_of(NoteCode::kLooksLikeLabels,
+                 reason +
+                     ". Use \"labels\": \"all\" to mesh each label. An iso-value makes one "
+                     "surface around all samples above it.");
+}
+
 // Completes the note on labels, if there is one.
 void note_stored_type(const SampleLayout& layout, Volume& volume) {
-  const auto note =
-      std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
+  const auto note = find_labels_note(volume);
   if (note == volume.notes.end()) return;
   const std::string stored =
       is_wide_integer(layout) ? "64-bit integers" : std::string(to_string(canonical_type(layout)));
@@ -131,10 +141,13 @@ void note_labels(std::span<const std::byte> samples, Volume& volume) {
       told > 0 ? "The file describes " + std::to_string(told) + (told == 1 ? " label" : " labels")
                : "The samples look like labels: they have " + std::to_string(*values) +
                      " different whole values in flat regions";
-  volume.notes.push_back(
-      note_of(NoteCode::kLooksLikeLabels,
-              what + ". Use \"labels\": \"all\" to mesh each label. An iso-value makes one surface "
-                     "around all samples above it."));
+  volume.notes.push_back(labels_note(what));
+}
+
+// The header alone says so: the samples need not look like labels.
+void note_declared_labels(Volume& volume) {
+  if (!is_integer(volume.type) || find_labels_note(volume) != volume.notes.end()) return;
+  volume.notes.push_back(labels_note("The file says that its samples are labels"));
 }
 
 }  // namespace
@@ -150,9 +163,10 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
   volume.type = canonical_type(samples.layout);
   CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
   read_samples(samples.file, samples.offset, samples.layout, writer.samples());
-  const bool is_converted = store_whole_numbers(samples.layout, writer, volume);
+  const bool is_converted = store_whole_numbers(samples, writer, volume);
   if (!is_integer(volume.type)) volume.labels.clear();
   volume = finish(writer, std::move(volume));
+  if (samples.are_labels) note_declared_labels(volume);
   if (is_converted) note_stored_type(samples.layout, volume);
   return volume;
 }
@@ -174,8 +188,8 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task.target);
   volume.labels = source.labels;
-  return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),
-                         task.target);
+  return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels},
+                         std::move(volume), task.target);
 }
 
 Volume finish(CanonicalWriter& writer, Volume volume) {

@@ -136,6 +136,7 @@ struct SourceVolume {
   Geometry geometry;
   std::vector<Note> notes;
   std::vector<LabelEntry> labels;       // see label_table()
+  bool are_labels = false;              // by the header, even without a table
   std::optional<SegmentLayers> layers;  // then all volumes are read, and `chosen` is the first
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }

@@ -101,6 +101,28 @@ TEST(NiftiLabels, OfDamagedExtensionsAreNone) {
   }
 }
 
+// The samples differ everywhere, so they do not look like labels.
+TEST(NiftiLabels, AreDeclaredByTheIntent) {
+  const auto of = [](const std::vector<float>& samples) {
+    std::string file = nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples));
+    const std::int16_t intent = 1002;
+    file.replace(68, sizeof(intent), reinterpret_cast<const char*>(&intent), sizeof(intent));
+    return import_bytes(file);
+  };
+  std::vector<float> samples;
+  for (int at = 0; at < 24; ++at) samples.push_back(static_cast<float>(at * 7 % 24));
+  const Outcome whole = of(samples);
+  ASSERT_EQ(whole.error, "");
+  EXPECT_EQ(whole.volume.type, SampleType::kUint8);
+  ASSERT_THAT(codes_of(whole), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(whole.volume.notes[0].detail, HasSubstr("says that its samples are labels"));
+  EXPECT_THAT(whole.volume.notes[0].detail, HasSubstr("float32 in the file, are now uint8"));
+  samples[3] = 0.5F;
+  const Outcome fractions = of(samples);
+  EXPECT_EQ(fractions.volume.type, SampleType::kFloat32);
+  EXPECT_THAT(codes_of(fractions), IsEmpty());
+}
+
 TEST(NiftiLabels, OfFractionsAreNone) {
   const NiftiFields fields = {.datatype = 16, .bitpix = 32};
   const Outcome outcome = import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false),
