@@ -176,8 +176,16 @@ std::optional<Rescale> rescale_of(const Fields& fields) {
   return rescale;
 }
 
-bool is_big_endian(const Fields& fields) {
-  return flag(fields, "ElementByteOrderMSB", flag(fields, "BinaryDataByteOrderMSB", false));
+bool is_big_endian(const Fields& fields, StoredType type) {
+  const bool of_data = flag(fields, "BinaryDataByteOrderMSB", false);
+  const bool of_elements = flag(fields, "ElementByteOrderMSB", of_data);
+  const bool has_both = !optional(fields, "BinaryDataByteOrderMSB").empty();
+  if (of_elements != of_data && has_both && bytes_per_sample(type) > 1) {
+    throw_unusable(
+        "The MetaImage header contradicts itself: \"ElementByteOrderMSB\" differs from "
+        "\"BinaryDataByteOrderMSB\", which has the same meaning.");
+  }
+  return of_elements;
 }
 
 Encoding encoding_of(const Fields& fields) {
@@ -317,7 +325,7 @@ SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& 
   volume.dims = volume_dims(std::span(sizes).first(std::min<std::size_t>(sizes.size(), 3)));
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
-  volume.layout.big_endian = is_big_endian(fields);
+  volume.layout.big_endian = is_big_endian(fields, volume.layout.type);
   volume.layout.rescale = rescale_of(fields);
   if (volume.layout.rescale) {
     volume.notes.push_back(

@@ -94,6 +94,21 @@ TEST(MetaImage, KnowsTheOtherNamesOfItsFields) {
   EXPECT_EQ(import_with("ElementSize", "2 3 4").volume.geometry.spacing, (Vector3{1, 1, 1}));
 }
 
+TEST(MetaImage, HasOneByteOrder) {
+  const Lines lines =
+      with(with(small_metaimage(), "ElementType", "MET_SHORT"), "BinaryDataByteOrderMSB", "True");
+  const std::vector<std::int16_t> samples = some_samples<std::int16_t>(24);
+  const auto of = [&](const Lines& header) {
+    return import_bytes(metaimage(header, bytes_of(samples, true)));
+  };
+  EXPECT_EQ(samples_of<std::int16_t>(of(with(lines, "ElementByteOrderMSB", "1"))), samples);
+  EXPECT_EQ(samples_of<std::int16_t>(
+                of(with(with(lines, "BinaryDataByteOrderMSB", ""), "ElementByteOrderMSB", "True"))),
+            samples);
+  EXPECT_THAT(of(with(lines, "ElementByteOrderMSB", "False")).error, HasSubstr("contradicts"));
+  EXPECT_TRUE(import_with("ElementByteOrderMSB", "True").imported());  // samples of one byte
+}
+
 TEST(MetaImage, TakesASpacingIfItHasNone) {
   const ImportOptions spaced = {.spacing = Vector3{1, 2, 3}};
   // The steps of this matrix are not of length 1, which the given spacing replaces.
