@@ -213,12 +213,29 @@ double spacing_of_extent(const Axis& axis) {
   return spacing;
 }
 
+// The distance from min to max must be as many spacings as the axis has samples, or one fewer.
+// Writers round, and their centers are often missing.
+void check_extent(const Axis& axis) {
+  constexpr double kTolerance = 0.01;
+  const double extent = std::abs(axis.max - axis.min);
+  const auto fits = [&](std::uint64_t steps) {
+    const double expected = std::abs(axis.spacing) * static_cast<double>(steps);
+    return std::abs(extent - expected) <= kTolerance * expected;
+  };
+  if (!has_extent(axis) || fits(axis.size) || fits(axis.size - 1)) return;
+  throw_unusable("The NRRD header contradicts itself: " + std::to_string(axis.size) +
+                 " samples with a spacing of " + to_text(axis.spacing) +
+                 " do not fit between the axis min " + to_text(axis.min) + " and the axis max " +
+                 to_text(axis.max) + ".");
+}
+
 void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_space) {
   if (is_known(axis.spacing)) {
     if (in_space) {
       throw_unusable(
           "The NRRD header has a space, but an axis with a spacing instead of a direction.");
     }
+    check_extent(axis);
     geometry.spacing[at] = axis.spacing;
     return;
   }

@@ -226,6 +226,12 @@ bool has_spacing_of_extent(const NrrdHeader& header) {
   return !value_in(header, "axis maxs").empty() && value_in(header, "spacings").empty();
 }
 
+// Random ones contradict each other, which ITK does not notice.
+bool has_spacing_and_extent(const NrrdHeader& header) {
+  return !value_in(header, "spacings").empty() && !value_in(header, "axis mins").empty() &&
+         !value_in(header, "axis maxs").empty();
+}
+
 // ITK turns LAS around the wrong axis, so it is told that all spaces are LPS, and the signs are
 // written down here.
 std::optional<Geometry> itk_reading(const Folder& folder, const NrrdHeader& header) {
@@ -255,7 +261,7 @@ TEST(ItkSpace, NrrdIsReadAsItkReadsIt) {
     const std::string file = file_of(header, header.space);
     const auto expected = kept(itk_reading(folder, header), header.dims);
     const auto found = ours(import_bytes(file));
-    if (!found && header.leaves_open) continue;
+    if (!found && (header.leaves_open || has_spacing_and_extent(header))) continue;
     EXPECT_EQ(found.has_value(), expected.has_value()) << file << import_bytes(file).error;
     if (found && expected) {
       EXPECT_EQ(*found, *expected) << file;

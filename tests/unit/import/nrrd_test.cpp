@@ -135,6 +135,21 @@ TEST(Nrrd, HonoursItsUnits) {
   EXPECT_THAT(import_with("space units", "\"ell\" \"ell\" \"ell\"").error, HasSubstr("ell"));
 }
 
+TEST(Nrrd, MinsAndMaxsMustFitTheSpacings) {
+  const Lines plain =
+      with(with(with(small_nrrd(), "space", ""), "space directions", ""), "space origin", "");
+  const auto of = [&](const std::string& maxs) {
+    const Lines lines = with(with(plain, "axis mins", "10 20 30"), "spacings", "1.5 2 3");
+    return import_bytes(nrrd(with(lines, "axis maxs", maxs), kSmallSamples));
+  };
+  for (const char* fitting : {"16 26 36", "14.5 24 33", "16.001 26 33", "nan nan nan"}) {
+    EXPECT_EQ(of(fitting).volume.geometry.spacing, (Vector3{1.5, 2, 3})) << of(fitting).error;
+  }
+  EXPECT_THAT(of("16 30 36").error,
+              HasSubstr("3 samples with a spacing of 2 do not fit between the axis min 20 and the "
+                        "axis max 30"));
+}
+
 TEST(Nrrd, TakesASpacingIfItHasNone) {
   const ImportOptions spaced = {.spacing = Vector3{1, 2, 3}};
   const Lines plain =
