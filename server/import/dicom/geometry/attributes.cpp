@@ -247,8 +247,12 @@ Plane plane_of(const std::vector<double>& cosines, const std::vector<double>& sp
   return plane;
 }
 
-Rescale rescale_of(const DataSet& data) {
-  return {factor(data, kRescaleSlope).value_or(1), factor(data, kRescaleIntercept).value_or(0)};
+void set_rescale(const DataSet& data, Frame& frame) {
+  const std::optional<double> slope = factor(data, kRescaleSlope);
+  const std::optional<double> intercept = factor(data, kRescaleIntercept);
+  frame.rescale = {slope.value_or(1), intercept.value_or(0)};
+  frame.has_slope = slope.has_value();
+  frame.has_intercept = intercept.has_value();
 }
 
 std::span<const std::string_view> phase_names() { return kPhaseNames; }

@@ -52,8 +52,9 @@ Vector3 unit_vector(const double* parts);
 std::vector<double> required_numbers(const DataSet& data, Tag tag, std::size_t count,
                                      std::string_view name);
 
-// Missing slopes are 1, missing intercepts 0. Throws Error kUnusableVolume.
-Rescale rescale_of(const DataSet& data);
+// Sets the frame's rescale to that of `data`. Missing slopes are 1, missing intercepts 0. Throws
+// Error kUnusableVolume.
+void set_rescale(const DataSet& data, Frame& frame);
 
 // The names (PS3.6) of the attributes in which frames at one position may differ.
 std::span<const std::string_view> phase_names();

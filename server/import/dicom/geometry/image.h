@@ -53,6 +53,9 @@ struct Frame {
   std::uint32_t number = 0;  // in its object, from 0
   Plane plane;
   Rescale rescale;
+  // The object has this factor, or a table instead. A missing one is assumed.
+  bool has_slope = false;
+  bool has_intercept = false;
   std::uint32_t segment = 0;  // of a segmentation with one segment per frame; 0: none
   std::vector<Phase> phases;  // of this frame alone
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/text.h"
+#include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/vectors.h"
 #include "server/import/source/source.h"
 
@@ -62,6 +63,20 @@ void refuse_others(std::span<const Slice> slices, const std::string& what, const
                  place_of(usual) + ".");
 }
 
+// A factor that is missing in some slices is assumed there. That is safe only if the others have
+// the assumed one.
+void refuse_assumed(std::span<const Slice> slices, const std::string& what, double Rescale::*factor,
+                    bool Frame::*has_factor) {
+  const double first = slices.front().frame->rescale.*factor;
+  const bool is_safe = std::ranges::all_of(slices, [&](const Slice& slice) {
+    return !slice.image->table && slice.frame->rescale.*factor == first;
+  });
+  if (is_safe) return;
+  refuse_others(slices, what, [&](const Slice& a, const Slice& b) {
+    return a.frame->*has_factor == b.frame->*has_factor;
+  });
+}
+
 }  // namespace
 
 std::string count_of(std::size_t count, const std::string& what) {
@@ -96,6 +111,10 @@ void refuse_mixtures(std::span<const Slice> slices) {
   refuse_others(slices, "modality", [](const Slice& a, const Slice& b) {
     return a.image->modality == b.image->modality;
   });
+  refuse_assumed(slices, "having a rescale slope " + tag_name(kRescaleSlope), &Rescale::slope,
+                 &Frame::has_slope);
+  refuse_assumed(slices, "having a rescale intercept " + tag_name(kRescaleIntercept),
+                 &Rescale::intercept, &Frame::has_intercept);
 }
 
 std::vector<Placed> placed_along_normal(std::span<const Slice> slices) {

@@ -37,7 +37,8 @@ bool same_size(const Slice& a, const Slice& b);
 bool same_spacing(const Slice& a, const Slice& b);
 
 // Throws Error kUnusableVolume, naming slices, if they differ in size, orientation, spacing,
-// modality or photometric interpretation.
+// modality or photometric interpretation, or if only some of them have a rescale that changes
+// values. Slopes and intercepts themselves may differ.
 void refuse_mixtures(std::span<const Slice> slices);
 
 // The lattice whose planes are like `first` and `step` apart.

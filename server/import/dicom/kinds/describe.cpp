@@ -80,8 +80,10 @@ Frame describe_frame(const DataSet& data, std::uint32_t number, const Image& ima
   Frame frame;
   frame.number = number;
   frame.plane = is_placed_grid(data) ? placeless_plane_of(attributes) : plane_of(attributes);
-  if (!image.table) {
-    frame.rescale = rescale_of(attributes.place(kPixelValueTransformationSequence));
+  if (image.table) {
+    frame.has_slope = frame.has_intercept = true;
+  } else {
+    set_rescale(attributes.place(kPixelValueTransformationSequence), frame);
   }
   if (image.segmentation && image.segmentation->kind != SegmentKind::kLabelMap) {
     frame.segment = segment_of(data, number);

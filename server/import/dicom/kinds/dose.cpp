@@ -47,7 +47,10 @@ void place_dose(const DataSet& data, std::span<Frame> frames) {
     throw_unusable("The DICOM dose's scaling " + tag_name(kDoseGridScaling) + " is " +
                    in_quotes(data.text(kDoseGridScaling)) + ", not a positive number.");
   }
-  for (Frame& frame : frames) frame.rescale = {scaling[0], 0};
+  for (Frame& frame : frames) {
+    frame.rescale = {scaling[0], 0};
+    frame.has_slope = frame.has_intercept = true;
+  }
   if (frames.size() == 1) return;
   const Plane first = frames.front().plane;
   const Vector3 normal = cross(first.along_row, first.along_column);

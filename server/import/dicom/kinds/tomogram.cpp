@@ -94,13 +94,12 @@ void place_tomogram(const DataSet& data, std::uint32_t frames, Image& image) {
   const Plane first = first_plane(data, image);
   const Vector3 normal = cross(first.along_row, first.along_column);
   const double step = slice_step(data, image);
-  const Rescale rescale = rescale_of(data);
   const std::vector<std::uint32_t> numbers = slice_numbers(data, frames);
   for (std::uint32_t number = 0; number < frames; ++number) {
     Frame frame;
     frame.number = number;
     frame.plane = first;
-    frame.rescale = rescale;
+    set_rescale(data, frame);
     frame.plane.position = moved(first.position, normal, step * (numbers[number] - 1.0));
     image.frames.push_back(std::move(frame));
   }

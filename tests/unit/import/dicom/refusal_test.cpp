@@ -131,6 +131,76 @@ INSTANTIATE_TEST_SUITE_P(
                             "photometric"}),
     [](const auto& each) { return std::string(each.param.name); });
 
+NamedFiles rescaled(const char* slope, const char* intercept,
+                    const std::function<void(DicomObject&)>& change) {
+  return files_of(DicomSeries{}, [&](std::uint32_t k, DicomObject& object) {
+    object.text(kRescaleSlope, "DS", slope).text(kRescaleIntercept, "DS", intercept);
+    if (k == 4) change(object);
+    return true;
+  });
+}
+
+TEST(DicomRescale, ThatOneSliceLacksIsRefused) {
+  const auto error_of = [](const NamedFiles& files) { return import_objects(files).error; };
+  const auto without_both = [](DicomObject& object) {
+    object.erase(kRescaleSlope).erase(kRescaleIntercept);
+  };
+  EXPECT_THAT(
+      error_of(rescaled("1", "-1024", without_both)),
+      AllOf(HasSubstr("1 of its 6 slices differs in having a rescale intercept (0028,1052)"),
+            HasSubstr("\"IM5\"")));
+  EXPECT_THAT(error_of(rescaled("2", "0", without_both)),
+              AllOf(HasSubstr("rescale slope (0028,1053)"), HasSubstr("\"IM5\"")));
+  // An empty value is missing, too.
+  EXPECT_THAT(
+      error_of(rescaled("1", "-1024",
+                        [](DicomObject& object) { object.text(kRescaleIntercept, "DS", ""); })),
+      HasSubstr("rescale intercept"));
+  // The assumed factors are those of the others.
+  EXPECT_EQ(error_of(rescaled("1", "0", without_both)), "");
+  EXPECT_EQ(
+      error_of(rescaled("1", "-1024", [](DicomObject& object) { object.erase(kRescaleSlope); })),
+      "");
+}
+
+TEST(DicomRescale, MayDifferFromSliceToSlice) {
+  EXPECT_EQ(
+      import_objects(rescaled("1", "-1024",
+                              [](DicomObject& object) { object.text(kRescaleSlope, "DS", "0.5"); }))
+          .error,
+      "");
+}
+
+TEST(DicomRescale, ThatOneFrameLacksIsRefused) {
+  const DicomSeries series;
+  std::vector<DicomObject> frames;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject frame;
+    frame.items(kPlanePositionSequence,
+                {DicomObject().text(kImagePosition, "DS",
+                                    "-10\\20\\" + std::to_string(series.position(k)[2]))});
+    if (k != 2) {
+      frame.items(
+          kPixelValueTransformationSequence,
+          {DicomObject().text(kRescaleSlope, "DS", "1").text(kRescaleIntercept, "DS", "-1024")});
+    }
+    frames.push_back(frame);
+  }
+  DicomObject object = series.enhanced({0, 1, 2, 3, 4, 5});
+  object.items(kPerFrameFunctionalGroups, frames);
+  EXPECT_THAT(import_objects({{"one", object.file()}}).error,
+              AllOf(HasSubstr("rescale intercept"), HasSubstr("frame 3 differs from")));
+}
+
+TEST(DicomTable, ThatOneSliceLacksIsRefused) {
+  const NamedFiles files = with_slice(4, [](DicomObject& object) {
+    object.items(kModalityLutSequence,
+                 {DicomObject().numbers(kLutDescriptor, {1, 0, 16}).bytes(kLutData, "OW", "ab")});
+  });
+  EXPECT_THAT(import_objects(files).error,
+              AllOf(HasSubstr("1 of its 6 slices"), HasSubstr("\"IM5\"")));
+}
+
 // --- Single objects ------------------------------------------------------------------------------
 
 struct Fault {
