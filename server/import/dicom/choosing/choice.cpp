@@ -94,6 +94,13 @@ SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   return all;
 }
 
+void note_distance(const Stack& stack, std::vector<Note>& notes) {
+  if (!stack.is_distance_assumed) return;
+  notes.push_back(note_of(NoteCode::kDistanceAssumed,
+                          "The distance between the slices is unknown. The slice thickness, " +
+                              in_mm(stack.geometry.spacing[2]) + ", was used."));
+}
+
 // Planes without a frame have no label.
 void note_empty_planes(const Stack& stack, std::vector<Note>& notes) {
   std::uint32_t filled = 0;
@@ -122,6 +129,7 @@ std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOp
 Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
                     std::vector<Note>& notes) {
   Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes));
+  note_distance(stack, notes);
   note_empty_planes(stack, notes);
   return stack;
 }
@@ -158,11 +166,7 @@ Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
     throw_unusable("The series is not a single volume: it mixes images and segmentations.");
   }
   Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
-  if (stack.slices.front().image->is_distance_assumed) {
-    notes.push_back(note_of(NoteCode::kDistanceAssumed,
-                            "The distance between the slices is unknown. The slice thickness, " +
-                                in_mm(stack.geometry.spacing[2]) + ", was used."));
-  }
+  note_distance(stack, notes);
   note_place(stack, options, notes);
   if (auto note = note_on_frames_of_reference(stack.slices, options)) {
     notes.push_back(std::move(*note));

@@ -81,6 +81,7 @@ struct Segmentation {
   SegmentKind kind = SegmentKind::kBinary;
   std::uint32_t maximum = 1;             // of fractional samples
   std::optional<double> slice_distance;  // mm
+  std::optional<double> thickness;       // of slices, mm
 };
 
 // Origin of the frames' positions.

@@ -142,6 +142,7 @@ Stack make_stack(std::vector<Slice> slices) {
 
   stack.geometry = lattice(placed.front().slice.frame->plane, step);
   for (const Placed& each : placed) stack.slices.push_back(each.slice);
+  stack.is_distance_assumed = stack.slices.front().image->is_distance_assumed;
   return stack;
 }
 

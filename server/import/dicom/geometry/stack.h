@@ -25,6 +25,7 @@ struct Stack {
   // has a slice.
   std::vector<std::uint32_t> planes = {};
   std::uint32_t plane_count = 0;
+  bool is_distance_assumed = false;  // the distance between slices is their thickness
 
   std::uint32_t depth() const {
     return plane_count > 0 ? plane_count : static_cast<std::uint32_t>(slices.size());

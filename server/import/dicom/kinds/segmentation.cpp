@@ -25,6 +25,8 @@ namespace isomesh::import::dicom {
 namespace {
 
 constexpr double kMostPlanes = 65535;
+// A gap of more thicknesses says that the thickness is wrong.
+constexpr double kMostThicknesses = 20;
 
 std::vector<Segment> described_segments(const DataSet& data) {
   std::vector<Segment> segments;
@@ -38,9 +40,8 @@ std::vector<Segment> described_segments(const DataSet& data) {
   return segments;
 }
 
-std::optional<double> slice_distance(const DataSet& data) {
-  const auto told =
-      Attributes(data, 0).place(kPixelMeasuresSequence).numbers(kSpacingBetweenSlices);
+std::optional<double> measure_of(const DataSet& data, Tag tag) {
+  const auto told = Attributes(data, 0).place(kPixelMeasuresSequence).numbers(tag);
   if (told.size() == 1 && told[0] != 0) return std::abs(told[0]);
   return std::nullopt;
 }
@@ -58,39 +59,49 @@ std::vector<double> gaps_of(std::span<const Placed> placed, std::span<const std:
   return gaps;
 }
 
-// The distance of planes that include all positions.
-double plane_distance(const std::vector<double>& gaps, const std::optional<double>& told) {
+struct PlaneDistance {
+  double mm = 0;
+  bool is_thickness = false;
+};
+
+// The distance of planes that include all positions. If the object has none, and all gaps are of
+// several slices, frames between them were left out.
+PlaneDistance plane_distance(const std::vector<double>& gaps, const Segmentation& told) {
   const auto fits = [&](double distance) {
     return std::ranges::all_of(gaps, [&](double gap) { return is_whole_step(gap, distance); });
   };
-  if (told && fits(*told)) return *told;
+  if (told.slice_distance && fits(*told.slice_distance)) return {*told.slice_distance};
   const double smallest = std::ranges::min(gaps);
-  if (fits(smallest)) return smallest;
+  const double thicknesses = told.thickness ? std::round(smallest / *told.thickness) : 0;
+  if (!told.slice_distance && thicknesses >= 2 && thicknesses <= kMostThicknesses &&
+      fits(*told.thickness)) {
+    return {*told.thickness, true};
+  }
+  if (fits(smallest)) return {smallest};
   throw_unusable("The segmentation's frames are unevenly spaced: some are " + in_mm(smallest) +
                  " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
-std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
-                                     const std::optional<double>& told) {
+void set_planes(std::span<const Placed> placed, Stack& stack) {
   const std::vector<std::size_t> starts = position_starts(placed);
+  const Image& image = *placed.front().slice.image;
   if (starts.size() == 1) {
-    const PixelLayout& layout = placed.front().slice.image->layout;
-    refuse_flat("The segmentation", {layout.columns, layout.rows, 1});
+    refuse_flat("The segmentation", {image.layout.columns, image.layout.rows, 1});
   }
   const std::vector<double> gaps = gaps_of(placed, starts);
-  const double distance = plane_distance(gaps, told);
-  std::vector<std::uint32_t> planes;
+  const PlaneDistance distance = plane_distance(gaps, *image.segmentation);
+  stack.is_distance_assumed = distance.is_thickness;
   double plane = 0;
   for (std::size_t position = 0; position < starts.size(); ++position) {
-    if (position > 0) plane += std::round(gaps[position - 1] / distance);
+    if (position > 0) plane += std::round(gaps[position - 1] / distance.mm);
     if (plane > kMostPlanes) {
       throw_unusable("The segmentation's frames lie more than " + to_text(kMostPlanes) +
                      " planes apart.");
     }
     const std::size_t end = position + 1 < starts.size() ? starts[position + 1] : placed.size();
-    planes.resize(end, static_cast<std::uint32_t>(plane));
+    stack.planes.resize(end, static_cast<std::uint32_t>(plane));
   }
-  return planes;
+  stack.plane_count = stack.planes.back() + 1;
 }
 
 void refuse_crooked(std::span<const Placed> placed, const Stack& stack, const Vector3& step) {
@@ -230,7 +241,8 @@ Segmentation describe_segmentation(const DataSet& data) {
   return {.segments = described_segments(data),
           .kind = kind,
           .maximum = kind == SegmentKind::kFractional ? maximum_of(data) : 1,
-          .slice_distance = slice_distance(data)};
+          .slice_distance = measure_of(data, kSpacingBetweenSlices),
+          .thickness = measure_of(data, kSliceThickness)};
 }
 
 std::uint32_t segment_of(const DataSet& data, std::uint32_t frame) {
@@ -255,8 +267,7 @@ Stack make_label_stack(std::vector<Slice> slices) {
   refuse_mixtures(slices);
   const std::vector<Placed> placed = placed_along_normal(slices);
   Stack stack;
-  stack.planes = planes_of(placed, slices.front().image->segmentation->slice_distance);
-  stack.plane_count = stack.planes.back() + 1;
+  set_planes(placed, stack);
   Vector3 step = difference(placed.back().position(), placed.front().position());
   for (double& part : step) part /= stack.planes.back();
   refuse_crooked(placed, stack, step);

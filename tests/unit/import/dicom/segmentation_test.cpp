@@ -136,6 +136,29 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   EXPECT_EQ(label_at(sparse, 1, 6), 2);
 }
 
+TEST(DicomSegmentation, HasEmptyPlanesWhereGapsAreOfSeveralSlices) {
+  SegmentObject object = two_segments();
+  object.frames[3].z = 6;
+  object.thickness = "1";
+  const Outcome thick = import_labels(object);
+  ASSERT_EQ(thick.error, "");
+  EXPECT_EQ(thick.volume.dims[2], 7);
+  EXPECT_EQ(thick.volume.geometry.spacing[2], 1);
+  EXPECT_EQ(label_at(thick, 1, 6), 2);
+  EXPECT_THAT(note_detail(thick, NoteCode::kDistanceAssumed), HasSubstr("thickness, 1 mm"));
+  EXPECT_THAT(note_detail(thick, NoteCode::kEmptyPlanes), HasSubstr("4 of the 7 planes"));
+  // The object's own distance counts, and a thickness that the gaps do not consist of does not.
+  object.slice_distance = "2";
+  EXPECT_EQ(import_labels(object).volume.dims[2], 4);
+  object.slice_distance = "";
+  for (const char* thickness : {"2", "1.5", "3", "0.001", "0"}) {
+    object.thickness = thickness;
+    const Outcome outcome = import_labels(object);
+    EXPECT_EQ(outcome.volume.dims[2], 4) << thickness;
+    EXPECT_EQ(note_detail(outcome, NoteCode::kDistanceAssumed), "") << thickness;
+  }
+}
+
 std::string packed_bits(const SegmentFrame& frame) {
   std::string bytes((kSegmentSamples + 7) / 8, '\0');
   for (const unsigned place : frame.labels) {

@@ -65,6 +65,7 @@ DicomObject segmentation(const SegmentObject& what) {
   if (!what.slice_distance.empty()) {
     measures.text(kSpacingBetweenSlices, "DS", what.slice_distance);
   }
+  if (!what.thickness.empty()) measures.text(kSliceThickness, "DS", what.thickness);
   DicomObject orientation;
   orientation.text(kImageOrientation, "DS", "1\\0\\0\\0\\1\\0");
   DicomObject shared;

@@ -27,6 +27,7 @@ struct SegmentObject {
   std::vector<std::string> segments = {"liver", "spleen"};
   std::string type = "BINARY";
   std::string slice_distance = {};
+  std::string thickness = {};
   std::string uid = "1.2.3.4";
   unsigned maximum = 0;                              // of fractional samples; 0: not told
   std::vector<std::array<unsigned, 3>> colors = {};  // of the first segments, as they are stored
