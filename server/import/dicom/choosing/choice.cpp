@@ -134,6 +134,30 @@ Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
   return stack;
 }
 
+bool has_changed_values(const Slice& slice) {
+  const Rescale& rescale = slice.frame->rescale;
+  return slice.image->value_mappings > 0 && (rescale.slope != 1 || rescale.intercept != 0);
+}
+
+void note_mappings(const Stack& stack, std::vector<Note>& notes) {
+  std::uint32_t mappings = 0;
+  for (const Slice& slice : stack.slices) {
+    mappings = std::max(mappings, slice.image->value_mappings);
+  }
+  std::string detail;
+  if (std::ranges::any_of(stack.slices, has_changed_values)) {
+    detail =
+        "The samples were changed by the slope and intercept of the parametric map's real world "
+        "values. Programs that ignore these show other values.";
+  }
+  if (mappings > 1) {
+    detail += (detail.empty() ? "" : " ") + std::string("The parametric map has ") +
+              std::to_string(mappings) +
+              " mappings to real world values. The first one that applies to all samples was used.";
+  }
+  if (!detail.empty()) notes.push_back(note_of(NoteCode::kValuesRescaled, std::move(detail)));
+}
+
 // Throws unless the options accept that a volume's place in the patient is unknown.
 void note_place(const Stack& stack, const ImportOptions& options, std::vector<Note>& notes) {
   const PlaceKind place = stack.slices.front().image->place;
@@ -167,6 +191,7 @@ Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
   }
   Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
   note_distance(stack, notes);
+  note_mappings(stack, notes);
   note_place(stack, options, notes);
   if (auto note = note_on_frames_of_reference(stack.slices, options)) {
     notes.push_back(std::move(*note));

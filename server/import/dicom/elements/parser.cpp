@@ -59,6 +59,7 @@ bool is_needed_sequence(Tag tag) {
     case kModalityLutSequence:
     case kPixelMeasuresSequence:
     case kPixelValueTransformationSequence:
+    case kRealWorldValueMappingSequence:
     case kSharedFunctionalGroups:
     case kPerFrameFunctionalGroups:
       return true;

@@ -175,11 +175,17 @@ Attributes::Attributes(const DataSet& data, std::uint32_t frame)
   if (frames != nullptr && frame < frames->items.size()) own_ = &frames->items[frame];
 }
 
-const DataSet* Attributes::group(Tag sequence) const {
-  if (own_ != nullptr) {
-    if (const DataSet* item = own_->item(sequence)) return item;
+const Element* Attributes::sequence(Tag tag) const {
+  for (const DataSet* groups : {own_, shared_}) {
+    const Element* found = groups == nullptr ? nullptr : groups->find(tag);
+    if (found != nullptr && !found->items.empty()) return found;
   }
-  return shared_ == nullptr ? nullptr : shared_->item(sequence);
+  return nullptr;
+}
+
+const DataSet* Attributes::group(Tag sequence_tag) const {
+  const Element* found = sequence(sequence_tag);
+  return found == nullptr ? nullptr : &found->items.front();
 }
 
 const DataSet& Attributes::place(Tag sequence) const {

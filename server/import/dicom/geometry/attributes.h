@@ -17,8 +17,11 @@ class Attributes {
   // `data` must outlive the attributes.
   Attributes(const DataSet& data, std::uint32_t frame);
 
-  // The frame's own or shared group; null if there is neither.
-  const DataSet* group(Tag sequence) const;
+  // All items of the frame's own or shared group; null if there is neither.
+  const Element* sequence(Tag tag) const;
+
+  // The first item of it; null if there is none.
+  const DataSet* group(Tag sequence_tag) const;
 
   // The data set that holds the attributes of a group.
   const DataSet& place(Tag sequence) const;

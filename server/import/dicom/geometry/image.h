@@ -111,6 +111,8 @@ struct Image {
   std::uint32_t tiles_per_row = 0;
   bool is_distance_assumed = false;  // the frames' distance is their slice thickness
   PlaceKind place = PlaceKind::kPatient;
+  // Of a parametric map: the most mappings of a frame to different real world values.
+  std::uint32_t value_mappings = 0;
   std::optional<ValueTable> table;  // then `layout` has 16 unsigned bits
   std::vector<Frame> frames;
   std::vector<Phase> phases;  // of the whole object

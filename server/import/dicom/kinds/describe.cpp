@@ -8,6 +8,7 @@
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/geometry/attributes.h"
+#include "server/import/dicom/kinds/parametric_map.h"
 #include "server/import/dicom/kinds/placed_frames.h"
 #include "server/import/dicom/kinds/segmentation.h"
 #include "server/import/dicom/pixels/pixel_layout.h"
@@ -75,16 +76,25 @@ PixelLayout decoded_layout(const Image& image) {
   return layout;
 }
 
-Frame describe_frame(const DataSet& data, std::uint32_t number, const Image& image) {
+void set_values(const DataSet& data, const Attributes& attributes, Image& image, Frame& frame) {
+  if (image.table) {
+    frame.has_slope = frame.has_intercept = true;
+    return;
+  }
+  set_rescale(attributes.place(kPixelValueTransformationSequence), frame);
+  if (!is_parametric_map(data)) return;
+  const std::uint32_t mappings = set_real_world_values(attributes, image.stored, frame);
+  image.value_mappings = std::max(image.value_mappings, mappings);
+  // Another frame's mapping does not apply to this one.
+  if (mappings == 0) frame.has_slope = frame.has_intercept = false;
+}
+
+Frame describe_frame(const DataSet& data, std::uint32_t number, Image& image) {
   const Attributes attributes(data, number);
   Frame frame;
   frame.number = number;
   frame.plane = is_placed_grid(data) ? placeless_plane_of(attributes) : plane_of(attributes);
-  if (image.table) {
-    frame.has_slope = frame.has_intercept = true;
-  } else {
-    set_rescale(attributes.place(kPixelValueTransformationSequence), frame);
-  }
+  set_values(data, attributes, image, frame);
   if (image.segmentation && image.segmentation->kind != SegmentKind::kLabelMap) {
     frame.segment = segment_of(data, number);
   }

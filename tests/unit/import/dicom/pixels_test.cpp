@@ -1,5 +1,7 @@
 // Compressed samples, and what is wrong with them.
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <span>
 #include <sstream>
 
@@ -276,6 +278,114 @@ TEST(DicomReals, AreRefusedWhenSomeAreMissing) {
   object.bytes(kDoubleFloatPixelData, "OD", std::string(400, 'x'));
   EXPECT_THAT(import_objects({{"map", object.file()}}).error,
               HasSubstr("take 480 bytes, but the file has 400"));
+}
+
+// --- Parametric maps -----------------------------------------------------------------------------
+
+std::string real_bytes(double value) {
+  return {reinterpret_cast<const char*>(&value), sizeof value};
+}
+
+DicomObject mapping(double slope, double intercept) {
+  return DicomObject()
+      .bytes(kRealWorldValueSlope, "FD", real_bytes(slope))
+      .bytes(kRealWorldValueIntercept, "FD", real_bytes(intercept));
+}
+
+DicomObject with_range(DicomObject item, unsigned first, unsigned last) {
+  return item.number(kRealWorldValueFirst, first).number(kRealWorldValueLast, last);
+}
+
+// A map of 12-bit integers in six frames; each has the mappings that `mappings_of` returns.
+DicomObject map_of(const std::function<std::vector<DicomObject>(std::uint32_t)>& mappings_of) {
+  const DicomSeries series;
+  std::vector<DicomObject> frames;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject frame;
+    frame.items(kPlanePositionSequence,
+                {DicomObject().text(kImagePosition, "DS",
+                                    "-10\\20\\" + std::to_string(series.position(k)[2]))});
+    const std::vector<DicomObject> mappings = mappings_of(k);
+    if (!mappings.empty()) frame.items(kRealWorldValueMappingSequence, mappings);
+    frames.push_back(frame);
+  }
+  return series.enhanced({0, 1, 2, 3, 4, 5})
+      .text(kSopClassUid, "UI", "1.2.840.10008.5.1.4.1.1.30")
+      .items(kPerFrameFunctionalGroups, frames);
+}
+
+Outcome import_map(const std::vector<DicomObject>& mappings) {
+  return import_objects({{"map", map_of([&](std::uint32_t) { return mappings; }).file()}});
+}
+
+TEST(DicomMaps, HaveRealWorldValues) {
+  const DicomSeries series;
+  for (const std::string_view syntax : {kImplicit, kExplicit}) {
+    const Outcome outcome =
+        import_objects({{"map", map_of([](std::uint32_t k) {
+                                  return std::vector<DicomObject>{mapping(k + 0.5, -10)};
+                                }).file(syntax)}});
+    ASSERT_EQ(outcome.error, "");
+    const auto samples = samples_of<float>(outcome);
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      EXPECT_EQ(samples[k * 20 + 7], static_cast<double>(series.stored(2, 1, k)) * (k + 0.5) - 10);
+    }
+    EXPECT_THAT(note_detail(outcome, NoteCode::kValuesRescaled), HasSubstr("slope and intercept"));
+  }
+  const Outcome plain = import_map({mapping(1, 0)});
+  EXPECT_EQ(samples_of<std::uint16_t>(plain)[7], series.stored(2, 1, 0));
+  EXPECT_EQ(note_detail(plain, NoteCode::kValuesRescaled), "");
+}
+
+TEST(DicomMaps, OfRealsMayShareAMapping) {
+  DicomObject object = real_object<float>(kFloatPixelData, "OF");
+  object.text(kSopClassUid, "UI", "1.2.840.10008.5.1.4.1.1.30");
+  DicomObject shared;
+  shared
+      .items(kPlaneOrientationSequence,
+             {DicomObject().text(kImageOrientation, "DS", "1\\0\\0\\0\\1\\0")})
+      .items(kPixelMeasuresSequence, {DicomObject().text(kPixelSpacing, "DS", "0.5\\0.75")})
+      .items(kRealWorldValueMappingSequence, {mapping(2, 10)});
+  object.items(kSharedFunctionalGroups, {shared});
+  const Outcome outcome = import_objects({{"map", object.file()}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat32);
+  EXPECT_EQ(samples_of<float>(outcome)[5], (5 * 0.25F - 3) * 2 + 10);
+  // A CT image's values are those of its rescale.
+  object.text(kSopClassUid, "UI", "1.2.840.10008.5.1.4.1.1.2.1");
+  EXPECT_EQ(samples_of<float>(import_objects({{"map", object.file()}}))[5], 5 * 0.25F - 3);
+}
+
+TEST(DicomMaps, WithSeveralMappingsHaveTheFirstForAllSamples) {
+  const DicomSeries series;
+  const Outcome same = import_map({mapping(3, 1), mapping(3, 1)});
+  EXPECT_EQ(samples_of<std::uint16_t>(same)[7], series.stored(2, 1, 0) * 3 + 1);
+  EXPECT_THAT(note_detail(same, NoteCode::kValuesRescaled), Not(HasSubstr("mappings")));
+  const Outcome units = import_map({mapping(3, 1), mapping(3000, 1000)});
+  EXPECT_EQ(units.canonical, same.canonical);
+  EXPECT_THAT(note_detail(units, NoteCode::kValuesRescaled), HasSubstr("2 mappings"));
+  const Outcome wide =
+      import_map({with_range(mapping(2, 1), 0, 99), with_range(mapping(3, 1), 0, 4095)});
+  EXPECT_EQ(wide.canonical, same.canonical);
+  EXPECT_THAT(
+      import_map({with_range(mapping(2, 1), 0, 99), with_range(mapping(3, 1), 100, 4095)}).error,
+      HasSubstr("2 mappings apply to different stored values"));
+}
+
+TEST(DicomMaps, WithoutAUsableMappingAreRefused) {
+  DicomObject table;
+  table.bytes(kRealWorldValueLutData, "FD", real_bytes(1) + real_bytes(2));
+  EXPECT_THAT(import_map({table}).error, HasSubstr("only lookup tables (0040,9212)"));
+  EXPECT_EQ(import_map({table, mapping(3, 1)}).error, "");
+  EXPECT_THAT(import_map({mapping(0, 1)}).error, HasSubstr("slope (0040,9225) is 0"));
+  EXPECT_THAT(import_map({mapping(1, NAN)}).error, HasSubstr("intercept (0040,9224)"));
+  EXPECT_THAT(import_map({DicomObject()}).error, HasSubstr("slope (0040,9225)"));
+  EXPECT_THAT(import_objects({{"map", map_of([](std::uint32_t k) {
+                                        return k == 3 ? std::vector<DicomObject>{}
+                                                      : std::vector<DicomObject>{mapping(2, 0)};
+                                      }).file()}})
+                  .error,
+              HasSubstr("frame 4 differs from"));
 }
 
 }  // namespace
