@@ -42,6 +42,21 @@ Range value_range(const PixelLayout& layout, const Rescale& rescale) {
   return {std::min(one, other), std::max(one, other)};
 }
 
+// True if no two stored values become equal: float32 numbers of this size are at most 2^-23 of it
+// apart.
+bool differ_in_float32(const PixelLayout& layout, const Rescale& rescale) {
+  const auto size_of = [&](std::int64_t stored) {
+    return std::abs(static_cast<double>(stored) * rescale.slope + rescale.intercept);
+  };
+  const Range stored = stored_range(layout);
+  return std::max(size_of(stored.low), size_of(stored.high)) <= std::abs(rescale.slope) * 0x1p23;
+}
+
+bool fits_float32(const PixelLayout& layout, const Rescale& rescale) {
+  if (layout.is_float) return layout.bits_allocated <= 32;
+  return layout.bits_allocated <= 16 && differ_in_float32(layout, rescale);
+}
+
 struct IntegerType {
   SampleType type;
   Range range;
@@ -140,7 +155,7 @@ std::vector<SampleType> candidate_types(std::span<const Slice> slices) {
     const PixelLayout& layout = slice.image->layout;
     bits_allocated = std::max(bits_allocated, layout.bits_allocated);
     integral = integral && !layout.is_float && is_integral(slice.frame->rescale);
-    fits_float = fits_float && layout.bits_allocated <= (layout.is_float ? 32 : 16);
+    fits_float = fits_float && fits_float32(layout, slice.frame->rescale);
   }
   if (!integral) return {fits_float ? SampleType::kFloat32 : SampleType::kFloat64};
   Range all = value_range(slices.front().image->layout, slices.front().frame->rescale);

@@ -10,8 +10,9 @@
 namespace isomesh::import::dicom {
 
 // The types to try, in order, for the samples of all slices; the last fits all. They are integers
-// if all slopes and intercepts are, otherwise float32, or float64 for 32-bit integers and 64-bit
-// floats. int16 precedes int32, because 16-bit CT values seldom exceed it.
+// if all slopes and intercepts are, otherwise float32, or float64 for 32-bit integers, 64-bit
+// floats, and integers that would become equal in float32 because the intercept is far larger than
+// the slope. int16 precedes int32, because 16-bit CT values seldom exceed it.
 std::vector<SampleType> candidate_types(std::span<const Slice> slices);
 
 // Writes the values of one frame's stored samples as `type`; padding is not treated specially.

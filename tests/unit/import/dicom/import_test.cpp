@@ -225,6 +225,17 @@ TEST(DicomValues, AreScaledSliceBySlice) {
   }
 }
 
+TEST(DicomValues, StayDifferentBesideALargeIntercept) {
+  const DicomSeries series;
+  const Outcome outcome = import_scaled(series, {{"0.5", "10000000", {}}});
+  ASSERT_EQ(outcome.error, "");
+  ASSERT_EQ(outcome.volume.type, SampleType::kFloat64);
+  const auto samples = samples_of<double>(outcome);
+  const auto stored = expected_samples<double>(series);
+  for (std::size_t i = 0; i < samples.size(); ++i) ASSERT_EQ(samples[i], stored[i] * 0.5 + 1e7);
+  EXPECT_EQ(import_scaled(series, {{"0.5", "4000000.5", {}}}).volume.type, SampleType::kFloat32);
+}
+
 TEST(DicomValues, WithoutAMeaningAreRefused) {
   const DicomSeries series;
   for (const auto& [slope, intercept] :
