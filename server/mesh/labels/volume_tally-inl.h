@@ -7,10 +7,13 @@
 #define ISOMESH_VOLUME_TALLY_INL_H_
 #endif
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <tuple>
 #include <utility>
 
 #include <hwy/highway.h>
@@ -30,35 +33,24 @@ class TallyCellWriter {
 
   Triangle* write(std::size_t x, unsigned /*bit*/, const LabelCells& /*cells*/,
                   const std::uint32_t* places, Triangle* out) const {
-    const std::array<PartNumber, 8> labels = row_.labels_at(x);
-    const unsigned parity = row_.parity_at(x);
-    const CellSplit& split = separation_.splits[parity];
-    const TallyCases& cases = tally_.cases[parity];
-    const Double4 corner =
-        Double4{static_cast<double>(x), static_cast<double>(y_), static_cast<double>(z_), 0} -
-        static_cast<double>(separation_.margin);
     const int borders = is_at_border(x, separation_.dims.x) + is_at_border(y_, separation_.dims.y) +
                         is_at_border(z_, separation_.dims.z);
-    BorderCell border;
-    for (std::size_t t = 0; t < split.tetrahedra; ++t) {
-      const unsigned pattern = pattern_in(labels, split.corners[t]);
-      const TetrahedronWalls& walls = separation_.walls[parity].tetrahedra[t][pattern];
-      for (std::size_t i = 0; i < walls.triangles; ++i) {
-        const WallTriangle& wall = walls.walls[i];
-        const Missing missing = missing_at(wall, {labels[wall.front], labels[wall.back]},
-                                           cases.tetrahedra[t][pattern][i], corner, cases, places);
-        if (borders == 0) {
-          for (std::size_t k = 0; k < 3; ++k) give(missing.fan(tally_, k), missing.volumes[k]);
-        } else {
-          border.triangles[border.size++] = missing;
-        }
-      }
+    if (borders == 0) {
+      visit_triangles(x, places, [&](const Missing& missing) {
+        for (std::size_t k = 0; k < 3; ++k) give(missing.fan(tally_, k), missing.volumes[k]);
+      });
+      return out;
     }
-    if (border.size > 0) give_at_border(border, borders == 1);
+    std::array<Missing, kMostTriangles> triangles;
+    std::size_t size = 0;
+    visit_triangles(x, places, [&](const Missing& missing) { triangles[size++] = missing; });
+    give_at_border(std::span(triangles).first(size), borders == 1);
     return out;
   }
 
  private:
+  static constexpr std::size_t kMostTriangles = 6 * std::tuple_size_v<OwedVolumes>;  // of a cell
+
   // What the three corners of a triangle are owed by the part behind it.
   struct Missing {
     WallSides sides;
@@ -70,10 +62,25 @@ class TallyCellWriter {
     }
   };
 
-  struct BorderCell {
-    std::array<Missing, 6 * 12> triangles;  // of all tetrahedra
-    std::size_t size = 0;
-  };
+  template <class Visit>
+  void visit_triangles(std::size_t x, const std::uint32_t* places, const Visit& visit) const {
+    const std::array<PartNumber, 8> labels = row_.labels_at(x);
+    const unsigned parity = row_.parity_at(x);
+    const CellSplit& split = separation_.splits[parity];
+    const TallyCases& cases = tally_.cases[parity];
+    const Double4 corner =
+        Double4{static_cast<double>(x), static_cast<double>(y_), static_cast<double>(z_), 0} -
+        static_cast<double>(separation_.margin);
+    for (std::size_t t = 0; t < split.tetrahedra; ++t) {
+      const unsigned pattern = pattern_in(labels, split.corners[t]);
+      const TetrahedronWalls& walls = separation_.walls[parity].tetrahedra[t][pattern];
+      for (std::size_t i = 0; i < walls.triangles; ++i) {
+        const WallTriangle& wall = walls.walls[i];
+        visit(missing_at(wall, {labels[wall.front], labels[wall.back]},
+                         cases.tetrahedra[t][pattern][i], corner, cases, places));
+      }
+    }
+  }
 
   bool is_at_border(std::size_t at, std::uint32_t samples) const {
     return separation_.margin != 0 && (at == 0 || at + 2 == samples);
@@ -82,36 +89,30 @@ class TallyCellWriter {
   // Caps stay flat and the edges of the volume's box bevelled. So what a cell beyond the samples
   // lacks is owed to those of its vertices in the same wall that may move: within the samples, or
   // else, beyond one face alone, where a wall leaves a cap.
-  void give_at_border(const BorderCell& cell, bool is_at_face) const {
-    const Mesh& mesh = tally_.surface.mesh;
-    for (std::size_t first = 0; first < cell.size; ++first) {
-      const WallSides& sides = cell.triangles[first].sides;
+  void give_at_border(std::span<const Missing> triangles, bool is_at_face) const {
+    for (auto first = triangles.begin(); first != triangles.end(); ++first) {
+      const auto is_same = [&](const Missing& other) { return other.sides == first->sides; };
+      if (std::any_of(triangles.begin(), first, is_same)) continue;
       double volume = 0;
-      std::array<std::uint32_t, 6 * 12 * 3> within;
-      std::array<std::uint32_t, 6 * 12 * 3> beyond;
+      std::array<std::uint32_t, 3 * kMostTriangles> within;
+      std::array<std::uint32_t, 3 * kMostTriangles> beyond;
       std::size_t within_size = 0;
       std::size_t beyond_size = 0;
-      bool is_done = false;
-      for (std::size_t i = 0; i < cell.size; ++i) {
-        const Missing& missing = cell.triangles[i];
-        if (!(missing.sides == sides)) continue;
-        is_done |= i < first;
+      for (const Missing& missing : triangles) {
+        if (!is_same(missing)) continue;
         for (std::size_t k = 0; k < 3; ++k) {
           volume += missing.volumes[k];
           const std::uint32_t fan = missing.fan(tally_, k);
           if (fan == WallFans::kNone) continue;
-          if (!mesh.is_on_border(missing.vertices[k]))
-            within[within_size++] = fan;
-          else if (is_at_face)
-            beyond[beyond_size++] = fan;
+          const bool is_beyond = tally_.surface.mesh.is_on_border(missing.vertices[k]);
+          (is_beyond ? beyond[beyond_size++] : within[within_size++]) = fan;
         }
       }
-      if (is_done) continue;
-      if (within_size > 0) {
-        for (std::size_t i = 0; i < within_size; ++i) give(within[i], volume / within_size);
-      } else {
-        for (std::size_t i = 0; i < beyond_size; ++i) give(beyond[i], volume / beyond_size);
-      }
+      const auto share = [&](std::span<const std::uint32_t> fans) {
+        for (const std::uint32_t fan : fans) give(fan, volume / static_cast<double>(fans.size()));
+      };
+      if (within_size > 0) share(std::span(within).first(within_size));
+      if (within_size == 0 && is_at_face) share(std::span(beyond).first(beyond_size));
     }
   }
 
