@@ -55,7 +55,7 @@ std::array<double, 3> color_of(const LabelSummary& label) {
 std::string ObjGroups::of(const LabelSummary& label) {
   std::string title = title_of(label);
   std::ranges::replace_if(
-      title, [](char c) { return c == ' ' || c == '\t'; }, '_');
+      title, [](char c) { return c == ' ' || c == '\t' || c == '\\'; }, '_');
   std::string group = title;
   for (int more = 0; !taken_.insert(group).second; ++more) {
     group =

@@ -11,6 +11,8 @@ using Json = nlohmann::ordered_json;
 Json provenance_json(const Provenance& provenance) {
   Json parameters = {{"volume", provenance.volume}};
   parameters.update(Json::parse(to_json(provenance.parameters)));
+  // A file does not depend on the job's other files.
+  parameters.erase("formats");
   Json json = {{"parameters", parameters}};
   if (!provenance.parameters.labels) json["iso"] = provenance.iso;
   json.update({{"dims", provenance.dims},

@@ -57,17 +57,21 @@ bool is_letter_or_digit(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
-// A unique identifier in ASCII: other names need a reader of USD 24.03 or later.
+std::string material_of(const std::string& prim) { return prim + "_material"; }
+
+// A unique identifier in ASCII: other names need a reader of USD 24.03 or later. So is the name of
+// its material, which stands beside it.
 std::string prim_of(const LabelSummary& label, std::set<std::string>& taken) {
   std::string title = title_of(label);
   std::ranges::replace_if(
       title, [](char c) { return !is_letter_or_digit(c); }, '_');
   if (title.empty() || (title[0] >= '0' && title[0] <= '9')) title.insert(0, 1, '_');
   std::string prim = title;
-  for (int more = 0; !taken.insert(prim).second; ++more) {
+  for (int more = 0; taken.contains(prim) || taken.contains(material_of(prim)); ++more) {
     prim = title + '_' + std::to_string(label.label < 0 ? -label.label : label.label) +
            (more == 0 ? "" : '_' + std::to_string(more));
   }
+  taken.insert({prim, material_of(prim)});
   return prim;
 }
 
@@ -97,12 +101,12 @@ class Stage {
     std::ranges::transform(object.color, linear.begin(),
                            [](double channel) { return static_cast<float>(linear_of(channel)); });
     const std::string color = vector_text(linear);
-    write_material(object.prim + "_material", color);
+    write_material(material_of(object.prim), color);
     write("    def Mesh \"" + object.prim + "\" (\n" + object.metadata +
           "        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {\n"
           "        uniform token subdivisionScheme = \"none\"\n"
           "        rel material:binding = </isomesh/" +
-          object.prim + "_material>\n        color3f[] primvars:displayColor = [" + color +
+          material_of(object.prim) + ">\n        color3f[] primvars:displayColor = [" + color +
           "]\n        float3[] extent = " + extent_of(mesh) + '\n');
     write_arrays(mesh, std::as_const(normals).span(), context);
     write("    }\n\n");

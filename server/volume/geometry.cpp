@@ -86,7 +86,8 @@ std::optional<FieldError> resolution_fault(const std::array<std::uint32_t, 3>& d
   if (finest >= largest * kFinestRelativeSpacing) return std::nullopt;
   return FieldError{"origin", "samples " + to_text(finest) + " mm apart at coordinates of up to " +
                                   to_text(largest) +
-                                  " mm cannot be told apart in single precision"};
+                                  " mm leave no room for positions between them in single "
+                                  "precision; a spacing must be at least 1/65536 of that"};
 }
 
 }  // namespace

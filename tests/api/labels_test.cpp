@@ -154,6 +154,8 @@ TEST_F(LabelsTest, OneRequestMakesAFileOfAllLabels) {
                         {{"Content-Type", "application/octet-stream"}});
   };
   EXPECT_EQ(mesh_of("labels=all&format=glb").body.substr(0, 4), "glTF");
+  EXPECT_EQ(mesh_of("labels=all&format=ply").body.substr(0, 4), "ply\n");
+  EXPECT_EQ(mesh_of("labels=all&format=obj").body.substr(0, 9), "# isomesh");
   EXPECT_EQ(mesh_of("labels=all&format=zip").body.substr(0, 2), "PK");
   EXPECT_EQ(mesh_of("labels=7&format=stl").body.substr(0, 7), "isomesh");
   EXPECT_EQ(mesh_of("labels=all&format=stl").status, 400);

@@ -63,7 +63,9 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
     throw invalid_parameter("format", "must be one format, because the response is one file");
   }
   const auto& labels = parameters.labels;
-  if (labels && labels->values.size() != 1 && files_of(parameters) != parameters.formats) {
+  const MeshFormat format = parameters.formats.front();
+  const bool is_one_file = holds_all_labels(format) || format == MeshFormat::kZip;
+  if (labels && labels->values.size() != 1 && !is_one_file) {
     throw invalid_parameter(
         "format",
         "must hold all labels, such as glb, ply, obj or zip, because the response is one file");

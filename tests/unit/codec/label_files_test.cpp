@@ -122,6 +122,14 @@ TEST_F(LabelFilesTest, GroupsOfLabelsThatAreNamedAlikeAreTold) {
   EXPECT_NE(obj.find("usemtl a_b-4\n"), std::string::npos);
 }
 
+// A backslash there would continue the line.
+TEST_F(LabelFilesTest, NoGroupEndsInABackslash) {
+  labels_[0].name = "a\\";
+  const std::string obj = encoded(MeshFormat::kObj);
+  EXPECT_NE(obj.find("g a_\n"), std::string::npos);
+  EXPECT_EQ(obj.find('\\'), std::string::npos);
+}
+
 TEST_F(LabelFilesTest, MaterialsAreNamedLikeTheGroupsAndHaveTheLabelsColours) {
   LabelSummary label;
   label.label = 3;

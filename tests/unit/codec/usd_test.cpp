@@ -116,6 +116,16 @@ TEST_F(UsdOfLabels, HasAMeshWithNameColourAndValueForEachLabel) {
   EXPECT_EQ(stage.meshes[1].color[2], 0);
 }
 
+TEST_F(UsdOfLabels, NoMeshIsNamedLikeAMaterial) {
+  labels_[0].name = "implant";
+  labels_[1].name = "implant material";
+  const UsdStage stage = read_usda(encoded(MeshFormat::kUsda));
+  ASSERT_EQ(stage.meshes.size(), kLabels);
+  EXPECT_EQ(stage.meshes[0].prim, "implant");
+  EXPECT_EQ(stage.meshes[1].prim, "implant_material_2");
+  EXPECT_EQ(stage.meshes[1].title, "implant material");
+}
+
 TEST_F(UsdOfLabels, IsTheSameInAPackage) {
   EXPECT_EQ(test::first_file_of_usdz(encoded(MeshFormat::kUsdz)), encoded(MeshFormat::kUsda));
 }
