@@ -191,8 +191,7 @@ struct Commands::State {
   }
 
   void tell(const char* what, const store::Copied& copied) {
-    std::cout << what << ' ' << copied.blobs << " files of volumes and meshes, " << copied.bytes
-              << " bytes" << std::endl;
+    std::cout << what << ' ' << copied.blobs << " files, " << copied.bytes << " bytes" << std::endl;
     for (const std::string& lost : copied.damaged) {
       log_warning("{} is damaged: its bytes have changed", lost);
     }

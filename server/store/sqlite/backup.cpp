@@ -158,24 +158,52 @@ void snapshot(const fs::path& data, const fs::path& file) {
   File::open(file).sync();
 }
 
+// A column whose values are the keys of blobs, and the column that says in messages what needs
+// them.
+struct Naming {
+  std::string table;
+  std::string blob;
+  std::string name;
+  std::string what;
+};
+
+// The tables that is_named() of the stores looks at. Records of an older version lack some of them.
+std::vector<Naming> namings(Connection& connection) {
+  std::vector<Naming> all = {
+      {.table = "volumes", .blob = "id", .name = "id", .what = "the volume "},
+      {.table = "meshes", .blob = "blob", .name = "job", .what = "a mesh of the job "},
+      {.table = "order_blobs",
+       .blob = "blob",
+       .name = "\"order\"",
+       .what = "an object of the order "},
+      {.table = "received", .blob = "blob", .name = "instance", .what = "the received image "}};
+  std::erase_if(all, [&](const Naming& each) {
+    return !connection.query("SELECT 1 FROM sqlite_schema WHERE name = ?", each.table).next();
+  });
+  return all;
+}
+
 std::set<std::string> named_blobs(const fs::path& records) {
   Connection connection(records, Connection::Mode::kRead);
   std::set<std::string> blobs;
-  Rows query = connection.query("SELECT id FROM volumes UNION SELECT blob FROM meshes");
-  while (query.next()) blobs.insert(place_of(query.text(0)));
+  for (const Naming& each : namings(connection)) {
+    Rows query = connection.query("SELECT DISTINCT " + each.blob + " FROM " + each.table +
+                                  " WHERE " + each.blob + " IS NOT NULL");
+    while (query.next()) blobs.insert(place_of(query.text(0)));
+  }
   return blobs;
 }
 
-// Describes lost blobs by the volumes and jobs that used them.
+// Describes lost blobs by the records that need them.
 std::vector<std::string> told(const fs::path& records, const std::set<std::string>& keys) {
   Connection connection(records, Connection::Mode::kRead);
   std::vector<std::string> lost;
-  for (const auto& [sql, what] :
-       {std::pair("SELECT id FROM volumes WHERE id = ?", "the volume "),
-        std::pair("SELECT job FROM meshes WHERE blob = ?", "a mesh of the job ")}) {
+  for (const Naming& each : namings(connection)) {
+    const std::string sql =
+        "SELECT " + each.name + " FROM " + each.table + " WHERE " + each.blob + " = ?";
     for (const std::string& key : keys) {
       Rows query = connection.query(sql, key);
-      while (query.next()) lost.push_back(what + query.text(0));
+      while (query.next()) lost.push_back(each.what + query.text(0));
     }
   }
   return lost;

@@ -9,7 +9,7 @@
 namespace isomesh::store {
 
 struct Copied {
-  std::uint64_t blobs = 0;           // files of volumes and meshes
+  std::uint64_t blobs = 0;           // files that records name
   std::uint64_t bytes = 0;           // of those files
   std::vector<std::string> damaged;  // with wrong bytes; described as "the volume ID"
   std::vector<std::string> missing;  // without a file; described as "a mesh of the job ID"
@@ -17,7 +17,8 @@ struct Copied {
   bool operator==(const Copied&) const = default;
 };
 
-// Copies all volumes, meshes and records of `data` to `target`, which must not exist, as of one
+// Copies all records of `data` and the files that they name (volumes, meshes, received images and
+// objects to be sent) to `target`, which must not exist, as of one
 // moment during the run. A daemon that uses `data` is neither stopped nor blocked. `target` appears
 // once everything is on disk. Throws Error kInvalidParameter if `data` is not a data folder or
 // `target` exists; kUnavailable if too much changed meanwhile; kOutOfSpace or kInternal.

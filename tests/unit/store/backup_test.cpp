@@ -1,0 +1,87 @@
+#include "server/store/sqlite/backup.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/ids.h"
+#include "server/store/files/blob_store.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/received_store.h"
+#include "server/store/sqlite/database.h"
+#include "tests/support/files.h"
+
+namespace isomesh::store {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// A data folder with an image that a peer has sent and an object that an order is about to send.
+class BackupOfAHospitalTest : public testing::Test {
+ protected:
+  BackupOfAHospitalTest() {
+    const DataFolder data(root());
+    Database database(data);
+    FileBlobStore blobs(data);
+    image_ = put(blobs, "an image");
+    SqlReceivedStore(database).add({"BONE", "1.2", "1.3"},
+                                   {.instance = "1.3.1", .blob = image_, .bytes = 8});
+    object_ = put(blobs, "an object");
+    SqlOrderStore orders(database);
+    OrderSpec spec;
+    spec.record.order.id = order_;
+    spec.record.order.source = {.pacs = "main", .study = "1.2", .series = "1.3"};
+    spec.record.order.created = "2024-01-02T03:04:05.678Z";
+    spec.record.work.begun = spec.record.order.created;
+    orders.submit(spec, 1);
+    spec.record.order.state = OrderState::kSending;
+    spec.record.work.blobs = {object_};
+    EXPECT_TRUE(orders.save(spec.record, {}));
+  }
+
+  static std::string put(BlobStore& blobs, const std::string& text) {
+    const auto writer = blobs.begin();
+    writer->write(test::as_span(text));
+    return writer->commit().key;
+  }
+  std::filesystem::path root() const { return folder_ / "data"; }
+  std::filesystem::path blob(const std::string& in, const std::string& key) const {
+    return folder_ / in / "blobs" / key.substr(0, 2) / key;
+  }
+
+  test::TemporaryFolder folder_;
+  const std::string order_ = time_ordered_id();
+  std::string image_;
+  std::string object_;
+};
+
+TEST_F(BackupOfAHospitalTest, HasWhatWasReceivedAndWhatIsToBeSent) {
+  const Copied copied = back_up(root(), folder_ / "backup");
+  EXPECT_EQ(copied.blobs, 2U);
+  EXPECT_THAT(copied.missing, IsEmpty());
+  EXPECT_EQ(restore(folder_ / "backup", folder_ / "restored"), copied);
+  EXPECT_EQ(test::read_file(blob("restored", image_)), "an image");
+  EXPECT_EQ(test::read_file(blob("restored", object_)), "an object");
+}
+
+TEST_F(BackupOfAHospitalTest, SaysWhichOfThemIsDamagedOrMissing) {
+  std::filesystem::remove(blob("data", image_));
+  test::write_file(blob("data", object_), "spoilt");
+  const Copied copied = back_up(root(), folder_ / "backup");
+  EXPECT_THAT(copied.missing, ElementsAre("the received image 1.3.1"));
+  EXPECT_THAT(copied.damaged, ElementsAre("an object of the order " + order_));
+}
+
+// Records of the first version have no orders.
+TEST_F(BackupOfAHospitalTest, OfRecordsWithoutOrdersIsRestored) {
+  Connection(root() / "isomesh.sqlite", Connection::Mode::kWrite)
+      .script("DROP TABLE order_blobs; DROP TABLE received;");
+  EXPECT_EQ(back_up(root(), folder_ / "backup").blobs, 0U);
+  EXPECT_THAT(restore(folder_ / "backup", folder_ / "restored").missing, IsEmpty());
+}
+
+}  // namespace
+}  // namespace isomesh::store
