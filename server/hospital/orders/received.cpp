@@ -1,13 +1,18 @@
 #include "server/hospital/orders/received.h"
 
 #include <algorithm>
+#include <memory>
+#include <span>
+#include <vector>
 
 #include <fcntl.h>
 
 #include "base/clock.h"
 #include "base/descriptor.h"
+#include "base/hex.h"
 #include "base/ids.h"
 #include "base/log.h"
+#include "base/sha256.h"
 #include "server/hospital/orders/orders.h"
 
 namespace isomesh::orders {
@@ -19,13 +24,26 @@ void append(const Descriptor& file, const std::string& text) {
   write_all(file, std::as_bytes(std::span(text)));
 }
 
-void append(const Descriptor& file, const store::BlobReader& blob) {
+// Returns false if the blob is missing, or its bytes are not those that were received: a mesh made
+// from them would be wrong. Files are read once, so they are not checked beforehand.
+bool append(const Descriptor& file, const store::BlobStore& blobs, const std::string& key) {
+  std::unique_ptr<store::BlobReader> blob;
+  try {
+    blob = blobs.open(key);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNotFound) return false;
+    throw;
+  }
+  Sha256 digest;
   std::vector<std::byte> buffer(std::size_t{1} << 20);
   std::uint64_t at = 0;
-  while (const std::size_t count = blob.read_at(at, buffer)) {
-    write_all(file, std::span(buffer).first(count));
+  while (const std::size_t count = blob->read_at(at, buffer)) {
+    const auto bytes = std::span<const std::byte>(buffer).first(count);
+    digest.update(bytes);
+    write_all(file, bytes);
     at += count;
   }
+  return to_hex(digest.finish()) == key;
 }
 
 }  // namespace
@@ -71,7 +89,11 @@ std::string Received::fetch_series(const std::string& study, const std::string& 
                         "stored: send the whole series again");
     }
     append(file, "\r\n--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n");
-    append(file, *blobs_.open(each.blob));
+    if (!append(file, blobs_, each.blob)) {
+      throw Error(ErrorCode::kUnusableVolume,
+                  "the received image " + each.instance +
+                      " is damaged or missing in the store: send the whole series again");
+    }
   }
   append(file, "\r\n--" + boundary + "--\r\n");
   return "multipart/related; type=\"application/dicom\"; boundary=" + boundary;

@@ -199,6 +199,22 @@ TEST_F(ReceivedOrdersTest, WaitForTheRestOfWhatIsNotHeldAnyMore) {
   EXPECT_EQ(all().front().source.instances, 4U);
 }
 
+// One wrong bit in a sample is no fault that a reader of DICOM could see.
+TEST_F(ReceivedOrdersTest, OfADamagedImageFailAndNameIt) {
+  receive(0, kSlices);
+  const auto damaged = received_.instances({"BONE", kStudy, kSeries}).at(2);
+  std::string bytes = blob(damaged.blob);
+  bytes.back() ^= 0x40;
+  test::write_file(blobs_.path_of(damaged.blob), bytes);
+  pass(minutes(2));
+  ASSERT_TRUE(until([&] { return all().size() == 1 && is_final(all().front().state); }));
+  const Order order = all().front();
+  EXPECT_EQ(order.state, OrderState::kFailed);
+  EXPECT_EQ(order.error.value().type, "urn:isomesh:problem:unusable-volume");
+  EXPECT_THAT(order.error->detail, testing::HasSubstr(damaged.instance));
+  EXPECT_THAT(order.error->detail, testing::HasSubstr("send the whole series again"));
+}
+
 TEST_F(ReceivedOrdersTest, AreMadeThoughAnotherSeriesCannotBeRead) {
   orders_.reset();
   settings_.poll = minutes(1);
