@@ -3,12 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/clock.h"
+#include "base/log.h"
 #include "base/sha256.h"
 #include "base/share.h"
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/store/microseconds.h"
 
 namespace isomesh::store {
+namespace {
+
+constexpr const char* kDamagedJob =
+    "the record of this job is damaged: delete the job, and submit it again";
+
+}  // namespace
 
 const Job& job_of(const Submission& submission) {
   if (submission.kind == Submission::Kind::kOwnersShare) {
@@ -44,6 +53,32 @@ void throw_no_volume(bool is_gone) {
       is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
   throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
 }
+
+std::optional<Job> readable_job(const std::string& record, const std::string& id,
+                                const std::string& volume) {
+  try {
+    Job job = job_from_record(record);
+    if (job.id == id && (volume.empty() || job.parameters.volume == volume)) return job;
+  } catch (const Error&) {
+    // Logged below, as a record of another job is.
+  }
+  log_error("the record of job {} is damaged: no version of this service wrote it", id);
+  return std::nullopt;
+}
+
+Job damaged_job(const JobColumns& columns) {
+  Job job;
+  job.id = columns.id;
+  job.state = columns.state;
+  job.parameters.volume = columns.volume;
+  job.parameters.priority = columns.priority;
+  job.created = timestamp_of(from_us(columns.accepted_us));
+  job.error = to_problem(Error(ErrorCode::kInternal, kDamagedJob), "/v1/jobs/" + job.id);
+  job.error->detail = kDamagedJob;  // about the job, not the service, so clients may see it
+  return job;
+}
+
+void throw_damaged_job() { throw Error(ErrorCode::kInternal, kDamagedJob, {{"id", kDamagedJob}}); }
 
 void throw_no_job(bool is_gone) {
   if (is_gone) throw Error(ErrorCode::kGone, "the job has expired");

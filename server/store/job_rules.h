@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,27 @@ std::string result_key(const std::string& volume, const std::vector<Note>& notes
 // Cost of a job's turn in the queue, in microseconds: its expected run time, between 1 ms and a
 // day, so that no job is free.
 std::int64_t turn_cost_us(double expected_ms);
+
+// What the columns of a job tell without its record.
+struct JobColumns {
+  std::string id;
+  JobState state = JobState::kQueued;
+  std::string volume;
+  Priority priority = Priority::kRoutine;
+  std::int64_t accepted_us = 0;
+};
+
+// The job in a record. Empty if the record is damaged, which is logged: it must not hide or block
+// other jobs. The volume of the job's columns is compared, too, if the caller knows it.
+std::optional<Job> readable_job(const std::string& record, const std::string& id,
+                                const std::string& volume = {});
+
+// Stands for a job with a damaged record. Its parameters are lost, so it can only fail, with the
+// error that this sets.
+Job damaged_job(const JobColumns& columns);
+
+// Throws Error kInternal.
+[[noreturn]] void throw_damaged_job();
 
 // Throws Error kNotFound, or kGone if the job's volume has expired.
 [[noreturn]] void throw_no_volume(bool is_gone);

@@ -1,15 +1,33 @@
 #include "server/store/order_rules.h"
 
 #include "base/clock.h"
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::store {
+
+std::optional<Order> readable_order(const std::string& record, const std::string& id) {
+  try {
+    Order order = order_from_record(record);
+    if (order.id == id) return order;
+  } catch (const Error&) {
+    // Logged below, as a record of another order is.
+  }
+  log_error("the record of order {} is damaged: no version of this service wrote it", id);
+  return std::nullopt;
+}
+
+void throw_damaged_order() {
+  constexpr const char* kReason =
+      "the record of this order is damaged: cancel the order, and submit it again";
+  throw Error(ErrorCode::kInternal, kReason, {{"id", kReason}});
+}
 
 bool is_done(const LastOrder& last, const WatchedSeries& series) {
   if (last.instances == series.instances) return true;
   if (!last.state) return false;
   if (!is_final(*last.state)) return true;
-  return order_from_record(*last.record).source.instances == series.instances;
+  return last.order && last.order->source.instances == series.instances;
 }
 
 ReceivedFate fate_of(const LastOrder& last, const WatchedSeries& series, Time newest) {
@@ -17,7 +35,8 @@ ReceivedFate fate_of(const LastOrder& last, const WatchedSeries& series, Time ne
   if (!last.state) return is_all ? ReceivedFate::kDone : ReceivedFate::kNew;
   if (!is_final(*last.state)) return ReceivedFate::kOpen;
   if (!is_all) return ReceivedFate::kNew;
-  const Order order = order_from_record(*last.record);
+  if (!last.order) return ReceivedFate::kNew;  // its images may not have become a mesh
+  const Order& order = *last.order;
   const bool is_over = order.state == OrderState::kSucceeded ||
                        (order.finished && newest <= time_of(*order.finished));
   return is_over ? ReceivedFate::kDone : ReceivedFate::kNew;
@@ -34,6 +53,10 @@ void begin_anew(OrderRecord& record) {
     throw Error(ErrorCode::kNotReady, "only a failed order can be retried");
   }
   Order& order = record.order;
+  // Orders always have a PACS, unless their record was damaged.
+  if (order.source.pacs.empty()) {
+    throw Error(ErrorCode::kNotReady, "what was ordered is lost: submit a new order");
+  }
   order.state = OrderState::kWaiting;
   order.finished.reset();
   order.next_attempt.reset();

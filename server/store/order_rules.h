@@ -9,11 +9,18 @@
 
 namespace isomesh::store {
 
+// The order in a record. Empty if the record is damaged, which is logged: it must not hide or block
+// other orders.
+std::optional<Order> readable_order(const std::string& record, const std::string& id);
+
+// Throws Error kInternal.
+[[noreturn]] void throw_damaged_order();
+
 // The last order made for a watched series.
 struct LastOrder {
-  std::uint32_t instances = 0;             // of the series at that time
-  std::optional<OrderState> state = {};    // empty: the order is forgotten
-  std::optional<std::string> record = {};  // the order's record
+  std::uint32_t instances = 0;           // of the series at that time
+  std::optional<OrderState> state = {};  // empty: the order is forgotten
+  std::optional<Order> order = {};       // if it has ended; empty if its record is damaged
 };
 
 // True if no new order is needed: the last one is still open, or had that many instances.

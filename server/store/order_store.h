@@ -22,6 +22,8 @@ struct OrderRecord {
   std::string owner;
   Order order;
   OrderWork work;
+  // The record in the database is damaged: these members have only what its columns tell.
+  bool is_damaged = false;
 };
 
 struct OrderSpec {

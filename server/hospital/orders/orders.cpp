@@ -250,6 +250,7 @@ void Orders::work(const std::stop_token& stop) {
 }
 
 void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
+  if (record.is_damaged) return end_damaged(record);
   const std::string pacs = OrderSteps::pacs_of(record);
   const OrderState before = record.order.state;
   try {
@@ -319,13 +320,27 @@ void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Erro
 }
 
 void Orders::end(store::OrderRecord& record, const Error& error) {
+  save_failed(record, to_problem(error, "/v1/orders/" + record.order.id),
+              std::string(describe(error.code()).name));
+}
+
+// What was ordered is lost, so no step can be made.
+void Orders::end_damaged(store::OrderRecord& record) {
+  Problem problem =
+      to_problem(Error(ErrorCode::kInternal, "damaged"), "/v1/orders/" + record.order.id);
+  problem.detail = "the record of this order is damaged: submit the order again";
+  save_failed(record, problem, "damaged");
+}
+
+void Orders::save_failed(store::OrderRecord& record, const Problem& problem,
+                         const std::string& reason) {
   Order& order = record.order;
   order.state = OrderState::kFailed;
   order.finished = timestamp_of(options_.now());
   order.next_attempt.reset();
-  order.error = to_problem(error, "/v1/orders/" + order.id);
+  order.error = problem;
   services_.orders.save(record, options_.now());
-  log(record, std::string(describe(error.code()).name));
+  log(record, reason);
   ended(order.id);
   changed();
 }

@@ -105,6 +105,9 @@ class Orders {
   void fail_step(store::OrderRecord& record, OrderState failed, const Error& error, bool may_pass,
                  std::chrono::seconds retry_after);
   void end(store::OrderRecord& record, const Error& error);
+  void end_damaged(store::OrderRecord& record);
+  // Saves the end of an order that has failed with that error.
+  void save_failed(store::OrderRecord& record, const Problem& problem, const std::string& reason);
   void note_success(const std::string& pacs);
   void note_failure(const std::string& pacs, const PacsFailure& failure, const std::string& order);
   std::uint64_t generation() const;

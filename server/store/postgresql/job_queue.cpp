@@ -76,6 +76,7 @@ void end(Job& job, JobState state, std::int64_t accepted, std::int64_t now) {
   job.state = state;
   job.waiting_for.reset();
   job.finished = timestamp_of_us(now);
+  if (state == JobState::kCancelled) job.error.reset();
   job.timing.total = milliseconds_between(accepted, now);
 }
 
@@ -156,7 +157,17 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
 std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
                                              std::chrono::milliseconds lease) {
   Steady asked;
-  std::optional<Rows> claimed = database_.ask([&](Connection& connection, bool is_again) {
+  while (const auto claimed = take_next(worker, lease, asked)) {
+    const auto job = readable_job(claimed->text(4), claimed->text(0));
+    if (job) return begin_run(*claimed, *job, asked, lease);
+    fail_damaged(claimed->text(0), static_cast<std::uint64_t>(claimed->integer(1)));
+  }
+  return std::nullopt;
+}
+
+std::optional<Rows> PostgresJobStore::take_next(const std::string& worker,
+                                                std::chrono::milliseconds lease, Steady& asked) {
+  return database_.ask([&](Connection& connection, bool is_again) {
     asked = options_.now();
     std::optional<Rows> rows;
     if (is_again) {
@@ -175,21 +186,38 @@ std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
     if (!rows->next()) rows.reset();
     return rows;
   });
-  if (!claimed) return std::nullopt;
+}
+
+// Without this, the job would be claimed again and again.
+void PostgresJobStore::fail_damaged(const std::string& id, std::uint64_t fence) {
+  const auto row =
+      database_.read([&](SqlConnection& connection) { return find(connection, std::nullopt, id); });
+  if (!row) return;  // removed meanwhile
+  Job job = row->job;
+  end(job, JobState::kFailed, row->accepted, database_.now_us());
+  Ending ending;
+  ending.state = JobState::kFailed;
+  ending.record = to_record(job);
+  ending.cancelled = to_record(cancelled(row->job, row->accepted));
+  end_run(id, fence, ending);
+}
+
+Lease PostgresJobStore::begin_run(const Rows& claimed, const Job& job, Steady asked,
+                                  std::chrono::milliseconds lease) {
   Live run;
-  run.job = job_from_record(claimed->text(4));
-  run.fence = static_cast<std::uint64_t>(claimed->integer(1));
-  run.accepted = claimed->integer(5);
+  run.job = job;
+  run.fence = static_cast<std::uint64_t>(claimed.integer(1));
+  run.accepted = claimed.integer(5);
   run.job.state = JobState::kRunning;
   run.job.stage = Stage::kLoad;
   run.job.waiting_for.reset();
-  run.job.started = timestamp_of_us(claimed->integer(6));
-  run.job.timing.queue = milliseconds_between(run.accepted, claimed->integer(6));
+  run.job.started = timestamp_of_us(claimed.integer(6));
+  run.job.timing.queue = milliseconds_between(run.accepted, claimed.integer(6));
   run.claimed = asked;
   run.lease_until = asked + lease;
-  run.transaction = claimed->integer(7);
-  const Lease result = {claimed->text(0), run.fence, static_cast<int>(claimed->integer(2)),
-                        claimed->text(3), run.job.parameters};
+  run.transaction = claimed.integer(7);
+  const Lease result = {claimed.text(0), run.fence, static_cast<int>(claimed.integer(2)),
+                        claimed.text(3), run.job.parameters};
   {
     const Lock lock(live_mutex_);
     live_[result.id] = std::move(run);
@@ -343,7 +371,12 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
     std::vector<Alike> alike;
     const std::int64_t now = database_.now_us();
     do {
-      Job other = job_from_record(rows.text(2));
+      auto readable = readable_job(rows.text(2), rows.text(1));
+      if (!readable) {
+        cancel(std::nullopt, rows.text(1));
+        continue;
+      }
+      Job other = *std::move(readable);
       const std::int64_t accepted = rows.integer(3);
       other.reused = true;
       other.timing = {};
@@ -367,6 +400,13 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
 Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
   const Row row =
       database_.read([&](SqlConnection& connection) { return found(connection, viewer, id); });
+  if (row.is_damaged && is_final(row.job.state)) {
+    return database_.change(Change::kRepeatable, [&](SqlTransaction& transaction) {
+      const Job repaired = repair_ended(transaction.connection(), row);
+      transaction.commit();
+      return repaired;
+    });
+  }
   if (is_final(row.job.state)) return row.job;
   const Job ended = cancelled(row.job, row.accepted);
   Rows after = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_record(ended),

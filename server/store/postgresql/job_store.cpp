@@ -15,7 +15,8 @@ namespace isomesh::store::postgresql {
 PostgresJobStore::PostgresJobStore(Database& database, BlobStore& blobs, JobStoreOptions options)
     : SqlJobStore(database, blobs, std::move(options),
                   "SELECT j.record, j.owner, j.result_key, j.accepted, j.attempts, j.fence, "
-                  "j.state, j.waiting_for, r.claimed, r.stage, r.progress, r.timings FROM jobs j "
+                  "j.state, j.waiting_for, r.claimed, r.stage, r.progress, r.timings, "
+                  "j.id, j.state, j.volume, j.priority FROM jobs j "
                   "LEFT JOIN runs r ON r.job = j.id "),
       database_(database),
       feed_(database),
@@ -76,12 +77,13 @@ void PostgresJobStore::forget_events(Time before) {
 std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::string& owner,
                                                                   const std::string& key) const {
   Rows row = database_.query(
-      "SELECT id, record FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = "
-      "{job.succeeded} ORDER BY id "
-      "DESC LIMIT 1",
+      select_ +
+          "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = {job.succeeded} ORDER BY j.id "
+          "DESC LIMIT 1",
       owner, key);
   if (!row.next()) return std::nullopt;
-  Made made = {row.text(0), job_from_record(row.text(1)).mesh};
+  const Job job = row_of(row).job;
+  Made made = {job.id, job.mesh};
   const bool is_usable = made.mesh && is_there(*made.mesh, blobs_) && is_intact(*made.mesh, blobs_);
   if (!is_usable) made.mesh.reset();
   return made;
@@ -89,12 +91,12 @@ std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::str
 
 PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
   Row row;
-  row.job = job_from_record(rows.text(0));
   row.owner = rows.text(1);
   row.result_key = rows.text(2);
   row.accepted = rows.integer(3);
   row.attempts = static_cast<int>(rows.integer(4));
   row.fence = static_cast<std::uint64_t>(rows.integer(5));
+  read_job(rows, 0, 12, row);
   row.job.state = static_cast<JobState>(rows.integer(6));
   if (!rows.is_null(7)) row.job.waiting_for = static_cast<WaitingFor>(rows.integer(7));
   if (row.job.state != JobState::kRunning || rows.is_null(8)) return row;

@@ -9,6 +9,7 @@
 #include "proto/error.h"
 #include "proto/json.h"
 #include "server/store/files/blob_store.h"
+#include "server/store/job_rules.h"
 #include "server/store/outbox.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/sqlite/database.h"
@@ -104,7 +105,9 @@ std::uint64_t copy_jobs(Source& from, Connection& to) {
   Rows rows = from.query(kTable.rows);
   for (; rows.next(); ++count) {
     Values values(rows, 16);
-    const auto callback = job_from_record(rows.text(14)).parameters.callback;
+    // A damaged record is copied as it is, and its job fails there.
+    const auto job = readable_job(rows.text(14), rows.text(0));
+    const auto callback = job ? job->parameters.callback : std::nullopt;
     values.add(callback ? std::optional(receiver_of(callback->url)) : std::nullopt);
     values.add(callback ? std::optional(callback->url) : std::nullopt);
     to.tell(sql, values.parameters());

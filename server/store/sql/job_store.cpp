@@ -8,31 +8,53 @@
 #include "server/store/sql/expiry.h"
 
 namespace isomesh::store {
+namespace {
+
+// Throws Error kInternal if the row's record is damaged.
+template <class Row>
+Row intact(Row row) {
+  if (row.is_damaged) throw_damaged_job();
+  return row;
+}
+
+}  // namespace
 
 // --- Queries
 
 Job SqlJobStore::get(const Viewer& viewer, const std::string& id) const {
-  return records_.read(
-      [&](SqlConnection& connection) { return with_progress(found(connection, viewer, id)); });
+  return records_.read([&](SqlConnection& connection) {
+    return with_progress(intact(found(connection, viewer, id)));
+  });
 }
 
 JobAccount SqlJobStore::account(const std::string& id) const {
   return records_.read([&](SqlConnection& connection) {
-    const Row row = found(connection, std::nullopt, id);
+    const Row row = intact(found(connection, std::nullopt, id));
     return JobAccount{with_progress(row), row.attempts};
   });
 }
 
 std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState> state,
                                    const std::string& after, std::size_t limit) const {
-  // Conditions that are absent from the text let the query use an index.
-  Rows rows = records_.query(select_ + "WHERE " + (viewer ? "j.owner = ?1" : "?1 IS NULL") +
-                                 (state ? " AND j.state = ?2" : " AND ?2 IS NULL") +
-                                 (after.empty() ? " AND ?3 = ''" : " AND j.id < ?3") +
-                                 " ORDER BY j.id DESC LIMIT ?4",
-                             viewer, state, after, limit);
   std::vector<Job> jobs;
-  while (rows.next()) jobs.push_back(with_progress(row_of(rows)));
+  std::string last = after;
+  // Repeats only if damaged records were skipped, because fewer than `limit` jobs mean the end of
+  // the list.
+  for (bool is_over = false; !is_over && jobs.size() < limit;) {
+    // Conditions that are absent from the text let the query use an index.
+    std::size_t left = std::min<std::size_t>(limit - jobs.size(), 1 << 30);
+    Rows rows = records_.query(select_ + "WHERE " + (viewer ? "j.owner = ?1" : "?1 IS NULL") +
+                                   (state ? " AND j.state = ?2" : " AND ?2 IS NULL") +
+                                   (last.empty() ? " AND ?3 = ''" : " AND j.id < ?3") +
+                                   " ORDER BY j.id DESC LIMIT ?4",
+                               viewer, state, last, left);
+    for (; rows.next(); --left) {
+      const Row row = row_of(rows);
+      last = row.job.id;
+      if (!row.is_damaged) jobs.push_back(with_progress(row));
+    }
+    is_over = left > 0;
+  }
   return jobs;
 }
 
@@ -82,6 +104,27 @@ SqlJobStore::Row SqlJobStore::found(SqlConnection& connection, const Viewer& vie
                                     const std::string& id) const {
   if (auto row = find(connection, viewer, id)) return *std::move(row);
   throw_no_job(has_expired(connection, viewer, id));
+}
+
+void SqlJobStore::read_job(const Rows& rows, int record, int columns, Row& row) {
+  const JobColumns known = {.id = rows.text(columns),
+                            .state = static_cast<JobState>(rows.integer(columns + 1)),
+                            .volume = rows.text(columns + 2),
+                            .priority = static_cast<Priority>(rows.integer(columns + 3)),
+                            .accepted_us = row.accepted};
+  auto job = readable_job(rows.text(record), known.id, known.volume);
+  row.is_damaged = !job;
+  row.job = job ? *std::move(job) : damaged_job(known);
+}
+
+Job SqlJobStore::repair_ended(SqlConnection& connection, const Row& row) const {
+  Job job = row.job;
+  job.state = JobState::kCancelled;
+  job.finished = job.created;
+  job.error.reset();
+  connection.run("UPDATE jobs SET state = ?1, record = ?2 WHERE id = ?3 AND state >= {job.final}",
+                 job.state, to_record(job), job.id);
+  return job;
 }
 
 Job SqlJobStore::with_progress(const Row& row) const {
@@ -140,7 +183,7 @@ bool SqlJobStore::is_whole(const Job& job) const {
 Job SqlJobStore::remake(const std::string& id) {
   JobSpec spec;
   const auto like = records_.read([&](SqlConnection& connection) -> std::optional<Job> {
-    const Row row = found(connection, std::nullopt, id);
+    const Row row = intact(found(connection, std::nullopt, id));
     spec.owner = row.owner;
     spec.parameters = row.job.parameters;
     spec.parameters.callback.reset();
@@ -151,7 +194,8 @@ Job SqlJobStore::remake(const std::string& id) {
             "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.id > ?3 ORDER BY j.id DESC LIMIT 1",
         row.owner, row.result_key, id);
     if (!rows.next()) return std::nullopt;
-    return with_progress(row_of(rows));
+    const Row latest = row_of(rows);
+    return latest.is_damaged ? std::nullopt : std::optional(with_progress(latest));
   });
   // Outside the transaction, because this may read the whole volume or the files. The job that
   // makes it again may have ended since the damage was seen.

@@ -38,6 +38,7 @@ class SqlJobStore : public JobStore {
  protected:
   struct Row {
     Job job;
+    bool is_damaged = false;  // the job is damaged_job()
     std::string owner;
     std::string result_key;
     std::int64_t accepted = 0;
@@ -83,8 +84,13 @@ class SqlJobStore : public JobStore {
 
   std::optional<Row> find(SqlConnection& connection, const Viewer& viewer,
                           const std::string& id) const;
-  // Throws Error kGone or kNotFound if there is no such row.
+  // Throws Error kGone or kNotFound if there is no such row. The row may be damaged.
   Row found(SqlConnection& connection, const Viewer& viewer, const std::string& id) const;
+  // Sets the row's job from a record and the columns `id`, `state`, `volume` and `priority`, which
+  // begin at that number.
+  static void read_job(const Rows& rows, int record, int columns, Row& row);
+  // Cancels a job that has ended and whose record is damaged, so that its record is valid again.
+  Job repair_ended(SqlConnection& connection, const Row& row) const;
   // Replaces recorded progress by newer progress of this process's own runs.
   Job with_progress(const Row& row) const;
   // Empty if the volume is missing.

@@ -1,7 +1,9 @@
 #include "server/store/sql/order_store.h"
 
+#include <algorithm>
 #include <set>
 
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/store/microseconds.h"
 #include "server/store/order_rules.h"
@@ -13,20 +15,43 @@ namespace {
 // Locked while an order is made, because that depends on the existing orders.
 constexpr const char* kOrders = "orders";
 
+// The columns that record_of() reads.
+constexpr const char* kColumns =
+    "SELECT owner, record, work, id, state, coalesce(rule, ''), created FROM orders ";
+
+std::optional<OrderWork> readable_work(const std::string& record) {
+  try {
+    return order_work_from_record(record);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 OrderRecord record_of(const Rows& row) {
-  return {.owner = row.text(0),
-          .order = order_from_record(row.text(1)),
-          .work = order_work_from_record(row.text(2))};
+  OrderRecord record;
+  record.owner = row.text(0);
+  auto order = readable_order(row.text(1), row.text(3));
+  auto work = readable_work(row.text(2));
+  if (order && !work) log_error("the work of order {} is damaged", order->id);
+  record.is_damaged = !order || !work;
+  if (!record.is_damaged) {
+    record.order = *std::move(order);
+    record.work = *std::move(work);
+    return record;
+  }
+  record.order.id = row.text(3);
+  record.order.state = static_cast<OrderState>(row.integer(4));
+  if (!row.text(5).empty()) record.order.rule = row.text(5);
+  record.order.created = timestamp_of(from_us(row.integer(6)));
+  record.work.begun = record.order.created;
+  return record;
 }
 
 // Empty if the viewer sees no such order.
 std::optional<OrderRecord> find(SqlConnection& connection, const Viewer& viewer,
                                 const std::string& id, const char* lock = "") {
   Rows row = connection.query(
-      std::string(
-          "SELECT owner, record, work FROM orders WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)") +
-          lock,
-      id, viewer);
+      std::string(kColumns) + "WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)" + lock, id, viewer);
   if (!row.next()) return std::nullopt;
   return record_of(row);
 }
@@ -35,6 +60,11 @@ OrderRecord found(SqlConnection& connection, const Viewer& viewer, const std::st
                   const char* lock = "") {
   if (auto record = find(connection, viewer, id, lock)) return *std::move(record);
   throw Error(ErrorCode::kNotFound, "there is no order with this id");
+}
+
+OrderRecord intact(OrderRecord record) {
+  if (record.is_damaged) throw_damaged_order();
+  return record;
 }
 
 std::size_t count_open(SqlConnection& connection) {
@@ -50,14 +80,14 @@ bool is_made(const SqlTransaction& transaction, const OrderSpec& spec) {
 }
 
 void insert(SqlConnection& connection, const OrderSpec& spec) {
-  const auto& [owner, order, work] = spec.record;
+  const Order& order = spec.record.order;
   const std::optional<std::string> key =
       spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
   connection.run(
       "INSERT INTO orders(id, owner, state, rule, created, next, idempotency_key, request_digest, "
       "record, work) VALUES(?1, ?2, ?3, ?4, ?5, isomesh_now(), ?6, ?7, ?8, ?9)",
-      order.id, owner, order.state, order.rule, us_of_timestamp(order.created), key,
-      spec.request_digest, to_json(order), to_record(work));
+      order.id, spec.record.owner, order.state, order.rule, us_of_timestamp(order.created), key,
+      spec.request_digest, to_json(order), to_record(spec.record.work));
 }
 
 // The result of an earlier submission with the same key.
@@ -65,25 +95,27 @@ std::optional<OrderSubmission> made_before(SqlConnection& connection, const Orde
   using Kind = OrderSubmission::Kind;
   if (spec.idempotency_key.empty()) return std::nullopt;
   Rows known = connection.query(
-      "SELECT record, request_digest FROM orders WHERE owner = ?1 AND idempotency_key = ?2",
+      "SELECT record, request_digest, id FROM orders WHERE owner = ?1 AND idempotency_key = ?2",
       spec.record.owner, spec.idempotency_key);
   if (!known.next()) return std::nullopt;
   if (known.text(1) != spec.request_digest) {
     return OrderSubmission{.kind = Kind::kConflict, .order = {}};
   }
-  return OrderSubmission{.kind = Kind::kExisting, .order = order_from_record(known.text(0))};
+  auto order = readable_order(known.text(0), known.text(2));
+  if (!order) throw_damaged_order();
+  return OrderSubmission{.kind = Kind::kExisting, .order = *std::move(order)};
 }
 
 std::optional<LastOrder> last_of(SqlConnection& connection, const WatchedSeries& series) {
   Rows row = connection.query(
-      "SELECT w.instances, o.state, o.record FROM watched w LEFT JOIN orders o ON o.id = "
+      "SELECT w.instances, o.state, o.record, o.id FROM watched w LEFT JOIN orders o ON o.id = "
       "w.\"order\" WHERE w.rule = ?1 AND w.study = ?2 AND w.series = ?3",
       series.rule, series.study, series.series);
   if (!row.next()) return std::nullopt;
   LastOrder last = {.instances = static_cast<std::uint32_t>(row.integer(0))};
   if (row.is_null(1)) return last;
   last.state = static_cast<OrderState>(row.integer(1));
-  last.record = row.text(2);
+  if (is_final(*last.state)) last.order = readable_order(row.text(2), row.text(3));
   return last;
 }
 
@@ -180,26 +212,35 @@ ReceivedFate SqlOrderStore::submit_received(const OrderSpec& spec, const Watched
 
 Order SqlOrderStore::get(const Viewer& viewer, const std::string& id) const {
   return database_.read(
-      [&](SqlConnection& connection) { return found(connection, viewer, id).order; });
+      [&](SqlConnection& connection) { return intact(found(connection, viewer, id)).order; });
 }
 
 std::vector<Order> SqlOrderStore::list(const Viewer& viewer, const OrderFilter& filter,
                                        const std::string& after, std::size_t limit) const {
-  Rows rows = database_.query(
-      std::string("SELECT record FROM orders WHERE ") + (viewer ? "owner = ?1" : "?1 IS NULL") +
-          " AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR rule = ?3)" +
-          (after.empty() ? " AND ?4 = ''" : " AND id < ?4") + " ORDER BY id DESC LIMIT ?5",
-      viewer, filter.state, filter.rule, after, limit);
   std::vector<Order> orders;
-  while (rows.next()) orders.push_back(order_from_record(rows.text(0)));
+  std::string last = after;
+  // Repeats only if damaged records were skipped, because fewer than `limit` orders mean the end of
+  // the list.
+  for (bool is_over = false; !is_over && orders.size() < limit;) {
+    std::size_t left = std::min<std::size_t>(limit - orders.size(), 1 << 30);
+    Rows rows = database_.query(
+        std::string("SELECT record, id FROM orders WHERE ") +
+            (viewer ? "owner = ?1" : "?1 IS NULL") +
+            " AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR rule = ?3)" +
+            (last.empty() ? " AND ?4 = ''" : " AND id < ?4") + " ORDER BY id DESC LIMIT ?5",
+        viewer, filter.state, filter.rule, last, left);
+    for (; rows.next(); --left) {
+      last = rows.text(1);
+      if (auto order = readable_order(rows.text(0), last)) orders.push_back(*std::move(order));
+    }
+    is_over = left > 0;
+  }
   return orders;
 }
 
 std::vector<OrderRecord> SqlOrderStore::due(Time now, std::size_t limit) const {
   Rows rows = database_.query(
-      "SELECT owner, record, work FROM orders WHERE state < {order.final} AND next <= ?1 ORDER BY "
-      "next LIMIT "
-      "?2",
+      std::string(kColumns) + "WHERE state < {order.final} AND next <= ?1 ORDER BY next LIMIT ?2",
       database_.to_us(now), limit);
   std::vector<OrderRecord> records;
   while (rows.next()) records.push_back(record_of(rows));
@@ -208,9 +249,8 @@ std::vector<OrderRecord> SqlOrderStore::due(Time now, std::size_t limit) const {
 
 std::optional<OrderRecord> SqlOrderStore::if_due(const std::string& id, Time now) const {
   Rows rows = database_.query(
-      "SELECT owner, record, work FROM orders WHERE id = ?1 AND state < {order.final} AND next <= "
-      "?2",
-      id, database_.to_us(now));
+      std::string(kColumns) + "WHERE id = ?1 AND state < {order.final} AND next <= ?2", id,
+      database_.to_us(now));
   if (!rows.next()) return std::nullopt;
   return record_of(rows);
 }
@@ -250,7 +290,7 @@ Order SqlOrderStore::cancel(const Viewer& viewer, const std::string& id) {
   return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
     OrderRecord record = found(connection, viewer, id, connection.for_update());
-    if (is_final(record.order.state)) return record.order;
+    if (is_final(record.order.state) && !record.is_damaged) return record.order;
     cancel_order(record);
     write(connection, record);
     tell_of_end(connection, record);
@@ -262,7 +302,7 @@ Order SqlOrderStore::cancel(const Viewer& viewer, const std::string& id) {
 Order SqlOrderStore::retry(const Viewer& viewer, const std::string& id) {
   return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
-    OrderRecord record = found(connection, viewer, id, connection.for_update());
+    OrderRecord record = intact(found(connection, viewer, id, connection.for_update()));
     if (transaction.is_again() && !is_final(record.order.state)) return record.order;
     begin_anew(record);
     write(connection, record);

@@ -29,8 +29,8 @@ struct Records {
 std::optional<Volume> readable(const std::string& record, const std::string& id) {
   try {
     return volume_from_record(record);
-  } catch (const Error& error) {
-    log_error("the record of volume {} is damaged: it {}", id, error.what());
+  } catch (const Error&) {
+    log_error("the record of volume {} is damaged: no version of this service wrote it", id);
     return std::nullopt;
   }
 }

@@ -86,6 +86,10 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   Change change(*this, Durability::kProcess);
   const std::int64_t now = now_us();
   auto next = take_next(change, now);
+  while (next && next->is_damaged) {
+    end(change, *next, JobState::kFailed);
+    next = take_next(change, now);
+  }
   if (!next) {
     change.commit();
     return std::nullopt;
@@ -236,7 +240,9 @@ Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
   return database_.freeing([&] {
     Change change(*this);
     Row row = found(change.connection(), viewer, id);
-    if (row.job.state == JobState::kQueued) {
+    if (row.is_damaged && is_final(row.job.state)) {
+      row.job = repair_ended(change.connection(), row);
+    } else if (row.job.state == JobState::kQueued) {
       end(change, row, JobState::kCancelled);
     } else if (row.job.state == JobState::kRunning) {
       change->run("UPDATE jobs SET cancelling = 1 WHERE id = ?", id);
@@ -269,6 +275,7 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) {
   row.job.state = state;
   row.job.waiting_for.reset();
   row.job.finished = timestamp();
+  if (state == JobState::kCancelled) row.job.error.reset();
   row.job.timing.total = milliseconds_since(row.accepted);
   const std::int64_t now = now_us();
   change->run("UPDATE jobs SET state = ?, finished = isomesh_kept(?), record = ? WHERE id = ?",
@@ -282,6 +289,7 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) {
 }
 
 void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) {
+  if (row.is_damaged) return end(change, row, JobState::kFailed);
   give_mesh(row.job, mesh);
   for (const Blob& blob : blobs_of(mesh)) {
     change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, blob.key, blob.bytes);
@@ -312,6 +320,7 @@ void SqliteJobStore::give_back(Change& change, Row& row, std::chrono::millisecon
 }
 
 void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::milliseconds delay) {
+  if (row.is_damaged) return end(change, row, JobState::kFailed);
   row.job.state = JobState::kQueued;
   row.job.stage = Stage::kQueue;
   row.job.progress = 0;

@@ -33,19 +33,21 @@ std::uint64_t greatest_event(Connection& connection) {
 SqliteJobStore::SqliteJobStore(Database& database, BlobStore& blobs, JobStoreOptions options)
     : SqlJobStore(database, blobs, std::move(options),
                   "SELECT j.record, j.owner, j.result_key, j.accepted, j.attempts, j.fence, "
-                  "j.cancelling, j.cost FROM jobs j "),
+                  "j.cancelling, j.cost, j.id, j.state, j.volume, j.priority FROM jobs j "),
       database_(database),
       log_(greatest_event(database.reader())) {}
 
 SqliteJobStore::Row SqliteJobStore::row_of(const Rows& rows) const {
-  return {.job = job_from_record(rows.text(0)),
-          .owner = rows.text(1),
-          .result_key = rows.text(2),
-          .accepted = rows.integer(3),
-          .attempts = static_cast<int>(rows.integer(4)),
-          .fence = static_cast<std::uint64_t>(rows.integer(5)),
-          .cancelling = rows.boolean(6),
-          .cost_us = rows.integer(7)};
+  Row row;
+  row.owner = rows.text(1);
+  row.result_key = rows.text(2);
+  row.accepted = rows.integer(3);
+  row.attempts = static_cast<int>(rows.integer(4));
+  row.fence = static_cast<std::uint64_t>(rows.integer(5));
+  row.cancelling = rows.boolean(6);
+  row.cost_us = rows.integer(7);
+  read_job(rows, 0, 8, row);
+  return row;
 }
 
 std::vector<Event> SqliteJobStore::events(const Viewer& viewer, const std::string& job,
@@ -109,12 +111,12 @@ std::optional<MeshSummary> SqliteJobStore::mesh_like(
     SqlConnection& connection, const std::string& owner, const std::string& result_key,
     const std::optional<MeshSummary>& spoilt) const {
   Rows row = connection.query(
-      "SELECT record FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = {job.succeeded} "
-      "ORDER BY id DESC "
-      "LIMIT 1",
+      select_ +
+          "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = {job.succeeded} ORDER BY j.id "
+          "DESC LIMIT 1",
       owner, result_key);
   if (!row.next()) return std::nullopt;
-  auto mesh = job_from_record(row.text(0)).mesh;
+  auto mesh = row_of(row).job.mesh;
   const bool is_spoilt = mesh && spoilt && have_same_blobs(*mesh, *spoilt);
   return mesh && is_there(*mesh, blobs_) && !is_spoilt ? std::move(mesh) : std::nullopt;
 }

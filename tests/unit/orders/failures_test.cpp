@@ -33,6 +33,23 @@ TEST_F(OrdersTest, OfASeriesOfTwoPatientsFailAtOnce) {
   EXPECT_EQ(main_->fetches, 1);
 }
 
+TEST_F(OrdersTest, WithADamagedRecordFailAndHoldUpNoOther) {
+  main_->hangs = true;
+  const std::string damaged = submit();
+  ASSERT_TRUE(until([&] { return main_->calls > 0; }));
+  stop();
+  main_->hangs = false;
+  database_.run(store::Change::kRepeatable,
+                "UPDATE orders SET record = '#' || substr(record, 2) WHERE id = ?1", damaged);
+  begin();
+  const std::string next = submit();
+  ASSERT_TRUE(finish_job());
+  EXPECT_TRUE(reaches(next, OrderState::kSucceeded));
+  ASSERT_TRUE(until([&] { return orders_->list(std::nullopt, {}, "", 10).size() == 2; }));
+  EXPECT_EQ(get(damaged).state, OrderState::kFailed);
+  EXPECT_THAT(get(damaged).error.value().detail, testing::HasSubstr("damaged"));
+}
+
 TEST_F(OrdersTest, OfASeriesWithoutAListedInstanceWaitLongerEachTime) {
   main_->sent_slices = kSlices - 1;
   const std::string id = submit();

@@ -153,6 +153,60 @@ TEST_P(JobConformance, AnErrorEndsItFailed) {
   EXPECT_FALSE(job.mesh);
 }
 
+TEST_P(JobConformance, ADamagedRecordHidesAndBlocksNoOther) {
+  const std::string damaged = submit().id;
+  const std::string next = submit().id;
+  damage("jobs", damaged);
+  const auto listed = jobs().list("", std::nullopt, "", 1);
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_EQ(listed[0].id, next);
+  EXPECT_TRUE(jobs().list("", std::nullopt, next, 1).empty());
+  EXPECT_EQ(test::code_thrown_by([&] { jobs().get("", damaged); }), ErrorCode::kInternal);
+  EXPECT_EQ(claimed().id, next);
+  const Job failed = jobs().get("", damaged);
+  EXPECT_EQ(failed.state, JobState::kFailed);
+  EXPECT_THAT(failed.error.value().detail, testing::HasSubstr("damaged"));
+  EXPECT_EQ(failed.parameters.volume, kVolume);
+  EXPECT_FALSE(can_claim());
+}
+
+TEST_P(JobConformance, ADamagedRecordIsCancelledAndFreesItsVolume) {
+  const std::string queued = submit().id;
+  damage("jobs", queued);
+  EXPECT_EQ(jobs().cancel("", queued).state, JobState::kCancelled);
+  EXPECT_EQ(jobs().get("", queued).state, JobState::kCancelled);
+  const JobParameters parameters = unlike();
+  const std::string ended = submit(parameters).id;
+  jobs().finish(claimed(), some_mesh());
+  damage("jobs", ended);
+  EXPECT_FALSE(submit(parameters).reused);
+  EXPECT_EQ(jobs().cancel("", ended).state, JobState::kCancelled);
+  EXPECT_EQ(jobs().get("", ended).state, JobState::kCancelled);
+  jobs().finish(claimed(), some_mesh());
+  EXPECT_NO_THROW(volumes().erase("", kVolume));
+}
+
+TEST_P(JobConformance, ARecordThatIsDamagedWhileItRunsDoesNotRunAgain) {
+  const std::string id = submit().id;
+  claimed();
+  damage("jobs", id);
+  restart();
+  EXPECT_FALSE(jobs().claim("worker", kLongLease));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kFailed);
+}
+
+TEST_P(JobConformance, AnEqualJobWithADamagedRecordHoldsUpNoResult) {
+  const JobParameters parameters = unlike();
+  const std::string id = submit(parameters).id;
+  const Lease lease = claimed();
+  const std::string equal = submit(parameters).id;
+  damage("jobs", equal);
+  EXPECT_TRUE(jobs().finish(lease, some_mesh()));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kSucceeded);
+  EXPECT_TRUE(is_final(jobs().get("", equal).state));
+  EXPECT_FALSE(jobs().get("", equal).mesh);
+}
+
 TEST_P(JobConformance, AFinishedJobTakesNoLateNews) {
   const std::string id = submit().id;
   const Lease lease = claimed();

@@ -150,6 +150,35 @@ TEST_P(OrderConformance, OnlyWhatFailedIsTriedAnew) {
 }
 
 // The sweeper would take an object that is about to be sent.
+TEST_P(OrderConformance, ADamagedRecordHidesAndBlocksNoOther) {
+  const OrderRecord damaged = submitted();
+  const OrderRecord next = submitted();
+  damage("orders", damaged.order.id);
+  EXPECT_EQ(test::code_thrown_by([&] { orders().get(std::nullopt, damaged.order.id); }),
+            ErrorCode::kInternal);
+  const std::vector<Order> listed = orders().list(std::nullopt, {}, "", 1);
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_EQ(listed[0].id, next.order.id);
+  EXPECT_THAT(orders().list(std::nullopt, {}, next.order.id, 1), IsEmpty());
+  EXPECT_THAT(due(now()), testing::UnorderedElementsAre(damaged.order.id, next.order.id));
+  auto record = orders().if_due(damaged.order.id, now());
+  ASSERT_TRUE(record && record->is_damaged);
+  EXPECT_TRUE(end(*record, OrderState::kFailed));
+  EXPECT_EQ(orders().get(std::nullopt, damaged.order.id).state, OrderState::kFailed);
+  EXPECT_EQ(test::code_thrown_by([&] { orders().retry(std::nullopt, damaged.order.id); }),
+            ErrorCode::kNotReady);
+}
+
+TEST_P(OrderConformance, ADamagedRecordIsCancelled) {
+  for (const bool has_ended : {false, true}) {
+    const OrderRecord record = submitted();
+    if (has_ended) end(record, OrderState::kFailed);
+    damage("orders", record.order.id);
+    EXPECT_EQ(orders().cancel(std::nullopt, record.order.id).state, OrderState::kCancelled);
+    EXPECT_EQ(orders().get(std::nullopt, record.order.id).state, OrderState::kCancelled);
+  }
+}
+
 TEST_P(OrderConformance, NameTheirObjectsUntilTheyEnd) {
   OrderRecord record = submitted();
   record.work.blobs = {"aa", "aa", "bb"};

@@ -32,6 +32,7 @@ class SqliteEngine : public Engine {
   store::OrderStore& orders() override { return *orders_; }
   store::AuditTrail& audit() override { return *audit_; }
   store::ReceivedStore& received() override { return *received_; }
+  store::SqlDatabase& database() override { return *database_; }
 
   void restart() override {
     close();
@@ -125,6 +126,7 @@ class PostgresEngine : public Engine {
   store::OrderStore& orders() override { return *orders_; }
   store::AuditTrail& audit() override { return *audit_; }
   store::ReceivedStore& received() override { return *received_; }
+  store::SqlDatabase& database() override { return *database_; }
 
   void restart() override {
     jobs_.reset();

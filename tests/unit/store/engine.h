@@ -16,6 +16,7 @@
 #include "server/store/order_store.h"
 #include "server/store/outbox.h"
 #include "server/store/received_store.h"
+#include "server/store/sql/sql.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::test {
@@ -40,6 +41,8 @@ class Engine {
   virtual store::OrderStore& orders() = 0;
   virtual store::AuditTrail& audit() = 0;
   virtual store::ReceivedStore& received() = 0;
+  // Under the stores, for what they do not do.
+  virtual store::SqlDatabase& database() = 0;
 
   // As after a crash: the stores are opened anew on what is on disk, and nobody holds a lease. What
   // was returned before is not valid any more.
@@ -101,6 +104,12 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::OrderStore& orders() { return engine_->orders(); }
   store::AuditTrail& audit() { return engine_->audit(); }
   store::ReceivedStore& received() { return engine_->received(); }
+  // One wrong byte in the record of a job or an order.
+  void damage(const std::string& table, const std::string& id) {
+    engine_->database().run(
+        store::Change::kRepeatable,
+        "UPDATE " + table + " SET record = '#' || substr(record, 2) WHERE id = ?1", id);
+  }
   void restart() { engine_->restart(); }
   void lose_power() { engine_->lose_power(); }
 
