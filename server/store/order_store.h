@@ -108,6 +108,9 @@ class OrderStore {
   // because it was cancelled.
   virtual bool save(const OrderRecord& record, Time next) = 0;
 
+  // The blobs that the order names.
+  virtual std::vector<std::string> blobs(const std::string& id) const = 0;
+
   // Makes an open order due now.
   virtual void hurry(const std::string& id) = 0;
 

@@ -116,6 +116,7 @@ std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest
 }
 
 Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
+  const std::vector<std::string> named = services_.orders.blobs(id);
   const Order order = services_.orders.cancel(viewer, id);
   {
     const Lock lock(mutex_);
@@ -130,6 +131,7 @@ Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
       if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
     }
   }
+  erase_unnamed(named);
   ended(order.id);
   changed();
   return order;
@@ -250,6 +252,21 @@ void Orders::work(const std::stop_token& stop) {
 }
 
 void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
+  const std::vector<std::string> named = services_.orders.blobs(record.order.id);
+  make_step(record, stop);
+  if (is_final(record.order.state) || record.work.blobs != named) erase_unnamed(named);
+}
+
+void Orders::erase_unnamed(const std::vector<std::string>& blobs) {
+  try {
+    services_.blobs.erase_unnamed(
+        blobs, {}, [this](const std::string& key) { return services_.volumes.names(key); });
+  } catch (const std::exception& error) {
+    log_error("objects of an order could not be erased and are removed later: {}", error.what());
+  }
+}
+
+void Orders::make_step(store::OrderRecord& record, const std::stop_token& stop) {
   if (record.is_damaged) return end_damaged(record);
   const std::string pacs = OrderSteps::pacs_of(record);
   const OrderState before = record.order.state;

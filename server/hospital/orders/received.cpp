@@ -123,9 +123,7 @@ store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
     log(record, "");
     changed();
   } else if (fate == store::ReceivedFate::kDone) {
-    services_.blobs.erase_unnamed(
-        services_.received.release(held), {},
-        [this](const std::string& key) { return services_.volumes.names(key); });
+    erase_unnamed(services_.received.release(held));
   }
   return fate;
 }

@@ -279,6 +279,13 @@ bool SqlOrderStore::save(const OrderRecord& record, Time next) {
   });
 }
 
+std::vector<std::string> SqlOrderStore::blobs(const std::string& id) const {
+  Rows rows = database_.query("SELECT blob FROM order_blobs WHERE \"order\" = ?1", id);
+  std::vector<std::string> blobs;
+  while (rows.next()) blobs.push_back(rows.text(0));
+  return blobs;
+}
+
 void SqlOrderStore::hurry(const std::string& id) {
   database_.run(Change::kRepeatable,
                 "UPDATE orders SET next = isomesh_now() WHERE id = ?1 AND state < {order.final} "

@@ -26,6 +26,7 @@ class SqlOrderStore : public OrderStore {
   std::optional<OrderRecord> if_due(const std::string& id, Time now) const override;
   std::optional<Time> next_after(Time now) const override;
   bool save(const OrderRecord& record, Time next) override;
+  std::vector<std::string> blobs(const std::string& id) const override;
   void hurry(const std::string& id) override;
   Order cancel(const Viewer& viewer, const std::string& id) override;
   Order retry(const Viewer& viewer, const std::string& id) override;

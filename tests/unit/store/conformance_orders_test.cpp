@@ -192,6 +192,16 @@ TEST_P(OrderConformance, NameTheirObjectsUntilTheyEnd) {
   EXPECT_FALSE(volumes().names("bb"));
 }
 
+TEST_P(OrderConformance, TellTheBlobsThatTheyName) {
+  OrderRecord record = submitted();
+  EXPECT_THAT(orders().blobs(record.order.id), IsEmpty());
+  record.work.blobs = {"b", "a", "b"};
+  orders().save(record, now());
+  EXPECT_THAT(orders().blobs(record.order.id), testing::UnorderedElementsAre("a", "b"));
+  end(record, OrderState::kSucceeded);
+  EXPECT_THAT(orders().blobs(record.order.id), IsEmpty());
+}
+
 TEST_P(OrderConformance, TheirEndIsToldOnce) {
   OrderRecord record = submitted();
   record.work.callback = "https://a.example/x";
