@@ -6,6 +6,7 @@
 
 #include "base/files.h"
 #include "base/ids.h"
+#include "base/log.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "server/store/files/blob_store.h"
@@ -13,6 +14,7 @@
 #include "server/store/outbox.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/sqlite/database.h"
+#include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/job_store.h"
 
 namespace isomesh::store::postgresql {
@@ -116,21 +118,14 @@ std::uint64_t copy_jobs(Source& from, Connection& to) {
 }
 
 // The name in the mark of the folder's blobs, which the database gets too.
-std::string name_of_blobs(Source& from) {
-  Rows row = from.query("SELECT id FROM identity");
+std::string name_of_blobs(store::Database& source) {
+  const store::Reading reading(source.writer());
+  Rows row = reading->query("SELECT id FROM identity");
   return row.next() ? row.text(0) : random_hex(16);
 }
 
-}  // namespace
-
-Moved move_records(const DataFolder& folder, const std::string& url) {
-  if (!std::filesystem::exists(folder.records())) {
-    throw Error(ErrorCode::kInvalidParameter, "the data folder has no records to move");
-  }
-  store::Database source(folder);
-  // Nobody runs these jobs any more. They are queued again, here as in the copy.
-  FileBlobStore blobs(folder);
-  SqliteJobStore(source, blobs, {}).reap();
+// Copies all records to a database without records. The blobs belong to the database by that name.
+Moved copy_records(store::Database& source, const std::string& url, const std::string& name) {
   const store::Reading reading(source.writer());
   Database target({.url = url, .node = "move " + random_hex(8), .connections = 1});
   return target.ask_for(kLongestMove, [&](Connection& to, bool) {
@@ -149,9 +144,9 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
     moved.jobs = copy_jobs(reading.connection(), to);
     for (const Table& table : kAsTheyAre) {
       const std::uint64_t count = copy(reading.connection(), to, table);
-      const std::string_view name = table.columns;
-      if (name.starts_with("volumes(")) moved.volumes = count;
-      if (name.starts_with("orders(")) moved.orders = count;
+      const std::string_view columns = table.columns;
+      if (columns.starts_with("volumes(")) moved.volumes = count;
+      if (columns.starts_with("orders(")) moved.orders = count;
     }
     {
       Rows row = reading->query("SELECT id FROM audit_sent");
@@ -159,11 +154,36 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
       transaction->query("UPDATE audit_sent SET id = ?1", row.integer(0));
     }
     transaction->query("DELETE FROM identity");
-    transaction->query("INSERT INTO identity VALUES(?1, isomesh_now())",
-                       name_of_blobs(reading.connection()));
+    transaction->query("INSERT INTO identity VALUES(?1, isomesh_now())", name);
     transaction.commit();
     return moved;
   });
+}
+
+// The copy is complete by now, so an error does not undo it.
+void retire(store::Database& source, const std::string& name) {
+  try {
+    mark_as_moved(source, name);
+  } catch (const Error& error) {
+    log_error("the old records could not be marked as moved. Never start without --store again: {}",
+              error.what());
+  }
+}
+
+}  // namespace
+
+Moved move_records(const DataFolder& folder, const std::string& url) {
+  if (!std::filesystem::exists(folder.records())) {
+    throw Error(ErrorCode::kInvalidParameter, "the data folder has no records to move");
+  }
+  store::Database source(folder);
+  // Nobody runs these jobs any more. They are queued again, here as in the copy.
+  FileBlobStore blobs(folder);
+  SqliteJobStore(source, blobs, {}).reap();
+  const std::string name = name_of_blobs(source);
+  const Moved moved = copy_records(source, url, name);
+  retire(source, name);
+  return moved;
 }
 
 }  // namespace isomesh::store::postgresql

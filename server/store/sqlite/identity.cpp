@@ -15,6 +15,8 @@ namespace {
 
 // Interval of marks while nothing is stored.
 constexpr std::chrono::minutes kBetweenIdleMarks{10};
+// In place of the number of a mark. Smaller than any, so older versions refuse it, too.
+constexpr std::int64_t kMoved = -1;
 
 bool has_records(Connection& connection) {
   Rows query = connection.query(
@@ -42,6 +44,14 @@ std::int64_t newest_record(Connection& connection) {
 }
 
 }  // namespace
+
+void mark_as_moved(Database& database, const std::string& name) {
+  Transaction transaction(database.writer());
+  if (transaction->run("UPDATE identity SET number = ?", kMoved) == 0) {
+    transaction->run("INSERT INTO identity VALUES(?, ?, 0)", name, kMoved);
+  }
+  transaction.commit();
+}
 
 Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
                    const BelievedClock::Options& clock)
@@ -102,6 +112,12 @@ Identity::Mark Identity::mark_of_blobs() const {
 }
 
 void Identity::check(const Mark& records, const Mark& blobs) const {
+  if (records.number == kMoved) {
+    throw Error(ErrorCode::kUnavailable,
+                "the records of the data folder were moved to a PostgreSQL database by `isomeshd "
+                "move`: name it with --store. To continue with the old records that are still in "
+                "the folder, start once with --adopt");
+  }
   const bool is_recorded = [&] {
     const Reading reading(database_.reader());
     return has_records(reading.connection());

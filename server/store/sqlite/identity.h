@@ -11,6 +11,10 @@
 
 namespace isomesh::store {
 
+// Marks the records as moved to another database, whose blobs have that name if the records have
+// none. Identity then refuses them: what they accepted would be lost there.
+void mark_as_moved(Database& database, const std::string& name);
+
 // Ensures that the database and the blobs belong together, and provides a believed clock. Both
 // carry the same name, and a number that grows as data is stored: after a mix-up, a sweep would
 // remove all blobs that the database does not name. Thread safe; its dependencies must outlive it.

@@ -65,6 +65,29 @@ TEST_F(IdentityTest, IsKeptFromStartToStart) {
   EXPECT_EQ(refusal(), "");
 }
 
+// What a start on them accepted would be missing in the database they were moved to.
+TEST_F(IdentityTest, RecordsThatWereMovedAreRefusedUntilTheyAreAdopted) {
+  live("a volume");
+  {
+    const DataFolder data(root());
+    Database database(data);
+    mark_as_moved(database, "of the blobs");
+  }
+  EXPECT_THAT(refusal(), HasSubstr("--store"));
+  EXPECT_THAT(refusal(), HasSubstr("isomeshd move"));
+  live("", {.adopt = true});
+  EXPECT_EQ(refusal(), "");
+}
+
+TEST_F(IdentityTest, RecordsWithoutAMarkThatWereMovedAreRefused) {
+  {
+    const DataFolder data(root());
+    Database database(data);
+    mark_as_moved(database, "of the blobs");
+  }
+  EXPECT_THAT(refusal(), HasSubstr("--store"));
+}
+
 TEST_F(IdentityTest, OfAnEmptyFolderIsMadeAnew) {
   live("");
   remove_database();
