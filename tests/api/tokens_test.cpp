@@ -276,6 +276,18 @@ TEST_F(TokensTest, ARevokedTokenIsRefusedAfterSighup) {
   EXPECT_TRUE(eventually([&] { return daemon_.get("/v1/jobs", bearer(ct_)).status == 401; }));
 }
 
+TEST_F(TokensTest, ARevokedTokensStreamOfEventsEndsAfterSighup) {
+  const Connection connection(daemon_.url());
+  connection.send(request("GET", "/v1/events", "", bearer(ct_)));
+  EXPECT_THAT(connection.receive_some(), HasSubstr("200 OK"));
+  ASSERT_EQ(token_command({"revoke", "ct"}, file_).status, 0);
+  daemon_.send_signal(SIGHUP);
+  std::string rest;
+  do {
+    rest = connection.receive_some();  // throws if the stream stays open
+  } while (!rest.empty());
+}
+
 TEST(Tokens, LetTheDaemonListenBeyondThisMachine) {
   const TemporaryFolder folder;
   ASSERT_EQ(run({ISOMESHD, "token", "add", "ct", "--into", folder / "tokens"}).status, 0);

@@ -66,6 +66,19 @@ void begin_request(const Tokens* tokens, Request& request, Response& response) {
   check_role(context.caller.role, is_metrics);
 }
 
+std::function<bool()> validity_of(const Tokens* tokens, const Request& request) {
+  if (tokens == nullptr) return [] { return true; };
+  return [tokens, caller = request.context.caller,
+          token = bearer_of(request.header("Authorization")).value_or(""),
+          checked = std::uint64_t{0}]() mutable {
+    const std::uint64_t loads = tokens->loads();
+    if (checked == loads) return true;
+    if (tokens->find(token) != caller) return false;
+    checked = loads;
+    return true;
+  };
+}
+
 void end_request(Metrics& metrics, const Request& request, const Response& response,
                  const BodySizes& sizes) {
   const RequestContext& context = request.context;

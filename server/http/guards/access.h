@@ -2,6 +2,7 @@
 // to server/http.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "server/http/connections/connections.h"
@@ -27,6 +28,10 @@ std::string party_of(const Request& request);
 // none are configured. Call before routing. Throws Error kUnauthorized, and kForbidden if the
 // caller's role does not permit the route.
 void begin_request(const Tokens* tokens, Request& request, Response& response);
+
+// A check of whether the request's token is still valid, for responses that last. Always true if
+// `tokens` is null. It must not outlive `tokens`.
+std::function<bool()> validity_of(const Tokens* tokens, const Request& request);
 
 void end_request(Metrics& metrics, const Request& request, const Response& response,
                  const BodySizes& sizes);

@@ -94,6 +94,7 @@ void Tokens::reload() {
   auto entries = std::make_shared<const Entries>(read());
   const Lock lock(mutex_);
   entries_ = std::move(entries);
+  ++loads_;
 }
 
 std::size_t Tokens::count() const {

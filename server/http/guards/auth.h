@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -41,6 +43,9 @@ class Tokens {
 
   std::size_t count() const;
 
+  // Grows with each reload.
+  std::uint64_t loads() const { return loads_; }
+
   // Returns the token's owner. Its time depends on the token's length only: all entries are
   // compared, each in constant time.
   std::optional<Caller> find(std::string_view token) const;
@@ -58,6 +63,7 @@ class Tokens {
   const ReadBy reader_;
   mutable Mutex mutex_;
   std::shared_ptr<const Entries> entries_ ISOMESH_GUARDED_BY(mutex_);
+  std::atomic<std::uint64_t> loads_ = 1;
 };
 
 // True if `owner` may own a file of tokens: root, or the service's user. The owner can write to the

@@ -63,7 +63,7 @@ class EventSource : public TalkingSource {
   bool computes() const override { return end_.has_value(); }
 
   More next(std::string& bytes) override {
-    if (is_over_) return More::kEnd;
+    if (is_over_ || !stream_.may_listen()) return More::kEnd;
     if (end_) {
       tell(*std::exchange(end_, std::nullopt), bytes);
       return More::kBytes;
@@ -106,11 +106,14 @@ class EventSource : public TalkingSource {
 
 class AllEventsSource : public TalkingSource {
  public:
-  AllEventsSource(std::shared_ptr<Broadcaster::Mailbox> mailbox, net::FairPlaces::Place place)
-      : mailbox_(std::move(mailbox)), place_(std::move(place)) {}
+  AllEventsSource(std::shared_ptr<Broadcaster::Mailbox> mailbox, net::FairPlaces::Place place,
+                  std::function<bool()> may_listen)
+      : mailbox_(std::move(mailbox)),
+        place_(std::move(place)),
+        may_listen_(std::move(may_listen)) {}
 
   More next(std::string& bytes) override {
-    if (mailbox_->has_lost_some()) return More::kEnd;
+    if (mailbox_->has_lost_some() || !may_listen_()) return More::kEnd;
     begin(bytes);
     while (const auto event = mailbox_->take()) {
       bytes.append("event: ").append(name_of(event->kind));
@@ -124,6 +127,7 @@ class AllEventsSource : public TalkingSource {
  private:
   std::shared_ptr<Broadcaster::Mailbox> mailbox_;
   net::FairPlaces::Place place_;
+  std::function<bool()> may_listen_;
 };
 
 }  // namespace
@@ -193,8 +197,10 @@ std::unique_ptr<net::Source> event_source(EventStream stream) {
 }
 
 std::unique_ptr<net::Source> event_source(std::shared_ptr<Broadcaster::Mailbox> mailbox,
-                                          net::FairPlaces::Place place) {
-  return std::make_unique<AllEventsSource>(std::move(mailbox), std::move(place));
+                                          net::FairPlaces::Place place,
+                                          std::function<bool()> may_listen) {
+  return std::make_unique<AllEventsSource>(std::move(mailbox), std::move(place),
+                                           std::move(may_listen));
 }
 
 }  // namespace isomesh::http

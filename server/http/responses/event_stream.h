@@ -65,6 +65,8 @@ struct EventStream {
   std::uint64_t last = 0;               // the last event that the listener has seen
   std::function<std::string()> result;  // the ended job, as JSON
   net::FairPlaces::Place place;         // one of the limited streams
+  // The stream ends once this returns false.
+  std::function<bool()> may_listen = [] { return true; };
 };
 
 // Ends with the job's last event. Sends at least a comment every 15 seconds, to detect a lost
@@ -72,9 +74,10 @@ struct EventStream {
 std::unique_ptr<net::Source> event_source(EventStream stream);
 
 // All future events of a mailbox, each with its job's id, but without the finished job at the end.
-// Ends if events were lost, so that the client queries its jobs and reconnects. Sends comments as
-// above.
-std::unique_ptr<net::Source> event_source(std::shared_ptr<Broadcaster::Mailbox> mailbox,
-                                          net::FairPlaces::Place place);
+// Ends if events were lost, so that the client queries its jobs and reconnects, and once
+// `may_listen` returns false. Sends comments as above.
+std::unique_ptr<net::Source> event_source(
+    std::shared_ptr<Broadcaster::Mailbox> mailbox, net::FairPlaces::Place place,
+    std::function<bool()> may_listen = [] { return true; });
 
 }  // namespace isomesh::http

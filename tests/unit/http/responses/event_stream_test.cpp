@@ -80,6 +80,27 @@ TEST_F(EventStreamTest, OfProgressTheNewestIsKept) {
   EXPECT_LT(told.size(), 300U);
 }
 
+TEST_F(EventStreamTest, WhoMayNoLongerListenHearsNothing) {
+  bool may_listen = true;
+  const auto all = event_source(broadcaster_.listen_to_all(std::nullopt), places_.take(""),
+                                [&] { return may_listen; });
+  const auto one = event_source({.mailbox = broadcaster_.listen_to("a"),
+                                 .past = {},
+                                 .result = [] { return std::string("{}"); },
+                                 .place = places_.take(""),
+                                 .may_listen = [&] { return may_listen; }});
+  broadcaster_.publish(event(1, EventKind::kStage));
+  EXPECT_THAT(told_by(*all), testing::HasSubstr("event: stage"));
+  EXPECT_THAT(told_by(*one), testing::HasSubstr("event: stage"));
+  may_listen = false;
+  broadcaster_.publish(event(2, EventKind::kDone));
+  for (net::Source* stream : {all.get(), one.get()}) {
+    std::string nothing;
+    EXPECT_EQ(stream->next(nothing), net::Source::More::kEnd);
+    EXPECT_EQ(nothing, "");
+  }
+}
+
 TEST_F(EventStreamTest, ListenersThatAreGoneAreForgotten) {
   { const auto stream = source(); }
   broadcaster_.publish(event(1, EventKind::kStage));
