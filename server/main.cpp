@@ -99,6 +99,9 @@ Files open_files(const Options& options, const net::Address& address, http::Read
   if (!options.tls_certificate.empty() && !address.is_unix()) {
     files.tls = std::make_unique<net::TlsFiles>(options.tls_certificate, options.tls_key);
   }
+  // Otherwise every callback would fail, without a word at the start.
+  net::check_authorities("callback-ca", options.callback_authorities);
+  net::check_authorities("blob-ca", options.blobs.authorities);
   return files;
 }
 

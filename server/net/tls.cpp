@@ -83,7 +83,32 @@ void warn_if_readable(const std::filesystem::path& key) {
   }
 }
 
+// From the last error of OpenSSL.
+std::string why_no_certificate() {
+  switch (ERR_GET_REASON(ERR_peek_last_error())) {
+    case SSL_R_EE_KEY_TOO_SMALL:
+    case SSL_R_CA_KEY_TOO_SMALL:
+      return "the key of a certificate is too weak: RSA keys need at least 2048 bits";
+    case SSL_R_CA_MD_TOO_WEAK:
+      return "a certificate is signed with a digest that is too weak: use SHA-256";
+    default:
+      return "the file cannot be read, or contains no certificate in PEM form";
+  }
+}
+
 }  // namespace
+
+void check_authorities(const std::string& option, const std::filesystem::path& file) {
+  if (file.empty()) return;
+  const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_client_method()),
+                                                                  &SSL_CTX_free);
+  if (!context) throw Error(ErrorCode::kInternal, "TLS is not available");
+  const bool is_read = SSL_CTX_load_verify_file(context.get(), file.c_str()) == 1;
+  ERR_clear_error();
+  if (is_read) return;
+  throw invalid_parameter(option,
+                          "the file cannot be read, or contains no certificate in PEM form");
+}
 
 TlsFiles::TlsFiles(std::filesystem::path certificate, std::filesystem::path key)
     : certificate_(std::move(certificate)), key_(std::move(key)), context_(read()) {
@@ -119,8 +144,7 @@ TlsFiles::Context TlsFiles::read() const {
     throw Error(ErrorCode::kInternal, "TLS has none of the required ciphers");
   }
   if (SSL_CTX_use_certificate_chain_file(raw, certificate_.c_str()) != 1) {
-    throw invalid_parameter("tls-cert",
-                            "the file cannot be read, or contains no certificate in PEM form");
+    throw invalid_parameter("tls-cert", why_no_certificate());
   }
   if (SSL_CTX_use_PrivateKey_file(raw, key_.c_str(), SSL_FILETYPE_PEM) != 1 ||
       SSL_CTX_check_private_key(raw) != 1) {

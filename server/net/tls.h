@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "base/mutex.h"
 #include "proto/error.h"
@@ -11,6 +12,10 @@
 using SSL_CTX = struct ssl_ctx_st;  // NOLINT: OpenSSL's name
 
 namespace isomesh::net {
+
+// Checks a file of trusted certificate authorities, which `option` names. Does nothing without a
+// file. Throws Error kInvalidParameter.
+void check_authorities(const std::string& option, const std::filesystem::path& file);
 
 // A certificate (with its chain) and its key, from two PEM files. Thread safe.
 class TlsFiles {

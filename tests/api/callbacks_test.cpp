@@ -152,6 +152,23 @@ TEST_F(CallbacksTest, TheCommandAsksForThem) {
   EXPECT_TRUE(receiver.gets(1));
 }
 
+TEST_F(CallbacksTest, AuthoritiesThatCannotBeUsedAreRefusedAtTheStartAndByTheCheck) {
+  write_file(folder_ / "none.pem", "no certificate");
+  for (const std::string name : {"none.pem", "absent.pem"}) {
+    const std::vector<std::string> options = {"--data", folder_ / "data", "--callback-ca",
+                                              folder_ / name};
+    for (const std::vector<std::string>& begin : std::vector<std::vector<std::string>>{
+             {ISOMESHD, "--listen", "127.0.0.1:0"}, {ISOMESHD, "check"}}) {
+      std::vector<std::string> command = begin;
+      command.insert(command.end(), options.begin(), options.end());
+      const Finished told = run(command);
+      EXPECT_EQ(told.status, 1) << name;
+      EXPECT_THAT(told.output + told.errors, HasSubstr("callback-ca")) << name;
+      EXPECT_THAT(told.output + told.errors, HasSubstr("cannot be read")) << name;
+    }
+  }
+}
+
 TEST_F(CallbacksTest, NeedASecretAndAnAddress) {
   write_file(folder_ / "secret", kSecret);
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{

@@ -135,6 +135,19 @@ TEST_F(TlsTest, FilesThatDoNotFitAreRefused) {
   }
 }
 
+TEST_F(TlsTest, AWeakKeyIsRefusedAsSuch) {
+  const std::string cert = folder_ / "weak.pem";
+  const std::string key = folder_ / "weak.key";
+  ASSERT_EQ(run({"openssl", "req", "-x509", "-newkey", "rsa:1024", "-nodes", "-days", "2", "-subj",
+                 "/CN=localhost", "-keyout", key, "-out", cert})
+                .status,
+            0);
+  const Finished result = run({ISOMESHD, "--data", folder_ / "data", "--listen", "127.0.0.1:0",
+                               "--tls-cert", cert, "--tls-key", key});
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.output + result.errors, HasSubstr("too weak"));
+}
+
 TEST_F(TlsTest, AUnixSocketStaysPlain) {
   const Daemon daemon(folder_ / "data", "unix:" + std::string(folder_ / "s"), options());
   EXPECT_EQ(daemon.get("/livez").status, 200);
