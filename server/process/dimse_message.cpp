@@ -43,7 +43,11 @@ void visit(Is<DimseObject> auto& self, auto&& field) {
   field("instance", self.instance);
 }
 
-void visit(Is<DimseEnded> auto& self, auto&& field) { field("refusal", self.refusal); }
+void visit(Is<DimseEnded> auto& self, auto&& field) {
+  field("refusal", self.refusal);
+  field("called", self.called);
+  field("calling", self.calling);
+}
 
 namespace {
 
@@ -92,7 +96,12 @@ DimseOrder dimse_order_from(std::string_view line) {
 DimseReport dimse_report_from(std::string_view line) {
   const ReadLine message(line);
   if (const auto sent = message.find<DimseSent>(kSent)) return *sent;
-  if (const auto ended = message.find<DimseEnded>(kEnded)) return *ended;
+  if (const auto ended = message.find<DimseEnded>(kEnded)) {
+    for (const std::string& title : {ended->called, ended->calling}) {
+      if (!title.empty() && !is_ae_title(title)) throw_malformed();
+    }
+    return *ended;
+  }
   auto object = message.find<DimseObject>(kObject);
   if (!object || !is_harmless(*object)) throw_malformed();
   return *std::move(object);

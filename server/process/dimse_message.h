@@ -77,6 +77,9 @@ enum class DimseRefusal {
 
 struct DimseEnded {
   DimseRefusal refusal = DimseRefusal::kOther;
+  // The titles of a rejected association; empty if they are not valid.
+  std::string called = {};
+  std::string calling = {};
 
   bool operator==(const DimseEnded&) const = default;
 };

@@ -48,11 +48,16 @@ std::string audit_record(const AuditEntry& entry) {
   for (const auto& [name, text] :
        {std::pair{"order", &entry.order}, std::pair{"owner", &entry.owner},
         std::pair{"pacs", &entry.pacs}, std::pair{"direction", &entry.direction},
-        std::pair{"study", &entry.study}, std::pair{"patient_id", &entry.patient_id}}) {
+        std::pair{"study", &entry.study}, std::pair{"patient_id", &entry.patient_id},
+        std::pair{"peer", &entry.peer}, std::pair{"called", &entry.called},
+        std::pair{"calling", &entry.calling}}) {
     if (!text->empty()) put(name, *text);
   }
   if (entry.event == AuditEvent::kTransferred) {
     json_values::assign(json_values::member(json.root(), "instances"), entry.instances);
+  }
+  if (entry.unlisted > 0) {
+    json_values::assign(json_values::member(json.root(), "unlisted"), entry.unlisted);
   }
   return dump(json.root());
 }

@@ -204,7 +204,8 @@ void DimseListener::serve_association(Association& association) {
     const std::string line = lines.next(stop);
     if (line.empty()) break;
     const process::DimseReport report = process::dimse_report_from(line);
-    if (const auto* ended = std::get_if<DimseEnded>(&report)) return note_end(*ended);
+    if (const auto* ended = std::get_if<DimseEnded>(&report))
+      return note_end(*ended, association.party);
     const auto* object = std::get_if<DimseObject>(&report);
     if (object == nullptr) break;
     association.is_storing = true;
@@ -244,20 +245,31 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
 }
 
 // At most once a second: otherwise anybody who can connect could fill the trail, which cannot be
-// emptied.
-void DimseListener::note_end(const DimseEnded& ended) {
+// emptied. The others are counted.
+void DimseListener::note_end(const DimseEnded& ended, const std::string& party) {
   if (ended.refusal != DimseRefusal::kCalled && ended.refusal != DimseRefusal::kCalling) return;
+  std::uint64_t unlisted = 0;
   {
     const Lock lock(mutex_);
-    if (Clock::now() < next_note_) return;
+    if (Clock::now() < next_note_) {
+      ++unnoted_;
+      return;
+    }
     next_note_ = Clock::now() + std::chrono::seconds(1);
+    unlisted = std::exchange(unnoted_, 0);
   }
   LogLine("association", LogLevel::kWarn)
-      .add("rejected", ended.refusal == DimseRefusal::kCalled ? "called-title" : "calling-title");
+      .add("rejected", ended.refusal == DimseRefusal::kCalled ? "called-title" : "calling-title")
+      .add("peer", party)
+      .add("unlisted", unlisted);
   services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
                        .success = false,
                        .pacs = "dimse",
-                       .direction = "in"});
+                       .direction = "in",
+                       .peer = party,
+                       .called = ended.called,
+                       .calling = ended.calling,
+                       .unlisted = unlisted});
 }
 
 }  // namespace isomesh::c_store

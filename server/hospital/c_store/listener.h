@@ -79,7 +79,7 @@ class DimseListener {
   process::DimseVerdict keep(const process::DimseObject& object,
                              const std::filesystem::path& folder);
   bool has_room(std::uint64_t more_bytes) const;
-  void note_end(const process::DimseEnded& ended);
+  void note_end(const process::DimseEnded& ended, const std::string& party);
 
   const ListenerServices services_;
   const orders::DimseSettings settings_;
@@ -91,6 +91,7 @@ class DimseListener {
   std::vector<std::shared_ptr<Association>> open_ ISOMESH_GUARDED_BY(mutex_);
   std::deque<std::shared_ptr<Association>> ready_ ISOMESH_GUARDED_BY(mutex_);
   std::chrono::steady_clock::time_point next_note_ ISOMESH_GUARDED_BY(mutex_);
+  std::uint64_t unnoted_ ISOMESH_GUARDED_BY(mutex_) = 0;  // rejected since the last note
   // Last: its thread and these use the other members.
   AssociationAcceptor acceptor_;
   std::vector<std::jthread> threads_;

@@ -153,7 +153,10 @@ class Association {
   DimseEnded serve() {
     const DimseRefusal refusal = accept();
     if (refusal == DimseRefusal::kNone) answer_messages();
-    return {.refusal = refusal};
+    const auto valid = [](const std::string& title) {
+      return process::is_ae_title(title) ? title : "";
+    };
+    return {.refusal = refusal, .called = valid(called_), .calling = valid(calling_)};
   }
 
  private:

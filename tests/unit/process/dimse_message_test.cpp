@@ -40,13 +40,16 @@ TEST(DimseMessage, ReportsComeBack) {
   for (const DimseReport& report :
        {DimseReport(DimseSent{DimseEnd::kResponded, 0xA700}),
         DimseReport(DimseObject{"12", "BONE", "CT1", "1.2", "1.3", "1.4"}),
-        DimseReport(DimseEnded{DimseRefusal::kCalling})}) {
+        DimseReport(DimseEnded{DimseRefusal::kOther, "", ""}),
+        DimseReport(DimseEnded{DimseRefusal::kCalling, "BONE", "CT1"})}) {
     EXPECT_EQ(dimse_report_from(to_line(report)), report);
   }
 }
 
 // The process that reports may have been taken over by what it read.
 TEST(DimseMessage, ReportsThatWouldDoHarmAreRefused) {
+  EXPECT_ANY_THROW(
+      dimse_report_from(to_line(DimseReport(DimseEnded{DimseRefusal::kCalled, "a\nb", ""}))));
   const DimseObject good = {"12", "BONE", "CT1", "1.2", "1.3", "1.4"};
   std::vector<DimseObject> bad(6, good);
   bad[0].file = "../1";

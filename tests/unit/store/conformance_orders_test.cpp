@@ -274,6 +274,18 @@ TEST_P(OrderConformance, AreForgottenAfterTheirEnd) {
   EXPECT_EQ(orders().get("", open.order.id).state, OrderState::kWaiting);
 }
 
+TEST(AuditRecord, HasThePeerOfARefusedLogin) {
+  const std::string record = audit_record({.event = AuditEvent::kAuthenticationFailure,
+                                           .success = false,
+                                           .peer = "192.0.2.1",
+                                           .called = "BONE",
+                                           .calling = "CT9",
+                                           .unlisted = 7});
+  EXPECT_THAT(record, HasSubstr(R"("peer":"192.0.2.1","called":"BONE","calling":"CT9")"));
+  EXPECT_THAT(record, HasSubstr(R"("unlisted":7)"));
+  EXPECT_EQ(audit_record({.event = AuditEvent::kStart}).find("unlisted"), std::string::npos);
+}
+
 TEST_P(OrderConformance, TheAuditTrailGrowsInOrder) {
   audit().add({.event = AuditEvent::kStart});
   audit().add({.event = AuditEvent::kTransferred,
