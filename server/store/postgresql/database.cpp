@@ -32,6 +32,19 @@ std::int64_t to_steady_us(std::chrono::steady_clock::time_point time) {
 
 std::int64_t steady_us() { return to_steady_us(std::chrono::steady_clock::now()); }
 
+// Names have any characters, and the server would reject those that its encoding lacks. SQL_ASCII
+// stores bytes as they are.
+void check_encoding(Connection& connection) {
+  Rows row = connection.query("SELECT current_setting('server_encoding')");
+  row.next();
+  const std::string encoding = row.text(0);
+  if (encoding == "UTF8" || encoding == "SQL_ASCII") return;
+  throw Error(ErrorCode::kUnavailable,
+              "the database of --store has the encoding " + encoding +
+                  ", which lacks characters of names: create one with UTF8 (createdb --encoding "
+                  "UTF8 --template template0), and name it with --store");
+}
+
 // Number of connections that this thread holds, of any database.
 thread_local int borrowed = 0;
 
@@ -39,7 +52,10 @@ thread_local int borrowed = 0;
 
 Database::Database(DatabaseOptions options) : options_(std::move(options)), node_(random_uuid()) {
   try {
-    ask_for(kLongestMigration, [&](Connection& connection, bool) { migrate(connection); });
+    ask_for(kLongestMigration, [&](Connection& connection, bool) {
+      check_encoding(connection);
+      migrate(connection);
+    });
   } catch (const Interrupted&) {
     const std::string reason = reason_of_no_connection(options_.url);
     if (reason.empty()) throw;

@@ -25,6 +25,18 @@ TEST_F(ClusterTest, TablesOfANewerVersionAreRefused) {
   EXPECT_EQ(code_thrown_by([&] { Database({.url = url_, .node = "x"}); }), ErrorCode::kUnavailable);
 }
 
+// Names of volumes have characters that it lacks.
+TEST_F(ClusterTest, ADatabaseThatIsNotOfUtf8IsRefusedWithItsEncoding) {
+  ask("CREATE DATABASE latin TEMPLATE template0 ENCODING 'LATIN1' LOCALE 'C'");
+  std::string latin = url_.substr(0, url_.find("&options"));
+  const std::string name = "///postgres?";
+  latin.replace(latin.find(name), name.size(), "///latin?");
+  const auto error = test::thrown_by([&] { Database({.url = latin, .node = "x"}); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error->what(), testing::HasSubstr("LATIN1"));
+}
+
 TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
   const std::string id = submit();
   ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
