@@ -46,10 +46,11 @@ async function change(element: Locator): Promise<void> {
     await element.getByRole('checkbox').check();
     return;
   }
-  const number = element.locator('input[type=number]');
+  const number = element.getByRole('spinbutton');
   if ((await number.count()) > 0) {
-    const [low, high] = await Promise.all(['min', 'max'].map(async (bound) => Number(await number.getAttribute(bound))));
-    const isWhole = (await number.getAttribute('step')) === '1';
+    const [low, high] = await Promise.all(['aria-valuemin', 'aria-valuemax'].map(async (bound) => Number(await number.getAttribute(bound))));
+    const name = (await element.getAttribute('data-parameter')) ?? '';
+    const isWhole = jobParameters.get(name)?.type?.includes('integer') ?? false;
     await number.fill(String(isWhole ? (low ?? 0) + 2 : (low ?? 0) + (high || 1) / 4));
     return;
   }

@@ -6,6 +6,7 @@ import { labelTitle } from '../../job/labels';
 import { button, checkbox, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
+import { NumberField } from '../../ui/number_field';
 import type { Scope } from '../../ui/signal';
 import { colourOf, LabelMap, seriesColour, type LabelLook } from '../../volume/label_map';
 import { opacityControl } from './label_opacity';
@@ -42,16 +43,26 @@ export class LabelChoice {
     private readonly onLook: () => void,
   ) {
     this.background = start.background ?? 0;
-    const input = h('input', { type: 'number', step: 1, value: this.background });
-    input.addEventListener('change', () => {
-      if (!Number.isInteger(input.valueAsNumber)) return;
-      this.background = input.valueAsNumber;
+    this.element = h('div', { class: 'label-choice' }, this.body, opacityControl(), this.backgroundField());
+    scope.onEnd(() => this.asking?.abort());
+    this.ask(start.labels);
+  }
+
+  private backgroundField(): HTMLElement {
+    const number = new NumberField({ step: 1 });
+    number.write(this.background);
+    number.input.addEventListener('change', () => {
+      const { value } = number;
+      const isGood = value !== null && Number.isInteger(value);
+      number.mark(isGood ? '' : number.textFault || 'Enter a whole number.');
+      if (!isGood || value === this.background) return;
+      this.background = value;
       this.ask('all');
       this.changed();
     });
-    this.element = h('div', { class: 'label-choice' }, this.body, opacityControl(), field('Background', input, 'The value of samples without a label'));
-    scope.onEnd(() => this.asking?.abort());
-    this.ask(start.labels);
+    const element = field('Background', number.input, 'The value of samples without a label');
+    element.append(number.fault);
+    return element;
   }
 
   private ask(wanted: Choice['labels']): void {

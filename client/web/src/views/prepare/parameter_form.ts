@@ -16,8 +16,9 @@ import {
   type Parameter,
   type Value,
 } from '../../job/table';
-import { checkbox, field, h, segmented, uniqueId } from '../../ui/dom';
+import { checkbox, field, h, segmented } from '../../ui/dom';
 import { formatValue, meshFormatTitle } from '../../ui/format';
+import { NumberField } from '../../ui/number_field';
 import { errorSlider, type SliderHost } from './error_slider';
 
 export interface FormHost {
@@ -100,9 +101,8 @@ function errorControl(parameter: Parameter, host: FormHost): Control {
 }
 
 // The step of the arrows beside a number; other values may be typed.
-function stepOf({ kind, maximum }: Parameter): number | 'any' {
-  if (kind === 'integer') return 1;
-  return maximum === undefined ? 'any' : 10 ** Math.floor(Math.log10(maximum)) / 100;
+function stepOf({ kind, maximum }: Parameter): number {
+  return kind === 'integer' || maximum === undefined ? 1 : 10 ** Math.floor(Math.log10(maximum)) / 100;
 }
 
 // The placeholder of an empty field: the value that the daemon uses then.
@@ -126,40 +126,28 @@ function faultOf(parameter: Parameter, job: JobParameters): string {
 }
 
 function numberControl(parameter: Parameter, host: FormHost): Control {
-  const input = h('input', {
-    type: 'number',
-    inputmode: 'decimal',
-    step: stepOf(parameter),
-    min: parameter.minimum ?? parameter.above,
-  });
-  const fault = h('p', { class: 'fault', id: uniqueId('fault'), hidden: true });
-  const mark = (isGood: boolean): void => {
-    input.setAttribute('aria-invalid', String(!isGood));
-    fault.hidden = isGood;
-    if (isGood) input.removeAttribute('aria-errormessage');
-    else input.setAttribute('aria-errormessage', fault.id);
-    fault.textContent = isGood ? '' : faultOf(parameter, host.job());
-    host.mark(parameter, isGood);
-  };
+  const number = new NumberField({ step: stepOf(parameter), min: parameter.minimum ?? parameter.above });
+  const { input } = number;
   const update = (): void => {
     const job = host.job();
     const isUsed = applies(parameter, job);
+    const value = valueIn(job, parameter);
     input.disabled = !isUsed;
-    input.max = String(maximumOf(parameter, job) ?? '');
+    number.limit({ max: maximumOf(parameter, job) });
     input.placeholder = placeholderOf(parameter, job);
-    input.value = isUsed ? asText(valueIn(job, parameter)) : '';
-    mark(true);
+    number.write(isUsed && typeof value === 'number' ? value : null);
+    host.mark(parameter, true);
   };
   input.addEventListener('input', () => {
-    // The value is also empty when what was typed is no number; then badInput is true.
-    const value = input.value === '' && !input.validity.badInput ? null : input.valueAsNumber;
+    const { value } = number;
     const isGood = fits(parameter, value, host.job());
-    mark(isGood);
+    number.mark(isGood ? '' : number.textFault || faultOf(parameter, host.job()));
+    host.mark(parameter, isGood);
     if (isGood) host.set(parameter, value);
   });
   update();
   const element = field(labelOf(parameter), input);
-  element.append(fault);
+  element.append(number.fault);
   return { element, update };
 }
 

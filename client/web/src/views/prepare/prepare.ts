@@ -6,7 +6,7 @@ import { changed, defaultParameters, estimateQuery, jobRequest, parametersOfQuer
 import { kindOf, kinds, withKind, type Kind } from '../../job/kinds';
 import { trianglesOf } from '../../job/labels';
 import { isByLabels, withLabels } from '../../job/table';
-import { button, choose, field, h, isTyping, segmented } from '../../ui/dom';
+import { button, choose, h, isTyping, segmented } from '../../ui/dom';
 import { formatValue } from '../../ui/format';
 import { History } from '../../ui/history';
 import { refusal } from '../../ui/notices';
@@ -23,6 +23,7 @@ import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { CropControl } from './crop_control';
 import { estimateTexts, simplifiedInWords } from './estimate_texts';
 import { HistogramView } from './histogram_view';
+import { IsoField } from './iso_field';
 import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
@@ -71,7 +72,7 @@ class Prepare {
   private readonly live: LiveView;
   // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
   private readonly crop: CropControl | null;
-  private readonly isoInput: HTMLInputElement;
+  private readonly isoField = new IsoField((iso) => this.takeIso(iso), (isGood) => this.mark('iso', isGood));
   private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
   private readonly isoPart: HTMLElement;
@@ -134,9 +135,7 @@ class Prepare {
     this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));
     this.live = this.liveView(route, host);
-    this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box));
-    this.isoInput = h('input', { type: 'number', step: 'any', id: 'iso', class: 'iso-input' });
-    this.listenToIso();
+    this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box), (isGood) => this.mark('crop', isGood));
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
     this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
     this.element = this.layout(common);
@@ -173,21 +172,6 @@ class Prepare {
     });
   }
 
-  private listenToIso(): void {
-    this.isoInput.addEventListener('input', () => {
-      const isGood = Number.isFinite(this.isoInput.valueAsNumber);
-      this.isoInput.setAttribute('aria-invalid', String(!isGood));
-      this.mark('iso', isGood);
-      if (isGood) this.setIso(this.isoInput.valueAsNumber);
-    });
-    // An unfinished number is replaced by the value that is used.
-    this.isoInput.addEventListener('blur', () => {
-      this.isoInput.setAttribute('aria-invalid', 'false');
-      this.mark('iso', true);
-      this.update();
-    });
-  }
-
   private get iso(): number {
     const { iso } = this.parameters;
     return typeof iso === 'number' ? iso : this.volume.suggested_iso;
@@ -217,6 +201,7 @@ class Prepare {
       this.labelPart.append(this.labelChoice.element);
     }
     this.faulty.clear();
+    if (this.isoField.isMarked && !byLabels) this.faulty.add('iso');
     const isOpen = this.form.querySelector('details')?.open ?? false;
     this.form.replaceChildren(
       parameterForm({
@@ -329,12 +314,17 @@ class Prepare {
     return h(
       'div',
       { class: 'iso-row' },
-      field('Iso-value', this.isoInput),
+      this.isoField.element,
       h('div', { class: 'presets', role: 'group', 'aria-label': 'Presets' }, ...chips),
     );
   }
 
   private setIso(iso: number): void {
+    this.isoField.replace(iso);
+    this.takeIso(iso);
+  }
+
+  private takeIso(iso: number): void {
     this.parameters = { ...this.parameters, iso };
     this.changed();
   }
@@ -346,6 +336,7 @@ class Prepare {
     // These keep what was chosen in them.
     this.labelChoice = null;
     this.labelPart.replaceChildren();
+    this.isoField.replace(this.iso);
     this.kind.replaceChildren(this.kindChoice() ?? '');
     this.showKind();
     this.changed();
@@ -379,7 +370,7 @@ class Prepare {
     // Labels are seen as they are.
     this.windowText.hidden = this.resetWindow.hidden = isByLabels(this.parameters);
     this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
-    if (document.activeElement !== this.isoInput) this.isoInput.value = String(this.iso);
+    this.isoField.show(this.iso);
     noteInAddress({
       ...queryOfParameters(this.parameters, this.defaults),
       window: this.window.map((value) => Number(value.toPrecision(5))).join(','),

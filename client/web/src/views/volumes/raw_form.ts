@@ -1,34 +1,45 @@
 import type { RawDescription, SampleType } from '../../api/types';
 import { button, field, h } from '../../ui/dom';
+import { NumberField } from '../../ui/number_field';
 import { rawFault, sampleBytes } from '../../volume/raw';
 
 type Triple = [number, number, number];
 
-function triple(label: string, values: Triple, step: string): { element: HTMLElement; read: () => Triple } {
-  const inputs = values.map((value, axis) =>
-    h('input', {
-      type: 'number',
-      value: value > 0 ? value : '',
-      min: 0,
-      step,
-      'aria-label': `${label} along ${'xyz'[axis] ?? ''}`,
-    }),
-  );
+interface TripleField {
+  element: HTMLElement;
+  // NaN for what is missing or no number.
+  read: () => Triple;
+  // Marks the texts that are no numbers, and those that are not as they have to be. Says why the first is no number.
+  check: (fits: (value: number) => boolean, rule: string) => string;
+}
+
+function triple(label: string, values: Triple): TripleField {
+  const fields = values.map((value, axis) => {
+    const made = new NumberField({ min: 0 }, { 'aria-label': `${label} along ${'xyz'[axis] ?? ''}` });
+    made.write(value > 0 ? value : null);
+    return made;
+  });
   return {
     element: h(
       'fieldset',
       { class: 'triple' },
       h('legend', {}, label),
-      ...inputs,
+      ...fields.map(({ input }) => input),
     ),
-    read: () => inputs.map((input) => input.valueAsNumber) as Triple,
+    read: () => fields.map(({ value }) => value ?? NaN) as Triple,
+    check: (fits, rule) => {
+      for (const one of fields) one.mark(one.textFault || (one.value === null || fits(one.value) ? '' : rule));
+      return fields.map((one) => one.textFault).find(Boolean) ?? '';
+    },
   };
 }
 
+const positive = 'The spacing must be positive.';
+
 // Asks for what raw samples do not say themselves.
 export function rawForm(size: number, onDescribed: (raw: RawDescription) => void): HTMLElement {
-  const dims = triple('Samples', [0, 0, 0], '1');
-  const spacing = triple('Spacing in mm', [1, 1, 1], 'any');
+  const dims = triple('Samples', [0, 0, 0]);
+  const spacing = triple('Spacing in mm', [1, 1, 1]);
   const type = h(
     'select',
     {},
@@ -55,8 +66,10 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
   );
   const check = (): void => {
     const missing =
+      dims.check((count) => Number.isInteger(count) && count > 0, 'Enter a positive whole number.') ||
+      spacing.check((value) => value > 0, positive) ||
       rawFault(size, dims.read(), chosenType()) ||
-      (spacing.read().every((value) => value > 0) ? '' : 'The spacing must be positive.');
+      (spacing.read().every((value) => value > 0) ? '' : positive);
     fault.textContent = missing;
     submit.disabled = missing !== '';
   };
