@@ -3,7 +3,7 @@ import type { Job } from '@/api/types';
 import { emptyReason } from '@/job/empty';
 import { millimetres } from '@/ui/format';
 import { histogramPath } from '@/views/jobs/certificate';
-import { stepsOf } from '@/views/jobs/charts';
+import { stepsOf, totalOf } from '@/views/jobs/charts';
 import { errorAt, errorInWords, placeOf } from '@/views/prepare/error_slider';
 import { keepOnlyAt } from '@/views/surface/picked_part';
 
@@ -80,6 +80,14 @@ describe('the stages of a job', () => {
     // Cancelled before it was extracted.
     expect(names({ extract: 0, smooth: 0, encode: 0 })).toEqual(['queue', 'load']);
     expect(names({ simplify: 2, certify: 3 })).toEqual(['queue', 'load', 'extract', 'simplify', 'encode', 'certify']);
+  });
+});
+
+describe('the time of a job', () => {
+  it('is the whole, also where a stage did not end', () => {
+    const cancelled = { queue: 1, load: 12, extract: 0, smooth: 0, simplify: 0, encode: 0, certify: 0, total: 13_177 };
+    expect(totalOf(cancelled)).toBe(13_177);
+    expect(totalOf({ queue: 1, load: 12, total: 14 }, { transfer: 3, view: 2 })).toBe(19);
   });
 });
 

@@ -28,16 +28,24 @@ export function stepsOf(timing: Durations, more: Durations = {}): Step[] {
   });
 }
 
-export function waterfall(steps: readonly Step[]): HTMLElement {
-  const total = steps.reduce((sum, { duration }) => sum + duration, 0) || 1;
+// The time of a job, and of what came after it. A job that failed or was cancelled has taken more time than its
+// stages, since the one that it was in is not among them.
+export function totalOf(timing: Durations, more: Durations = {}): number {
+  const sum = (durations: readonly number[]): number => durations.reduce((all, duration) => all + duration, 0);
+  const stages = sum(stepsOf(timing).map(({ duration }) => duration));
+  return (timing['total'] ?? stages) + sum(Object.values(more));
+}
+
+export function waterfall(steps: readonly Step[], total: number): HTMLElement {
+  const all = Math.max(total, ...steps.map(({ begin, duration }) => begin + duration)) || 1;
   return h(
     'table',
     { class: 'waterfall' },
     h('caption', { class: 'sr-only' }, 'Time of each stage'),
     ...steps.map(({ name, begin, duration }) => {
       const bar = h('span', { class: `bar of-${name}` });
-      bar.style.marginLeft = `${(100 * begin) / total}%`;
-      bar.style.width = `${Math.max(0.6, (100 * duration) / total)}%`;
+      bar.style.marginLeft = `${(100 * begin) / all}%`;
+      bar.style.width = `${Math.max(0.6, (100 * duration) / all)}%`;
       return h(
         'tr',
         {},

@@ -12,7 +12,7 @@ import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
 import { exportActions } from './export_section';
 import { certificateBody, intersectionsText, openText } from './certificate';
-import { distributionChart, stepsOf, waterfall, type Durations } from './charts';
+import { distributionChart, stepsOf, totalOf, waterfall, type Durations } from './charts';
 
 export function section(title: string, ...children: Child[]): HTMLElement {
   return h('section', { class: 'panel-section' }, h('h2', {}, title), ...children);
@@ -134,7 +134,7 @@ export function accuracy(job: Job): HTMLElement | null {
 }
 
 export function timings(job: Job, more: Durations = {}): HTMLElement {
-  return section('Time', waterfall(stepsOf(job.timing, more)));
+  return section('Time', waterfall(stepsOf(job.timing, more), totalOf(job.timing, more)));
 }
 
 export function downloads(job: Job, volume: Volume | null): HTMLElement {
