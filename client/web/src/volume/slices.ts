@@ -136,6 +136,12 @@ export function valueIn({ window: [low, high], values, width }: Slice, column: n
   };
 }
 
+// The integer that a sample of integers has; null if the range holds several.
+export function onlyInteger({ low, high }: ValueRange): number | null {
+  const first = Math.ceil(low);
+  return first === Math.floor(high) ? first : null;
+}
+
 // An iso-value in the units of a slice's values.
 export function inSlice(slice: Pick<Slice, 'window'>, iso: number): number {
   const [low, high] = slice.window;

@@ -5,7 +5,7 @@ import { h } from '../../ui/dom';
 import { formatValue } from '../../ui/format';
 import { axisIndex, pictureAxes, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
-import { valueIn, type Slice } from '../../volume/slices';
+import { onlyInteger, valueIn, type Slice } from '../../volume/slices';
 import { placeText, sliceSpace } from './slice_looks';
 
 export interface ReadoutHost {
@@ -45,13 +45,15 @@ export class SliceReadout {
       const label = labels.map.at(slice.labels[place[row] * slice.width + place[column]] ?? 0);
       return { text: label ? labelTitle(label) : 'no label', value: null };
     }
-    const { low, high } = valueIn(slice, place[column], place[row]);
+    const range = valueIn(slice, place[column], place[row]);
+    const { low, high } = range;
     if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
     if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
+    const exact = this.host.isInteger ? onlyInteger(range) : null;
+    if (exact !== null) return { text: formatValue(exact), value: exact };
     const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
     const middle = Math.round((low + high) / 2 / digits) * digits;
     const value = Number(middle.toPrecision(6));
-    const isExact = this.host.isInteger && high - low < 1.5;
-    return { text: `${isExact ? '' : 'about '}${formatValue(isExact ? Math.round(value) : value)}`, value: isExact ? Math.round(value) : value };
+    return { text: `about ${formatValue(value)}`, value };
   }
 }
