@@ -1,7 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import type { Volume } from '@/api/types';
+import { defaultParameters, surfaceInNames } from '@/job/parameters';
 import { fileStem } from '@/volume/names';
-import { valueIn, type Slice } from '@/volume/slices';
+import { onlyInteger, valueIn, type Slice } from '@/volume/slices';
 
 describe('a file that is made of a volume', () => {
   const named = (name: string | null, series = ''): string =>
@@ -16,6 +17,12 @@ describe('a file that is made of a volume', () => {
     expect(fileStem(null, 'surface-1')).toBe('surface-1');
     expect(named('x'.repeat(200))).toHaveLength(60);
   });
+
+  it('has plain digits in its name', () => {
+    const nameAt = (iso: number): string => surfaceInNames(defaultParameters('v', iso));
+    expect([-300, 1250, -1250.4, 0.25].map(nameAt)).toEqual(['iso--300', 'iso-1250', 'iso--1250', 'iso-0.25']);
+    expect(surfaceInNames({ labels: 'all' })).toBe('all-labels');
+  });
 });
 
 describe('a value in a slice', () => {
@@ -25,5 +32,14 @@ describe('a value in a slice', () => {
     expect(valueIn(slice, 1, 0)).toEqual({ low: -49.5, high: -48.5 });
     expect(valueIn(slice, 0, 0)).toEqual({ low: -Infinity, high: -99.5 });
     expect(valueIn(slice, 0, 1)).toEqual({ low: 154.5, high: Infinity });
+  });
+
+  it('is one integer where its range holds no other', () => {
+    expect(onlyInteger({ low: -49.5, high: -48.5 })).toBe(-49);
+    // A step of 1.37, as of a window of 350: some greys stand for one integer, some for two.
+    expect(onlyInteger({ low: 6.2, high: 7.57 })).toBe(7);
+    expect(onlyInteger({ low: 6.9, high: 8.27 })).toBe(null);
+    expect(onlyInteger({ low: 7, high: 8 })).toBe(null);
+    expect(onlyInteger({ low: 154.5, high: Infinity })).toBe(null);
   });
 });

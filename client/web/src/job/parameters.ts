@@ -173,6 +173,11 @@ export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string 
   return labels.length === 1 ? `label ${only}` : `${labels.length} labels`;
 }
 
+// The same for the names of files, in ASCII: iso-1250. The page's own texts have a minus sign and thin spaces in numbers.
+export function surfaceInNames(job: Partial<JobParameters>): string {
+  return surfaceInWords(job).replaceAll('\u2212', '-').replaceAll('\u202f', '').replaceAll(' ', '-');
+}
+
 const lattices = { 5: '5 tetrahedra', 6: '6 tetrahedra', fcc: 'face-centred lattice', kuhn: 'primitive lattice', bcc: 'body-centred lattice' };
 
 export function schemeInWords({ scheme }: Pick<JobParameters, 'scheme'>): string {

@@ -5,7 +5,7 @@ import { shortId } from '../ui/format';
 import { tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import { fileStem } from '../volume/names';
-import { defaultParameters, jobRequest, queryOfParameters, surfaceInWords, variantOf } from './parameters';
+import { defaultParameters, jobRequest, queryOfParameters, surfaceInNames, variantOf } from './parameters';
 
 // Makes the same surface with other parameters, or finds it made already.
 export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
@@ -23,8 +23,7 @@ export function makeVariant(job: Job): (variant: Partial<JobParameters>) => void
 
 // The file name of a surface: head-iso-60.glb.
 export function fileNameOf(job: Job, volume: Volume | null, suffix: string): string {
-  const surface = surfaceInWords(job.parameters).replaceAll(' ', '-');
-  return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surface}${suffix}`;
+  return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surfaceInNames(job.parameters)}${suffix}`;
 }
 
 // The address of the volume with this job's parameters chosen.
