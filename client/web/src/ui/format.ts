@@ -9,8 +9,10 @@ export function formatCount(value: number): string {
 
 // At most that many digits after the point.
 export function formatNumber(value: number, digits = 2): string {
-  return new Intl.NumberFormat('en', { maximumFractionDigits: digits })
-    .format(value)
+  const text = new Intl.NumberFormat('en', { maximumFractionDigits: digits }).format(value);
+  // Rounded to zero, which has no sign.
+  if (text === '-0') return '0';
+  return text
     .replaceAll(',', '\u202f')
     .replace('-', '\u2212');
 }
@@ -42,10 +44,11 @@ export function formatBytes(bytes: number): string {
 
 export function formatMilliseconds(milliseconds: number): string {
   if (milliseconds < 1) return '< 1 ms';
-  if (milliseconds < 1000) return `${milliseconds.toFixed(0)} ms`;
-  if (milliseconds < 60_000) return `${(milliseconds / 1000).toFixed(milliseconds < 10_000 ? 2 : 1)} s`;
-  const minutes = Math.floor(milliseconds / 60_000);
-  return `${minutes} min ${Math.round((milliseconds % 60_000) / 1000)} s`;
+  // The limits are where rounding reaches the next unit.
+  if (milliseconds < 999.5) return `${milliseconds.toFixed(0)} ms`;
+  if (milliseconds < 59_950) return `${(milliseconds / 1000).toFixed(milliseconds < 9995 ? 2 : 1)} s`;
+  const seconds = Math.round(milliseconds / 1000);
+  return `${Math.floor(seconds / 60)} min ${seconds % 60} s`;
 }
 
 export function formatTime(iso: string): string {

@@ -44,7 +44,7 @@ export function pixelsOf(name: ColourName): Uint32Array {
 // In millimetres.
 export function placeText([left, posterior, superior]: Vec3, space: Space): string {
   const sign = space === 'RAS' ? -1 : 1;
-  return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value === 0 ? 0 : value, 1)).join(', ')} mm`;
+  return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value, 1)).join(', ')} mm`;
 }
 
 function layoutChoice(): HTMLElement {
