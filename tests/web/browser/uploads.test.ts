@@ -150,6 +150,31 @@ describe('an upload of several volumes', () => {
   });
 });
 
+describe('a refusal', () => {
+  it('is brought into view where the list is scrolled, and offers no empty file again', async () => {
+    const { page, daemon } = at;
+    for (let seed = 60; seed < 68; seed += 1) await daemon.upload(ballNrrd(16, 5, seed));
+    await page.setViewportSize({ width: 700, height: 480 });
+    await page.goto(daemon.url);
+    await expect.poll(() => page.locator('[data-volume]').count()).toBeGreaterThanOrEqual(8);
+    const panelTop = (): Promise<number> => page.evaluate(() => document.querySelector('.drop')?.getBoundingClientRect().top ?? 0);
+    await page.evaluate(() => document.querySelector('main')?.scrollTo(0, 1e6));
+    expect(await panelTop()).toBeLessThan(-480);
+    await drop(page, [{ name: 'empty.nii', bytes: Buffer.alloc(0) }], 'main');
+    const refusal = page.getByRole('alert').filter({ hasText: 'empty.nii is empty' });
+    const isInView = (): Promise<boolean> =>
+      refusal.evaluate((element) => element.getBoundingClientRect().top >= 0 && element.getBoundingClientRect().bottom <= innerHeight);
+    await expect.poll(isInView).toBe(true);
+    expect(await page.getByRole('button', { name: 'Upload it anyway' }).count()).toBe(0);
+    // A question, too, and at once for who wants no motion.
+    await page.emulateMedia({ reducedMotion: 'reduce' });
+    await page.evaluate(() => document.querySelector('main')?.scrollTo(0, 1e6));
+    await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }], 'main');
+    await page.getByRole('heading', { name: 'Which volume?' }).waitFor();
+    expect(await panelTop()).toBeGreaterThan(-200);
+  });
+});
+
 describe('what was uploaded and refused', () => {
   it('is sent again when the daemon does not keep it any more', async () => {
     const { page, daemon } = at;

@@ -129,6 +129,12 @@ export function checkbox(
   return h('label', { class: 'check' }, input, h('span', {}, label));
 }
 
+// Scrolls as little as possible so that the element is in view.
+export function bringIntoView(element: Element): void {
+  const isCalm = matchMedia('(prefers-reduced-motion: reduce)').matches;
+  element.scrollIntoView({ block: 'nearest', behavior: isCalm ? 'instant' : 'smooth' });
+}
+
 // True while a control takes what is typed, so that the keys are no shortcuts of the page.
 export function isTyping(event: KeyboardEvent): boolean {
   const target = event.target as HTMLElement | null;

@@ -3,7 +3,7 @@ import { volumeFormats } from '../../../generated/parameters';
 import { client } from '../../client';
 import { ApiError, asApiError, mayPass } from '../../api/problem';
 import type { RawDescription, UploadedVolume } from '../../api/types';
-import { button, h, icon } from '../../ui/dom';
+import { bringIntoView, button, h, icon } from '../../ui/dom';
 import { refusal, tell, tellError } from '../../ui/notices';
 import { currentRoute, go, hashOf, isVolumeList } from '../../ui/route';
 import { Signal } from '../../ui/signal';
@@ -121,7 +121,8 @@ export class UploadPanel {
       return;
     }
     this.running = null;
-    const anyway = button('Upload it anyway', () => void this.send(gathered));
+    // The server takes no empty file.
+    const anyway = gathered.body.size > 0 && button('Upload it anyway', () => void this.send(gathered));
     this.showProblem(fault, gathered, anyway);
   }
 
@@ -267,6 +268,7 @@ export class UploadPanel {
     if (!isPanelShown()) tell(h('a', { href: hashOf([]) }, `${name}: ${question}`));
     const asked = h('div', { role: 'status' }, h('h2', {}, question), h('p', {}, name));
     this.body.replaceChildren(asked, ...lists, h('div', { class: 'actions' }, this.otherButton()));
+    this.reveal();
   }
 
   private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
@@ -274,9 +276,10 @@ export class UploadPanel {
     this.state.value = 'Upload: your choice is needed';
     if (!isPanelShown()) tellError(error);
     this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
-    if (error.status === 415 && gathered.count === 1) {
+    if (error.status === 415 && gathered.count === 1 && gathered.body.size > 0) {
       this.body.append(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
     }
+    this.reveal();
   }
 
   // The results of several volumes stay until the next upload, since each rejected one can be retried.
@@ -288,12 +291,21 @@ export class UploadPanel {
       outcomeList(outcomes, gathered.files, (_, choices) => void this.send(gathered, { choices, outcomes })),
       h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
     );
+    this.reveal();
     this.onStored?.();
     if (outcomes.every(({ volume }) => volume !== null)) this.goOn();
   }
 
   private showUnusable(error: ApiError): void {
+    if (!isPanelShown()) tellError(error);
     this.body.replaceChildren(refusal(error, this.otherButton()));
+    this.reveal();
+  }
+
+  // Files may be dropped anywhere on the page, also where the panel is scrolled out of sight.
+  private reveal(): void {
+    const [first] = this.body.children;
+    if (first && isPanelShown()) bringIntoView(first);
   }
 
   private otherButton(): HTMLButtonElement {
