@@ -41,6 +41,47 @@ describe('on a phone', () => {
     expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(375);
   });
 
+  it('slices have room beside their captions, and each can be enlarged', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    for (const width of [390, 320]) {
+      await page.setViewportSize({ width, height: 844 });
+      await page.goto('about:blank');
+      await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+      await expect.poll(() => page.locator('[data-plane=axial] .slice-value').innerText()).not.toBe('');
+      await expect.poll(() => page.locator('.live-place').innerText()).not.toBe('');
+      for (const pane of await page.locator('.slice:not([hidden])').all()) {
+        const [whole, caption, enlarge] = await Promise.all([pane, pane.locator('figcaption'), pane.locator('.enlarge')].map((one) => one.boundingBox()));
+        if (!whole || !caption || !enlarge) throw new Error('a slice has no caption');
+        expect(caption.height).toBeLessThan(0.45 * whole.height);
+        expect(enlarge.x + enlarge.width).toBeLessThanOrEqual(whole.x + whole.width);
+        expect(enlarge.y + enlarge.height).toBeLessThanOrEqual(whole.y + whole.height);
+      }
+      for (const reading of await page.locator('.slice-value').all()) expect((await reading.boundingBox())?.height ?? 0).toBeLessThan(24);
+      await page.locator('[data-plane=axial] .enlarge').tap();
+      await expect.poll(() => page.locator('[data-plane=axial] .slice-value').innerText()).toContain('LPS');
+    }
+  });
+
+  it('nothing goes beyond the edge, and what is loaded is told below the tools', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    // The space at the right is as wide as that at the left.
+    const rightOf = (selector: string): Promise<number> =>
+      page.locator(selector).evaluateAll((all) => Math.max(...all.map((element) => element.getBoundingClientRect().right)));
+    await page.setViewportSize({ width: 320, height: 844 });
+    await page.goto(daemon.url);
+    await page.locator('[data-volume]').first().waitFor();
+    expect(await rightOf('.home section, .home section > *, .volume-search, .card')).toBeLessThanOrEqual(300);
+    await page.route('**/files/glb*', () => undefined);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await expect.poll(() => page.locator('.load-status').innerText()).not.toBe('');
+    const [status, tools] = await Promise.all(['.load-status', '.tools'].map((one) => page.locator(one).boundingBox()));
+    expect(status?.y).toBeGreaterThan((tools?.y ?? 999) + (tools?.height ?? 999));
+    expect(await rightOf('.panel > *, .panel-section > *, .panel .stack > *')).toBeLessThanOrEqual(304);
+  });
+
   it('a tap on a label leaves the page where it is', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(labelsNrrd(24));

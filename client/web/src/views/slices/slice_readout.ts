@@ -31,8 +31,12 @@ export class SliceReadout {
 
   show(cursor: Vec3): void {
     const place = this.pointed ?? cursor;
-    const text = [this.valueAt(place).text, placeText(toPatient(this.host.volume, place), sliceSpace.value)].filter(Boolean).join(' \u00b7 ');
-    if (this.element.textContent !== text) this.element.textContent = text;
+    const value = this.valueAt(place).text;
+    const where = placeText(toPatient(this.host.volume, place), sliceSpace.value);
+    const text = [value, where].filter(Boolean).join(' \u00b7 ');
+    if (this.element.textContent === text) return;
+    const reading = value !== '' && h('span', { class: 'slice-reading' }, value);
+    this.element.replaceChildren(...[reading, h('span', { class: 'slice-where' }, text.slice(value.length))].filter((part) => part !== false));
   }
 
   // Rounded to what the picture's eight bits tell; null where they tell no value.
