@@ -265,7 +265,8 @@ class Estimate(TypedDict):
     vertices: int
     #: About how many triangles remain if the parameters request fewer.
     simplified_triangles: NotRequired[int]
-    #: The size of each file. Exact for stl.
+    #: The size of each file. Exact for stl, unless components, fill_cavities or simplification
+    #: (triangles, max_error_mm) remove triangles.
     bytes: Mapping[str, int]
     #: The peak memory of the job without its mapped volume. An upper estimate.
     memory_bytes: int
