@@ -40,6 +40,9 @@ describe('a value in a slice', () => {
     expect(onlyInteger({ low: 6.2, high: 7.57 })).toBe(7);
     expect(onlyInteger({ low: 6.9, high: 8.27 })).toBe(null);
     expect(onlyInteger({ low: 7, high: 8 })).toBe(null);
+    // 50 is drawn as this grey, too: 42.5 is rounded to 43.
+    const tie = { width: 1, height: 1, values: Uint8Array.of(43), window: [0, 300] } as unknown as Slice;
+    expect(onlyInteger(valueIn(tie, 0, 0))).toBe(null);
     expect(onlyInteger({ low: 154.5, high: Infinity })).toBe(null);
   });
 });

@@ -138,8 +138,10 @@ export function valueIn({ window: [low, high], values, width }: Slice, column: n
 
 // The integer that a sample of integers has; null if the range holds several.
 export function onlyInteger({ low, high }: ValueRange): number | null {
-  const first = Math.ceil(low);
-  return first === Math.floor(high) ? first : null;
+  // A sample at the end of the range counts as within: both sides round.
+  const rounding = 1e-4 * (high - low);
+  const first = Math.ceil(low - rounding);
+  return first === Math.floor(high + rounding) ? first : null;
 }
 
 // An iso-value in the units of a slice's values.
