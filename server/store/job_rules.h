@@ -31,7 +31,7 @@ std::int64_t turn_cost_us(double expected_ms);
 struct JobColumns {
   std::string id;
   JobState state = JobState::kQueued;
-  std::string volume;
+  std::string volume = {};
   Priority priority = Priority::kRoutine;
   std::int64_t accepted_us = 0;
 };

@@ -27,6 +27,9 @@ const std::string kSamples = "abcdefghijklmnopqrstuvwx";  // 4 x 3 x 2
 
 // --- Files that show a note each -----------------------------------------------------------------
 
+// Without a spacing a header gets a note.
+const std::string kSpaced = "spacings: 1 1 1\n";
+
 std::string nrrd(const std::string& fields, const std::string& samples = kSamples) {
   return "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n" + fields + '\n' +
          samples;
@@ -423,20 +426,20 @@ TEST_F(NotesTest, AFormTellsItsFilesName) {
 // The same samples and geometry are one volume, whose record is that of the first upload. Each
 // upload's answer says how its own file was read.
 TEST_F(NotesTest, AreInTheAnswerOfTheirUploadAndInTheRecordOfTheFirst) {
-  const Volume first = volume_from_json(daemon_.send("POST", "/v1/volumes", nrrd("")).body);
-  const Answer again = daemon_.send("POST", "/v1/volumes", nrrd("", kSamples + "more"));
+  const Volume first = volume_from_json(daemon_.send("POST", "/v1/volumes", nrrd(kSpaced)).body);
+  const Answer again = daemon_.send("POST", "/v1/volumes", nrrd(kSpaced, kSamples + "more"));
   EXPECT_EQ(again.status, 200);
   Volume volume = volume_from_json(again.body);
   EXPECT_THAT(volume.notes, ElementsAre(Field(&Note::code, "trailing-bytes")));
   volume.notes = first.notes;
   EXPECT_EQ(volume, first);
   EXPECT_EQ(daemon_.client().volume(first.id), first);
-  const Answer third = daemon_.send("POST", "/v1/volumes", nrrd(""));
+  const Answer third = daemon_.send("POST", "/v1/volumes", nrrd(kSpaced));
   EXPECT_THAT(volume_from_json(third.body).notes, IsEmpty());
 }
 
 TEST_F(NotesTest, OneFileTwiceInAnArchiveIsOneVolume) {
-  const Shown twice = {{{"a.nrrd", nrrd("")}, {"copy of a.nrrd", nrrd("")}}};
+  const Shown twice = {{{"a.nrrd", nrrd(kSpaced)}, {"copy of a.nrrd", nrrd(kSpaced)}}};
   const Finished uploaded = upload_files(twice, "twice");
   ASSERT_EQ(uploaded.status, 0) << uploaded.errors;
   const Volume volume = volume_from_json(uploaded.output);

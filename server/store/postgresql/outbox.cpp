@@ -1,8 +1,18 @@
 #include "server/store/postgresql/outbox.h"
 
 #include "proto/json.h"
+#include "server/store/job_rules.h"
 
 namespace isomesh::store::postgresql {
+namespace {
+
+// The stored record of a job, or what is sent if it is damaged: other deliveries must not wait.
+Job job_of(const Delivery& delivery) {
+  const auto job = readable_job(delivery.body, delivery.job);
+  return job ? *job : damaged_job({.id = delivery.job, .state = JobState::kFailed});
+}
+
+}  // namespace
 
 std::vector<Delivery> PostgresOutbox::due(Time now, std::size_t per_receiver) const {
   // Longer than a delivery takes.
@@ -16,8 +26,7 @@ std::vector<Delivery> PostgresOutbox::due(Time now, std::size_t per_receiver) co
   while (rows.next()) {
     Delivery& delivery = deliveries.emplace_back(delivery_of(rows));
     const bool is_job = rows.boolean(5);
-    // Its body is the job's stored record.
-    if (is_job) delivery.body = to_json(job_from_record(delivery.body));
+    if (is_job) delivery.body = to_json(job_of(delivery));
   }
   return deliveries;
 }

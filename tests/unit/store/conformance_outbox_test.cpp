@@ -53,6 +53,13 @@ TEST_P(OutboxConformance, HoldsTheEndOfEveryJobThatHasACallback) {
   EXPECT_EQ(due[0].attempts, 0);
 }
 
+TEST_P(OutboxConformance, ADamagedBodyHoldsUpNoOther) {
+  const std::string damaged = end_with_callback("https://a.example.org/1");
+  const std::string other = end_with_callback("https://b.example.org/1");
+  damage("callbacks", "body", "job", damaged);
+  EXPECT_THAT(due(9), testing::UnorderedElementsAre(damaged, other));
+}
+
 TEST_P(OutboxConformance, OfEachReceiverSomeAreDue) {
   const std::string first = end_with_callback("https://a.example.org/1");
   const std::string second = end_with_callback("https://a.example.org/2");

@@ -106,9 +106,14 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::ReceivedStore& received() { return engine_->received(); }
   // One wrong byte in the record of a job or an order.
   void damage(const std::string& table, const std::string& id) {
-    engine_->database().run(
-        store::Change::kRepeatable,
-        "UPDATE " + table + " SET record = '#' || substr(record, 2) WHERE id = ?1", id);
+    damage(table, "record", "id", id);
+  }
+  void damage(const std::string& table, const std::string& column, const std::string& key,
+              const std::string& id) {
+    engine_->database().run(store::Change::kRepeatable,
+                            "UPDATE " + table + " SET " + column + " = '#' || substr(" + column +
+                                ", 2) WHERE " + key + " = ?1",
+                            id);
   }
   void restart() { engine_->restart(); }
   void lose_power() { engine_->lose_power(); }
