@@ -69,7 +69,8 @@ constexpr VolumeFormat kVolumeFormats[] = {
      .suffixes = ".tif .tiff .btf .tf8",
      .content =
          "several pages, or a folder or archive of single pages; OME-TIFF and ImageJ's TIFF with "
-         "their spacing, ImageJ's with calibrated values, others need `spacing`; `volume=N` chooses "
+         "their spacing, ImageJ's with calibrated values, others need `spacing`; `volume=N` "
+         "chooses "
          "a channel or time; strips and tiles, BigTIFF, grey of 8 to 32 bits and floats, without "
          "loss compressed"},
     {.name = "png",
