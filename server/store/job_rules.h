@@ -27,7 +27,7 @@ std::string result_key(const std::string& volume, const std::vector<Note>& notes
 // day, so that no job is free.
 std::int64_t turn_cost_us(double expected_ms);
 
-// What the columns of a job tell without its record.
+// The columns of a job, which can be read without its record.
 struct JobColumns {
   std::string id;
   JobState state = JobState::kQueued;

@@ -341,7 +341,7 @@ void Orders::end(store::OrderRecord& record, const Error& error) {
               std::string(describe(error.code()).name));
 }
 
-// What was ordered is lost, so no step can be made.
+// The order itself is lost, so no step can be made.
 void Orders::end_damaged(store::OrderRecord& record) {
   Problem problem =
       to_problem(Error(ErrorCode::kInternal, "damaged"), "/v1/orders/" + record.order.id);

@@ -51,7 +51,7 @@ class TallyCellWriter {
  private:
   static constexpr std::size_t kMostTriangles = 6 * std::tuple_size_v<OwedVolumes>;  // of a cell
 
-  // What the three corners of a triangle are owed by the part behind it.
+  // The volumes that the part behind a triangle owes its three corners.
   struct Missing {
     WallSides sides;
     std::array<std::uint32_t, 3> vertices = {};

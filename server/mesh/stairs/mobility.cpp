@@ -19,7 +19,7 @@ constexpr float kBendLoss = 0.12F;     // with each
 constexpr int kCurveSteps = 4;
 constexpr float kCurveLoss = 0.2F;
 // A closed curve of fewer vertices is smoothed less, or it would shrink to a point: at this length
-// the strongest smoothing (stairs.cpp) leaves 0.95 of its radius.
+// the strongest smoothing (stairs.cpp) leaves 0.94 of its radius.
 constexpr std::size_t kLongCurve = 39;
 constexpr int kCalmSteps = 4;    // along curves
 constexpr float kNoisy = 0.15F;  // the share of junctions among the vertices of a calm curve

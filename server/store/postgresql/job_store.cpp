@@ -90,13 +90,7 @@ std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::str
 }
 
 PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
-  Row row;
-  row.owner = rows.text(1);
-  row.result_key = rows.text(2);
-  row.accepted = rows.integer(3);
-  row.attempts = static_cast<int>(rows.integer(4));
-  row.fence = static_cast<std::uint64_t>(rows.integer(5));
-  read_job(rows, 0, 12, row);
+  Row row = read_row(rows, 12);
   row.job.state = static_cast<JobState>(rows.integer(6));
   if (!rows.is_null(7)) row.job.waiting_for = static_cast<WaitingFor>(rows.integer(7));
   if (row.job.state != JobState::kRunning || rows.is_null(8)) return row;

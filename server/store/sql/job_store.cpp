@@ -106,15 +106,22 @@ SqlJobStore::Row SqlJobStore::found(SqlConnection& connection, const Viewer& vie
   throw_no_job(has_expired(connection, viewer, id));
 }
 
-void SqlJobStore::read_job(const Rows& rows, int record, int columns, Row& row) {
+SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns) {
+  Row row;
+  row.owner = rows.text(1);
+  row.result_key = rows.text(2);
+  row.accepted = rows.integer(3);
+  row.attempts = static_cast<int>(rows.integer(4));
+  row.fence = static_cast<std::uint64_t>(rows.integer(5));
   const JobColumns known = {.id = rows.text(columns),
                             .state = static_cast<JobState>(rows.integer(columns + 1)),
                             .volume = rows.text(columns + 2),
                             .priority = static_cast<Priority>(rows.integer(columns + 3)),
                             .accepted_us = row.accepted};
-  auto job = readable_job(rows.text(record), known.id, known.volume);
+  auto job = readable_job(rows.text(0), known.id, known.volume);
   row.is_damaged = !job;
   row.job = job ? *std::move(job) : damaged_job(known);
+  return row;
 }
 
 Job SqlJobStore::repair_ended(SqlConnection& connection, const Row& row) const {

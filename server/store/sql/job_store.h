@@ -86,9 +86,9 @@ class SqlJobStore : public JobStore {
                           const std::string& id) const;
   // Throws Error kGone or kNotFound if there is no such row. The row may be damaged.
   Row found(SqlConnection& connection, const Viewer& viewer, const std::string& id) const;
-  // Sets the row's job from a record and the columns `id`, `state`, `volume` and `priority`, which
-  // begin at that number.
-  static void read_job(const Rows& rows, int record, int columns, Row& row);
+  // Reads the columns `record`, `owner`, `result_key`, `accepted`, `attempts` and `fence`, which
+  // come first, and `id`, `state`, `volume` and `priority`, which begin at that number.
+  static Row read_row(const Rows& rows, int columns);
   // Cancels a job that has ended and whose record is damaged, so that its record is valid again.
   Job repair_ended(SqlConnection& connection, const Row& row) const;
   // Replaces recorded progress by newer progress of this process's own runs.

@@ -38,15 +38,9 @@ SqliteJobStore::SqliteJobStore(Database& database, BlobStore& blobs, JobStoreOpt
       log_(greatest_event(database.reader())) {}
 
 SqliteJobStore::Row SqliteJobStore::row_of(const Rows& rows) const {
-  Row row;
-  row.owner = rows.text(1);
-  row.result_key = rows.text(2);
-  row.accepted = rows.integer(3);
-  row.attempts = static_cast<int>(rows.integer(4));
-  row.fence = static_cast<std::uint64_t>(rows.integer(5));
+  Row row = read_row(rows, 8);
   row.cancelling = rows.boolean(6);
   row.cost_us = rows.integer(7);
-  read_job(rows, 0, 8, row);
   return row;
 }
 

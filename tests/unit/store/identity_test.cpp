@@ -65,7 +65,7 @@ TEST_F(IdentityTest, IsKeptFromStartToStart) {
   EXPECT_EQ(refusal(), "");
 }
 
-// What a start on them accepted would be missing in the database they were moved to.
+// Jobs that such a start accepted would be missing in the database they were moved to.
 TEST_F(IdentityTest, RecordsThatWereMovedAreRefusedUntilTheyAreAdopted) {
   live("a volume");
   {

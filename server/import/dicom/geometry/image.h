@@ -111,7 +111,7 @@ struct Image {
   std::uint32_t tiles_per_row = 0;
   bool is_distance_assumed = false;  // the frames' distance is their slice thickness
   PlaceKind place = PlaceKind::kPatient;
-  // Of a parametric map: the most mappings of a frame to different real world values.
+  // The most mappings to different real world values that a frame of a parametric map has.
   std::uint32_t value_mappings = 0;
   std::optional<ValueTable> table;  // then `layout` has 16 unsigned bits
   std::vector<Frame> frames;

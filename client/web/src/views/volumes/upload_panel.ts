@@ -74,7 +74,7 @@ export class UploadPanel {
     }
   }
 
-  // Whether readAgain() can: the files of other uploads are gone.
+  // True if readAgain() works: the files of other uploads are gone.
   hasFileOf(id: string): boolean {
     return this.last?.id === id;
   }
