@@ -80,8 +80,21 @@ Difference difference_of(const TiffMeaning& meaning) {
           }};
 }
 
+// Spacing and calibration.
+void set_meaning(SourceVolume& source, const TiffMeaning& meaning) {
+  source.has_spacing = meaning.spacing.has_value();
+  if (meaning.spacing) source.geometry.spacing = *meaning.spacing;
+  source.layout.rescale = meaning.rescale;
+  if (!meaning.rescale) return;
+  source.notes.push_back(
+      note_of(NoteCode::kValuesRescaled,
+              "The samples were changed by the calibration of ImageJ in the TIFF's description. "
+              "Programs that ignore it show other values."));
+}
+
 Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   const TiffMeaning meaning = tiff.meaning();
+  check_pages(meaning, tiff.pages());
   Pages pages(meaning.slices, task);
   if (meaning.slices == 1)
     tiff.read(0, pages.check(), pages.sink());  // refused, whatever is chosen
@@ -90,25 +103,32 @@ Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   for (std::uint64_t slice = 0; slice < meaning.slices; ++slice) {
     tiff.read(meaning.page_of(source.chosen.index, slice), pages.check(), pages.sink());
   }
-  source.has_spacing = meaning.spacing.has_value();
-  if (meaning.spacing) source.geometry.spacing = *meaning.spacing;
-  source.layout.rescale = meaning.rescale;
-  if (meaning.rescale) {
-    source.notes.push_back(
-        note_of(NoteCode::kValuesRescaled,
-                "The samples were changed by the calibration of ImageJ in the TIFF's description. "
-                "Programs that ignore it show other values."));
-  }
+  set_meaning(source, meaning);
   source.notes.push_back(lps_assumed("A TIFF image"));
   return pages.write(std::move(source));
 }
 
-void read_page(const InputFile& file, Pages& pages) {
+TiffMeaning read_page(const InputFile& file, Pages& pages) {
   const std::string head = file.text(0, kSniffBytes);
-  if (is_png(head)) return read_png(file, pages.check(), pages.sink());
-  if (is_bmp(head)) return read_bmp(file, pages.check(), pages.sink());
+  if (is_png(head)) {
+    read_png(file, pages.check(), pages.sink());
+    return {};
+  }
+  if (is_bmp(head)) {
+    read_bmp(file, pages.check(), pages.sink());
+    return {};
+  }
   TiffFile tiff(file);
   tiff.read(0, pages.check(), pages.sink());
+  return tiff.meaning();
+}
+
+// All images of a volume have one calibration. Their spacing is known if all tell the same.
+void unite(TiffMeaning& all, const TiffMeaning& next) {
+  if (next.rescale != all.rescale) {
+    throw_unusable("Its values are calibrated otherwise than those of the images before it.");
+  }
+  if (next.spacing != all.spacing) all.spacing.reset();
 }
 
 void check_gaps(const std::vector<ImageFile>& files) {
@@ -145,15 +165,18 @@ Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
   SourceVolume source;
   choose_volume(1, {}, task.options, source);
   Pages pages(files.size(), task);
+  std::optional<TiffMeaning> all;
   for (const ImageFile& file : files) {
     try {
-      read_page(InputFile(file.path), pages);
+      const TiffMeaning meaning = read_page(InputFile(file.path), pages);
+      if (!all) all = meaning;
+      unite(*all, meaning);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kUnusableVolume || files.size() == 1) throw;
       throw error.with_detail(in_quotes(file.name) + ": " + error.what());
     }
   }
-  source.has_spacing = false;
+  set_meaning(source, all.value());
   source.notes.push_back(lps_assumed("A stack of images"));
   return pages.write(std::move(source));
 }

@@ -151,8 +151,10 @@ TiffMeaning imagej_meaning(std::string_view description, const TiffResolution& r
   return meaning;
 }
 
-TiffMeaning meaning_of(std::string_view description, const TiffResolution& resolution,
-                       std::uint64_t pages) {
+}  // namespace
+
+TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
+                         std::uint64_t pages) {
   const std::size_t pixels = description.find("<Pixels");
   if (pixels != std::string_view::npos && description.find("<OME") < pixels) {
     return ome_meaning(description, pixels);
@@ -162,8 +164,6 @@ TiffMeaning meaning_of(std::string_view description, const TiffResolution& resol
   meaning.slices = pages;
   return meaning;
 }
-
-}  // namespace
 
 std::uint64_t TiffMeaning::page_of(std::uint64_t volume, std::uint64_t slice) const {
   const std::uint64_t channel = volume % channels;
@@ -177,10 +177,8 @@ std::uint64_t TiffMeaning::page_of(std::uint64_t volume, std::uint64_t slice) co
   return page;
 }
 
-TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
-                         std::uint64_t pages) {
-  TiffMeaning meaning = meaning_of(description, resolution, pages);
-  if (meaning.pages() == pages) return meaning;
+void check_pages(const TiffMeaning& meaning, std::uint64_t pages) {
+  if (meaning.slices * meaning.channels * meaning.times == pages) return;
   throw_unusable("The TIFF's description tells of " + std::to_string(meaning.slices) + " slices, " +
                  std::to_string(meaning.channels) + " channels and " +
                  std::to_string(meaning.times) + " times, but the file has " +

@@ -22,7 +22,6 @@ struct TiffMeaning {
   std::optional<std::array<double, 3>> spacing = {};
   std::optional<Rescale> rescale = {};
 
-  std::uint64_t pages() const { return slices * channels * times; }
   // The page of a slice in the volume of that index; channels count before times.
   std::uint64_t page_of(std::uint64_t volume, std::uint64_t slice) const;
 };
@@ -34,9 +33,12 @@ struct TiffResolution {
 };
 
 // Without a description that is understood, all pages are slices. Throws Error kUnusableVolume if
-// the description contradicts the number of pages, or calibrates values by another function than a
-// straight line.
+// the description calibrates values by another function than a straight line.
 TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
                          std::uint64_t pages);
+
+// Throws Error kUnusableVolume if the meaning contradicts the number of pages of the file. Files of
+// one page each may tell of the whole volume.
+void check_pages(const TiffMeaning& meaning, std::uint64_t pages);
 
 }  // namespace isomesh::import

@@ -37,6 +37,8 @@ StoredType stored_type(SampleType type);
 struct Rescale {
   double slope = 1;
   double intercept = 0;
+
+  bool operator==(const Rescale&) const = default;
 };
 
 struct SampleLayout {

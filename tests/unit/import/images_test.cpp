@@ -50,7 +50,8 @@ TEST(TiffMeaning, PagesAreOrderedAsOmeSays) {
   const TiffMeaning meaning = tiff_meaning(ome, {}, 6);
   EXPECT_EQ(meaning.page_of(1, 2), 5);
   EXPECT_EQ(meaning.spacing, (Vector{0.0005, 0.0005, 2}));
-  EXPECT_TRUE(isomesh::test::thrown_by([&] { tiff_meaning(ome, {}, 5); }));
+  check_pages(meaning, 6);
+  EXPECT_TRUE(isomesh::test::thrown_by([&] { check_pages(meaning, 5); }));
 }
 
 TEST(TiffMeaning, ImageJCountsChannelsFirst) {
@@ -86,6 +87,31 @@ TEST(Tiff, ValuesAreCalibratedAsInImageJ) {
   EXPECT_THAT(of("cf=7\nc0=1\nc1=2\nc2=3\nc3=4\n").error, HasSubstr("its function \"7\""));
   EXPECT_THAT(of("cf=21\n").error, HasSubstr("Convert the image to 32 bits"));
   EXPECT_THAT(of("cf=0\nc0=1\nc1=0\n").error, HasSubstr("is not a straight line"));
+}
+
+TEST(Tiff, FilesOfAFolderHaveOneCalibrationAndSpacing) {
+  const auto of = [](const std::string& first, const std::string& second,
+                     const ImportOptions& options) {
+    return import_bytes(
+        zip({{"s1.tif", tiff({kFirst}, first)}, {"s2.tif", tiff({kSecond}, second)}}), {}, options);
+  };
+  const std::string signed_values = "ImageJ=1.53t\ncf=0\nc0=-32768\nc1=1\n";
+  const Outcome outcome = of(signed_values, signed_values, kSpaced);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(samples_of<float>(outcome)[0], static_cast<float>(kFirst[0]) - 32768);
+  EXPECT_THAT(codes_of(outcome), Contains("values-rescaled"));
+  EXPECT_THAT(of(signed_values, "ImageJ=1.53t\n", kSpaced).error,
+              HasSubstr("\"s2.tif\": Its values are calibrated otherwise"));
+  // Each file tells of the whole volume.
+  const auto ome = [](const std::string& between) {
+    return "<OME><Image><Pixels DimensionOrder='XYZCT' SizeZ='2' PhysicalSizeX='1000' "
+           "PhysicalSizeY='2000' PhysicalSizeZ='" +
+           between + "'/></Image></OME>";
+  };
+  const Outcome spaced = of(ome("3000"), ome("3000"), {});
+  ASSERT_EQ(spaced.error, "");
+  EXPECT_EQ(spaced.volume.geometry.spacing, (Vector{1, 2, 3}));
+  EXPECT_THAT(of(ome("3000"), ome("4000"), {}).error, HasSubstr("spacing=X,Y,Z"));
 }
 
 TEST(Tiff, PagesAreSlices) {
