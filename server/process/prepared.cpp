@@ -44,10 +44,9 @@ Child PreparedProcesses::take(std::chrono::steady_clock::time_point until) {
     return child;
   }
   --takers_;
-  if (stop_.stop_requested()) {
-    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-  }
-  throw Error(ErrorCode::kInternal, "A process could not be started.");
+  throw Error(ErrorCode::kUnavailable, stop_.stop_requested()
+                                           ? "the service is shutting down"
+                                           : "no process could be started in time");
 }
 
 void PreparedProcesses::renew() {

@@ -24,8 +24,8 @@ class PreparedProcesses {
   PreparedProcesses& operator=(const PreparedProcesses&) = delete;
 
   // Takes a prepared process, which is then replaced, or waits for one. Skips processes that have
-  // died. Retries failed starts, because a busy machine may recover. Throws Error kInternal if
-  // there is none by `until`, and kUnavailable after stop().
+  // died. Retries failed starts, because a busy machine may recover. Throws Error kUnavailable if
+  // there is none by `until`, and after stop().
   Child take(std::chrono::steady_clock::time_point until);
 
   // Call after input has crashed a process. Copies share addresses and stack guards. To prevent

@@ -63,7 +63,7 @@ TEST(Import, ASeriesIsChosenOnlyWhereThereIsOne) {
 }
 
 TEST(Import, LimitsAreThoseThatAreConfigured) {
-  const Daemon daemon({"--imports", "1", "--import-seconds", "1", "--import-memory", "64MiB"});
+  const Daemon daemon({"--imports", "1", "--import-seconds", "100", "--import-memory", "64MiB"});
   EXPECT_EQ(upload(daemon, sphere_upload()).format, "raw");
 }
 
