@@ -179,12 +179,13 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
     return unproven("The surface is not the whole one of the samples.");
   }
   const Metric metric = Metric(lattice.to_space).before(margin);
+  const double least = kLeastReach * options.max_error_mm;
+  const double unmoved =
+      options.max_error_mm - options.rounding_mm - rounding_of(field->dims, metric);
+  if (!(unmoved > least)) return unproven("Rounding of coordinates takes up the limit.");
   const double shift = shift_of(lattice, extract, *field, crossings.all, context);
-  const double reach =
-      options.max_error_mm - options.rounding_mm - shift - rounding_of(field->dims, metric);
-  if (!(reach > kLeastReach * options.max_error_mm)) {
-    return unproven("Rounding of coordinates takes up the limit.");
-  }
+  const double reach = unmoved - shift;
+  if (!(reach > least)) return unproven("Samples are too near to the iso-value for the limit.");
 
   const StartSurface surface = {*field,
                                 crossings.all,

@@ -150,9 +150,10 @@ Vecd zero_between(const Field& field, const Crossing& crossing) {
 template <class T>
 double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const Field& field,
                 std::span<const Crossing> crossings, const Context& context) {
-  const double of_caps = field.margin == 0 ? 0 : -kLargest / double{kPhantom};
   const Metric metric(lattice.to_space);
-  if (options.interpolation == Interpolation::kMidpoint) return of_caps * metric.largest_step();
+  const double of_caps =
+      field.margin == 0 ? 0 : -kLargest / double{kPhantom} * metric.largest_step();
+  if (options.interpolation == Interpolation::kMidpoint) return of_caps;
   const auto difference = [&](std::uint32_t sample) {
     const Vecd at = field.place(sample) - Vecd{1, 1, 1} * field.margin;
     const Dims& inner = lattice.dims;
@@ -171,11 +172,12 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
       const double p = field.values[inside];
       const double q = field.values[outside];
       const double placed = std::clamp(a / (a - b), kept, 1 - kept);
-      const double moved = std::abs(placed - p / (p - q));
+      const double moved = std::abs(placed - p / (p - q)) *
+                           length(metric.mm(field.place(outside) - field.place(inside)));
       if (!(moved <= most[chunk])) most[chunk] = moved;
     }
   });
-  return std::ranges::max(most) * metric.largest_step() * (1 + 1e-6);
+  return std::ranges::max(most) * (1 + 1e-6);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                          \

@@ -237,5 +237,20 @@ TEST(BoundTest, ClaimsNothingWhereItProvesNothing) {
   EXPECT_EQ(mesh.positions.size(), vertices);
 }
 
+TEST(BoundTest, TellsWhatTakesUpTheLimit) {
+  const auto why_not = [](const auto& volume, double iso, const BoundOptions& options) {
+    Mesh mesh = test::extracted(volume, {.iso = iso});
+    std::string why;
+    EXPECT_FALSE(simplify_within(volume.lattice(), {.iso = iso}, options, {}, mesh, why));
+    return why;
+  };
+  const auto sphere = test::sample<float>(test::sphere({8, 8, 8}, 6.3), {17, 17, 17});
+  EXPECT_EQ(why_not(sphere, 0, {.max_error_mm = 0.1, .rounding_mm = 0.09}),
+            "Rounding of coordinates takes up the limit.");
+  const auto beside = test::noise<double>({0.1, std::nextafter(0.1, 0.0), 1, -1}, {6, 7, 5}, 3);
+  EXPECT_EQ(why_not(beside, 0.1, {.max_error_mm = 0.5}),
+            "Samples are too near to the iso-value for the limit.");
+}
+
 }  // namespace
 }  // namespace isomesh::mesh
