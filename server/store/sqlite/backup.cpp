@@ -338,6 +338,7 @@ Copied restore(const fs::path& backup, const fs::path& data) {
   if (is_in(data, backup)) refuse(data, "is inside the backup");
   std::error_code error;
   const bool is_there = fs::exists(data, error);
+  if (fs::exists(data / kUnfinishedRestore, error)) refuse(data, kRestoreAgain);
   if (is_there && (!fs::is_directory(data, error) || !fs::is_empty(data, error))) {
     refuse(data, "is not empty: a backup is restored into a new folder");
   }
