@@ -229,7 +229,7 @@ int run(const Options& options, const sigset_t& signals) {
                                         .setup = {.threads = mesh::thread_count()}};
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
-  const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
+  const jobs::Housekeeper housekeeper(retention, library, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
   jobs::LabelLists labels(blobs);
   jobs::Estimator estimator(volumes, blobs, jobs, limits, job_program);

@@ -143,6 +143,7 @@ auto with_audit_trail(const Options& options, const OfFolder& of_folder, const O
       throw Error(ErrorCode::kNotFound, "the data folder has no data of isomeshd");
     }
     store::Connection connection(file, store::Connection::Mode::kRead);
+    store::refuse_moved(connection);
     return of_folder(connection);
   }
   store::postgresql::check_url(options.store);

@@ -133,6 +133,9 @@ TEST(Backup, ARestoreThatFailsLeavesNothing) {
   const Finished refused = run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "empty"});
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.errors, HasSubstr("restore again"));
+  const Finished again = isomeshd("restore", folder / "backup", folder / "empty");
+  EXPECT_EQ(again.status, 1);
+  EXPECT_THAT(again.errors, HasSubstr("was not restored completely"));
 }
 
 TEST(Backup, RefusesWhatWouldLoseSomething) {

@@ -53,6 +53,27 @@ TEST_F(LogTest, EveryRequestIsOneLine) {
   EXPECT_GT(lines[0]["ms"], 0);
 }
 
+// As a daemon that was killed between a deletion and the erasing leaves it. It erases these samples
+// itself and takes them for nothing that is to be put into quarantine.
+TEST(LogOfAStart, DoesNotTakeDeletedSamplesForFilesOfUnknownOrigin) {
+  const TemporaryFolder folder;
+  const std::filesystem::path data = folder / "data";
+  const std::string key(64, 'a');
+  {
+    Daemon daemon(data, "127.0.0.1:0");
+    EXPECT_EQ(daemon.stop(), 0);
+  }
+  std::filesystem::create_directories(data / "blobs/aa");
+  write_file(data / "blobs/aa" / key, "samples");
+  write_file(data / "erasing" / key, "");
+  Daemon daemon(data, "127.0.0.1:0");
+  EXPECT_TRUE(eventually([&] { return !std::filesystem::exists(data / "erasing" / key); }));
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_FALSE(std::filesystem::exists(data / "blobs/aa" / key));
+  EXPECT_TRUE(std::filesystem::is_empty(data / "quarantine"));
+  EXPECT_THAT(daemon.errors(), Not(HasSubstr("quarantine")));
+}
+
 TEST_F(LogTest, SoIsEveryJobThatEndsAndEveryVolumeThatIsRefused) {
   const Job job = finished_job(daemon_);
   daemon_.send("POST", "/v1/volumes", "garbage");

@@ -334,6 +334,17 @@ TEST_F(Cluster, AFolderIsMovedWithAllThatItHolds) {
   EXPECT_EQ(moved.status, 0) << moved.errors;
   EXPECT_THAT(moved.output, HasSubstr("moved 2 volumes, 3 jobs and 0 orders"));
   EXPECT_NE(move().status, 0) << "the database is not empty";
+  const std::string backup = folder_ / "backup";
+  for (const std::vector<std::string>& old :
+       {std::vector<std::string>{"backup", backup}, {"audit"}, {"audit", "--verify"}}) {
+    std::vector<std::string> command = {ISOMESHD};
+    command.insert(command.end(), old.begin(), old.end());
+    command.insert(command.end(), {"--data", data.string()});
+    const Finished refused = run(command);
+    EXPECT_EQ(refused.status, 1) << old.front();
+    EXPECT_THAT(refused.errors, HasSubstr("--store")) << old.front();
+  }
+  EXPECT_FALSE(std::filesystem::exists(backup));
   nodes_[0] = std::make_unique<Daemon>(
       data, "127.0.0.1:0", std::vector<std::string>{"--store", store_, "--workers", "2"});
   EXPECT_EQ(node(0).client().job(done.id), done);

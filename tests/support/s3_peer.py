@@ -14,7 +14,7 @@ standard output names. What tests tell it comes by POST /-/..., unsigned:
   /-/keys lists keys; /-/count?method=M&part=TEXT says how many such requests came; /-/uploads how many
   uploads in parts are open
 
-Kinds: status-503 and other numbers; cut: half of the body, then the end; flip: one byte is another; drop: no
+Kinds: status-503 and other numbers, also status-400-CODE; cut: half of the body, then the end; flip: one byte is another; drop: no
 answer, the connection ends; hang: no answer for long; forget: answered as if it were stored; ignore-range; more:
 bytes behind the object's; late: done, and then no answer.
 """
@@ -220,7 +220,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.close_connection = True
             return
         if fault and fault.startswith("status-"):
-            self.refuse(int(fault[7:]), "Told")
+            status, _, code = fault[7:].partition("-")
+            self.refuse(int(status), code or "Told")
             return
         try:
             self.check_signature(body)

@@ -19,16 +19,19 @@ inline store::LocalBlob intact_volume(const store::BlobStore& blobs, const std::
 }
 
 // Runs `make`, in which a process works on a file of intact_volume(). If `make` fails with
-// kInternal, verifies the blob again and throws kUnusableVolume if it is corrupt: a file truncated
-// meanwhile kills the process or is no canonical volume any more.
+// kInternal or kNotFound, verifies the blob again and throws kUnusableVolume if it is corrupt: a
+// file truncated meanwhile kills the process or is no canonical volume any more. A file that was
+// missing only for a moment is kUnavailable.
 template <class Make>
 auto make_from_volume(const store::BlobStore& blobs, const std::string& volume,
                       const std::stop_token& stop, const Make& make) {
   try {
     return make();
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kInternal) intact_volume(blobs, volume, stop);
-    throw;
+    const bool was_missing = error.code() == ErrorCode::kNotFound;
+    if (was_missing || error.code() == ErrorCode::kInternal) intact_volume(blobs, volume, stop);
+    if (!was_missing) throw;
+    throw Error(ErrorCode::kUnavailable, "the volume's file was missing for a moment: try again");
   }
 }
 

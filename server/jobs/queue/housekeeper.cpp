@@ -30,11 +30,13 @@ void enforce(store::Retention& retention) {
 
 }  // namespace
 
-Housekeeper::Housekeeper(store::Retention& retention, std::chrono::milliseconds interval)
-    : thread_([&retention, interval](const std::stop_token& stop) {
+Housekeeper::Housekeeper(store::Retention& retention, VolumeLibrary& library,
+                         std::chrono::milliseconds interval)
+    : thread_([&retention, &library, interval](const std::stop_token& stop) {
         Mutex mutex;
         Condition never;
         while (!stop.stop_requested()) {
+          library.finish_erasing();
           enforce(retention);
           Lock lock(mutex);
           never.wait_for(lock, stop, interval, [] { return false; });

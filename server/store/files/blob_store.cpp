@@ -9,6 +9,7 @@
 #include "base/files.h"
 #include "base/hex.h"
 #include "base/ids.h"
+#include "base/log.h"
 #include "base/sha256.h"
 #include "proto/error.h"
 #include "server/store/files/files.h"
@@ -24,6 +25,9 @@ constexpr std::chrono::minutes kBetweenForgetting{5};
 constexpr const char* kMark = "identity";
 // Free space required in a shared folder.
 constexpr std::uint64_t kLeastShared = std::uint64_t{64} << 20;
+
+// The database's name. SQLite's engine appends a number that grows.
+std::string name_in(const std::string& mark) { return mark.substr(0, mark.find_first_of(" \n")); }
 
 // A file's properties that change if it is written to or replaced; empty if it is missing.
 std::string traits_of(const std::filesystem::path& file) {
@@ -69,12 +73,67 @@ class FileReader : public BlobReader {
 
 }  // namespace
 
+bool FileBlobStore::is_there() const {
+  const std::string name = [&] {
+    const Lock lock(mark_mutex_);
+    return name_;
+  }();
+  std::error_code missing;
+  bool is = std::filesystem::is_directory(folders_.blobs, missing);
+  try {
+    is = is && (name.empty() || name_in(read_whole(folders_.blobs / kMark)) == name);
+  } catch (const Error& error) {
+    is = error.code() == ErrorCode::kUnavailable;  // no descriptors: that says nothing about it
+  }
+  const bool was_missing = is_missing_.exchange(!is);
+  if (!is && !was_missing) {
+    log_error(
+        "the storage of volumes and meshes is missing: the folder of --blobs is not there, or it "
+        "belongs to another database. Is it mounted? Jobs wait until it is back");
+  }
+  if (is && was_missing) log_info("the storage of volumes and meshes is back");
+  return is;
+}
+
+void FileBlobStore::check_is_there() const {
+  if (is_there()) return;
+  throw Error(ErrorCode::kUnavailable,
+              "the storage of volumes and meshes is missing; nothing is lost");
+}
+
+template <class Read>
+auto FileBlobStore::read_in_folder(const Read& read) const {
+  try {
+    return read();
+  } catch (const Error& error) {
+    const bool may_be_missing =
+        error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kInternal;
+    if (!holds_ || !may_be_missing) throw;
+  }
+  check_is_there();
+  return read();
+}
+
+template <class Write>
+auto FileBlobStore::write_in_folder(const Write& write) const {
+  try {
+    return write();
+  } catch (const Error& error) {
+    const bool is_missing = error.code() == ErrorCode::kNotFound;
+    if (!holds_ || (!is_missing && error.code() != ErrorCode::kInternal)) throw;
+    check_is_there();
+    if (!is_missing) throw;
+  }
+  throw Error(ErrorCode::kUnavailable,
+              "the storage of volumes and meshes was missing for a moment: try again");
+}
+
 class FileBlobStore::Writer : public BlobWriter {
  public:
   explicit Writer(FileBlobStore& store)
       : store_(store),
         path_(store.folders_.drafts / (random_hex(8) + ".blob")),
-        file_(File::create(path_)) {}
+        file_(store.write_in_folder([&] { return File::create(path_); })) {}
 
   ~Writer() override {
     std::error_code ignored;  // a committed blob has moved away
@@ -90,13 +149,16 @@ class FileBlobStore::Writer : public BlobWriter {
     store_.reserve_.check_room();  // the reserve must not be used for new blobs
     store_.room_.take(bytes.size());
     taken_ += bytes.size();
-    file_.write(bytes);
+    store_.write_in_folder([&] { file_.write(bytes); });
     digest_.update(bytes);
   }
 
   Blob commit() override {
     const std::string key = to_hex(digest_.finish());
-    store_.believe(key, store_.publish_as(path_, file_, key, bytes_));
+    // Another folder may be in the place of the shared one: nothing must be stored there.
+    if (store_.holds_) store_.check_is_there();
+    store_.believe(
+        key, store_.write_in_folder([&] { return store_.publish_as(path_, file_, key, bytes_); }));
     taken_ = 0;
     return {key, bytes_};
   }
@@ -156,8 +218,9 @@ bool FileBlobStore::responds() const {
   return health_.passes(kForHowLong, kPatience, [this] {
     try {
       holds_->held(std::chrono::nanoseconds(0));
-      return true;
+      return is_there();
     } catch (const Error&) {
+      is_there();  // for the log
       return false;
     }
   });
@@ -173,10 +236,14 @@ bool FileBlobStore::is_empty() const {
 
 std::string FileBlobStore::mark() const {
   const std::filesystem::path place = folders_.blobs / kMark;
-  return std::filesystem::exists(place) ? read_whole(place) : "";
+  std::string text = std::filesystem::exists(place) ? read_whole(place) : "";
+  const Lock lock(mark_mutex_);
+  if (name_.empty()) name_ = name_in(text);
+  return text;
 }
 
 void FileBlobStore::set_mark(const std::string& text) {
+  if (holds_) check_is_there();
   const ScratchFolder scratch(folders_.drafts);
   const std::filesystem::path draft = scratch.path() / kMark;
   {
@@ -186,6 +253,8 @@ void FileBlobStore::set_mark(const std::string& text) {
   }
   move_to(draft, folders_.blobs / kMark);
   sync_folder(folders_.blobs);
+  const Lock lock(mark_mutex_);
+  name_ = name_in(text);
 }
 
 bool FileBlobStore::has_room() const {
@@ -244,7 +313,7 @@ void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob)
 }
 
 std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
-  return std::make_unique<FileReader>(File::open(found(key)));
+  return read_in_folder([&] { return std::make_unique<FileReader>(File::open(found(key))); });
 }
 
 LocalBlob FileBlobStore::local(const std::string& key) const {
@@ -263,7 +332,7 @@ bool is_there_and_intact(const BlobStore& blobs, const std::string& key,
 }
 
 bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
-  const std::filesystem::path place = found(key);
+  const std::filesystem::path place = read_in_folder([&] { return found(key); });
   const std::string traits = traits_of(place);
   {
     Lock lock(intact_mutex_);
@@ -277,8 +346,10 @@ bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& sto
     under_check_.insert(key);
   }
   const CheckUnderWay check(*this, key);
-  const bool is_intact = digest_of(File::open(place), stop).key == key;
-  if (is_intact) believe(key, traits);
+  const File file = read_in_folder([&] { return File::open(found(key)); });
+  const bool is_intact = digest_of(file, stop).key == key;
+  // Without properties, the shared folder was missing a moment ago.
+  if (is_intact && !traits.empty()) believe(key, traits);
   return is_intact;
 }
 
@@ -293,6 +364,13 @@ void FileBlobStore::believe(const std::string& key, const std::string& traits) c
 }
 
 std::optional<std::uint64_t> FileBlobStore::size(const std::string& key) const {
+  const auto bytes = read_in_folder([&] { return size_now(key); });
+  if (bytes || !holds_) return bytes;
+  check_is_there();
+  return size_now(key);
+}
+
+std::optional<std::uint64_t> FileBlobStore::size_now(const std::string& key) const {
   std::error_code absent;
   const std::uintmax_t bytes = std::filesystem::file_size(found(key), absent);
   if (absent) return std::nullopt;
@@ -303,12 +381,18 @@ void FileBlobStore::erase(const std::string& key) {
   const std::filesystem::path place = found(key);
   const std::uint64_t bytes = size_of(place);
   std::error_code ignored;
-  if (std::filesystem::remove(place, ignored)) room_.give(bytes);
+  if (std::filesystem::remove(place, ignored)) {
+    room_.give(bytes);
+  } else if (holds_) {
+    check_is_there();
+  }
 }
 
 std::filesystem::path FileBlobStore::found(const std::string& key) const {
   const std::filesystem::path place = path_of(key);
-  if (std::filesystem::exists(place)) return place;
+  std::error_code error;
+  if (std::filesystem::exists(place, error)) return place;
+  if (error) throw_system_error("finding a file", error.value());
   std::error_code absent;
   std::filesystem::rename(folders_.quarantine / key, place, absent);
   return place;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <map>
@@ -35,7 +36,7 @@ class FileBlobStore : public BlobStore {
     room_.limit(max_bytes, std::move(make));
   }
 
-  // For a shared folder: creates and removes a file.
+  // For a shared folder: creates and removes a file, and compares the mark.
   bool responds() const override;
   bool is_shared() const override { return holds_.has_value(); }
   bool is_empty() const override;
@@ -79,6 +80,20 @@ class FileBlobStore : public BlobStore {
     Steady when;
   };
 
+  // False if a shared folder is missing or another one is in its place: it may not be mounted. The
+  // log says once when it is missing and once when it is back.
+  bool is_there() const;
+  // Throws Error kUnavailable unless is_there().
+  void check_is_there() const;
+  // Returns the result of `read`. If that fails in a shared folder, checks that the folder is there
+  // and reads once more, because the folder may have been missing for a moment.
+  template <class Read>
+  auto read_in_folder(const Read& read) const;
+  // Returns the result of `write`. In a shared folder, a missing file means that the folder is
+  // missing: throws Error kUnavailable.
+  template <class Write>
+  auto write_in_folder(const Write& write) const;
+  std::optional<std::uint64_t> size_now(const std::string& key) const;
   void believe(const std::string& key, const std::string& traits) const;
   // Publishes `path`, open as `file`, as a blob. `taken` bytes are already taken from the room.
   // Returns the properties of the published file.
@@ -108,6 +123,10 @@ class FileBlobStore : public BlobStore {
   Reserve& reserve_;
   std::optional<FolderHolds> holds_;  // only for a shared folder
   mutable HealthCheck health_;
+  mutable std::atomic<bool> is_missing_ = false;  // the shared folder, by the last look
+  mutable Mutex mark_mutex_;
+  // The database's name in the mark, as read or written first; empty if there is none yet.
+  mutable std::string name_ ISOMESH_GUARDED_BY(mark_mutex_);
   Room room_;
   // Held while a file is moved to its place or is swept, so that a sweep never erases a file that
   // was just stored again.

@@ -37,7 +37,13 @@ void FileBlobStore::mark_named(const std::string& key) {
 }
 
 std::set<std::string> FileBlobStore::held(std::chrono::nanoseconds oldest) const {
-  return holds_ ? holds_->held(oldest) : std::set<std::string>();
+  if (!holds_) return {};
+  try {
+    return holds_->held(oldest);
+  } catch (const Error&) {
+    check_is_there();
+    throw;
+  }
 }
 
 std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::string> keys,
@@ -76,8 +82,9 @@ bool FileBlobStore::put_aside(const std::string& key) {
     move_to(path_of(key), folders_.quarantine / key);
   } catch (const Error& error) {
     // Another daemon on this folder was faster.
-    if (holds_ && error.code() == ErrorCode::kNotFound) return false;
-    throw;
+    if (!holds_ || error.code() != ErrorCode::kNotFound) throw;
+    check_is_there();
+    return false;
   }
   return true;
 }

@@ -54,8 +54,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
   if (error) throw Error(ErrorCode::kInternal, "the data folder: " + error.message());
 
   if (std::filesystem::exists(root_ / kUnfinishedRestore, error)) {
-    throw Error(ErrorCode::kUnavailable,
-                root_.string() + " was not restored completely: empty it and restore again");
+    throw Error(ErrorCode::kUnavailable, root_.string() + ' ' + kRestoreAgain);
   }
   lock_ = ::open((root_ / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {

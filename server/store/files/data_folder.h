@@ -12,6 +12,9 @@ namespace isomesh::store {
 
 // Exists in a data folder while a backup is being restored into it.
 inline constexpr const char* kUnfinishedRestore = "restoring";
+// Follows the name of such a folder in errors.
+inline constexpr const char* kRestoreAgain =
+    "was not restored completely: empty it and restore again";
 
 // The folders of a FileBlobStore.
 struct BlobFolders {

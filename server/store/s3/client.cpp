@@ -27,9 +27,30 @@ constexpr int kMostPages = 100'000;
 // S3 allows 10 000.
 constexpr std::uint64_t kMostParts = 9'000;
 
-[[noreturn]] void throw_silent() {
+bool is_out_of_space(long status, std::string_view code) {
+  constexpr std::array<std::string_view, 3> kCodes = {"XMinioStorageFull", "QuotaExceeded",
+                                                      "XMinioAdminBucketQuotaExceeded"};
+  return status == kS3InsufficientStorage || std::ranges::find(kCodes, code) != kCodes.end();
+}
+
+// Throws for a response that no request should get: it is the storage's fault, not the job's.
+[[noreturn]] void reject(const S3Response& response) {
+  const std::string code = s3_error_code(response.text);
+  if (response.status == 0 || response.status / 100 == 2) {  // silent, or it sends too little
+    log_error("the storage does not respond");
+    throw Error(ErrorCode::kUnavailable,
+                "the storage of volumes and meshes does not respond; nothing is lost");
+  }
+  log_error("the storage rejected a request with status {} {}", response.status, code);
+  if (is_out_of_space(response.status, code)) {
+    throw Error(ErrorCode::kOutOfSpace, "the storage of volumes and meshes has no space left");
+  }
+  if (response.status == kS3Forbidden) {
+    throw Error(ErrorCode::kUnavailable,
+                "the storage of volumes and meshes denies access to this service; nothing is lost");
+  }
   throw Error(ErrorCode::kUnavailable,
-              "the storage of volumes and meshes does not respond; nothing is lost");
+              "the storage of volumes and meshes rejects requests; nothing is lost");
 }
 
 // Pauses between repeated requests; each is twice as long as the one before.
@@ -45,9 +66,9 @@ class Pauses {
     end_ = Clock::now() + patience_;
   }
 
-  // Throws if the time is over or `stop` is requested.
-  void wait(const std::stop_token& stop) {
-    if (Clock::now() + next_ > end_) throw_silent();
+  // Throws if the time is over, because of the last `response`, or if `stop` is requested.
+  void wait(const S3Response& response, const std::stop_token& stop) {
+    if (Clock::now() + next_ > end_) reject(response);
     const auto until = Clock::now() + next_;
     constexpr std::chrono::milliseconds kLook{20};
     while (Clock::now() < until) {
@@ -64,9 +85,20 @@ class Pauses {
   Clock::time_point end_;
 };
 
-bool is_worth_repeating(long status) {
+// Credentials are read again for each attempt, so a token that has expired may have been replaced.
+bool is_worth_repeating(const S3Response& response) {
   constexpr std::array kPassing = {0L, 408L, kS3Conflict, 429L, 500L, 502L, 503L, 504L};
-  return std::ranges::find(kPassing, status) != kPassing.end();
+  if (std::ranges::find(kPassing, response.status) != kPassing.end()) return true;
+  if (response.status != kS3BadRequest) return false;
+  const std::string code = s3_error_code(response.text);
+  return code == "RequestTimeout" || code == "ExpiredToken";
+}
+
+// Conditions are not supported by every peer.
+bool is_answer(const S3Request& request, long status) {
+  if (status / 100 == 2 || status == kS3NotFound) return true;
+  const bool is_about_condition = status == kS3PreconditionFailed || status == kS3NotImplemented;
+  return is_about_condition && !request.condition.empty();
 }
 
 }  // namespace
@@ -76,22 +108,12 @@ S3Response S3Client::ask(const S3Request& request, const std::stop_token& stop) 
   for (int attempts = 1;; ++attempts) {
     S3Response response = connections_.attempt(request, stop);
     response.attempts = attempts;
-    if (is_worth_repeating(response.status)) {
-      pauses.wait(stop);
+    if (is_worth_repeating(response)) {
+      pauses.wait(response, stop);
       continue;
     }
-    const bool is_told = response.status == kS3NotFound ||
-                         response.status == kS3PreconditionFailed ||
-                         response.status == kS3NotImplemented;
-    if (response.status / 100 == 2 || is_told) return response;
-    log_error("the storage rejected a request with status {} {}", response.status,
-              s3_error_code(response.text));
-    if (response.status == kS3Forbidden) {
-      throw Error(
-          ErrorCode::kUnavailable,
-          "the storage of volumes and meshes denies access to this service; nothing is lost");
-    }
-    throw Error(ErrorCode::kInternal, "the storage rejected a request");
+    if (!is_answer(request, response.status)) reject(response);
+    return response;
   }
 }
 
@@ -110,7 +132,8 @@ std::optional<std::uint64_t> S3Client::size(const std::string& key) const {
   if (response.status == kS3NotFound) return std::nullopt;
   const auto bytes = parse_uint64(response.header("content-length"));
   if (response.status != kS3Ok || !bytes) {
-    throw Error(ErrorCode::kInternal, "the storage does not give the size of a file");
+    throw Error(ErrorCode::kUnavailable,
+                "the storage of volumes and meshes does not give the size of a file");
   }
   return bytes;
 }
@@ -126,6 +149,7 @@ bool S3Client::put_file(const std::string& key, const File& file, const Blob& bl
       if (is_stored) put_in_parts(key, file, blob);
     } else {
       const S3Response response = put_at_once(key, file, blob, if_there);
+      if (response.status == kS3NotFound) reject(response);  // the bucket is missing
       is_stored = response.status / 100 == 2;
     }
     // A successful PUT does not prove that the object is stored.
@@ -154,8 +178,10 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
   const S3Response begun = ask({.method = "POST", .key = key, .query = "uploads="});
   const S3Text text = read_s3_text(begun.text);
   const std::string id(text.find("UploadId"));
-  if (begun.status != kS3Ok || id.empty()) {
-    throw Error(ErrorCode::kInternal, "the storage does not accept multipart uploads");
+  if (begun.status != kS3Ok) reject(begun);
+  if (id.empty()) {
+    throw Error(ErrorCode::kUnavailable,
+                "the storage of volumes and meshes does not accept multipart uploads");
   }
   const std::string upload = "uploadId=" + uri_escaped(id);
   try {
@@ -214,9 +240,8 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
 }
 
 void S3Client::put_text(const std::string& key, std::string_view text) {
-  if (ask({.method = "PUT", .key = key, .text = text}).status / 100 != 2) {
-    throw Error(ErrorCode::kInternal, "the storage did not accept a small file");
-  }
+  const S3Response response = ask({.method = "PUT", .key = key, .text = text});
+  if (response.status == kS3NotFound) reject(response);  // the bucket is missing
 }
 
 std::optional<std::string> S3Client::get_text(const std::string& key) const {
@@ -234,15 +259,14 @@ void S3Client::get(const std::string& key, std::uint64_t bytes, const S3Sink& si
     if (done > 0) request.condition = "Range: bytes=" + std::to_string(done) + '-';
     const S3Response response = connections_.attempt(request, stop);
     done += response.taken;
-    if (response.status == kS3NotFound)
+    if (response.status == kS3NotFound) {
+      if (!responds()) reject(response);  // a missing bucket also looks like a missing object
       throw Error(ErrorCode::kNotFound, "the file does not exist");
-    if (done == bytes) return;
-    if (response.status == kS3Forbidden) {
-      throw Error(ErrorCode::kUnavailable,
-                  "the storage of volumes and meshes denies access to this service");
     }
+    if (done == bytes) return;
+    if (response.status == kS3Forbidden) reject(response);
     if (response.taken > 0) pauses.start_over();
-    pauses.wait(stop);
+    pauses.wait(response, stop);
   }
 }
 
@@ -283,7 +307,7 @@ S3Listing S3Client::list(const std::string& beginning) const {
       if (name == "Key") {
         // If the peer lists other objects than requested, they must not be swept.
         if (!value.starts_with(options_.address.prefix + beginning)) {
-          throw Error(ErrorCode::kInternal, "the storage lists objects that were not requested");
+          throw Error(ErrorCode::kUnavailable, "the storage lists objects that were not requested");
         }
         all.objects.push_back({.key = value.substr(options_.address.prefix.size())});
       }
@@ -295,7 +319,7 @@ S3Listing S3Client::list(const std::string& beginning) const {
     if (all.objects.empty() || all.objects.back().key == last) break;
     last = all.objects.back().key;
   }
-  throw Error(ErrorCode::kInternal, "a list of the storage does not end");
+  throw Error(ErrorCode::kUnavailable, "a list of the storage does not end");
 }
 
 bool S3Client::has_any(const std::string& beginning) const {

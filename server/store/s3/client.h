@@ -30,9 +30,10 @@ struct S3Listing {
 enum class IfThere { kKeep, kReplace };
 
 // Keys have plain characters only and no prefix. Requests are repeated, with growing pauses, while
-// the peer does not respond, disconnects or is busy. Throws Error kUnavailable if that continues or
-// the peer denies access; kInternal for other rejections and invalid responses. Messages contain
-// neither credentials nor text of the peer. Thread safe.
+// the peer does not respond, disconnects or is busy. Throws Error kUnavailable if that continues,
+// and for all other rejections and invalid responses: they are never the fault of a job or an
+// upload. Throws kOutOfSpace if the peer is full. The log has the status and the peer's code;
+// messages contain neither credentials nor text of the peer. Thread safe.
 class S3Client {
  public:
   explicit S3Client(S3ClientOptions options) : options_(std::move(options)) {}

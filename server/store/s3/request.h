@@ -59,11 +59,13 @@ struct S3Request {
 // Statuses with a specific meaning.
 inline constexpr long kS3Ok = 200;
 inline constexpr long kS3Partial = 206;
+inline constexpr long kS3BadRequest = 400;
 inline constexpr long kS3Forbidden = 403;
 inline constexpr long kS3NotFound = 404;
 inline constexpr long kS3Conflict = 409;
 inline constexpr long kS3PreconditionFailed = 412;
 inline constexpr long kS3NotImplemented = 501;
+inline constexpr long kS3InsufficientStorage = 507;
 
 struct S3Response {
   long status = 0;                                  // 0: none, or the transfer was aborted

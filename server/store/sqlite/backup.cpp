@@ -21,6 +21,7 @@
 #include "proto/error.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/files/files.h"
+#include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/sqlite.h"
 
 namespace isomesh::store {
@@ -306,6 +307,10 @@ void give_to(uid_t user, gid_t group, const fs::path& folder) {
 
 Copied back_up(const fs::path& data, const fs::path& named) {
   check_is_data_folder(data);
+  {
+    Connection connection(data / kRecords, Connection::Mode::kRead);
+    refuse_moved(connection);
+  }
   std::error_code error;
   // Shell completion appends a slash to a folder's name.
   const fs::path target = named.has_filename() ? named : named.parent_path();
@@ -333,6 +338,7 @@ Copied restore(const fs::path& backup, const fs::path& data) {
   if (is_in(data, backup)) refuse(data, "is inside the backup");
   std::error_code error;
   const bool is_there = fs::exists(data, error);
+  if (fs::exists(data / kUnfinishedRestore, error)) refuse(data, kRestoreAgain);
   if (is_there && (!fs::is_directory(data, error) || !fs::is_empty(data, error))) {
     refuse(data, "is not empty: a backup is restored into a new folder");
   }

@@ -43,6 +43,13 @@ std::int64_t newest_record(Connection& connection) {
                   "quarantine, and jobs whose files are missing can be submitted again");
 }
 
+[[noreturn]] void throw_moved() {
+  throw Error(ErrorCode::kUnavailable,
+              "the records of the data folder were moved to a PostgreSQL database by `isomeshd "
+              "move`: name it with --store. To continue with the old records that are still in "
+              "the folder, start once with --adopt");
+}
+
 }  // namespace
 
 void mark_as_moved(Database& database, const std::string& name) {
@@ -51,6 +58,12 @@ void mark_as_moved(Database& database, const std::string& name) {
     transaction->run("INSERT INTO identity VALUES(?, ?, 0)", name, kMoved);
   }
   transaction.commit();
+}
+
+void refuse_moved(Connection& connection) {
+  // Records of an older version lack the table.
+  if (!connection.query("SELECT 1 FROM sqlite_schema WHERE name = 'identity'").next()) return;
+  if (connection.query("SELECT 1 FROM identity WHERE number = ?", kMoved).next()) throw_moved();
 }
 
 Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides& overrides,
@@ -112,12 +125,7 @@ Identity::Mark Identity::mark_of_blobs() const {
 }
 
 void Identity::check(const Mark& records, const Mark& blobs) const {
-  if (records.number == kMoved) {
-    throw Error(ErrorCode::kUnavailable,
-                "the records of the data folder were moved to a PostgreSQL database by `isomeshd "
-                "move`: name it with --store. To continue with the old records that are still in "
-                "the folder, start once with --adopt");
-  }
+  if (records.number == kMoved) throw_moved();
   const bool is_recorded = [&] {
     const Reading reading(database_.reader());
     return has_records(reading.connection());

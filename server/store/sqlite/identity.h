@@ -15,6 +15,10 @@ namespace isomesh::store {
 // none. Identity then refuses them: what they accepted would be lost there.
 void mark_as_moved(Database& database, const std::string& name);
 
+// Throws Error kUnavailable if the records are marked so. For commands that read them without
+// Identity: they would copy or print an old state as if it were the present one.
+void refuse_moved(Connection& connection);
+
 // Ensures that the database and the blobs belong together, and provides a believed clock. Both
 // carry the same name, and a number that grows as data is stored: after a mix-up, a sweep would
 // remove all blobs that the database does not name. Thread safe; its dependencies must outlive it.

@@ -105,6 +105,30 @@ TEST_F(WorkersTest, AJobThatFindsNoDescriptorIsPutBackUncharged) {
   EXPECT_EQ(account.attempts, 0);
 }
 
+// A shared folder that is not mounted for a while damages no volume.
+TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
+  const Volume volume = add_sphere();
+  std::filesystem::create_directory(folder_ / "shared");
+  store::FileBlobStore shared(store::shared_blob_folders(folder_ / "shared"), data_.reserve());
+  shared.set_mark("ours 1\n");
+  const std::string bytes = blob(volume.id);
+  const auto writer = shared.begin();
+  writer->write(test::as_span(bytes));
+  writer->commit();
+  std::filesystem::rename(folder_ / "shared", folder_ / "elsewhere");
+  const std::string id = submit(parameters_of(volume, 0));
+  const Workers workers(threads(1), jobs_, volumes_, shared);
+  EXPECT_TRUE(eventually([&] {
+    return jobs_.events("", id, 0, milliseconds(0)).size() >= 3 &&
+           jobs_.get("", id).state != JobState::kRunning;
+  }));
+  EXPECT_EQ(jobs_.get("", id).state, JobState::kQueued);
+  EXPECT_EQ(jobs_.account(id).attempts, 0);
+  std::filesystem::rename(folder_ / "elsewhere", folder_ / "shared");
+  EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kSucceeded);
+  EXPECT_EQ(jobs_.account(id).attempts, 1);
+}
+
 TEST_F(WorkersTest, AJobThatTakesTooLongFails) {
   WorkerOptions options = threads(1);
   options.longest_job = std::chrono::minutes(0);

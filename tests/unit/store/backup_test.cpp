@@ -11,12 +11,15 @@
 #include "server/store/sql/order_store.h"
 #include "server/store/sql/received_store.h"
 #include "server/store/sqlite/database.h"
+#include "server/store/sqlite/identity.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 
 namespace isomesh::store {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 // A data folder with an image that a peer has sent and an object that an order is about to send.
@@ -65,6 +68,20 @@ TEST_F(BackupOfAHospitalTest, HasWhatWasReceivedAndWhatIsToBeSent) {
   EXPECT_EQ(restore(folder_ / "backup", folder_ / "restored"), copied);
   EXPECT_EQ(test::read_file(blob("restored", image_)), "an image");
   EXPECT_EQ(test::read_file(blob("restored", object_)), "an object");
+}
+
+// They would be old ones, and look like a good backup.
+TEST_F(BackupOfAHospitalTest, OfRecordsThatWereMovedIsRefused) {
+  {
+    const DataFolder data(root());
+    Database database(data);
+    mark_as_moved(database, "of the blobs");
+  }
+  const auto error = test::thrown_by([&] { back_up(root(), folder_ / "backup"); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error->what(), HasSubstr("--store"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "backup"));
 }
 
 TEST_F(BackupOfAHospitalTest, SaysWhichOfThemIsDamagedOrMissing) {

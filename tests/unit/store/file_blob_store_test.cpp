@@ -1,11 +1,14 @@
+#include <functional>
 #include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/log.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/files/files.h"
 #include "tests/support/errors.h"
@@ -234,6 +237,82 @@ TEST_F(SharedFolder, DoesNotAnswerOnceItIsGone) {
   FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
   std::filesystem::remove_all(folder_ / "shared");
   EXPECT_FALSE(blobs.responds());
+}
+
+// A folder that is not mounted for a while is no damage, and nothing is stored in its place.
+class MovedAway : public SharedFolder, public testing::WithParamInterface<const char*> {
+ protected:
+  std::filesystem::path shared() const { return folder_ / "shared"; }
+
+  void move_away() {
+    std::filesystem::rename(shared(), folder_ / "elsewhere");
+    const std::string instead = GetParam();
+    if (instead == "Empty") std::filesystem::create_directory(shared());
+    if (instead == "Another") {
+      std::filesystem::create_directory(shared());
+      FileBlobStore(shared_blob_folders(shared()), data_.reserve()).set_mark("another 1\n");
+    }
+  }
+
+  void move_back() {
+    std::filesystem::remove_all(shared());
+    std::filesystem::rename(folder_ / "elsewhere", shared());
+  }
+
+  std::string store_hello(FileBlobStore& blobs) {
+    const auto writer = blobs.begin();
+    writer->write(as_span("hello"));
+    std::string key = writer->commit().key;
+    blobs.mark_named(key);
+    return key;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Instead, MovedAway, testing::Values("Nothing", "Empty", "Another"),
+                         [](const auto& instead) { return std::string(instead.param); });
+
+TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
+  FileBlobStore blobs(shared_blob_folders(shared()), data_.reserve());
+  blobs.set_mark("ours 1\n");
+  store_hello(blobs);
+  const auto begun = blobs.begin();
+  begun->write(as_span("begun"));
+  const auto nothing = [](const std::string& /*key*/) { return false; };
+  const auto later = Steady::clock::now() + std::chrono::hours(1);
+  const std::string key = kHello;
+  const std::vector<std::function<void()>> all = {
+      [&] { blobs.open(key); },
+      [&] { blobs.local(key); },
+      [&] { blobs.size(key); },
+      [&] { blobs.is_intact(key, {}); },
+      [&] { is_there_and_intact(blobs, key, {}); },
+      [&] { blobs.erase(key); },
+      [&] { blobs.erase_unnamed(std::span(&key, 1), later, nothing); },
+      [&] { store_hello(blobs); },
+      [&] { begun->commit(); },
+      [&] { blobs.set_mark("ours 2\n"); }};
+  start_log(LogFormat::kText, LogLevel::kInfo);
+  testing::internal::CaptureStderr();
+  move_away();
+  const auto files = [this] {
+    return std::filesystem::exists(shared()) ? test::files_below(shared())
+                                             : std::vector<std::string>();
+  };
+  const auto before = files();
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    EXPECT_EQ(code_thrown_by(all[n]), ErrorCode::kUnavailable) << n;
+  }
+  EXPECT_FALSE(blobs.responds());
+  EXPECT_EQ(files(), before);
+  move_back();
+  EXPECT_EQ(blobs.open(key)->size(), 5U);
+  EXPECT_TRUE(blobs.is_intact(key, {}));
+  EXPECT_EQ(store_hello(blobs), key);
+  EXPECT_EQ(code_thrown_by([&] { blobs.local(std::string(64, '0')); }), ErrorCode::kNotFound);
+  const std::string log = testing::internal::GetCapturedStderr();
+  start_log(LogFormat::kText, LogLevel::kOff);
+  EXPECT_THAT(log, testing::MatchesRegex("[^\n]* error [^\n]*storage[^\n]* is missing[^\n]*\n"
+                                         "[^\n]* info [^\n]*storage[^\n]* is back[^\n]*\n"));
 }
 
 TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {

@@ -98,6 +98,55 @@ TEST_F(S3Blobs, AnAnswerThatThePeerIsBusyIsAskedAgain) {
   EXPECT_EQ(get(key), "hello");
 }
 
+TEST_F(S3Blobs, NoRefusalIsTheFaultOfABlob) {
+  const std::string key = put_elsewhere("hello");
+  for (const int status :
+       {301, 302, 307, 400, 401, 403, 404, 405, 410, 411, 412, 418, 431, 451, 501, 505, 511, 599}) {
+    const std::string what = "status-" + std::to_string(status);
+    peer().fail(what);
+    EXPECT_EQ(code_thrown_by([&] { put(what); }), ErrorCode::kUnavailable) << status;
+    EXPECT_EQ(code_thrown_by([&] { blobs_->open(key); }), ErrorCode::kUnavailable) << status;
+    EXPECT_EQ(code_thrown_by([&] { blobs_->is_intact(key, {}); }), ErrorCode::kUnavailable)
+        << status;
+    EXPECT_EQ(code_thrown_by([&] { blobs_->sweep({}, {}); }), ErrorCode::kUnavailable) << status;
+    peer().recover();
+    peer().fail(what, 0, "PUT", "/blobs/");
+    EXPECT_EQ(code_thrown_by([&] { put(what); }), ErrorCode::kUnavailable) << status;
+    peer().recover();
+    EXPECT_EQ(get(put_elsewhere(what)), what) << status;
+  }
+  EXPECT_EQ(get(key), "hello");
+}
+
+TEST_F(S3Blobs, AFullServiceIsOutOfSpace) {
+  for (const char* what : {"status-507", "status-507-XMinioStorageFull", "status-403-QuotaExceeded",
+                           "status-400-XMinioAdminBucketQuotaExceeded"}) {
+    for (const char* part : {"/holds/", "/blobs/"}) {
+      peer().fail(what, 0, "PUT", part);
+      EXPECT_EQ(code_thrown_by([&] { put("hello"); }), ErrorCode::kOutOfSpace) << what << part;
+      peer().recover();
+    }
+  }
+  EXPECT_EQ(get(put("hello")), "hello");
+}
+
+TEST_F(S3Blobs, AnExpiredTokenIsReplacedMeanwhile) {
+  for (const char* what : {"status-400-ExpiredToken", "status-400-RequestTimeout"}) {
+    peer().fail(what, 3, "PUT");
+    EXPECT_EQ(get(put_elsewhere(what)), what);
+  }
+}
+
+// Whoever looks for a blob must not take it for damaged.
+TEST_F(S3Blobs, ABucketThatIsGoneBetweenTwoRequestsLosesNothing) {
+  const std::string key = put_elsewhere("hello");
+  peer().fail("status-404", 0, "GET");
+  EXPECT_EQ(code_thrown_by([&] { is_there_and_intact(*blobs_, key, {}); }),
+            ErrorCode::kUnavailable);
+  peer().recover();
+  EXPECT_EQ(get(key), "hello");
+}
+
 TEST_F(S3Blobs, AConnectionThatBreaksIsMadeAgain) {
   peer().fail("drop", 2);
   const std::string key = put_elsewhere("hello");
