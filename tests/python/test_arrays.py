@@ -75,6 +75,8 @@ class Arrays(DaemonTest):
             (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
             (object(), {}, TypeError, "object"),
             ("/no/such/file.nii", {}, FileNotFoundError, "/no/such/file.nii"),
+            ("", {}, FileNotFoundError, "empty"),
+            ([""], {}, FileNotFoundError, "empty"),
             (b"", {"affine": numpy.eye(4)}, ValueError, "for arrays"),
         ]
         for source, more, kind, text in wrong:

@@ -60,6 +60,13 @@ def of_paths(paths: Sequence[Path]) -> Body:
     return _tar(members, name)
 
 
+def _path(source: Union[str, os.PathLike[str]]) -> Path:
+    if source == "":
+        # A Path would make it the working folder, and that would be uploaded.
+        raise FileNotFoundError("the path of the file to upload is empty")
+    return Path(source)
+
+
 def _files_of(path: Path) -> List[Tuple[str, Path]]:
     if path.is_dir():
         return _files_below(path)
@@ -224,11 +231,11 @@ def of_source(
     """The body for anything that `Client.upload` accepts."""
     is_array = False
     if isinstance(source, (str, os.PathLike)):
-        body = of_paths([Path(source)])
+        body = of_paths([_path(source)])
     elif isinstance(source, (bytes, bytearray)) or type(source) is memoryview:
         body = of_bytes(source)
     elif isinstance(source, (list, tuple)) and source and all(isinstance(p, (str, os.PathLike)) for p in source):
-        body = of_paths([Path(each) for each in source])
+        body = of_paths([_path(each) for each in source])
     else:
         is_array = True
         if hasattr(source, "dataobj") and hasattr(source, "affine"):
