@@ -110,7 +110,7 @@ class Client:
         """
         keywords = locals()
         parameters = given(keywords)
-        of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(keywords[each])}
+        of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(each, keywords[each])}
         if affine_space != "ras":
             of_upload["affine_space"] = affine_space
         stored = self._stored(source, of_upload)
@@ -158,7 +158,7 @@ class Client:
         affine    for an array: the 4 x 4 matrix that maps its indices to millimetres
         affine_space  the space of `affine`: "ras" (nibabel, NIfTI) or "lps" (DICOM, ITK)
         spacing   for an array, instead of `affine`, and for a file that gives none: millimetres between
-                  samples along each axis
+                  samples along each axis. An array with neither has 1 mm, as raw samples have
         raw       for a path or bytes: describes them as raw samples
         name      the volume's name. Default: the name of the file or of its series
 
@@ -413,8 +413,10 @@ def _why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
     return f"there is none at the iso-value {iso:g}"
 
 
-def _is_empty(value: Any) -> bool:
-    return value is None or isinstance(value, (str, tuple, list)) and not value
+def _is_empty(keyword: str, value: Any) -> bool:
+    """True for a keyword's default. An empty place is no default but an error."""
+    is_place = keyword in ("affine", "spacing")
+    return value is None or not is_place and isinstance(value, (str, tuple, list)) and not value
 
 
 def _id_of(thing: Any) -> str:

@@ -187,17 +187,29 @@ class Raw:
     big_endian: bool = False
 
     def query(self) -> Dict[str, str]:
-        def joined(numbers: Sequence[float]) -> str:
-            return ",".join(repr(float(number)) for number in numbers)
-
         return {
             "dims": ",".join(str(int(each)) for each in self.dims),
             "type": self.type,
-            "spacing": joined(self.spacing),
-            "origin": joined(self.origin),
-            "direction": joined(self.direction),
+            "spacing": _joined(steps_of(self.spacing)),
+            "origin": _joined(self.origin),
+            "direction": _joined(self.direction),
             "byte_order": "big" if self.big_endian else "little",
         }
+
+
+def _joined(numbers: Sequence[float]) -> str:
+    return ",".join(repr(float(number)) for number in numbers)
+
+
+def steps_of(spacing: Any) -> Tuple[float, float, float]:
+    """The three lengths of a `spacing` that a caller gave."""
+    try:
+        steps = [] if isinstance(spacing, (str, bytes)) else [float(step) for step in spacing]
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"spacing must be three numbers, not {spacing!r}") from error
+    if len(steps) != 3 or not all(math.isfinite(step) and step > 0 for step in steps):
+        raise ValueError(f"spacing must be three positive numbers, the millimetres along x, y and z, not {spacing!r}")
+    return (steps[0], steps[1], steps[2])
 
 
 def placed(affine: Any, space: str) -> Dict[str, Any]:
@@ -251,7 +263,7 @@ def of_source(
     if raw is not None:
         body.query = raw.query()
     if not is_array and spacing is not None:
-        body.query = {**body.query, "spacing": ",".join(repr(float(each)) for each in spacing)}
+        body.query = {**body.query, "spacing": _joined(steps_of(spacing))}
     return body
 
 
@@ -268,8 +280,9 @@ def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Se
     if affine is not None and spacing is not None:
         raise ValueError("give either affine or spacing, not both")
     if affine is None:
-        steps = spacing or (1, 1, 1)
-        affine = [[float(steps[row]) if row == column else 0.0 for column in range(4)] for row in range(3)]
+        # The default is that of raw samples.
+        steps = (1.0, 1.0, 1.0) if spacing is None else steps_of(spacing)
+        affine = [[steps[row] if row == column else 0.0 for column in range(4)] for row in range(3)]
         space = "lps"
     x, y, z = samples.shape
     raw = Raw((x, y, z), target.name, **placed(affine, space))
