@@ -10,7 +10,7 @@ from unittest import mock
 
 import isomesh
 import numpy
-from support import DAEMON, DaemonTest, Relay, UploadRelay, ball
+from support import DAEMON, Canned, DaemonTest, Relay, UploadRelay, ball
 
 
 class Files(DaemonTest):
@@ -300,6 +300,26 @@ class Connections(DaemonTest):
         job["mesh"]["files"]["ply"]["sha256"] = "0" * 64
         with self.assertRaises(isomesh.WrongAnswer):
             self.client.fetch(job)
+
+    def test_an_answer_without_its_members_is_wrong(self):
+        job = {"id": "j", "state": "succeeded", "volume": "v", "mesh": None, "error": None}
+        note = {"id": "v", "range": [0, 1], "notes": [{"code": "x"}]}
+        calls = (
+            lambda client: client.volume("v"), lambda client: client.histogram("v"), lambda client: client.labels("v"),
+            lambda client: client.rename("v", "name"), lambda client: list(client.volumes()),
+            lambda client: client.upload(ball()), lambda client: client.mesh(ball(), iso=-8),
+            lambda client: client.job("j"), lambda client: list(client.jobs()), lambda client: client.wait("j"),
+            lambda client: list(client.job_labels("j")), lambda client: client.cancel("j"),
+            lambda client: client.submit("v", iso=1), lambda client: client.estimate("v", iso=1),
+            lambda client: client.fetch("j"),
+        )
+        for body in ({}, [], {"jobs": [{}], "next": None}, note):
+            with Canned(body) as server:
+                for call in calls:
+                    with self.assertRaises(isomesh.WrongAnswer):
+                        call(isomesh.Client(server.url))
+        with Canned(job) as server, self.assertRaisesRegex(isomesh.WrongAnswer, "'mesh' is missing"):
+            isomesh.Client(server.url).wait("j")
 
     def test_no_server(self):
         for server in ("http://127.0.0.1:1", f"unix:{self.folder}/nothing"):
