@@ -330,6 +330,9 @@ class Connections(DaemonTest):
                 isomesh.Client(server)
         with self.assertRaises(ValueError):
             isomesh.Client(token="a\r\nb")
+        for authorities, reason in (("/no/such.pem", "cannot be read: No such file"), (__file__, "is not a PEM file")):
+            with self.assertRaisesRegex(ValueError, f"^authorities: {authorities} {reason}"):
+                isomesh.Client("https://127.0.0.1:1", authorities=authorities)
 
     def test_the_environment_says_where_and_who(self):
         with mock.patch.dict(os.environ, {"ISOMESH_SERVER": self.url, "http_proxy": "http://127.0.0.1:1"}):
