@@ -71,6 +71,10 @@ class Arrays(DaemonTest):
         large[0, 0, 0] = 0
         self.assertEqual(self.client.upload(large)["range"], [0, 2**32 - 1])
 
+    def test_a_mask_that_hides_nothing_is_no_obstacle(self):
+        bare = numpy.ma.masked_array(ball(), mask=False)
+        self.assertEqual(self.client.upload(bare)["id"], self.client.upload(ball())["id"])
+
     def test_what_cannot_be_sent_is_refused_with_the_reason(self):
         wrong = [
             (numpy.full((2, 2, 2), 2**40), {}, ValueError, "do not fit"),
@@ -82,6 +86,7 @@ class Arrays(DaemonTest):
             (ball(), {"affine": numpy.eye(4), "affine_space": "mni"}, ValueError, "'ras' or 'lps'"),
             (ball(), {"affine": numpy.eye(4) * numpy.nan}, ValueError, "finite"),
             (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
+            (numpy.ma.masked_less(ball(), -10), {}, ValueError, "filled"),
             (object(), {}, TypeError, "object"),
             ("/no/such/file.nii", {}, FileNotFoundError, "/no/such/file.nii"),
             (ball(), {"spacing": (-1, 1, 1)}, ValueError, "spacing must be three positive"),

@@ -276,6 +276,9 @@ def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Se
         samples = samples[..., 0]
     if samples.ndim != 3 or samples.size == 0:
         raise ValueError(f"the array must have three axes and no empty one; its shape is {samples.shape}")
+    if numpy.any(getattr(samples, "mask", False)):
+        # The values under a mask mean nothing, and only the caller knows what to mesh there.
+        raise ValueError("the array has masked samples; fill them, for example with array.filled(0)")
     target = _sendable(numpy, samples)
     if affine is not None and spacing is not None:
         raise ValueError("give either affine or spacing, not both")
