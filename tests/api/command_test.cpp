@@ -299,6 +299,18 @@ TEST_F(CommandTest, SaysWhenItsOutputCannotBeWritten) {
   }
 }
 
+TEST_F(CommandTest, LeavesNothingOfAMeshBeyondTheFileSizeLimit) {
+  std::filesystem::create_directory(folder_ / "limited");
+  const Finished result =
+      run({"sh", "-c",
+           std::string("ulimit -f 1; ") + ISOMESH + " --server " + daemon_.url() + " mesh '" +
+               (folder_ / "sphere.raw").string() + "' --dims 21,20,19 --type uint8 --iso 100 -o '" +
+               (folder_ / "limited" / "out.stl").string() + "'"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("out.stl: File too large"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "limited"));
+}
+
 TEST_F(CommandTest, EraseTakesVolumesAndTellsOfThoseThatAreNone) {
   const std::string volume = upload();
   const Finished erased = daemon_.command({"erase", "0123", volume});
