@@ -351,6 +351,10 @@ TEST(CommandOnItsOwn, MeshesWithoutAServerAndLeavesNothing) {
   EXPECT_GT(read_file(folder / "out.stl").size(), 1000U);
   EXPECT_TRUE(std::filesystem::is_empty(folder / "tmp"));
 
+  const Finished lost = run(words, {"TMPDIR=/no/such/folder"});
+  EXPECT_EQ(lost.status, 1);
+  EXPECT_THAT(lost.errors, HasSubstr("TMPDIR=/no/such/folder: No such file"));
+
   words.insert(words.end(), {"--daemon", "/bin/false"});
   const Finished broken = run(words, environment);
   EXPECT_EQ(broken.status, 3);
