@@ -182,7 +182,8 @@ class Parser {
   }
 
  private:
-  // The library's "--iso excludes --labels" and "--passes: 1 required N missing" in plain words.
+  // The library's "--iso excludes --labels", "--passes: 1 required N missing" and "--passes: At
+  // Most 1 required but received 2" in plain words.
   static std::string in_words(const CLI::ParseError& error) {
     constexpr std::string_view kExcludes = " excludes ";
     std::string text = error.what();
@@ -192,6 +193,8 @@ class Parser {
     } else if (error.get_name() == "ArgumentMismatch") {
       const std::size_t at = text.find(": 1 required ");
       if (at != std::string::npos) text = text.substr(0, at) + " needs a value";
+      const std::size_t most = text.find(": At Most 1 required ");
+      if (most != std::string::npos) text = text.substr(0, most) + " can only be given once";
     }
     return text;
   }

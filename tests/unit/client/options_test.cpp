@@ -208,6 +208,12 @@ TEST_F(OptionsTest, RefusesWrongUsage) {
   }
 }
 
+TEST_F(OptionsTest, SaysThatAnOptionWasGivenTwice) {
+  const auto [status, text] = ending_of({"submit", "abc", "--passes", "1", "--passes", "2"});
+  EXPECT_EQ(status, kWrongUsage);
+  EXPECT_THAT(text, HasSubstr("--passes can only be given once"));
+}
+
 TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   const std::string help = ending_of({"submit", "--help"}).second;
   JobParameters parameters;
