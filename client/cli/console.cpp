@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <mutex>
@@ -74,7 +75,7 @@ void tell_folders(const std::vector<std::filesystem::path>& files) {
 // Downloads to a file first, so that only a complete mesh is written.
 void fetch_to_stdout(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
                      std::optional<std::int64_t> label) {
-  const ScratchFile file(std::filesystem::temp_directory_path(), ".mesh");
+  const ScratchFile file(temporary_folder(), ".mesh");
   fetch(client, id, {file.path(), output.format}, bar, label);
   std::ifstream mesh(file.path(), std::ios::binary);
   std::vector<char> block(std::size_t{1} << 20);
@@ -93,6 +94,20 @@ Client client_of(const Options& options, const std::stop_token& stop) {
                  .token = options.token,
                  .authorities = options.authorities,
                  .stop = stop});
+}
+
+std::filesystem::path temporary_folder() {
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (!error) return folder;
+  std::string place = "/tmp";
+  // The variables that the library looks at; it prefers the last of them.
+  for (const std::string name : {"TEMPDIR", "TEMP", "TMP", "TMPDIR"}) {
+    if (const char* const value = std::getenv(name.c_str())) place = name + '=' + value;
+  }
+  throw Error(ErrorCode::kInvalidParameter,
+              "the folder for temporary files cannot be used: " + place + ": " + error.message() +
+                  "; set TMPDIR to an existing folder");
 }
 
 void complain(const std::string& message) {

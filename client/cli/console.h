@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -14,6 +15,10 @@
 namespace isomesh::cli {
 
 Client client_of(const Options& options, const std::stop_token& stop);
+
+// The folder for temporary files. Throws Error kInvalidParameter with its name if it is not a
+// folder.
+std::filesystem::path temporary_folder();
 
 // A line on standard error. Safe to call from several threads.
 void complain(const std::string& message);

@@ -15,6 +15,7 @@
 #include "base/descriptor.h"
 #include "base/files.h"
 #include "base/text.h"
+#include "client/cli/console.h"
 #include "proto/error.h"
 
 namespace isomesh::cli {
@@ -74,7 +75,7 @@ std::string first_line(int pipe) {
 
 LocalDaemon::LocalDaemon(const fs::path& program, int jobs) {
   const fs::path found = find_program(program);
-  std::string folder = (fs::temp_directory_path() / "isomesh-XXXXXX").string();
+  std::string folder = (temporary_folder() / "isomesh-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr) {
     throw Error(ErrorCode::kInvalidParameter, "a temporary folder cannot be created: " + folder);
   }

@@ -25,6 +25,8 @@ int main(int argc, char** argv) {
   using namespace isomesh::cli;
   // If the reader of the output ends, writing fails instead of ending the process.
   std::signal(SIGPIPE, SIG_IGN);
+  // The same for a file beyond `ulimit -f`, so that the unfinished file is removed.
+  std::signal(SIGXFSZ, SIG_IGN);
   const Interrupt interrupt;
   int status = kRefused;
   try {

@@ -56,7 +56,7 @@ void cancel_after_stop(const Options& options, const std::string& id) {
 
 // Copies standard input to a file, because an upload states its size first.
 std::unique_ptr<ScratchFile> stdin_as_file() {
-  auto file = std::make_unique<ScratchFile>(std::filesystem::temp_directory_path(), ".volume");
+  auto file = std::make_unique<ScratchFile>(temporary_folder(), ".volume");
   std::vector<char> block(std::size_t{1} << 20);
   while (const std::size_t count = std::fread(block.data(), 1, block.size(), stdin)) {
     file->write(std::as_bytes(std::span(block).first(count)));

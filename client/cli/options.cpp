@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "base/command_line/completion.h"
 #include "base/command_line/help.h"
@@ -53,6 +54,15 @@ void add_id(CLI::App& app, Options& options, const std::string& name) {
 void add_allow_empty(CLI::App& app, Options& options) {
   app.add_flag("--allow-empty", options.allow_empty,
                "Exit with status 0 instead of 1 if the surface is empty");
+}
+
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(nlohmann::json(text).dump());
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
 }
 
 class Parser {
@@ -168,6 +178,7 @@ class Parser {
       wrong_usage(in_words(error) + "\n" + help_of_command());
     }
     describe_itself();
+    check_text();
     options_.outputs = outputs_from(outputs_);
     // A dry run may have formats without files.
     if (options_.outputs.empty() && !outputs_.formats.empty()) {
@@ -182,7 +193,8 @@ class Parser {
   }
 
  private:
-  // The library's "--iso excludes --labels" and "--passes: 1 required N missing" in plain words.
+  // The library's "--iso excludes --labels", "--passes: 1 required N missing" and "--passes: At
+  // Most 1 required but received 2" in plain words.
   static std::string in_words(const CLI::ParseError& error) {
     constexpr std::string_view kExcludes = " excludes ";
     std::string text = error.what();
@@ -192,6 +204,8 @@ class Parser {
     } else if (error.get_name() == "ArgumentMismatch") {
       const std::size_t at = text.find(": 1 required ");
       if (at != std::string::npos) text = text.substr(0, at) + " needs a value";
+      const std::size_t most = text.find(": At Most 1 required ");
+      if (most != std::string::npos) text = text.substr(0, most) + " can only be given once";
     }
     return text;
   }
@@ -257,6 +271,18 @@ class Parser {
                     "The program isomeshd, if it is neither beside isomesh nor in PATH")
         ->envname("ISOMESHD")
         ->type_name("FILE");
+  }
+
+  // JSON would silently hold another text. The names of files and of an archive's members may be in
+  // any encoding.
+  void check_text() const {
+    for (const CLI::Option* option : app_.get_subcommands().front()->get_options()) {
+      const std::string type = option->get_type_name();
+      if (type == "FILE" || type == "OUT" || option->check_name("--member")) continue;
+      if (!std::ranges::all_of(option->results(), is_utf8)) {
+        wrong_usage(option->get_name() + ": is not UTF-8; this is the encoding of all texts");
+      }
+    }
   }
 
   void check_mesh() const {

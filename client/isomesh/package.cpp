@@ -249,6 +249,7 @@ std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>
 }
 
 UploadBody::UploadBody(const std::vector<std::filesystem::path>& paths) {
+  if (paths.empty()) throw Error(ErrorCode::kInvalidParameter, "there are no files to upload");
   const std::vector<PackedFile> files = files_of_upload(paths);
   if (files.size() == 1 && !fs::is_directory(paths.front())) {
     add_file(files.front().path, InputFile::chosen(files.front().path).size());

@@ -35,7 +35,7 @@ std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>
 class UploadBody {
  public:
   // Reads the sizes of all files. Throws Error kInvalidParameter with the name of an unreadable
-  // file.
+  // file, and for no paths.
   explicit UploadBody(const std::filesystem::path& path)
       : UploadBody(std::vector<std::filesystem::path>{path}) {}
   explicit UploadBody(const std::vector<std::filesystem::path>& paths);

@@ -5,8 +5,9 @@ import { basename, extname } from 'node:path';
 import { ApiError, choicesOf, Client } from 'isomesh';
 
 const [file, iso, target] = process.argv.slice(2);
-if (!target) {
-  console.error('Usage: node mesh.mjs FILE ISO OUT');
+// Number('') is 0.
+if (!target || iso.trim() === '' || !Number.isFinite(Number(iso))) {
+  console.error('Usage: node mesh.mjs FILE ISO OUT, with a number for ISO');
   process.exit(2);
 }
 const { ISOMESH_SERVER: server = 'http://127.0.0.1:8080', ISOMESH_TOKEN: token } = process.env;

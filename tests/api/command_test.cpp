@@ -299,6 +299,18 @@ TEST_F(CommandTest, SaysWhenItsOutputCannotBeWritten) {
   }
 }
 
+TEST_F(CommandTest, LeavesNothingOfAMeshBeyondTheFileSizeLimit) {
+  std::filesystem::create_directory(folder_ / "limited");
+  const Finished result =
+      run({"sh", "-c",
+           std::string("ulimit -f 1; ") + ISOMESH + " --server " + daemon_.url() + " mesh '" +
+               (folder_ / "sphere.raw").string() + "' --dims 21,20,19 --type uint8 --iso 100 -o '" +
+               (folder_ / "limited" / "out.stl").string() + "'"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("out.stl: File too large"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "limited"));
+}
+
 TEST_F(CommandTest, EraseTakesVolumesAndTellsOfThoseThatAreNone) {
   const std::string volume = upload();
   const Finished erased = daemon_.command({"erase", "0123", volume});
@@ -338,6 +350,10 @@ TEST(CommandOnItsOwn, MeshesWithoutAServerAndLeavesNothing) {
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_GT(read_file(folder / "out.stl").size(), 1000U);
   EXPECT_TRUE(std::filesystem::is_empty(folder / "tmp"));
+
+  const Finished lost = run(words, {"TMPDIR=/no/such/folder"});
+  EXPECT_EQ(lost.status, 1);
+  EXPECT_THAT(lost.errors, HasSubstr("TMPDIR=/no/such/folder: No such file"));
 
   words.insert(words.end(), {"--daemon", "/bin/false"});
   const Finished broken = run(words, environment);

@@ -1,5 +1,7 @@
 """A real daemon for each test class, and a server that breaks."""
 
+import http.server
+import json
 import os
 import shutil
 import socket
@@ -145,6 +147,39 @@ class UploadRelay(Relay):
             return
         for side in (client, server):
             side.shutdown(socket.SHUT_RDWR)
+
+
+class Canned:
+    """A server whose response to every request is the same JSON."""
+
+    def __init__(self, value):
+        body = json.dumps(value).encode()
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def respond(self):
+                self.rfile.read(int(self.headers.get("Content-Length", 0)))
+                self.send_response(200)
+                self.send_header("Content-Length", str(len(body)))
+                self.end_headers()
+                self.wfile.write(body)
+
+            do_GET = do_POST = do_PATCH = do_DELETE = respond
+
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.url = f"http://127.0.0.1:{self.server.server_address[1]}"
+        self.thread = threading.Thread(target=self.server.serve_forever, daemon=True)
+        self.thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.server.shutdown()
+        self.server.server_close()
+        self.thread.join(60)
 
 
 def ball(size=(40, 32, 24), radius=9.0, spacing=(1.0, 1.0, 1.0)):

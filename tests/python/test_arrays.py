@@ -42,6 +42,15 @@ class Arrays(DaemonTest):
         self.assertEqual(self.client.upload(nibabel.load(file))["id"], of_file["id"])
         self.assertEqual(of_file["name"], "ball.nii.gz")
 
+    def test_a_spacing_may_be_an_array(self):
+        spacing = numpy.array([0.5, 0.75, 1.25])
+        volume = self.client.upload(ball(), spacing=spacing)
+        self.assertEqual(volume["spacing"], spacing.tolist())
+        self.assertEqual(volume["id"], self.client.upload(ball(), affine=numpy.diag([-0.5, -0.75, 1.25, 1]))["id"])
+        self.assertEqual(self.client.upload(ball())["spacing"], [1, 1, 1], "without one, as raw samples")
+        with self.assertRaisesRegex(ValueError, "spacing"):
+            self.client.mesh(ball(), spacing=[], iso=-8)
+
     def test_samples_keep_their_type_and_values(self):
         for name in ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"):
             with self.subTest(name):
@@ -62,6 +71,10 @@ class Arrays(DaemonTest):
         large[0, 0, 0] = 0
         self.assertEqual(self.client.upload(large)["range"], [0, 2**32 - 1])
 
+    def test_a_mask_that_hides_nothing_is_no_obstacle(self):
+        bare = numpy.ma.masked_array(ball(), mask=False)
+        self.assertEqual(self.client.upload(bare)["id"], self.client.upload(ball())["id"])
+
     def test_what_cannot_be_sent_is_refused_with_the_reason(self):
         wrong = [
             (numpy.full((2, 2, 2), 2**40), {}, ValueError, "do not fit"),
@@ -73,8 +86,20 @@ class Arrays(DaemonTest):
             (ball(), {"affine": numpy.eye(4), "affine_space": "mni"}, ValueError, "'ras' or 'lps'"),
             (ball(), {"affine": numpy.eye(4) * numpy.nan}, ValueError, "finite"),
             (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
+            (numpy.ma.masked_less(ball(), -10), {}, ValueError, "filled"),
             (object(), {}, TypeError, "object"),
             ("/no/such/file.nii", {}, FileNotFoundError, "/no/such/file.nii"),
+            (ball(), {"spacing": (-1, 1, 1)}, ValueError, "spacing must be three positive"),
+            (ball(), {"spacing": (1, 1, 1, 9)}, ValueError, "spacing"),
+            (ball(), {"spacing": (1, 1)}, ValueError, "spacing"),
+            (ball(), {"spacing": []}, ValueError, "spacing"),
+            (ball(), {"spacing": "123"}, ValueError, "spacing"),
+            (ball(), {"spacing": 1}, TypeError, "spacing"),
+            (ball(), {"spacing": (1, 2, float("inf"))}, ValueError, "spacing"),
+            (b"", {"spacing": "123"}, ValueError, "spacing"),
+            (b"", {"raw": isomesh.Raw((1, 1, 1), "uint8", spacing=(1, 1))}, ValueError, "spacing"),
+            ("", {}, FileNotFoundError, "empty"),
+            ([""], {}, FileNotFoundError, "empty"),
             (b"", {"affine": numpy.eye(4)}, ValueError, "for arrays"),
         ]
         for source, more, kind, text in wrong:

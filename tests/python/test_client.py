@@ -10,7 +10,7 @@ from unittest import mock
 
 import isomesh
 import numpy
-from support import DAEMON, DaemonTest, Relay, UploadRelay, ball
+from support import DAEMON, Canned, DaemonTest, Relay, UploadRelay, ball
 
 
 class Files(DaemonTest):
@@ -301,6 +301,26 @@ class Connections(DaemonTest):
         with self.assertRaises(isomesh.WrongAnswer):
             self.client.fetch(job)
 
+    def test_an_answer_without_its_members_is_wrong(self):
+        job = {"id": "j", "state": "succeeded", "volume": "v", "mesh": None, "error": None}
+        note = {"id": "v", "range": [0, 1], "notes": [{"code": "x"}]}
+        calls = (
+            lambda client: client.volume("v"), lambda client: client.histogram("v"), lambda client: client.labels("v"),
+            lambda client: client.rename("v", "name"), lambda client: list(client.volumes()),
+            lambda client: client.upload(ball()), lambda client: client.mesh(ball(), iso=-8),
+            lambda client: client.job("j"), lambda client: list(client.jobs()), lambda client: client.wait("j"),
+            lambda client: list(client.job_labels("j")), lambda client: client.cancel("j"),
+            lambda client: client.submit("v", iso=1), lambda client: client.estimate("v", iso=1),
+            lambda client: client.fetch("j"),
+        )
+        for body in ({}, [], {"jobs": [{}], "next": None}, note):
+            with Canned(body) as server:
+                for call in calls:
+                    with self.assertRaises(isomesh.WrongAnswer):
+                        call(isomesh.Client(server.url))
+        with Canned(job) as server, self.assertRaisesRegex(isomesh.WrongAnswer, "'mesh' is missing"):
+            isomesh.Client(server.url).wait("j")
+
     def test_no_server(self):
         for server in ("http://127.0.0.1:1", f"unix:{self.folder}/nothing"):
             with self.subTest(server), self.assertRaisesRegex(isomesh.Unreachable, "cannot be reached"):
@@ -310,6 +330,9 @@ class Connections(DaemonTest):
                 isomesh.Client(server)
         with self.assertRaises(ValueError):
             isomesh.Client(token="a\r\nb")
+        for authorities, reason in (("/no/such.pem", "cannot be read: No such file"), (__file__, "is not a PEM file")):
+            with self.assertRaisesRegex(ValueError, f"^authorities: {authorities} {reason}"):
+                isomesh.Client("https://127.0.0.1:1", authorities=authorities)
 
     def test_the_environment_says_where_and_who(self):
         with mock.patch.dict(os.environ, {"ISOMESH_SERVER": self.url, "http_proxy": "http://127.0.0.1:1"}):

@@ -208,6 +208,29 @@ TEST_F(OptionsTest, RefusesWrongUsage) {
   }
 }
 
+TEST_F(OptionsTest, SaysThatAnOptionWasGivenTwice) {
+  const auto [status, text] = ending_of({"submit", "abc", "--passes", "1", "--passes", "2"});
+  EXPECT_EQ(status, kWrongUsage);
+  EXPECT_THAT(text, HasSubstr("--passes can only be given once"));
+}
+
+TEST_F(OptionsTest, TextsAreUtf8) {
+  EXPECT_EQ(parse({"rename", "abc", "Gr\u00f6\u00dfe \"1\""}).name, "Gr\u00f6\u00dfe \"1\"");
+  for (const std::vector<const char*>& arguments :
+       {std::vector<const char*>{"rename", "abc", "\xff"},
+        std::vector<const char*>{"upload", file_.c_str(), "--name",
+                                 "Gr\xf6\xdf"
+                                 "e"}}) {
+    const auto [status, text] = ending_of(arguments);
+    EXPECT_EQ(status, kWrongUsage) << arguments.front();
+    EXPECT_THAT(text, HasSubstr(arguments.front()[0] == 'r' ? "NAME: is not UTF-8"
+                                                            : "--name: is not UTF-8"));
+  }
+  const std::string latin = (folder_ / "gr\xf6.nii").string();
+  test::write_file(latin, "x");
+  EXPECT_EQ(parse({"upload", latin.c_str()}).files.front(), latin);
+}
+
 TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   const std::string help = ending_of({"submit", "--help"}).second;
   JobParameters parameters;

@@ -99,6 +99,13 @@ TEST(UploadBody, OfAnEmptyFolderIsRefused) {
   EXPECT_THAT(error.what(), HasSubstr("contains no files"));
 }
 
+TEST(UploadBody, OfNoPathsIsRefused) {
+  const Error error =
+      test::error_of([] { Client({.server = "http://127.0.0.1:1"}).upload_all({}); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+  EXPECT_THAT(error.what(), HasSubstr("no files"));
+}
+
 TEST(UploadBody, OfAHeaderTakesItsDataAlong) {
   const test::TemporaryFolder folder;
   for (const char* name : {"head.raw", "1.raw", "2.raw", "a b.raw"})

@@ -8,10 +8,10 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
-from . import ply, uploads
+from . import answers, ply, uploads
 from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
 from .exchange import Exchange
 from .files import FINAL_STATES, file_of, format_of, written
@@ -110,7 +110,7 @@ class Client:
         """
         keywords = locals()
         parameters = given(keywords)
-        of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(keywords[each])}
+        of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(each, keywords[each])}
         if affine_space != "ras":
             of_upload["affine_space"] = affine_space
         stored = self._stored(source, of_upload)
@@ -158,7 +158,7 @@ class Client:
         affine    for an array: the 4 x 4 matrix that maps its indices to millimetres
         affine_space  the space of `affine`: "ras" (nibabel, NIfTI) or "lps" (DICOM, ITK)
         spacing   for an array, instead of `affine`, and for a file that gives none: millimetres between
-                  samples along each axis
+                  samples along each axis. An array with neither has 1 mm, as raw samples have
         raw       for a path or bytes: describes them as raw samples
         name      the volume's name. Default: the name of the file or of its series
 
@@ -177,23 +177,24 @@ class Client:
         """Stores every volume of a file, folder or archive. Each item of the result has the `volume`,
         or the `problem` for which the server rejected it."""
         body = uploads.of_source(source, None, "ras", None, None)
-        answers = self._exchange.upload(body, name, {"accept": ",".join(accept), "nifti_form": nifti_form})
-        for each in answers:
+        uploaded = self._exchange.upload(body, name, {"accept": ",".join(accept), "nifti_form": nifti_form})
+        for each in uploaded:
             if each["volume"]:
                 warn_of_notes(each["volume"]["notes"], each["member"] or body.name)
-        return answers
+        return uploaded
 
     def volume(self, volume: Union[str, api.Volume]) -> api.Volume:
         """The server's description of a stored volume."""
-        return cast("api.Volume", self._exchange.get(_volume_path(volume)))
+        return cast("api.Volume", self._exchange.get(_volume_path(volume), answers.VOLUME))
 
     def volumes(self) -> Iterator[api.Volume]:
         """All stored volumes, the oldest first."""
-        return cast("Iterator[api.Volume]", self._exchange.pages("/v1/volumes", "volumes", {}))
+        return cast("Iterator[api.Volume]", self._exchange.pages("/v1/volumes", "volumes", answers.VOLUME, {}))
 
     def rename(self, volume: Union[str, api.Volume], name: Optional[str]) -> api.Volume:
         """Gives a volume another name; None removes its name."""
-        return cast("api.Volume", self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}))
+        renamed = self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}, answers.VOLUME)
+        return cast("api.Volume", renamed)
 
     def erase(self, volume: Union[str, api.Volume]) -> None:
         """Deletes a volume from the server."""
@@ -201,12 +202,13 @@ class Client:
 
     def histogram(self, volume: Union[str, api.Volume], bins: int = 256) -> api.Histogram:
         """How many samples have a value in each of `bins` equal intervals."""
-        return cast("api.Histogram", self._exchange.get(f"{_volume_path(volume)}/histogram?bins={int(bins)}"))
+        target = f"{_volume_path(volume)}/histogram?bins={int(bins)}"
+        return cast("api.Histogram", self._exchange.get(target, answers.HISTOGRAM))
 
     def labels(self, volume: Union[str, api.Volume], background: int = 0) -> api.VolumeLabels:
         """The labels of a segmentation, with their voxels, volumes, names and colours."""
         query = {"background": str(int(background))}
-        labels = list(self._exchange.pages(f"{_volume_path(volume)}/labels", "labels", query))
+        labels = list(self._exchange.pages(f"{_volume_path(volume)}/labels", "labels", answers.LABEL, query))
         return {"volume": _id_of(volume), "background": int(background), "labels": labels, "next": None}
 
     # --- Jobs ------------------------------------------------------------------------------------
@@ -242,11 +244,12 @@ class Client:
 
     def job(self, job: Union[str, AnyJob]) -> api.Job:
         """The job as it is now."""
-        return cast("api.Job", self._exchange.get(_job_path(job)))
+        return cast("api.Job", self._exchange.get(_job_path(job), answers.JOB))
 
     def jobs(self, state: Optional[api.JobState] = None) -> Iterator[api.Job]:
         """All jobs, or all jobs in one state, the newest first."""
-        return cast("Iterator[api.Job]", self._exchange.pages("/v1/jobs", "jobs", {"state": state} if state else {}))
+        query: Dict[str, str] = {"state": state} if state else {}
+        return cast("Iterator[api.Job]", self._exchange.pages("/v1/jobs", "jobs", answers.JOB, query))
 
     def wait(
         self,
@@ -264,11 +267,12 @@ class Client:
             longest = 1.0 if progress else _LONGEST_WAIT
             if end is not None:
                 longest = max(0, min(longest, end - asked))
-            seen = cast("api.Job", self._exchange.get(f"{_job_path(job)}?wait={longest:.3f}", patience=longest))
+            target = f"{_job_path(job)}?wait={longest:.3f}"
+            seen = cast("api.Job", self._exchange.get(target, answers.JOB, patience=longest))
             if progress:
                 progress(seen)
             if seen["state"] == "succeeded":
-                return cast("api.SucceededJob", seen)
+                return cast("api.SucceededJob", answers.checked(seen, answers.SUCCEEDED_JOB))
             if seen["state"] in FINAL_STATES:
                 raise JobFailed(seen)
             if end is not None and time.monotonic() >= end:
@@ -279,11 +283,12 @@ class Client:
     def job_labels(self, job: Union[str, AnyJob]) -> Iterator[api.LabelSummary]:
         """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
         number, `job["mesh"]["labels_count"]`."""
-        return cast("Iterator[api.LabelSummary]", self._exchange.pages(f"{_job_path(job)}/labels", "labels", {}))
+        pages = self._exchange.pages(f"{_job_path(job)}/labels", "labels", answers.LABEL, {})
+        return cast("Iterator[api.LabelSummary]", pages)
 
     def cancel(self, job: Union[str, AnyJob]) -> api.Job:
         """Cancels a job. A job that has ended stays as it is."""
-        return cast("api.Job", self._exchange.delete(_job_path(job)))
+        return cast("api.Job", self._exchange.cancel(_job_path(job)))
 
     @by_keywords
     def estimate(
@@ -308,7 +313,7 @@ class Client:
     ) -> api.Estimate:
         """The exact numbers of triangles and vertices of a job, and what it takes, without running it."""
         query = {"volume": _id_of(volume), **as_query(given(locals()))}
-        return cast("api.Estimate", self._exchange.get("/v1/estimate?" + urlencode(query)))
+        return cast("api.Estimate", self._exchange.get("/v1/estimate?" + urlencode(query), answers.ESTIMATE))
 
     # --- Meshes ----------------------------------------------------------------------------------
 
@@ -372,9 +377,9 @@ class Client:
             "nifti_form": get("nifti_form", ""),
         }
         body = uploads.of_source(source, get("affine"), get("affine_space", "ras"), get("spacing"), get("raw"))
-        answers = self._exchange.upload(body, get("name", ""), chosen)
-        if len(answers) == 1 and answers[0]["volume"] is not None:
-            found = answers[0]["volume"]
+        uploaded = self._exchange.upload(body, get("name", ""), chosen)
+        if len(uploaded) == 1 and uploaded[0]["volume"] is not None:
+            found = uploaded[0]["volume"]
             # This note advises what a job by labels does.
             notes = [each for each in found["notes"] if not (is_by_labels and each["code"] == _LOOKS_LIKE_LABELS)]
             warn_of_notes(notes, body.name)
@@ -385,14 +390,15 @@ class Client:
                 "value": each["member"],
                 "title": each["problem"]["detail"] if each["problem"] else "can be meshed",
             }
-            for each in answers
+            for each in uploaded
         ]
-        detail = f"the upload has {len(answers)} volumes; select one of them"
+        detail = f"the upload has {len(uploaded)} volumes; select one of them"
         raise Refused(422, {"detail": detail, "choices": choices})
 
     def _submit(self, volume: Union[str, api.Volume], idempotency_key: str, parameters: Mapping[str, Any]) -> api.Job:
         value = {"volume": _id_of(volume), **parameters}
-        return cast("api.Job", self._exchange.send_json("POST", "/v1/jobs", value, idempotency_key or uuid.uuid4().hex))
+        key = idempotency_key or uuid.uuid4().hex
+        return cast("api.Job", self._exchange.send_json("POST", "/v1/jobs", value, answers.JOB, key))
 
     def _fetch(self, job: api.SucceededJob, notes: Sequence[api.Note]) -> Mesh:
         data = bytearray()
@@ -413,8 +419,10 @@ def _why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
     return f"there is none at the iso-value {iso:g}"
 
 
-def _is_empty(value: Any) -> bool:
-    return value is None or isinstance(value, (str, tuple, list)) and not value
+def _is_empty(keyword: str, value: Any) -> bool:
+    """True for a keyword's default. An empty place is no default but an error."""
+    is_place = keyword in ("affine", "spacing")
+    return value is None or not is_place and isinstance(value, (str, tuple, list)) and not value
 
 
 def _id_of(thing: Any) -> str:

@@ -7,13 +7,14 @@ import json
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, cast
 from urllib.parse import quote, urlencode
 
-from . import resume, uploads
+from . import answers, resume, uploads
 from .errors import WrongAnswer
 from .parameters import as_plain
 from .transport import Answer, Broken, Request, Transport, pause
 
 if TYPE_CHECKING:
     from . import api
+    from .answers import Members
     from .uploads import Body
 
 _TRIES = 4
@@ -26,23 +27,26 @@ class Exchange:
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
 
-    def get(self, target: str, patience: float = 0) -> Dict[str, Any]:
-        return _parsed(self._transport.repeat(Request("GET", target, patience=patience)))
+    def get(self, target: str, members: Members, patience: float = 0) -> Dict[str, Any]:
+        """The response's object. Raises WrongAnswer if it lacks one of the `members`."""
+        return _parsed(self._transport.repeat(Request("GET", target, patience=patience)), members)
 
-    def pages(self, path: str, member: str, query: Dict[str, str]) -> Iterator[Any]:
+    def pages(self, path: str, member: str, items: Members, query: Dict[str, str]) -> Iterator[Any]:
         """The items of all pages of a list."""
         while True:
-            page = self.get(path + ("?" + urlencode(query) if query else ""))
+            page = self.get(path + ("?" + urlencode(query) if query else ""), answers.page_of(member, items))
             yield from page[member]
             if not page["next"] or not page[member]:
                 return
             query = {**query, "cursor": page["next"]}
 
-    def delete(self, target: str) -> Dict[str, Any]:
-        text = self._transport.send(Request("DELETE", target)).text()
-        return _parsed(text) if text else {}
+    def delete(self, target: str) -> bytes:
+        return self._transport.send(Request("DELETE", target)).text()
 
-    def send_json(self, method: str, target: str, value: object, key: str = "") -> Dict[str, Any]:
+    def cancel(self, target: str) -> Dict[str, Any]:
+        return _parsed(self.delete(target), answers.JOB)
+
+    def send_json(self, method: str, target: str, value: object, members: Members, key: str = "") -> Dict[str, Any]:
         """With an idempotency key, the request is repeated when its connection breaks."""
         try:
             text = json.dumps(value, allow_nan=False, default=as_plain).encode()
@@ -50,7 +54,7 @@ class Exchange:
             raise ValueError(f"a parameter cannot be sent: {error}") from error
         headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
         request = Request(method, target, headers, uploads.of_bytes(text))
-        return _parsed(self._transport.repeat(request) if key else self._transport.send(request).text())
+        return _parsed(self._transport.repeat(request) if key else self._transport.send(request).text(), members)
 
     def upload(self, body: Body, name: str, chosen: Dict[str, str]) -> List[api.UploadedVolumesVolumes]:
         """One item for each volume of the upload. `chosen` are query parameters, left out if empty."""
@@ -64,14 +68,14 @@ class Exchange:
             answer = resume.send(self._transport, target, headers, body)
         else:
             answer = self._transport.send(Request("POST", target, headers, body))
-        parsed = _parsed(answer.text())
         if answer.status == _MULTI_STATUS:
-            return cast("List[api.UploadedVolumesVolumes]", parsed["volumes"])
-        volume = cast("api.Volume", parsed)
+            return cast("List[api.UploadedVolumesVolumes]", _parsed(answer.text(), answers.UPLOADED)["volumes"])
+        volume = cast("api.Volume", _parsed(answer.text(), answers.VOLUME))
         return [{"member": "", "status": answer.status, "volume": volume, "problem": None}]
 
     def download(self, announced: api.MeshFile, write: Callable[[int, bytes], None]) -> None:
         """Downloads a file and resumes where its connection breaks."""
+        answers.checked(announced, answers.MESH_FILE)
         size, digest, at = announced["bytes"], hashlib.sha256(), 0
         for attempt in range(1, _TRIES + 1):
             headers = {"Range": f"bytes={at}-", "If-Range": f'"{announced["sha256"]}"'} if at else {}
@@ -92,14 +96,12 @@ class Exchange:
             raise WrongAnswer("the downloaded mesh does not match the job's SHA-256")
 
 
-def _parsed(body: bytes) -> Dict[str, Any]:
+def _parsed(body: bytes, members: Members) -> Dict[str, Any]:
     try:
         value = json.loads(body)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise WrongAnswer("the server's response is not JSON") from error
-    if not isinstance(value, dict):
-        raise WrongAnswer("the server's response is not a JSON object")
-    return value
+    return answers.checked(value, members)
 
 
 def _goes_on(answer: Answer, at: int) -> bool:

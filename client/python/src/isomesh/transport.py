@@ -96,7 +96,7 @@ class Transport:
             raise ValueError(f"{server!r} must be http://HOST:PORT, https://HOST:PORT or unix:PATH")
         self._host = parts.hostname
         self._port = parts.port  # raises ValueError for an invalid port
-        self._tls = ssl.create_default_context(cafile=authorities) if parts.scheme == "https" else None
+        self._tls = _tls_context(authorities) if parts.scheme == "https" else None
 
     def send(self, request: Request) -> Answer:
         """A successful response. Raises Refused for any other, and Unreachable without a response."""
@@ -159,6 +159,15 @@ class Transport:
             raise
         connection.sock.settimeout(connection.timeout)
         return connection.getresponse()
+
+
+def _tls_context(authorities: Optional[str]) -> ssl.SSLContext:
+    try:
+        return ssl.create_default_context(cafile=authorities)
+    except ssl.SSLError as error:
+        raise ValueError(f"authorities: {authorities} is not a PEM file of certificates") from error
+    except OSError as error:
+        raise ValueError(f"authorities: {authorities} cannot be read: {error.strerror}") from error
 
 
 def pause(attempt: int) -> None:

@@ -60,6 +60,13 @@ def of_paths(paths: Sequence[Path]) -> Body:
     return _tar(members, name)
 
 
+def _path(source: Union[str, os.PathLike[str]]) -> Path:
+    if source == "":
+        # A Path would make it the working folder, and that would be uploaded.
+        raise FileNotFoundError("the path of the file to upload is empty")
+    return Path(source)
+
+
 def _files_of(path: Path) -> List[Tuple[str, Path]]:
     if path.is_dir():
         return _files_below(path)
@@ -180,17 +187,29 @@ class Raw:
     big_endian: bool = False
 
     def query(self) -> Dict[str, str]:
-        def joined(numbers: Sequence[float]) -> str:
-            return ",".join(repr(float(number)) for number in numbers)
-
         return {
             "dims": ",".join(str(int(each)) for each in self.dims),
             "type": self.type,
-            "spacing": joined(self.spacing),
-            "origin": joined(self.origin),
-            "direction": joined(self.direction),
+            "spacing": _joined(steps_of(self.spacing)),
+            "origin": _joined(self.origin),
+            "direction": _joined(self.direction),
             "byte_order": "big" if self.big_endian else "little",
         }
+
+
+def _joined(numbers: Sequence[float]) -> str:
+    return ",".join(repr(float(number)) for number in numbers)
+
+
+def steps_of(spacing: Any) -> Tuple[float, float, float]:
+    """The three lengths of a `spacing` that a caller gave."""
+    try:
+        steps = [] if isinstance(spacing, (str, bytes)) else [float(step) for step in spacing]
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"spacing must be three numbers, not {spacing!r}") from error
+    if len(steps) != 3 or not all(math.isfinite(step) and step > 0 for step in steps):
+        raise ValueError(f"spacing must be three positive numbers, the millimetres along x, y and z, not {spacing!r}")
+    return (steps[0], steps[1], steps[2])
 
 
 def placed(affine: Any, space: str) -> Dict[str, Any]:
@@ -224,11 +243,11 @@ def of_source(
     """The body for anything that `Client.upload` accepts."""
     is_array = False
     if isinstance(source, (str, os.PathLike)):
-        body = of_paths([Path(source)])
+        body = of_paths([_path(source)])
     elif isinstance(source, (bytes, bytearray)) or type(source) is memoryview:
         body = of_bytes(source)
     elif isinstance(source, (list, tuple)) and source and all(isinstance(p, (str, os.PathLike)) for p in source):
-        body = of_paths([Path(each) for each in source])
+        body = of_paths([_path(each) for each in source])
     else:
         is_array = True
         if hasattr(source, "dataobj") and hasattr(source, "affine"):
@@ -244,7 +263,7 @@ def of_source(
     if raw is not None:
         body.query = raw.query()
     if not is_array and spacing is not None:
-        body.query = {**body.query, "spacing": ",".join(repr(float(each)) for each in spacing)}
+        body.query = {**body.query, "spacing": _joined(steps_of(spacing))}
     return body
 
 
@@ -257,12 +276,16 @@ def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Se
         samples = samples[..., 0]
     if samples.ndim != 3 or samples.size == 0:
         raise ValueError(f"the array must have three axes and no empty one; its shape is {samples.shape}")
+    if numpy.any(getattr(samples, "mask", False)):
+        # The values under a mask mean nothing, and only the caller knows what to mesh there.
+        raise ValueError("the array has masked samples; fill them, for example with array.filled(0)")
     target = _sendable(numpy, samples)
     if affine is not None and spacing is not None:
         raise ValueError("give either affine or spacing, not both")
     if affine is None:
-        steps = spacing or (1, 1, 1)
-        affine = [[float(steps[row]) if row == column else 0.0 for column in range(4)] for row in range(3)]
+        # The default is that of raw samples.
+        steps = (1.0, 1.0, 1.0) if spacing is None else steps_of(spacing)
+        affine = [[steps[row] if row == column else 0.0 for column in range(4)] for row in range(3)]
         space = "lps"
     x, y, z = samples.shape
     raw = Raw((x, y, z), target.name, **placed(affine, space))
