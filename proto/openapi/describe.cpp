@@ -304,8 +304,10 @@ std::string schemas() {
     yaml.line("oneOf: " + in_brackets(alternatives));
   });
   yaml.under("CompleteJobParameters", [&] {
-    yaml.line(
-        "description: All parameters. Parameters that the request left out have their defaults.");
+    yaml.text("description",
+              "The parameters of a job, with the defaults of those that the request left out. A "
+              "parameter that is not required here may be absent. It then has its default, or does "
+              "not apply to the job.");
     yaml.line(base);
     yaml.under("required", [&] {
       for (const std::string& name : always) yaml.line("- " + name);
