@@ -3,6 +3,8 @@
 #include <cerrno>
 #include <system_error>
 
+#include "base/text.h"
+
 namespace isomesh {
 
 Error invalid_parameter(const std::string& field, const std::string& message) {
@@ -11,7 +13,8 @@ Error invalid_parameter(const std::string& field, const std::string& message) {
 
 Error invalid_parameters(std::vector<FieldError> fields) {
   std::string detail;
-  for (const FieldError& fault : fields) {
+  for (FieldError& fault : fields) {
+    fault.field = printable(fault.field);  // a client may choose any name
     if (!detail.empty()) detail += "; ";
     detail.append(fault.field).append(": ").append(fault.message);
   }

@@ -136,8 +136,8 @@ class Flaws {
   }
 
   void see_name(const std::string& name) {
-    if (!open_.back().names.insert(name).second) repeated_.push_back(name);
     open_.back().name = name;
+    if (!open_.back().names.insert(name).second) repeated_.push_back(path());
     see_text(name);
   }
 
@@ -279,16 +279,6 @@ void visit(VolumeName& self, auto&& field) {
   field(Parameter{.name = "name", .is_required = true, .may_be_absent = true}, self.name);
 }
 
-// True for members of a body that a query lacks or spells differently.
-bool is_for_bodies(const std::string& name) {
-  bool found = false;
-  JobParameters parameters;  // not constant, so that `visit` reaches members that may be absent
-  visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
-    found = found || name == parameter.name;
-  });
-  return found && !query_names().contains(name);
-}
-
 Json value_of(const std::string& text, const QueryName& name) {
   switch (name.kind) {
     case QueryName::Kind::kText:
@@ -345,7 +335,7 @@ Json request_body(std::string_view body, RequestReader& reader) {
   if (!json.is_object()) {
     throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
   }
-  for (const std::string& name : flaws.repeated()) reader.add(name, "is given twice");
+  for (const std::string& path : flaws.repeated()) reader.add(path, "is given twice");
   if (text == body) return json;
   for (const std::string& path : flaws.halves()) {
     reader.add(path, "has half of a surrogate pair (\\ud800 to \\udfff), which is not a character");
@@ -378,10 +368,8 @@ JobParameters parse_job_parameters(const QueryParameters& query, VolumeIn volume
   Json json = Json::object();
   for (const auto& [name, text] : query) {
     const auto known = query_names().find(name);
-    if (is_for_bodies(name) || (name == "volume" && volume_in == VolumeIn::kBody)) {
+    if (known == query_names().end() || (name == "volume" && volume_in == VolumeIn::kBody)) {
       reader.add(name, "is not a parameter of this request");
-    } else if (known == query_names().end()) {
-      reader.add(name, "is not a known member");
     } else if (const auto place = pointer_to(known->second.path); json.contains(place)) {
       reader.add(name, "is given twice");
     } else {

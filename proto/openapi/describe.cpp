@@ -304,8 +304,10 @@ std::string schemas() {
     yaml.line("oneOf: " + in_brackets(alternatives));
   });
   yaml.under("CompleteJobParameters", [&] {
-    yaml.line(
-        "description: All parameters. Parameters that the request left out have their defaults.");
+    yaml.text("description",
+              "The parameters of a job, with the defaults of those that the request left out. A "
+              "parameter that is not required here may be absent. It then has its default, or does "
+              "not apply to the job.");
     yaml.line(base);
     yaml.under("required", [&] {
       for (const std::string& name : always) yaml.line("- " + name);
@@ -314,26 +316,53 @@ std::string schemas() {
   return yaml.str();
 }
 
-// Calls each(parameter) for parameters that a query spells as a body does.
+// Calls each(parameter, member) for parameters that a query spells as a body does.
 template <class Each>
 void visit_query(const Each& each) {
   JobParameters parameters = complete_parameters();
   visit_leaves(parameters, [&](const std::string&, const Parameter& parameter, const auto& member) {
     if constexpr (kStandsAlone<std::remove_cvref_t<decltype(member)>>) {
-      if (parameter.in_query) each(parameter);
+      if (parameter.in_query) each(parameter, member);
     }
   });
 }
 
+template <class T>
+constexpr bool kHoldsPoints =
+    std::is_same_v<T, std::optional<Box>> || std::is_same_v<T, std::vector<std::array<double, 3>>>;
+
+template <class T>
+constexpr bool kIsList = kHoldsPoints<T> || std::is_same_v<T, std::vector<double>> ||
+                         std::is_same_v<T, std::optional<LabelChoice>>;
+
+// A query lists the numbers of all points in one row.
+template <class T>
+std::string query_schema_of(const Parameter& parameter) {
+  if constexpr (kHoldsPoints<T>) {
+    constexpr bool kIsBox = std::is_same_v<T, std::optional<Box>>;
+    constexpr std::size_t kLeast = kIsBox ? 2 : 1;
+    constexpr std::size_t kMost = kIsBox ? 2 : ComponentFilter::kMostPlaces;
+    return "type: array, items: { type: number }, minItems: " + std::to_string(3 * kLeast) +
+           ", maxItems: " + std::to_string(3 * kMost);
+  } else {
+    return reference("schemas", schema_name_of(parameter));
+  }
+}
+
 std::string query() {
   Yaml yaml(2);
-  visit_query([&](const Parameter& parameter) {
+  visit_query([&](const Parameter& parameter, const auto& member) {
+    using Member = std::remove_cvref_t<decltype(member)>;
     yaml.under(schema_name_of(parameter), [&] {
       yaml.line("name: " + query_name_of(parameter));
       yaml.line("in: query");
       if (parameter.is_required && parameter.unless == nullptr) yaml.line("required: true");
       yaml.text("description", parameter.help);
-      yaml.line("schema: { " + reference("schemas", schema_name_of(parameter)) + " }");
+      yaml.line("schema: { " + query_schema_of<Member>(parameter) + " }");
+      if constexpr (kIsList<Member>) {
+        yaml.line("style: form");
+        yaml.line("explode: false");
+      }
     });
   });
   return yaml.str();
@@ -341,7 +370,7 @@ std::string query() {
 
 std::string query_references() {
   Yaml yaml(4);
-  visit_query([&](const Parameter& parameter) {
+  visit_query([&](const Parameter& parameter, const auto& /*member*/) {
     yaml.line("- " + reference("parameters", schema_name_of(parameter)));
   });
   return yaml.str();

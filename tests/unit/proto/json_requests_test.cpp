@@ -386,8 +386,17 @@ TEST(JobBody, ALongVolumeIsAnIdThatNothingHas) {
 TEST(JobBody, AMemberGivenTwiceIsRefused) {
   EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "iso": 1})"), ElementsAre("iso"));
   EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "draco": {"speed": 1, "speed": 2}})"),
-              ElementsAre("speed"));
+              ElementsAre("draco.speed"));
+  EXPECT_THAT(faults_in(R"({"volume": "a", "labels": "all", "label_names": {"1": "a", "1": "b"}})"),
+              ElementsAre("label_names.1"));
   EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "x": {"iso": 1}})"), ElementsAre("x"));
+}
+
+TEST(JobBody, ControlCharactersOfNamesAreShown) {
+  const auto error =
+      thrown_by([] { parse_job_parameters(R"({"volume": "a", "iso": 1, "a\u0000b": 1})"); });
+  ASSERT_TRUE(error);
+  EXPECT_STREQ(error->what(), "a\uFFFDb: is not a known member");
 }
 
 TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {

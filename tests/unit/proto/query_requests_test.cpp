@@ -56,6 +56,14 @@ TEST(JobQuery, RefusesAnIsoThatIsNoNumber) {
   }
 }
 
+TEST(JobQuery, CallsParametersSo) {
+  const auto error = thrown_by([] {
+    parse_job_parameters(Query{{"iso", "1"}, {"isovalue", "1"}}, VolumeIn::kBody);
+  });
+  ASSERT_TRUE(error);
+  EXPECT_STREQ(error->what(), "isovalue: is not a parameter of this request");
+}
+
 TEST(JobQuery, RefusesAParameterGivenTwice) {
   EXPECT_THAT(query_faults(Query{{"iso", "1"}, {"iso", "2"}}), ElementsAre("iso"));
   EXPECT_THAT(query_faults(Query{{"iso", "1"}, {"speed", "2"}, {"speed", "2"}}),

@@ -471,7 +471,9 @@ class Job(TypedDict):
     stage: Stage
     #: The progress of the whole job.
     progress: float
-    #: All parameters. Parameters that the request left out have their defaults.
+    #: The parameters of a job, with the defaults of those that the request left out. A parameter
+    #: that is not required here may be absent. It then has its default, or does not apply to the
+    #: job.
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
@@ -950,7 +952,9 @@ class SucceededJob(TypedDict):
     stage: Stage
     #: The progress of the whole job.
     progress: float
-    #: All parameters. Parameters that the request left out have their defaults.
+    #: The parameters of a job, with the defaults of those that the request left out. A parameter
+    #: that is not required here may be absent. It then has its default, or does not apply to the
+    #: job.
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
