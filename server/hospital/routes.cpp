@@ -98,8 +98,12 @@ void list(Orders* orders, const Request& request, Response& response) {
 
 void cancel(Orders* orders, const Request& request, Response& response) {
   check_known(request, {});
-  answer_json(response, 200,
-              to_json(configured(orders).cancel(viewer_of(request), request.path_parameter("id"))));
+  Orders& all = configured(orders);
+  const std::string id = request.path_parameter("id");
+  if (request.has_header("If-Match")) {
+    check_if_match(request, etag_of(to_json(all.get(viewer_of(request), id))));
+  }
+  answer_json(response, 200, to_json(all.cancel(viewer_of(request), id)));
 }
 
 void retry(Orders* orders, const Request& request, Response& response) {

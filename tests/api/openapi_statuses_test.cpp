@@ -243,7 +243,6 @@ void probe_orders(Statuses& statuses, const Order& order, const std::string& bod
   const std::string one = "/v1/orders/" + order.id;
   statuses.probe("GET /v1/orders/{id}", one);
   statuses.probe("GET /v1/orders/{id}", one, {}, {{"If-None-Match", "*"}});
-  statuses.probe("GET /v1/orders/{id}", one, {}, {{"If-Match", "\"x\""}});
   const std::string retry = "POST /v1/orders/{id}/retry";
   statuses.probe(retry, one + "/retry");
   statuses.probe(retry, "/v1/orders/0123/retry");
@@ -252,6 +251,7 @@ void probe_orders(Statuses& statuses, const Order& order, const std::string& bod
   for (const std::string method : {"GET", "DELETE"}) {
     statuses.probe(method + " /v1/orders/{id}", one + "?x=1");
     statuses.probe(method + " /v1/orders/{id}", "/v1/orders/0123");
+    statuses.probe(method + " /v1/orders/{id}", one, {}, {{"If-Match", "\"x\""}});
   }
   statuses.probe("DELETE /v1/orders/{id}", one);
 }
