@@ -99,12 +99,16 @@ std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& optio
   return delay;
 }
 
-void give_progress(Job& job, const Progress& progress) {
+void give_timing(Job& job, const Timing& timing) {
   const double queue = job.timing.queue;
+  job.timing = timing;
+  job.timing.queue = queue;
+}
+
+void give_progress(Job& job, const Progress& progress) {
   job.stage = progress.stage;
   job.progress = progress.share;
-  job.timing = progress.timing;
-  job.timing.queue = queue;
+  give_timing(job, progress.timing);
 }
 
 void give_mesh(Job& job, const MeshSummary& mesh) {

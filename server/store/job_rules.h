@@ -67,7 +67,8 @@ bool has_share_of_queue(const JobSpec& spec, const QueueShare& waiting, std::siz
 // Delay before the next attempt of a job that has failed that often.
 std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& options);
 
-// Copies the progress into the job; keeps its time in the queue.
+// Copies the times or the progress of a run into the job; keeps its time in the queue.
+void give_timing(Job& job, const Timing& timing);
 void give_progress(Job& job, const Progress& progress);
 
 // Sets the job's mesh and the addresses of its files.

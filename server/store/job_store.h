@@ -78,7 +78,7 @@ struct Outcome {
   std::optional<Problem> error;
   // The error may be temporary: the job is retried after a delay, unless this was its last attempt.
   bool may_retry = false;
-  Timing timing;
+  Timing timing;  // with a mesh; otherwise the job keeps the progress of its last renewal
 };
 
 // Data about a job for the service itself.

@@ -267,8 +267,7 @@ bool PostgresJobStore::finish(const Lease& lease, const Outcome& outcome) {
   if (!run) return false;
   const std::int64_t now = database_.now_us();
   Job job = run->job;
-  job.timing = outcome.timing;
-  job.timing.queue = run->job.timing.queue;
+  if (outcome.mesh) give_timing(job, outcome.timing);
   Ending ending;
   ending.cancelled = to_record(cancelled(job, run->accepted));
   if (!outcome.mesh && !outcome.error) {
@@ -433,7 +432,9 @@ std::optional<PostgresJobStore::Live> PostgresJobStore::live_run(const Lease& le
   const Lock lock(live_mutex_);
   const auto run = live_.find(lease.id);
   if (run == live_.end() || run->second.fence != lease.fence) return std::nullopt;
-  return run->second;
+  Live copy = run->second;
+  if (copy.progress) give_progress(copy.job, *copy.progress);
+  return copy;
 }
 
 }  // namespace isomesh::store::postgresql

@@ -171,9 +171,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
     auto held = leased(change.connection(), lease);
     if (!held) return false;
     Row& row = *held;
-    const double queue = row.job.timing.queue;
-    row.job.timing = outcome.timing;
-    row.job.timing.queue = queue;
+    if (outcome.mesh) give_timing(row.job, outcome.timing);
     if (row.cancelling || (!outcome.mesh && !outcome.error)) {
       end(change, row, JobState::kCancelled);
     } else if (outcome.mesh) {
@@ -226,6 +224,7 @@ std::size_t SqliteJobStore::reap() {
     }
     std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
     for (Row& row : rows) {
+      row.job = with_progress(row);
       give_back(change, row, std::chrono::milliseconds(0));
       forget_run(row.job.id, row.fence);
     }
@@ -261,7 +260,9 @@ std::optional<SqliteJobStore::Row> SqliteJobStore::leased(Connection& connection
                                                           const Lease& lease) const {
   auto row = find(connection, std::nullopt, lease.id);
   const bool is_its = row && row->job.state == JobState::kRunning && row->fence == lease.fence;
-  return is_its && is_held(lease.id, lease.fence) ? std::move(row) : std::nullopt;
+  if (!is_its || !is_held(lease.id, lease.fence)) return std::nullopt;
+  row->job = with_progress(*row);
+  return row;
 }
 
 bool SqliteJobStore::is_held(const std::string& id, std::uint64_t fence) const {

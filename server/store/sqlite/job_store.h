@@ -46,6 +46,7 @@ class SqliteJobStore : public SqlJobStore {
 
   // Selects the next job to run and charges its owner's turn.
   std::optional<Row> take_next(Change& change, std::int64_t now);
+  // The run's job with its last progress. Empty if the lease is lost.
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
   // The job submitted before with the same key.
   std::optional<Submission> known(Connection& connection, const JobSpec& spec) const;

@@ -129,6 +129,37 @@ TEST_P(JobConformance, AMeshEndsItSucceeded) {
   EXPECT_GT(job.timing.total, 0);
 }
 
+TEST_P(JobConformance, AJobWithoutAMeshKeepsItsLastProgress) {
+  const auto end_by = [&](auto&& end) {
+    const std::string id = submit().id;
+    const Lease lease = claimed();
+    const double queued = jobs().get("", id).timing.queue;
+    jobs().renew(lease, {Stage::kSmooth, 0.4, {.load = 1, .extract = 2}}, kLongLease);
+    end(lease);
+    const Job job = jobs().get("", id);
+    EXPECT_EQ(job.stage, Stage::kSmooth);
+    EXPECT_EQ(job.progress, 0.4);
+    EXPECT_EQ(job.timing.load, 1);
+    EXPECT_EQ(job.timing.extract, 2);
+    EXPECT_EQ(job.timing.queue, queued);
+    EXPECT_GE(job.timing.total, queued);
+    return job.state;
+  };
+  EXPECT_EQ(end_by([&](const Lease& lease) { jobs().finish(lease, failure()); }),
+            JobState::kFailed);
+  EXPECT_EQ(end_by([&](const Lease& lease) { jobs().finish(lease, {}); }), JobState::kCancelled);
+  EXPECT_EQ(end_by([&](const Lease& lease) {
+              jobs().cancel("", lease.id);
+              jobs().finish(lease, failure());
+            }),
+            JobState::kCancelled);
+  EXPECT_EQ(end_by([&](const Lease& lease) {
+              jobs().cancel("", lease.id);
+              jobs().put_back(lease, milliseconds(0));
+            }),
+            JobState::kCancelled);
+}
+
 TEST_P(JobConformance, TheFileOfManyLabelsBelongsToItsMesh) {
   Outcome outcome = some_mesh();
   outcome.mesh->labels_count = 300;
