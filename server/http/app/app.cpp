@@ -141,6 +141,8 @@ std::optional<Continuation> guarded(const Request& request, Response& response,
                                     const std::function<std::optional<Continuation>()>& run) {
   try {
     return run();
+  } catch (const RecordedProblem& recorded) {
+    answer_problem(request, response, recorded.problem());
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kInternal) {
       log_error("{} {} failed: {}", request.method, request.path, error.what());

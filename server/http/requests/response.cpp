@@ -36,7 +36,11 @@ void Response::set_body(std::string text, std::string_view type) {
 }
 
 void answer_problem(const Request& request, Response& response, const Error& error) {
-  const Problem problem = to_problem(error, request.path);
+  answer_problem(request, response, to_problem(error, request.path));
+}
+
+void answer_problem(const Request& request, Response& response, Problem problem) {
+  problem.instance = request.path;
   response.status = problem.status;
   response.set_header("Cache-Control", "no-store");
   if (may_come_again(problem) && !response.has_header("Retry-After")) {

@@ -59,8 +59,21 @@ struct Continuation {
 // and become kInternal. Called concurrently.
 using Handler = std::function<std::optional<Continuation>(const Request&, Response&)>;
 
-// Sets the response to the error's problem (RFC 9457).
+// The problem in a record, such as a failed job's. A handler that throws it answers with this
+// problem, also with its detail, and does not fail itself.
+class RecordedProblem : public Error {
+ public:
+  explicit RecordedProblem(const Problem& problem) : Error(to_error(problem)), problem_(problem) {}
+
+  const Problem& problem() const { return problem_; }
+
+ private:
+  Problem problem_;
+};
+
+// Sets the response to the error's problem (RFC 9457), or to that problem at the request's path.
 void answer_problem(const Request& request, Response& response, const Error& error);
+void answer_problem(const Request& request, Response& response, Problem problem);
 
 // The bytes of a response to a connection whose request was not read.
 std::string refusal(const Error& error);

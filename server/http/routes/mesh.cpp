@@ -121,7 +121,7 @@ void check_intact(const App& app, const Job& job, const std::string& blob) {
   if (store::is_there_and_intact(app.services.blobs, blob, {})) return;
   log_error("the stored mesh of job {} is damaged", job.id);
   const Job again = app.services.jobs.remake(job.id);
-  if (again.error) throw to_error(*again.error);
+  if (again.error) throw RecordedProblem(*again.error);
   throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is being made again");
 }
 
@@ -190,7 +190,7 @@ std::optional<std::string> link_to(const App& app, const Request& request, const
 }
 
 void check_has_mesh(const Job& job) {
-  if (job.error) throw to_error(*job.error);
+  if (job.error) throw RecordedProblem(*job.error);
   if (job.state == JobState::kCancelled) {
     throw Error(ErrorCode::kCancelled, "the job was cancelled and has no mesh");
   }

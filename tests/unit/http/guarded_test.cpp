@@ -1,0 +1,50 @@
+// Tests of the answers to requests whose handlers throw.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/http/app/app.h"
+
+namespace isomesh::http {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+struct Guarded {
+  Response response;
+  std::string log;
+};
+
+template <class Thrown>
+Guarded guard(const Thrown& thrown) {
+  Guarded result;
+  Request request;
+  request.path = "/v1/jobs/1/mesh.obj";
+  testing::internal::CaptureStderr();
+  guarded(request, result.response, [&]() -> std::optional<Continuation> { throw thrown; });
+  result.log = testing::internal::GetCapturedStderr();
+  return result;
+}
+
+TEST(GuardedRequest, HidesTheReasonOfItsOwnFailure) {
+  const auto [response, log] = guard(Error(ErrorCode::kInternal, "the secret"));
+  EXPECT_EQ(response.status, 500);
+  EXPECT_THAT(response.body, Not(HasSubstr("the secret")));
+  EXPECT_THAT(log, HasSubstr("the secret"));
+}
+
+TEST(GuardedRequest, AnswersWithTheProblemOfAFailedJob) {
+  Problem problem = to_problem(Error(ErrorCode::kInternal, ""), "/v1/jobs/1");
+  problem.detail = "the process was killed";
+  const auto [response, log] = guard(RecordedProblem(problem));
+  EXPECT_EQ(response.status, 500);
+  EXPECT_THAT(response.body, HasSubstr("the process was killed"));
+  EXPECT_THAT(response.body, HasSubstr("/v1/jobs/1/mesh.obj"));
+  EXPECT_THAT(log, IsEmpty());
+}
+
+}  // namespace
+}  // namespace isomesh::http
