@@ -39,7 +39,10 @@ std::optional<std::size_t> IncomingBody::read(std::span<char> target) {
   if (!deadline_) deadline_ = Clock::now() + limits_.patience;
   while (true) {
     const Transfer transfer = stream_->read(target);
-    if (transfer.state == Transfer::State::kClosed) return 0;
+    if (transfer.state == Transfer::State::kClosed) {
+      was_cut_ = true;
+      return 0;
+    }
     if (transfer.state == Transfer::State::kDone) {
       received_ += transfer.bytes;
       since_deadline_ += transfer.bytes;

@@ -47,6 +47,9 @@ class IncomingBody {
 
   bool was_too_slow() const { return was_too_slow_; }
 
+  // True if the client closed before a read, that is, before the end of the body.
+  bool was_cut() const { return was_cut_; }
+
   // The connection's descriptor, until take_stream().
   int descriptor() const { return stream_->descriptor(); }
 
@@ -70,6 +73,7 @@ class IncomingBody {
   bool was_too_slow_ = false;
   ChunkScanner chunks_;
   bool was_malformed_ = false;
+  bool was_cut_ = false;
 };
 
 }  // namespace isomesh::net

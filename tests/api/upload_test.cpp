@@ -111,6 +111,39 @@ TEST_F(UploadTest, ComesAsAForm) {
   EXPECT_EQ(post(sphere_.bytes).status, 200);
 }
 
+TEST_F(UploadTest, AFormComesWithAnyMediaTypeOfForms) {
+  const std::string body = form("file", sphere_.bytes) + kFormEnd;
+  for (const std::string type :
+       {"multipart/form-data; boundary=xyz; charset=utf-8",
+        "multipart/form-data; boundary=\"xyz\"; x=y", "multipart/form-data; Boundary=xyz",
+        "Multipart/Form-Data;boundary=xyz",
+        "multipart/form-data; x=\"; boundary=no\"; boundary=xyz"}) {
+    EXPECT_LT(post(body, {{"Content-Type", type}}).status, 300) << type;
+  }
+  for (const std::string type : {"multipart/form-data", "multipart/form-data; charset=utf-8"}) {
+    EXPECT_TRUE(blames(post(body, {{"Content-Type", type}}), "Content-Type")) << type;
+  }
+}
+
+// A line break after the last boundary is not required (RFC 2046, 5.1.1).
+TEST_F(UploadTest, AFormMayEndWithItsBoundary) {
+  const std::string file = form("file", sphere_.bytes);
+  for (const std::string end :
+       {"--xyz--", "--xyz--\r\n", "--xyz--\r\n\r\n", "--xyz--\r\nand more"}) {
+    EXPECT_LT(post(file + end, kForm).status, 300) << end;
+  }
+  EXPECT_EQ(volumes(), 1U);
+}
+
+TEST_F(UploadTest, AFormWithoutItsLastBoundarySaysSo) {
+  const std::string file = form("file", sphere_.bytes);
+  for (const std::string& wrong : {file, file + "--xyz", file + "--xyz-", "--abc" + file}) {
+    const Answer answer = post(wrong, kForm);
+    EXPECT_TRUE(is_problem(answer, ErrorCode::kInvalidParameter));
+    EXPECT_THAT(answer.body, testing::HasSubstr("boundary in Content-Type"));
+  }
+}
+
 TEST_F(UploadTest, AFormOfAnythingElseIsRefused) {
   const std::string file = form("file", sphere_.bytes);
   EXPECT_TRUE(blames(post(form("volume", sphere_.bytes) + kFormEnd, kForm), "file"));

@@ -5,11 +5,15 @@
 #include <chrono>
 #include <cstddef>
 #include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include <httplib.h>
 
 #include "base/clock.h"
+#include "server/http/requests/header_parameter.h"
 
 namespace isomesh::http {
 namespace {
@@ -37,12 +41,23 @@ bool is_for_library(std::string_view name) {
                              [&](std::string_view each) { return net::equal_names(each, name); });
 }
 
+// The library reads a form only if a line break follows its last boundary, which RFC 2046, 5.1.1
+// does not require. The break is added to a form whose length is known; what follows the last
+// boundary is ignored, so a second break does not matter.
+constexpr std::string_view kFormEnd = "\r\n";
+
+std::optional<std::uint64_t> form_bytes(const Request& request) {
+  return request.is_form() ? request.content_length : std::nullopt;
+}
+
 // The library's view of a connection. It reads a head without headers, because it decodes percent
 // signs in headers and is too lenient, and then the body. Its output is collected.
 class HttplibStream : public httplib::Stream {
  public:
-  HttplibStream(const std::string& target, net::IncomingBody& body)
-      : head_("GET " + with_one_question_mark(target) + " HTTP/1.1\r\n\r\n"), body_(body) {}
+  HttplibStream(const Request& request, net::IncomingBody& body)
+      : head_("GET " + with_one_question_mark(request.target) + " HTTP/1.1\r\n\r\n"),
+        form_left_(form_bytes(request)),
+        body_(body) {}
 
   ssize_t read(char* target, std::size_t size) override {
     if (head_read_ < head_.size()) {
@@ -74,16 +89,23 @@ class HttplibStream : public httplib::Stream {
   // Buffers the body: the library reads in pieces too small for system calls.
   bool read_ahead() {
     constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
+    ahead_read_ = 0;
+    if (form_left_ == 0U) {
+      ahead_ = kFormEnd;
+      form_left_.reset();
+      return true;
+    }
     ahead_.resize(kPieceBytes);
     const auto count = body_.read(ahead_);
     ahead_.resize(count.value_or(0));
-    ahead_read_ = 0;
+    if (form_left_) *form_left_ -= std::min<std::uint64_t>(*form_left_, ahead_.size());
     return count.has_value();
   }
 
   const std::string head_;
   std::size_t head_read_ = 0;
-  std::string ahead_;  // buffered bytes of the body
+  std::optional<std::uint64_t> form_left_;  // bytes of a form before kFormEnd
+  std::string ahead_;                       // buffered bytes of the body
   std::size_t ahead_read_ = 0;
   net::IncomingBody& body_;
   std::string written_;
@@ -105,6 +127,7 @@ class HttplibBodyReader : public BodyReader {
   bool is_whole() const override { return body_.is_whole(); }
   bool was_too_slow() const override { return body_.was_too_slow(); }
   bool was_malformed() const override { return body_.was_malformed(); }
+  bool was_cut() const override { return body_.was_cut(); }
 
  private:
   static httplib::ContentReceiver receiver_of(const TakePiece& take) {
@@ -178,6 +201,18 @@ class HttplibServer : public httplib::Server {
     for (const auto& [name, value] : request_.headers) {
       if (is_for_library(name)) in.headers.emplace(name, value);
     }
+    if (request_.is_form()) describe_form(in);
+  }
+
+  // The library knows the type of a form in lower case only, with no parameter but the boundary.
+  void describe_form(httplib::Request& in) {
+    const std::string boundary = header_parameter(request_.header("Content-Type"), "boundary");
+    in.headers.erase("Content-Type");
+    in.headers.emplace("Content-Type", "multipart/form-data; boundary=" + boundary);
+    if (const auto bytes = form_bytes(request_)) {
+      in.headers.erase("Content-Length");
+      in.headers.emplace("Content-Length", std::to_string(*bytes + kFormEnd.size()));
+    }
   }
 
   void handle_into(httplib::Response& out) {
@@ -226,7 +261,7 @@ class HttplibServer : public httplib::Server {
 
 WrittenResponse run_through_httplib(Request& request, net::IncomingBody& body, Response& response,
                                     const std::function<void()>& handle) {
-  HttplibStream stream(request.target, body);
+  HttplibStream stream(request, body);
   HttplibServer(request, body, response, handle).run(stream);
   if (request.method == "HEAD") response.stream.reset();
   WrittenResponse written{.bytes = stream.take_written()};

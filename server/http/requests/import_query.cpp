@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/text.h"
+#include "server/http/requests/header_parameter.h"
 #include "server/http/requests/request_values.h"
 
 namespace isomesh::http {
@@ -103,18 +104,6 @@ void refuse_choice_in_raw(const Request& request) {
   }
 }
 
-// The value of a parameter such as `filename="a b.nii"`; `text` follows the equals sign.
-std::string unquoted(std::string_view text) {
-  text = trimmed(text);
-  if (!text.starts_with('"')) return std::string(text.substr(0, text.find(';')));
-  std::string value;
-  for (std::size_t at = 1; at < text.size() && text[at] != '"'; ++at) {
-    if (text[at] == '\\' && at + 1 < text.size()) ++at;
-    value += text[at];
-  }
-  return value;
-}
-
 std::string percent_decoded(std::string_view text) {
   std::string value;
   for (std::size_t at = 0; at < text.size(); ++at) {
@@ -126,19 +115,6 @@ std::string percent_decoded(std::string_view text) {
     if (is_encoded) at += 2;
   }
   return value;
-}
-
-// The text after `name=` in the header; empty if missing.
-std::string_view disposition_parameter(std::string_view header, std::string_view name) {
-  const std::string folded = lower(header);
-  for (std::size_t at = folded.find(';'); at != std::string::npos; at = folded.find(';', at + 1)) {
-    const std::size_t begin = folded.find_first_not_of(" \t", at + 1);
-    if (begin == std::string::npos) break;
-    if (std::string_view(folded).substr(begin).starts_with(name)) {
-      return header.substr(begin + name.size());
-    }
-  }
-  return {};
 }
 
 }  // namespace
@@ -218,11 +194,11 @@ std::string plain_file_name(std::string_view name) {
 
 std::string file_name_of(std::string_view content_disposition) {
   constexpr std::string_view kUtf8 = "utf-8''";
-  const std::string extended = unquoted(disposition_parameter(content_disposition, "filename*="));
+  const std::string extended = header_parameter(content_disposition, "filename*");
   if (lower(extended).starts_with(kUtf8)) {
     return plain_file_name(percent_decoded(std::string_view(extended).substr(kUtf8.size())));
   }
-  return plain_file_name(unquoted(disposition_parameter(content_disposition, "filename=")));
+  return plain_file_name(header_parameter(content_disposition, "filename"));
 }
 
 }  // namespace isomesh::http

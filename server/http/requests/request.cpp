@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/text.h"
+
 namespace isomesh::http {
 namespace {
 
@@ -43,6 +45,8 @@ std::string Request::path_parameter(std::string_view name) const {
   return std::string(text_of(find(path_parameters, name)));
 }
 
-bool Request::is_form() const { return header("Content-Type").starts_with("multipart/form-data"); }
+bool Request::is_form() const {
+  return net::equal_names(split(header("Content-Type"), ';').front(), "multipart/form-data");
+}
 
 }  // namespace isomesh::http

@@ -61,6 +61,8 @@ class BodyReader {
   // True if reading ended because the body arrived too slowly, or because its chunks are malformed.
   virtual bool was_too_slow() const = 0;
   virtual bool was_malformed() const = 0;
+  // True if the client closed the connection before the end of the body.
+  virtual bool was_cut() const = 0;
 };
 
 using Parameters = std::vector<std::pair<std::string, std::string>>;

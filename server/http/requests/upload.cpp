@@ -12,6 +12,7 @@
 
 #include "base/hex.h"
 #include "base/sha256.h"
+#include "server/http/requests/header_parameter.h"
 #include "server/http/requests/import_query.h"
 #include "server/http/requests/partial_upload.h"
 #include "server/http/requests/request_values.h"
@@ -44,12 +45,17 @@ Error other_digest(const std::string& header) {
 // The headers that tell the SHA-256 of a whole body, which is a file here.
 constexpr std::array kDigestsOfAll = {"Content-Digest", "Repr-Digest"};
 
-Error incomplete(const BodyReader& body) {
+Error incomplete(const BodyReader& body, bool is_form) {
   if (body.was_too_slow()) {
     return {ErrorCode::kRequestTimeout, "the body arrived too slowly"};
   }
   if (body.was_malformed()) {
     return invalid_parameter("Transfer-Encoding", "the body is not in chunks");
+  }
+  if (is_form && !body.was_cut()) {
+    return {ErrorCode::kInvalidParameter,
+            "the body is not a form with the boundary in Content-Type: it must end with "
+            "--BOUNDARY-- and a line break"};
   }
   return {ErrorCode::kInvalidParameter, "the body ended before its length"};
 }
@@ -116,7 +122,7 @@ class Receiver {
     if (failure_) std::rethrow_exception(failure_);
     if (!complete && stopping_)
       throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-    if (!complete) throw incomplete(body);
+    if (!complete) throw incomplete(body, is_form);
     if (is_form && fields_ == 0) {
       throw invalid_parameter("file", "the form has no field `file`");
     }
@@ -168,6 +174,9 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   check_length(request, limits.max_bytes);
   check_room(folder, request);
   const bool is_form = request.is_form();
+  if (is_form && header_parameter(request.header("Content-Type"), "boundary").empty()) {
+    throw invalid_parameter("Content-Type", "must have the parameter boundary of the form");
+  }
   std::map<std::string, std::string> expected;
   for (const std::string header : kDigestsOfAll) {
     const auto sha256 = sha256_of_digest(request, header);
@@ -227,7 +236,7 @@ std::string read_text(const Request& request, std::size_t max_bytes) {
     return fits;
   });
   if (!fits) throw too_large(max_bytes);
-  if (!complete) throw incomplete(*request.body);
+  if (!complete) throw incomplete(*request.body, false);
   const auto expected = sha256_of_content_digest(request);
   if (expected && sha256_of(text) != *expected) throw other_digest("Content-Digest");
   return text;

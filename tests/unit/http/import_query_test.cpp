@@ -136,6 +136,7 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
 TEST(FileNameOf, IsWhatTheHeaderTells) {
   EXPECT_EQ(file_name_of("attachment; filename=\"a b.nii.gz\""), "a b.nii.gz");
   EXPECT_EQ(file_name_of("attachment; filename=ct.nrrd; x=y"), "ct.nrrd");
+  EXPECT_EQ(file_name_of("attachment; x=\"; filename=no\"; filename = b.nrrd"), "b.nrrd");
   EXPECT_EQ(file_name_of("attachment; filename=\"x\"; FileName*=UTF-8''M%C3%BCller%20ct"),
             "M\xC3\xBCller ct");
   EXPECT_EQ(file_name_of("attachment; filename=\"..\\\\secret\\\\a.nii\""), "a.nii");
