@@ -11,6 +11,7 @@
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "base/text.h"
+#include "server/http/requests/header_parameter.h"
 
 namespace isomesh::http {
 namespace {
@@ -22,8 +23,9 @@ std::optional<double> number_of(std::string_view text) {
   return text.starts_with('+') ? std::nullopt : parse_double(text);
 }
 
-// The value of a preference (RFC 7240) in the header, without parameters; "" if it has no value.
-std::optional<std::string_view> preference_in(std::string_view header, std::string_view wanted) {
+// The value of a preference (RFC 7240) in the header, without quotes and parameters; "" if it has
+// no value.
+std::optional<std::string> preference_in(std::string_view header, std::string_view wanted) {
   for (const std::string_view preference : split(header, ',')) {
     const std::size_t equals = preference.find('=');
     const bool has_value = equals != std::string_view::npos;
@@ -33,7 +35,7 @@ std::optional<std::string_view> preference_in(std::string_view header, std::stri
         ::strncasecmp(name.data(), wanted.data(), wanted.size()) != 0) {
       continue;
     }
-    return has_value ? trimmed(split(preference.substr(equals + 1), ';').front()) : "";
+    return has_value ? unquoted(split(preference.substr(equals + 1), ';').front()) : "";
   }
   return std::nullopt;
 }
@@ -115,8 +117,8 @@ void check_known(const Request& request, const std::set<std::string>& known) {
 
 std::chrono::milliseconds wait_of(const Request& request) {
   const bool in_query = request.has_parameter("wait");
-  const std::optional<std::string_view> text =
-      in_query ? request.parameter("wait") : preference_in(request.header("Prefer"), "wait");
+  const auto text = in_query ? std::optional(std::string(request.parameter("wait")))
+                             : preference_in(request.header("Prefer"), "wait");
   if (!text) return std::chrono::milliseconds(0);
   const auto seconds = number_of(*text);
   if (!seconds || !std::isfinite(*seconds) || *seconds < 0) {

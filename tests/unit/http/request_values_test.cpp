@@ -57,6 +57,8 @@ TEST(Wait, TakesThePreference) {
   EXPECT_EQ(wait("wait=10"), milliseconds(10'000));
   EXPECT_EQ(wait("respond-async, wait=10"), milliseconds(10'000));
   EXPECT_EQ(wait("wait=10, handling=lenient"), milliseconds(10'000));
+  EXPECT_EQ(wait("wait=\"10\""), milliseconds(10'000));
+  EXPECT_EQ(wait("wait = \"10\"; x=y"), milliseconds(10'000));
   EXPECT_EQ(wait("wait=1000"), milliseconds(30'000));
   EXPECT_EQ(wait("Wait = 10; x=y"), milliseconds(10'000));
 }
@@ -143,6 +145,13 @@ TEST(CheckKnown, RefusesWhatIsGivenTwice) {
   const auto error = thrown_by([] { check_known(with_query({{"a", "1"}, {"a", "1"}}), {"a"}); });
   ASSERT_TRUE(error);
   EXPECT_THAT(fields_of(*error), testing::Each("a"));
+}
+
+TEST(CheckKnown, ShowsControlCharactersOfNames) {
+  const auto error = thrown_by([] { check_known(with_query({{std::string("a\0b", 3), ""}}), {}); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(fields_of(*error), ElementsAre("a\uFFFDb"));
+  EXPECT_STREQ(error->what(), "a\uFFFDb: is not a parameter of this request");
 }
 
 TEST(CheckKnown, DoesNotRepeatLongNamesWhole) {
