@@ -216,6 +216,7 @@ void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
   statuses.probe("GET /livez", "/livez");
   statuses.probe("GET /readyz", "/readyz");
   statuses.probe("GET /metrics", "/metrics");
+  statuses.probe("GET /metrics", "/metrics?x=1");
   statuses.probe("GET /version", "/version");
   statuses.probe("GET /version", "/version?no=1");
   statuses.probe("GET /openapi.yaml", "/openapi.yaml");
