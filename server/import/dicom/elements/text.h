@@ -12,8 +12,4 @@ namespace isomesh::import::dicom {
 // separated by backslashes. Invalid bytes and control characters become U+FFFD.
 std::string utf8(const DataSet& data, Tag tag);
 
-// Loads all converters for the lifetime of the process. Call before the process drops the right to
-// open files: otherwise names that are neither ASCII nor UTF-8 are lost.
-void load_character_sets();
-
 }  // namespace isomesh::import::dicom
