@@ -17,7 +17,9 @@ TextKind kind_of(Tag tag) {
 std::string utf8(const DataSet& data, Tag tag) {
   const std::string_view text = data.text(tag);
   if (text.empty()) return {};
-  return decoded(text, data.text(kSpecificCharacterSet), kind_of(tag));
+  const std::string_view terms =
+      data.character_set ? without_padding(*data.character_set) : std::string_view();
+  return decoded(text, terms, kind_of(tag));
 }
 
 }  // namespace isomesh::import::dicom
