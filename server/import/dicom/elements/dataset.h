@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -39,6 +40,9 @@ class DataSet {
  public:
   std::vector<Element> elements;
   bool big_endian = false;
+  // The Specific Character Set, which items without one have from the data set around them
+  // (PS3.5, 7.5.3). Null if no set is declared. The parser sets it; utf8() of text.h reads it.
+  std::shared_ptr<const std::string> character_set;
 
   // Returns the first element with this tag, or null.
   const Element* find(Tag tag) const;

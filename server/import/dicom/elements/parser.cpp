@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
+#include <utility>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -47,6 +49,9 @@ bool is_needed_sequence(Tag tag) {
     case kStructureSetRoiSequence:
     case kTemporalPositionSequence:
     case kUsImageDescriptionSequence:
+    case kAnatomicRegionSequence:
+    case kSegmentedPropertyCategoryCodeSequence:
+    case kSegmentedPropertyTypeCodeSequence:
     case kSegmentSequence:
     case kSegmentIdentificationSequence:
     case kMrEchoSequence:
@@ -263,6 +268,9 @@ class Parser {
       throw_unusable("The DICOM file's elements take more than the " +
                      std::to_string(kMostKeptBytes) + " bytes that are accepted.");
     }
+    if (element.tag == kSpecificCharacterSet && !element.value.empty()) {
+      set.character_set = std::make_shared<const std::string>(element.value);
+    }
     set.elements.push_back(std::move(element));
   }
 
@@ -273,8 +281,8 @@ class Parser {
     if (!needed && end() - at_ >= 4) needed = blocks_.needed_by_value(head.tag, window(at_, 4));
     Head known = head;
     if (needed) known.tag = *needed;
-    Element element =
-        read_content(known, encoding, end(), 0, needed ? Meaning::kKnownPrivate : Meaning::kPublic);
+    Element element = read_content(known, encoding, {end(), 0, set.character_set},
+                                   needed ? Meaning::kKnownPrivate : Meaning::kPublic);
     if (needed) return keep(set, std::move(element));
     blocks_.reserve(head.tag, without_padding(element.value));
   }
@@ -285,39 +293,46 @@ class Parser {
       read_fragments(encoding, limit);  // an icon's fragments, which are skipped
       return;
     }
-    Element element = read_content(head, encoding, limit, depth);
+    Element element = read_content(head, encoding, {limit, depth, set.character_set});
     if (!is_private(head.tag)) keep(set, std::move(element));
   }
 
   enum class Meaning { kPublic, kKnownPrivate };
 
-  Element read_content(const Head& head, const Encoding& encoding, std::uint64_t limit,
-                       unsigned depth, Meaning meaning = Meaning::kPublic) {
+  // The data set around an element's value.
+  struct Outside {
+    std::uint64_t limit = 0;
+    unsigned depth = 0;
+    std::shared_ptr<const std::string> character_set;
+  };
+
+  Element read_content(const Head& head, const Encoding& encoding, const Outside& outside,
+                       Meaning meaning = Meaning::kPublic) {
     Element element;
     element.tag = head.tag;
     const bool is_known = meaning == Meaning::kKnownPrivate;
     const bool is_sequence = head.vr == "SQ" || head.has_undefined_length() ||
                              (is_known ? head.tag == kGridFrames : is_needed_sequence(head.tag));
     if (!is_sequence) {
-      element.value =
-          read_value(head, limit, is_known ? kLongestPrivateValue : longest_value(head.tag));
+      element.value = read_value(head, outside.limit,
+                                 is_known ? kLongestPrivateValue : longest_value(head.tag));
       return element;
     }
     // Systems that do not know an element store it as UN, with its items in implicit encoding.
     const Encoding inside = head.vr == "UN" ? Encoding{false, false} : encoding;
-    read_items(head, inside, limit, depth + 1, element);
+    read_items(head, inside, {outside.limit, outside.depth + 1, outside.character_set}, element);
     return element;
   }
 
-  void read_items(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
+  void read_items(const Head& head, const Encoding& encoding, const Outside& outside,
                   Element& sequence) {
-    if (depth > kDeepestSequence) {
+    if (outside.depth > kDeepestSequence) {
       throw_unusable("The DICOM file is corrupt: its sequences are nested more than " +
                      std::to_string(kDeepestSequence) + " levels deep.");
     }
     const bool has_end = !head.has_undefined_length();
-    if (has_end) require(head.length, limit, head.tag);
-    const std::uint64_t end = has_end ? at_ + head.length : limit;
+    if (has_end) require(head.length, outside.limit, head.tag);
+    const std::uint64_t end = has_end ? at_ + head.length : outside.limit;
     while (!has_end || at_ < end) {
       const Head item = read_head(encoding, end);
       if (item.tag == kSequenceEnd) return;
@@ -326,24 +341,24 @@ class Parser {
                        " contains something that is not an item.");
       }
       count_part();
-      DataSet set = read_item(item, encoding, end, depth);
+      DataSet set = read_item(item, encoding, {end, outside.depth, outside.character_set});
       if (!is_private(sequence.tag) || sequence.tag == kGridFrames) {
         sequence.items.push_back(std::move(set));
       }
     }
   }
 
-  DataSet read_item(const Head& item, const Encoding& encoding, std::uint64_t limit,
-                    unsigned depth) {
+  DataSet read_item(const Head& item, const Encoding& encoding, const Outside& outside) {
     const bool has_end = !item.has_undefined_length();
-    if (has_end) require(item.length, limit, kItem);
-    const std::uint64_t end = has_end ? at_ + item.length : limit;
+    if (has_end) require(item.length, outside.limit, kItem);
+    const std::uint64_t end = has_end ? at_ + item.length : outside.limit;
     DataSet set;
+    set.character_set = outside.character_set;
     set.big_endian = encoding.big_endian;
     while (!has_end || at_ < end) {
       const Head head = read_head(encoding, end);
       if (head.tag == kItemEnd) break;
-      read_element(head, encoding, end, depth, set);
+      read_element(head, encoding, end, outside.depth, set);
     }
     return set;
   }

@@ -8,12 +8,9 @@
 
 namespace isomesh::import::dicom {
 
-// Converts a text by the data set's Specific Character Set (PS3.3, C.12.1.1.2); values stay
-// separated by backslashes. Invalid bytes and control characters become U+FFFD.
+// Converts a text by the data set's Specific Character Set, its own or an inherited one (PS3.3,
+// C.12.1.1.2). Values stay separated by backslashes. Invalid bytes and control characters become
+// U+FFFD.
 std::string utf8(const DataSet& data, Tag tag);
-
-// Loads all converters for the lifetime of the process. Call before the process drops the right to
-// open files: otherwise names that are neither ASCII nor UTF-8 are lost.
-void load_character_sets();
 
 }  // namespace isomesh::import::dicom

@@ -54,6 +54,33 @@ LabelEntry entry(std::int64_t label, const std::string& name,
   return {.label = label, .name = name, .color = {}, .values = std::move(values)};
 }
 
+TEST(DicomSegmentation, HasTextsInTheCharacterSetOfTheObject) {
+  const DicomObject code = DicomObject().text(kCodeMeaning, "LO", "K\xc3\xb6rper");
+  DicomObject own;
+  own.text(kSpecificCharacterSet, "CS", "ISO_IR 100")
+      .number(kSegmentNumber, 2)
+      .text(kSegmentLabel, "LO", "Dr\xfcse")
+      .items(kSegmentedPropertyTypeCodeSequence,
+             {DicomObject().text(kCodeMeaning, "LO", "Gef\xe4\xdf")});
+  DicomObject inherited;
+  inherited.number(kSegmentNumber, 1)
+      .text(kSegmentLabel, "LO",
+            "Gro\xc3\x9f"
+            "e")
+      .items(kSegmentedPropertyTypeCodeSequence, {code});
+  DicomObject object = segmentation(two_segments());
+  object.text(kSpecificCharacterSet, "CS", "ISO_IR 192").items(kSegmentSequence, {own, inherited});
+  for (const std::string_view syntax : {kImplicit, kExplicit, kDeflate, kBigEndian}) {
+    const Outcome outcome = import_objects({{"seg", object.file(syntax)}});
+    ASSERT_EQ(outcome.error, "") << syntax;
+    EXPECT_THAT(outcome.volume.labels, testing::ElementsAre(entry(1, "Große"), entry(2, "Drüse")));
+    const auto& segments = outcome.volume.dicom->segments;
+    ASSERT_EQ(segments.size(), 2) << syntax;
+    EXPECT_EQ(segments[0].type.meaning, "Körper");
+    EXPECT_EQ(segments[1].type.meaning, "Gefäß");
+  }
+}
+
 TEST(DicomSegmentation, NamesItsLabels) {
   SegmentObject object = two_segments();
   object.segments = {"liver", "spleen", "absent"};

@@ -94,6 +94,17 @@ TEST(DicomStructures, AreDrawnOnTheGridOfTheirImages) {
   }
 }
 
+TEST(DicomStructures, HaveNamesInTheCharacterSetOfTheFile) {
+  DicomObject object = structure_set({{.name = "H\xfc"
+                                               "fte",
+                                       .contours = {{box(1.5, 1.5, 6.5, 6.5, 4)}}}});
+  object.text(kSpecificCharacterSet, "CS", "ISO_IR 100");
+  const Outcome outcome = import_objects(with_images(object), {.series = "1.2.9"});
+  ASSERT_EQ(outcome.error, "");
+  ASSERT_EQ(outcome.volume.labels.size(), 1);
+  EXPECT_EQ(outcome.volume.labels[0].name, "Hüfte");
+}
+
 TEST(DicomStructures, HaveTheGeometryNamesAndColoursOfTheirFiles) {
   const Outcome outcome =
       draw({{.number = 5, .name = "heart", .contours = {{box(1.5, 1.5, 6.5, 6.5, 4)}}},

@@ -1,0 +1,21 @@
+// The character sets of DICOM texts (PS3.3, C.12.1.1.2) and the escape sequences that switch
+// between them (PS3.5, 6.1.2.5).
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace isomesh::import::dicom {
+
+enum class TextKind { kText, kPersonName };
+
+// Converts a stored text to UTF-8. `terms` is the value of Specific Character Set. Bytes without a
+// meaning and control characters become U+FFFD; the result is valid UTF-8 and at most three times
+// as long as `text`. Never throws because of the bytes.
+std::string decoded(std::string_view text, std::string_view terms, TextKind kind);
+
+// Loads all converters for the lifetime of the process. Call before the process drops the right to
+// open files: otherwise names that are neither ASCII nor UTF-8 are lost.
+void load_character_sets();
+
+}  // namespace isomesh::import::dicom
