@@ -68,6 +68,7 @@ void forget_images(store::OrderRecord& record) {
   record.order.results.clear();
   record.order.source.instances.reset();
   record.work.identity.reset();
+  record.work.labels.reset();
   record.work.blobs.clear();
   record.work.listed.clear();
   record.work.listed_since.reset();
@@ -215,6 +216,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
                          .patient_id = identity.patient_id});
     record.order.volume = volume.id;
     record.work.identity = std::move(identity);
+    if (record.order.parameters.labels) record.work.labels = std::move(volume.labels);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kSeriesIncomplete) throw;
     // An incomplete series is listed again, so that no mesh is made from a part of it.
@@ -233,7 +235,9 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;
   if (parameters.labels) {
-    const Volume volume = services_.volumes.get(viewer, parameters.volume);
+    Volume volume = services_.volumes.get(viewer, parameters.volume);
+    // Orders of an older version have none.
+    if (record.work.labels) volume.labels = *record.work.labels;
     parameters = jobs::complete_labels(std::move(parameters), viewer, volume, services_.labels);
   }
   const store::Submission submission =

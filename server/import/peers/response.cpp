@@ -9,6 +9,7 @@
 #include "proto/error.h"
 #include "proto/json_tree.h"
 #include "proto/orders.h"
+#include "server/import/dicom/elements/dataset.h"
 
 namespace isomesh::import {
 namespace {
@@ -55,7 +56,8 @@ std::string tag_text(const Json& object, const char* tag) {
   constexpr std::size_t kLongest = 1024;
   const Json* value = tag_value(object, tag);
   if (value == nullptr || !json::is_string(*value)) return "";
-  return printable(json::text(*value).substr(0, kLongest));
+  // Spaces around a value are not significant. The same values of images are read without them.
+  return printable(dicom::without_padding(json::text(*value)).substr(0, kLongest));
 }
 
 std::string uid_of(const Json& object, const char* tag) {

@@ -64,6 +64,7 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   // These describe this upload, which may differ from the one that created the record.
   stored.notes = std::move(volume.notes);
   stored.ignored = std::move(volume.ignored);
+  stored.labels = std::move(volume.labels);
   return {std::move(stored), is_new};
 }
 

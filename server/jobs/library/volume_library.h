@@ -34,14 +34,15 @@ class VolumeLibrary {
   // Imports an uploaded file in a process of its own. `name` is the client's name for the upload,
   // used if the file contains no name; `party` takes turns with others (ImportPlaces). Second:
   // false if the owner already had the same samples and geometry. Then the record stays unchanged,
-  // but the returned volume has the notes and ignored files of this upload. Throws what
+  // but the returned volume has the notes, ignored files and labels of this upload. Throws what
   // ImportRunner::run throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
                               const std::string& name = {}, const std::string& party = {});
 
   // Imports a series from a PACS response. Second: the patient, study and series according to the
-  // images themselves; the record may be of an earlier upload of the same samples.
+  // images themselves; the record may be of an earlier upload of the same samples. The returned
+  // volume has the labels of this series, as with add().
   std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
                                              const std::filesystem::path& response,
                                              const process::PeersSeries& series);

@@ -115,6 +115,15 @@ TEST(Answer, OfASearchIsAListOfObjects) {
   EXPECT_THAT(answer_of("[]").objects, IsEmpty());
 }
 
+// Values of images are read without these spaces, too, and both are compared.
+TEST(Answer, IsWithoutSpacesAroundValues) {
+  const auto answer = answer_of(
+      R"([{"00100020": {"vr": "LO", "Value": [" P 7 "]}, "0008103E": {"Value": [" head  "]}}])");
+  ASSERT_EQ(answer.objects.size(), 1U);
+  EXPECT_EQ(answer.objects[0].patient_id, "P 7");
+  EXPECT_EQ(answer.objects[0].series_description, "head");
+}
+
 TEST(Answer, OfStoringTellsWhatWasStored) {
   const auto answer = answer_of(R"({
     "00081199": {"vr": "SQ", "Value": [{"00081155": {"vr": "UI", "Value": ["1.5"]}}]},

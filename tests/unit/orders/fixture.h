@@ -56,6 +56,35 @@ inline std::string slice_file(int slice, const std::string& patient = "PAT-1") {
                      element(0x7FE0, 0x10, "OW", pixels));
 }
 
+// A DICOM segmentation with one segment of that name. Its samples do not depend on the name.
+inline std::string segmentation_file(const std::string& name) {
+  const std::string first_number("\1\0", 2);
+  std::vector<std::string> frames;
+  for (int plane = 0; plane < kSlices; ++plane) {
+    const std::string place = element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(plane));
+    frames.push_back(test::sequence(0x20, 0x9113, {place}) +
+                     test::sequence(0x62, 0xA, {element(0x62, 0xB, "US", first_number)}));
+  }
+  const std::string shared =
+      test::sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
+      test::sequence(0x28, 0x9110,
+                     {element(0x18, 0x50, "DS", "1") + element(0x28, 0x30, "DS", "1\\1")});
+  const std::string segment = element(0x62, 4, "US", first_number) + element(0x62, 5, "LO", name);
+  // The first four bits of each row are set.
+  const std::string pixels(std::size_t{8} * kSlices, '\x0F');
+  return test::dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.4") +
+                     element(8, 0x18, "UI", instance_of(0)) + element(8, 0x60, "CS", "SEG") +
+                     element(0x10, 0x20, "LO", "PAT-1") + element(0x20, 0xD, "UI", kStudy) +
+                     element(0x20, 0xE, "UI", kSeries) + element(0x20, 0x52, "UI", "1.9") +
+                     test::number(0x28, 2, 1) + element(0x28, 4, "CS", "MONOCHROME2") +
+                     element(0x28, 8, "IS", std::to_string(kSlices)) + test::number(0x28, 0x10, 8) +
+                     test::number(0x28, 0x11, 8) + test::number(0x28, 0x100, 1) +
+                     test::number(0x28, 0x101, 1) + test::number(0x28, 0x102, 0) +
+                     test::number(0x28, 0x103, 0) + element(0x62, 1, "CS", "BINARY") +
+                     test::sequence(0x62, 2, {segment}) + test::sequence(0x5200, 0x9229, {shared}) +
+                     test::sequence(0x5200, 0x9230, frames) + element(0x7FE0, 0x10, "OB", pixels));
+}
+
 // One series, and what was stored.
 class FakePacs : public Archive, public ObjectReceiver {
  public:
@@ -81,13 +110,14 @@ class FakePacs : public Archive, public ObjectReceiver {
                        .series = kSeries,
                        .modality = "CT",
                        .description = "",
-                       .instances = kSlices};
+                       .instances = static_cast<std::uint32_t>(files().size())};
   }
   std::vector<std::string> list_instances(const std::string&, const std::string&,
                                           const std::stop_token& stop) override {
     answer(stop);
     std::vector<std::string> all;
-    for (int slice = 0; slice < kSlices; ++slice) all.push_back(instance_of(slice));
+    const auto count = static_cast<int>(files().size());
+    for (int slice = 0; slice < count; ++slice) all.push_back(instance_of(slice));
     return all;
   }
   std::string fetch_series(const std::string&, const std::string&,
@@ -96,9 +126,10 @@ class FakePacs : public Archive, public ObjectReceiver {
     answer(stop);
     ++fetches;
     std::ofstream file(target, std::ios::binary);
-    for (int slice = 0; slice < sent_slices; ++slice) {
-      file << "\r\n--b\r\nContent-Type: application/dicom\r\n\r\n"
-           << slice_file(slice, slice == foreign_slice ? "PAT-2" : "PAT-1");
+    const std::vector<std::string> all = files();
+    const std::size_t sent = std::min<std::size_t>(all.size(), sent_slices);
+    for (std::size_t n = 0; n < sent; ++n) {
+      file << "\r\n--b\r\nContent-Type: application/dicom\r\n\r\n" << all[n];
     }
     file << "\r\n--b--\r\n";
     return "multipart/related; boundary=b";
@@ -119,7 +150,25 @@ class FakePacs : public Archive, public ObjectReceiver {
     stored_.insert(object.place.instance);
   }
 
+  // From now on the series has these files instead of its slices.
+  void hold(const std::vector<std::string>& files) {
+    const Lock lock(mutex_);
+    held_ = files;
+  }
+
  private:
+  std::vector<std::string> files() {
+    {
+      const Lock lock(mutex_);
+      if (!held_.empty()) return held_;
+    }
+    std::vector<std::string> slices;
+    for (int slice = 0; slice < kSlices; ++slice) {
+      slices.push_back(slice_file(slice, slice == foreign_slice ? "PAT-2" : "PAT-1"));
+    }
+    return slices;
+  }
+
   void answer(const std::stop_token& stop) {
     ++calls;
     while (hangs) {
@@ -133,6 +182,7 @@ class FakePacs : public Archive, public ObjectReceiver {
 
   Mutex mutex_;
   std::set<std::string> stored_ ISOMESH_GUARDED_BY(mutex_);
+  std::vector<std::string> held_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 // Tells until when nothing was due.
@@ -213,10 +263,11 @@ class OrdersTest : public test::JobsFixture {
 
   void stop() { orders_.reset(); }
 
-  std::string submit(const std::string& pacs = "main", const std::string& series = kSeries) {
+  std::string submit(const std::string& pacs = "main", const std::string& series = kSeries,
+                     const std::string& parameters = R"({"iso": 100})") {
     OrderRequest request;
     request.source = {.pacs = pacs, .study = kStudy, .series = series};
-    request.parameters = R"({"iso": 100})";
+    request.parameters = parameters;
     request.send = {{.pacs = pacs}};
     return orders_->submit({.name = "", .is_administrator = true}, request, "", "").first.id;
   }

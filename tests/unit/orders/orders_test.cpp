@@ -60,6 +60,21 @@ TEST_F(OrdersTest, OfMoreLabelsThanAnOrderMayHaveObjectsFail) {
   EXPECT_EQ(main_->stores, 0);
 }
 
+// The volume's record has the names of the first upload of these samples.
+TEST_F(OrdersTest, HaveTheNamesOfTheirOwnSegments) {
+  std::set<std::string> volumes;
+  for (const char* name : {"Left kidney", "Right kidney"}) {
+    main_->hold({segmentation_file(name)});
+    const std::string id = submit("main", kSeries, R"({"labels": "all"})");
+    ASSERT_TRUE(finish_job()) << name;
+    EXPECT_EQ(last_parameters_.label_names, (LabelTexts{{1, name}}));
+    ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+    volumes.insert(get(id).volume.value());
+  }
+  EXPECT_EQ(volumes.size(), 1U);
+  EXPECT_EQ(main_->stores, 2);
+}
+
 class FittingOrdersTest : public OrdersTest {
  protected:
   FittingOrdersTest() {
