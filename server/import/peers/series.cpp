@@ -97,7 +97,13 @@ Volume read_peers_series(const ImportTask& task, const FormatListener& listener)
   const auto parts =
       unpack_multipart(task.source, boundary_of(asked.content_type), folder.path(), limits);
   if (listener) listener("dicom");
-  return import_dicom(checked(parts, asked, task), task);
+  const std::vector<NamedFile> files = checked(parts, asked, task);
+  try {
+    return import_dicom(files, task);
+  } catch (const Error& error) {
+    // Orders have none of the parameters that a remedy names.
+    throw Error(error.code(), error.what());
+  }
 }
 
 }  // namespace isomesh::import

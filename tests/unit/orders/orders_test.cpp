@@ -100,6 +100,21 @@ TEST_F(UnusableOrdersTest, NameTheImageByItsInstance) {
   EXPECT_THAT(error_of(files).detail, testing::StartsWith("Part 2 of the response: "));
 }
 
+TEST_F(UnusableOrdersTest, DoNotOfferParametersThatOrdersLack) {
+  std::vector<std::string> files;
+  for (int phase = 0; phase < 2; ++phase) {
+    for (int slice = 0; slice < kSlices; ++slice) {
+      files.push_back(slice_file(slice, "PAT-1", phase));
+    }
+  }
+  const Problem error = error_of(files);
+  EXPECT_THAT(error.detail,
+              testing::StartsWith("The series holds 2 volumes that differ in AcquisitionNumber. An "
+                                  "order has no parameter for this. Download the series, and "
+                                  "upload it with volume=N: 0 ("));
+  EXPECT_EQ(error.remedy, Remedy());
+}
+
 class FittingOrdersTest : public OrdersTest {
  protected:
   FittingOrdersTest() {
