@@ -258,9 +258,9 @@ Contents contents_of(Members& members) {
 
 Volume read_slices(const Contents& contents, const Input& input) {
   if (input.listener) input.listener(contents.slice_reader->name);
-  std::vector<std::filesystem::path> files;
+  std::vector<NamedFile> files;
   for (const auto* members : {&contents.slices, &contents.others}) {
-    for (const ArchiveMember& member : *members) files.push_back(member.path);
+    for (const ArchiveMember& member : *members) files.push_back(named(member.path));
   }
   Volume volume = import_dicom(files, input.task);
   volume.format = contents.slice_reader->name;

@@ -34,7 +34,7 @@ class OpenFile {
   FrameReader& reader(std::size_t index) {
     if (!file_ || index_ != index) {
       reader_.reset();
-      file_.emplace(sources_[index].path, scratch_, most_sample_bytes_);
+      file_.emplace(sources_[index].file.path, scratch_, most_sample_bytes_);
       reader_.emplace(*file_, sources_[index].image);
       index_ = index;
     }
@@ -185,12 +185,12 @@ bool is_dicom(std::string_view head) {
   return dicom::find_beginning(std::as_bytes(std::span(head))).has_value();
 }
 
-Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task) {
+Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;
   dicom::Upload upload = dicom::read_headers(files, task.scratch, most_sample_bytes);
   if (const auto* structures = chosen_structures(upload, task.options.series)) {
     Volume volume = import_structures(
-        structures->path, dicom::grid_beside(*structures, upload.sources, task.options), task);
+        structures->file.path, dicom::grid_beside(*structures, upload.sources, task.options), task);
     volume.ignored = std::move(upload.ignored);
     return volume;
   }
@@ -216,6 +216,9 @@ MostBytes most_dicom_bytes(const InputFile& beginning, const ImportTask& task) {
   return {.file = dicom::most_file_bytes(beginning, task.scratch, task.limits.max_sample_bytes)};
 }
 
-Volume parse_dicom(const Input& input) { return import_dicom({&input.path, 1}, input.task); }
+Volume parse_dicom(const Input& input) {
+  const NamedFile file = named(input.path);
+  return import_dicom({&file, 1}, input.task);
+}
 
 }  // namespace isomesh::import

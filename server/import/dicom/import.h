@@ -1,12 +1,11 @@
 // DICOM objects -> canonical volume.
 #pragma once
 
-#include <filesystem>
 #include <span>
-#include <string>
 #include <string_view>
 
 #include "proto/types.h"
+#include "server/import/dicom/choosing/named_file.h"
 #include "server/import/source/reader.h"
 
 namespace isomesh::import {
@@ -17,7 +16,7 @@ bool is_dicom(std::string_view head);
 // Imports the one volume among the images of `files`: single-frame slices, or frames of one file.
 // The task's options select one of several series and volumes, and accept ambiguities; the task's
 // source is not used. Other files and localisers are skipped and listed in the volume's `ignored`.
-// With several files, messages name them by the file names given here, without folders.
+// With several files, messages have their names.
 //
 // Samples are modality values: rescaled by slope and intercept. MONOCHROME1 is not inverted, and
 // padding is included. Integers stay integers if slopes and intercepts are integers.
@@ -25,7 +24,7 @@ bool is_dicom(std::string_view head);
 // Throws Error kUnusableVolume with the reason, naming slices, if the images are not one consistent
 // volume, with choices if there are several and none was selected; kTooLarge, kOutOfSpace,
 // kInternal. Thread safe.
-Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task);
+Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task);
 
 // See most_file_bytes in dataset.h.
 MostBytes most_dicom_bytes(const InputFile& beginning, const ImportTask& task);

@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/import/dicom/choosing/series.h"
 #include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
@@ -39,16 +40,35 @@ class PatientCheck {
   std::string issuer_;  // may be missing in some images
 };
 
+// A user knows the images of a PACS by these, and not by their place in the response, which looks
+// like the number of a slice.
+NamedFile named_by_instance(const std::filesystem::path& part, const dicom::DataSet& data) {
+  const std::string uid = "SOP Instance UID " + dicom::utf8(data, dicom::kSopInstanceUid);
+  const auto number = data.integer(dicom::kInstanceNumber);
+  if (!number) return {part, uid, uid};
+  const std::string text = std::to_string(*number);
+  return {part, "instance number " + text, "Instance number " + text + " (" + uid + ')'};
+}
+
+// Throws with the part's number if the part cannot be read.
+dicom::DicomFile opened(const std::filesystem::path& part, std::size_t number,
+                        const ImportTask& task) {
+  try {
+    return {part, task.scratch, task.limits.max_sample_bytes};
+  } catch (const Error& error) {
+    dicom::rethrow_for({part, "", "Part " + std::to_string(number) + " of the response"}, error);
+  }
+}
+
 // The files of the series' instances, without duplicates. Rejects missing instances, because half a
 // head is also a valid volume, and instances of several patients.
-std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::path>& parts,
-                                           const process::PeersSeries& asked,
-                                           const ImportTask& task) {
-  std::vector<std::filesystem::path> files;
+std::vector<NamedFile> checked(const std::vector<std::filesystem::path>& parts,
+                               const process::PeersSeries& asked, const ImportTask& task) {
+  std::vector<NamedFile> files;
   std::set<std::string> instances;
   PatientCheck patients;
-  for (const std::filesystem::path& part : parts) {
-    const dicom::DicomFile file(part, task.scratch, task.limits.max_sample_bytes);
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    const dicom::DicomFile file = opened(parts[n], n + 1, task);
     const dicom::DataSet& data = file.data();
     if (data.text(dicom::kStudyInstanceUid) != asked.study ||
         data.text(dicom::kSeriesInstanceUid) != asked.series) {
@@ -56,7 +76,9 @@ std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::pa
                   "the PACS sent an object of another series than the requested one");
     }
     patients.add(data);
-    if (instances.emplace(data.text(dicom::kSopInstanceUid)).second) files.push_back(part);
+    if (instances.emplace(data.text(dicom::kSopInstanceUid)).second) {
+      files.push_back(named_by_instance(parts[n], data));
+    }
   }
   const std::set<std::string> listed(asked.instances.begin(), asked.instances.end());
   if (instances == listed) return files;
@@ -75,7 +97,13 @@ Volume read_peers_series(const ImportTask& task, const FormatListener& listener)
   const auto parts =
       unpack_multipart(task.source, boundary_of(asked.content_type), folder.path(), limits);
   if (listener) listener("dicom");
-  return import_dicom(checked(parts, asked, task), task);
+  const std::vector<NamedFile> files = checked(parts, asked, task);
+  try {
+    return import_dicom(files, task);
+  } catch (const Error& error) {
+    // Orders have none of the parameters that a remedy names.
+    throw Error(error.code(), error.what());
+  }
 }
 
 }  // namespace isomesh::import

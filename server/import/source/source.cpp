@@ -191,4 +191,9 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
       std::move(choices));
 }
 
+std::string begin_remedy(const ImportOptions& options, const std::string& verb) {
+  if (!options.peers) return ' ' + verb + ' ';
+  return " An order has no parameter for this. Download the series, and upload it with ";
+}
+
 }  // namespace isomesh::import

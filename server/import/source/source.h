@@ -185,4 +185,9 @@ std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes);
 void choose_volume(std::uint64_t count, const Difference& difference, const ImportOptions& options,
                    SourceVolume& volume);
 
+// The words, with a space before them, between the reason of an error and the parameter of a client
+// that resolves it: `verb`, such as "Add". An order has no such parameter, so its series must be
+// uploaded.
+std::string begin_remedy(const ImportOptions& options, const std::string& verb);
+
 }  // namespace isomesh::import

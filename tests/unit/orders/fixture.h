@@ -40,20 +40,21 @@ inline std::string instance_of(int slice) {
   return std::string(kSeries) + '.' + std::to_string(slice);
 }
 
-inline std::string slice_file(int slice, const std::string& patient = "PAT-1") {
+inline std::string slice_file(int slice, const std::string& patient = "PAT-1", int phase = 0) {
   const std::string pixels(std::size_t{4} * 4 * 2, slice % 2 == 0 ? '\1' : '\0');
-  return test::dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-                     element(8, 0x18, "UI", instance_of(slice)) + element(8, 0x60, "CS", "CT") +
-                     element(0x10, 0x20, "LO", patient) + element(0x20, 0xD, "UI", kStudy) +
-                     element(0x20, 0xE, "UI", kSeries) +
-                     element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(slice)) +
-                     element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
-                     element(0x20, 0x52, "UI", "1.9") + test::number(0x28, 2, 1) +
-                     element(0x28, 4, "CS", "MONOCHROME2") + test::number(0x28, 0x10, 4) +
-                     test::number(0x28, 0x11, 4) + element(0x28, 0x30, "DS", "1\\1") +
-                     test::number(0x28, 0x100, 16) + test::number(0x28, 0x101, 16) +
-                     test::number(0x28, 0x102, 15) + test::number(0x28, 0x103, 0) +
-                     element(0x7FE0, 0x10, "OW", pixels));
+  return test::dicom(
+      element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+      element(8, 0x18, "UI", instance_of(slice + phase * kSlices)) + element(8, 0x60, "CS", "CT") +
+      element(0x10, 0x20, "LO", patient) + element(0x20, 0xD, "UI", kStudy) +
+      element(0x20, 0xE, "UI", kSeries) + element(0x20, 0x12, "IS", std::to_string(phase + 1)) +
+      element(0x20, 0x13, "IS", std::to_string(slice + 7)) +
+      element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(slice)) +
+      element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + element(0x20, 0x52, "UI", "1.9") +
+      test::number(0x28, 2, 1) + element(0x28, 4, "CS", "MONOCHROME2") +
+      test::number(0x28, 0x10, 4) + test::number(0x28, 0x11, 4) +
+      element(0x28, 0x30, "DS", "1\\1") + test::number(0x28, 0x100, 16) +
+      test::number(0x28, 0x101, 16) + test::number(0x28, 0x102, 15) + test::number(0x28, 0x103, 0) +
+      element(0x7FE0, 0x10, "OW", pixels));
 }
 
 // A DICOM segmentation with one segment of that name. Its samples do not depend on the name.

@@ -75,6 +75,46 @@ TEST_F(OrdersTest, HaveTheNamesOfTheirOwnSegments) {
   EXPECT_EQ(main_->stores, 2);
 }
 
+class UnusableOrdersTest : public OrdersTest {
+ protected:
+  // The error of an order of a series with these files.
+  Problem error_of(const std::vector<std::string>& files) {
+    main_->hold(files);
+    main_->sent_slices = static_cast<int>(files.size());
+    const std::string id = submit();
+    if (!reaches(id, OrderState::kFailed)) return {};
+    return get(id).error.value();
+  }
+};
+
+// The place of an image in the response means nothing to a user.
+TEST_F(UnusableOrdersTest, NameTheImageByItsInstance) {
+  std::vector<std::string> files;
+  for (int slice = 0; slice < kSlices; ++slice) files.push_back(slice_file(slice));
+  const std::string orientation = "1\\0\\0\\0\\1\\0";
+  std::vector<std::string> crooked = files;
+  crooked[2].replace(crooked[2].find(orientation), orientation.size(), "1\\0\\0\\0\\1\\x");
+  EXPECT_THAT(error_of(crooked).detail,
+              testing::StartsWith("Instance number 9 (SOP Instance UID 1.2.2.2): "));
+  files[1] = "nothing";
+  EXPECT_THAT(error_of(files).detail, testing::StartsWith("Part 2 of the response: "));
+}
+
+TEST_F(UnusableOrdersTest, DoNotOfferParametersThatOrdersLack) {
+  std::vector<std::string> files;
+  for (int phase = 0; phase < 2; ++phase) {
+    for (int slice = 0; slice < kSlices; ++slice) {
+      files.push_back(slice_file(slice, "PAT-1", phase));
+    }
+  }
+  const Problem error = error_of(files);
+  EXPECT_THAT(error.detail,
+              testing::StartsWith("The series holds 2 volumes that differ in AcquisitionNumber. An "
+                                  "order has no parameter for this. Download the series, and "
+                                  "upload it with volume=N: 0 ("));
+  EXPECT_EQ(error.remedy, Remedy());
+}
+
 class FittingOrdersTest : public OrdersTest {
  protected:
   FittingOrdersTest() {

@@ -40,7 +40,8 @@ std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
   const std::string difference = all.difference.empty() ? "" : " that differ in " + all.difference;
   const std::string found = "The series holds " + count_of(count, "volume") + difference + '.';
   std::vector<Choice> choices = choices_of(all);
-  const std::string choose = " Choose one with volume=N: " + listed(choices) + '.';
+  const std::string choose =
+      begin_remedy(options, "Choose one with") + "volume=N: " + listed(choices) + '.';
   if (!options.volume) {
     throw_choice(found + choose, choices);
   }
@@ -170,8 +171,9 @@ void note_place(const Stack& stack, const ImportOptions& options, std::vector<No
   if (!options.accepts(NoteCode::kSpaceAssumed)) {
     throw_overridable(NoteCode::kSpaceAssumed,
                       "The DICOM tomogram does not define its position and orientation, so its "
-                      "place in the patient is unknown. Add accept=space-assumed to place its "
-                      "first slice at the origin.");
+                      "place in the patient is unknown." +
+                          begin_remedy(options, "Add") +
+                          "accept=space-assumed to place its first slice at the origin.");
   }
   notes.push_back(note_of(NoteCode::kSpaceAssumed,
                           "The DICOM tomogram does not define its position and orientation. Its "

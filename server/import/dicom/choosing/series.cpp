@@ -20,18 +20,8 @@ namespace {
 
 constexpr std::size_t kMostNamedObjects = 100;
 
-std::string name_of(const std::filesystem::path& path) {
-  return printable(path.filename().string());
-}
-
-[[noreturn]] void rethrow_for(const std::filesystem::path& path, const Error& error) {
-  throw Error(error.code(), "File " + in_quotes(name_of(path)) + ": " + error.what());
-}
-
-void ignore(Upload& upload, const std::filesystem::path& path, const std::string& reason) {
-  if (upload.ignored.size() < kMostNamedObjects) {
-    upload.ignored.push_back({name_of(path), reason});
-  }
+void ignore(Upload& upload, const NamedFile& file, const std::string& reason) {
+  if (upload.ignored.size() < kMostNamedObjects) upload.ignored.push_back({file.name, reason});
 }
 
 // Some anonymisers keep identifiers only in the meta information, which is the fallback.
@@ -50,10 +40,10 @@ std::string series_name(const DataSet& data) {
   return std::to_string(data.integer(kSeriesNumber).value_or(0)) + ".0";
 }
 
-Source describe_source(const std::filesystem::path& path, const DicomFile& file) {
+Source describe_source(const NamedFile& from, const DicomFile& file) {
   const DataSet& data = file.data();
   Source source;
-  source.path = path;
+  source.file = from;
   source.series_uid = series_name(data);
   source.series_description = utf8(data, kSeriesDescription);
   source.series_number = data.integer(kSeriesNumber);
@@ -77,17 +67,17 @@ class HeaderReader {
   HeaderReader(std::filesystem::path scratch, std::uint64_t most_sample_bytes)
       : scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
 
-  void read(const std::filesystem::path& path) {
-    if (!begins_as_dicom(path)) return ignore(upload_, path, "it is not a DICOM file");
-    const DicomFile file(path, scratch_, most_sample_bytes_);
-    if (is_structure_set(file.data())) return read_structure_set(path, file);
-    if (const auto reason = reason_to_ignore(file)) return ignore(upload_, path, *reason);
-    Source source = describe_source(path, file);
+  void read(const NamedFile& from) {
+    if (!begins_as_dicom(from.path)) return ignore(upload_, from, "it is not a DICOM file");
+    const DicomFile file(from.path, scratch_, most_sample_bytes_);
+    if (is_structure_set(file.data())) return read_structure_set(from, file);
+    if (const auto reason = reason_to_ignore(file)) return ignore(upload_, from, *reason);
+    Source source = describe_source(from, file);
     const std::string& uid = source.instance.sop_instance_uid;
-    const auto [known, is_new] = first_with_uid_.try_emplace(uid, path);
-    if (!is_new && same_bytes(known->second, path)) {
+    const auto [known, is_new] = first_with_uid_.try_emplace(uid, from);
+    if (!is_new && same_bytes(known->second.path, from.path)) {
       ++doubles_;
-      return ignore(upload_, path, reason_of_double(name_of(known->second)));
+      return ignore(upload_, from, reason_of_double(known->second.name));
     }
     upload_.sources.push_back(std::move(source));
   }
@@ -98,21 +88,21 @@ class HeaderReader {
   }
 
  private:
-  void read_structure_set(const std::filesystem::path& path, const DicomFile& file) {
+  void read_structure_set(const NamedFile& from, const DicomFile& file) {
     const DataSet& data = file.data();
     for (const StructureFile& known : upload_.structure_sets) {
-      if (!same_bytes(known.path, path)) continue;
+      if (!same_bytes(known.file.path, from.path)) continue;
       ++doubles_;
-      return ignore(upload_, path, reason_of_double(name_of(known.path)));
+      return ignore(upload_, from, reason_of_double(known.file.name));
     }
     upload_.structure_sets.push_back(
-        {path, series_name(data), utf8(data, kSeriesDescription), frame_of_structures(data)});
+        {from, series_name(data), utf8(data, kSeriesDescription), frame_of_structures(data)});
   }
 
   std::filesystem::path scratch_;
   std::uint64_t most_sample_bytes_;
   Upload upload_;
-  std::map<std::string, std::filesystem::path> first_with_uid_;
+  std::map<std::string, NamedFile> first_with_uid_;
   std::size_t doubles_ = 0;
 };
 
@@ -196,20 +186,24 @@ std::vector<DicomSegment> segments_of(const DataSet& data) {
 
 }  // namespace
 
-Upload read_headers(std::span<const std::filesystem::path> files,
-                    const std::filesystem::path& scratch, std::uint64_t most_sample_bytes) {
+void rethrow_for(const NamedFile& file, const Error& error) {
+  throw Error(error.code(), file.title + ": " + error.what());
+}
+
+Upload read_headers(std::span<const NamedFile> files, const std::filesystem::path& scratch,
+                    std::uint64_t most_sample_bytes) {
   HeaderReader reader(scratch, most_sample_bytes);
-  for (const std::filesystem::path& path : files) {
+  for (const NamedFile& file : files) {
     try {
-      reader.read(path);
+      reader.read(file);
     } catch (const Error& error) {
       if (files.size() == 1) throw;
-      rethrow_for(path, error);
+      rethrow_for(file, error);
     }
   }
   Upload upload = reader.finish();
   if (files.size() > 1) {
-    for (Source& source : upload.sources) source.image.file_name = name_of(source.path);
+    for (Source& source : upload.sources) source.image.file_name = source.file.name;
   }
   if (!upload.sources.empty() || !upload.structure_sets.empty()) return upload;
   if (upload.ignored.size() == 1) {
@@ -271,7 +265,7 @@ std::vector<Source> choose_series(std::vector<Source> sources, const std::string
   for (const Source& source : sources) {
     if (!source.fault) continue;
     if (sources.size() == 1) throw *source.fault;
-    rethrow_for(source.path, *source.fault);
+    rethrow_for(source.file, *source.fault);
   }
   return sources;
 }

@@ -9,13 +9,14 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
+#include "server/import/dicom/choosing/named_file.h"
 #include "server/import/dicom/geometry/image.h"
 
 namespace isomesh::import::dicom {
 
 // An uploaded file with images.
 struct Source {
-  std::filesystem::path path;
+  NamedFile file;
   std::string series_uid;          // "3.0" for series 3 without a UID
   std::string series_description;  // UTF-8
   std::optional<std::int64_t> series_number;
@@ -27,7 +28,7 @@ struct Source {
 
 // An uploaded structure set (contours/structure_set.h).
 struct StructureFile {
-  std::filesystem::path path;
+  NamedFile file;
   std::string series_uid;
   std::string description;
   std::string frame_of_reference_uid;
@@ -40,10 +41,13 @@ struct Upload {
   std::vector<Note> notes;
 };
 
+// Throws the error of one of several files, with the file's title.
+[[noreturn]] void rethrow_for(const NamedFile& file, const Error& error);
+
 // Reads the headers of all files. Of identical files only the first is used. Throws Error
 // kUnusableVolume if a DICOM file is truncated or corrupt, or if none holds images.
-Upload read_headers(std::span<const std::filesystem::path> files,
-                    const std::filesystem::path& scratch, std::uint64_t most_sample_bytes);
+Upload read_headers(std::span<const NamedFile> files, const std::filesystem::path& scratch,
+                    std::uint64_t most_sample_bytes);
 
 // Returns the structure set of the series, or the only one if `uid` is empty and there are no
 // images; null for images. Throws Error kUnusableVolume with all series as choices if the upload

@@ -42,8 +42,8 @@ std::optional<Note> note_on_frames_of_reference(std::span<const Slice> slices,
   throw_overridable(
       NoteCode::kFrameOfReference,
       "The series is not a single volume: " + found +
-          " Slices with different frames of reference may not share one coordinate system. "
-          "Add accept=frame-of-reference to read them as one volume.");
+          " Slices with different frames of reference may not share one coordinate system." +
+          begin_remedy(options, "Add") + "accept=frame-of-reference to read them as one volume.");
 }
 
 }  // namespace isomesh::import::dicom

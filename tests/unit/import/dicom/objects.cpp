@@ -290,8 +290,8 @@ Outcome import_objects(const NamedFiles& files, const ImportOptions& options,
                        const SizeLimits& limits) {
   const Folder sources;
   const Folder target;
-  std::vector<std::filesystem::path> paths;
-  for (const auto& [name, bytes] : files) paths.push_back(sources.write(name, bytes));
+  std::vector<NamedFile> paths;
+  for (const auto& [name, bytes] : files) paths.push_back(named(sources.write(name, bytes)));
   Outcome outcome;
   try {
     outcome.volume = import_dicom(paths, {.source = {},
