@@ -19,7 +19,7 @@ std::string lower(std::string_view text);  // ASCII only
 // other than tabs, or noncharacters (Unicode 15, 23.7).
 bool has_control_characters(std::string_view text);
 
-// Replaces invalid UTF-8, tabs and the characters of has_control_characters() by U+FFFD.
+// Replaces tabs and the characters of has_control_characters() by U+FFFD.
 std::string printable(std::string_view text);
 
 // The longest prefix of a UTF-8 text of at most `most_bytes` bytes that does not split a character.

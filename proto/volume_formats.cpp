@@ -69,10 +69,9 @@ constexpr VolumeFormat kVolumeFormats[] = {
      .suffixes = ".tif .tiff .btf .tf8",
      .content =
          "several pages, or a folder or archive of single pages; OME-TIFF and ImageJ's TIFF with "
-         "their spacing, ImageJ's with calibrated values, others need `spacing`; `volume=N` "
-         "chooses "
-         "a channel or time; strips and tiles, BigTIFF, grey of 8 to 32 bits and floats, without "
-         "loss compressed"},
+         "their spacing, ImageJ's with calibrated values, both also in folders; others need "
+         "`spacing`; `volume=N` chooses a channel or time; strips and tiles, BigTIFF, grey of 8 to "
+         "32 bits and floats, without loss compressed"},
     {.name = "png",
      .title = "PNG",
      .suffixes = ".png",

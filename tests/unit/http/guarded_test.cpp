@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/log.h"
 #include "server/http/app/app.h"
 
 namespace isomesh::http {
@@ -23,9 +24,11 @@ Guarded guard(const Thrown& thrown) {
   Guarded result;
   Request request;
   request.path = "/v1/jobs/1/mesh.obj";
+  start_log(LogFormat::kText, LogLevel::kInfo);
   testing::internal::CaptureStderr();
   guarded(request, result.response, [&]() -> std::optional<Continuation> { throw thrown; });
   result.log = testing::internal::GetCapturedStderr();
+  start_log(LogFormat::kText, LogLevel::kOff);
   return result;
 }
 
