@@ -214,6 +214,6 @@ describe('levels of detail', () => {
     await expect.poll(() => page.locator('.pane[data-loaded]').count()).toBe(0);
     release();
     await surfaceLoaded(page);
-    expect((await silhouette(page, page.locator('.viewport'))).filling).toBeGreaterThan(Math.PI / 4 - 0.03);
+    await expect.poll(filling).toBeGreaterThan(Math.PI / 4 - 0.03);
   });
 });
