@@ -267,7 +267,13 @@ std::string decoded(std::string_view text, std::string_view terms, TextKind kind
 
 void load_character_sets() {
   // A module stays loaded while one of its converters is open.
-  for (const CharacterSet& set : kCharacterSets) static_cast<void>(iconv_open("UTF-8", set.name));
+  static const std::array kept = [] {
+    std::array<iconv_t, kCharacterSets.size()> converters;
+    std::ranges::transform(kCharacterSets, converters.begin(),
+                           [](const CharacterSet& set) { return iconv_open("UTF-8", set.name); });
+    return converters;
+  }();
+  static_cast<void>(kept);
 }
 
 }  // namespace isomesh::import::dicom
