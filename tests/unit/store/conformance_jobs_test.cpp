@@ -98,18 +98,23 @@ TEST_P(JobConformance, WaitingForWorkEndsWhenItIsStopped) {
 
 // --- Running
 
+const Progress kSomeProgress = {Stage::kSmooth, 0.4, {.load = 1, .extract = 2}};
+
+void expect_some_progress(const Job& job, double queued) {
+  EXPECT_EQ(job.stage, kSomeProgress.stage);
+  EXPECT_EQ(job.progress, kSomeProgress.share);
+  EXPECT_EQ(job.timing.load, kSomeProgress.timing.load);
+  EXPECT_EQ(job.timing.extract, kSomeProgress.timing.extract);
+  EXPECT_EQ(job.timing.queue, queued);
+}
+
 TEST_P(JobConformance, ProgressIsSeen) {
   const std::string id = submit().id;
   const Lease lease = claimed();
   const double queued = jobs().get("", id).timing.queue;
-  EXPECT_EQ(jobs().renew(lease, {Stage::kSmooth, 0.4, {.load = 1, .extract = 2}}, kLongLease),
-            Standing::kOk);
+  EXPECT_EQ(jobs().renew(lease, kSomeProgress, kLongLease), Standing::kOk);
   const Job job = jobs().get("", id);
-  EXPECT_EQ(job.stage, Stage::kSmooth);
-  EXPECT_EQ(job.progress, 0.4);
-  EXPECT_EQ(job.timing.load, 1);
-  EXPECT_EQ(job.timing.extract, 2);
-  EXPECT_EQ(job.timing.queue, queued);
+  expect_some_progress(job, queued);
 }
 
 TEST_P(JobConformance, AMeshEndsItSucceeded) {
@@ -134,14 +139,10 @@ TEST_P(JobConformance, AJobWithoutAMeshKeepsItsLastProgress) {
     const std::string id = submit().id;
     const Lease lease = claimed();
     const double queued = jobs().get("", id).timing.queue;
-    jobs().renew(lease, {Stage::kSmooth, 0.4, {.load = 1, .extract = 2}}, kLongLease);
+    jobs().renew(lease, kSomeProgress, kLongLease);
     end(lease);
     const Job job = jobs().get("", id);
-    EXPECT_EQ(job.stage, Stage::kSmooth);
-    EXPECT_EQ(job.progress, 0.4);
-    EXPECT_EQ(job.timing.load, 1);
-    EXPECT_EQ(job.timing.extract, 2);
-    EXPECT_EQ(job.timing.queue, queued);
+    expect_some_progress(job, queued);
     EXPECT_GE(job.timing.total, queued);
     return job.state;
   };

@@ -137,7 +137,7 @@ TEST_F(S3Blobs, AnExpiredTokenIsReplacedMeanwhile) {
   }
 }
 
-// Whoever looks for a blob must not take it for damaged.
+// A blob that is not found then must not be taken for damaged.
 TEST_F(S3Blobs, ABucketThatIsGoneBetweenTwoRequestsLosesNothing) {
   const std::string key = put_elsewhere("hello");
   peer().fail("status-404", 0, "GET");
