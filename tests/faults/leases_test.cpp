@@ -106,10 +106,14 @@ TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
     for (const pid_t process : job_processes()) {
       if (!others.contains(process)) ::kill(process, SIGKILL);
     }
-    ASSERT_TRUE(eventually([&] { return job(deadly.id).stage != Stage::kSmooth; })) << death;
+    ASSERT_TRUE(eventually([&] {
+      const Job now = job(deadly.id);
+      return now.stage != Stage::kSmooth || now.state == JobState::kFailed;
+    })) << death;
   }
   const Job failed = ended(deadly.id);
   EXPECT_EQ(failed.state, JobState::kFailed);
+  EXPECT_EQ(failed.stage, Stage::kSmooth);
   ASSERT_TRUE(failed.error);
   EXPECT_EQ(failed.error->detail,
             "The job process ended with signal 9 (killed) in the stage \"smooth\".");
