@@ -34,7 +34,6 @@ class BccClusterWalk {
  public:
   BccClusterWalk(const Extraction& extraction, const Slab& slab, SurfaceCount& count)
       : extraction_(extraction),
-        shape_(extraction),
         dims_(extraction.dims),
         slab_(slab),
         count_(count),
@@ -197,11 +196,12 @@ class BccClusterWalk {
   // The points whose neighbours all are points of the volume.
   Word joining_points(BccPoint point, std::size_t w, std::uint32_t y, std::uint32_t z) const {
     if (point == BccPoint::kSample) return joining_samples(extraction_, w, y, z);
-    if (!shape_.has_row(std::int64_t{y} - 1, std::int64_t{z} - 1) ||
-        !shape_.has_row(std::int64_t{y} + 1, std::int64_t{z} + 1)) {
+    const BccShape& shape = field_.shape();
+    if (!shape.has_row(std::int64_t{y} - 1, std::int64_t{z} - 1) ||
+        !shape.has_row(std::int64_t{y} + 1, std::int64_t{z} + 1)) {
       return 0;
     }
-    return shape_.cells_along_x(w, -1) & shape_.cells_along_x(w, 1);
+    return shape.along_x(w).last & shape.along_x(w).next;
   }
 
   void find_candidates(BccPoint point, std::uint32_t y, std::uint32_t z) {
@@ -283,7 +283,6 @@ class BccClusterWalk {
   }
 
   const Extraction& extraction_;
-  const BccShape shape_;
   const Dims dims_;
   const Slab slab_;
   SurfaceCount& count_;

@@ -25,16 +25,13 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// The bits of word w whose x is in [low, high).
-HWY_INLINE Word bits_between(std::size_t w, std::int64_t low, std::int64_t high) {
-  const auto begin = static_cast<std::int64_t>(w * kWordBits);
-  const auto below = [&](std::int64_t x) {
-    const std::int64_t bits = x - begin;
-    if (bits <= 0) return Word{0};
-    return bits >= std::int64_t{kWordBits} ? ~Word{0} : (Word{1} << bits) - 1;
-  };
-  return below(high) & ~below(low);
-}
+// What there is along x of the samples and cells of a word.
+struct BccAlongX {
+  Word edges = 0;  // the samples that have a next one
+  Word cells = 0;  // the cells that have a centre, and those whose next or last one has
+  Word next = 0;
+  Word last = 0;
+};
 
 // The cells that have a centre: those between the lattice's own samples.
 class BccShape {
@@ -42,26 +39,38 @@ class BccShape {
   explicit BccShape(const Extraction& extraction)
       : first_(extraction.margin),
         end_{extraction.dims.x - 1 - first_, extraction.dims.y - 1 - first_,
-             extraction.dims.z - 1 - first_} {}
-
-  // The same of the cells that are `shift` farther along x than those of word w.
-  HWY_INLINE Word cells_along_x(std::size_t w, std::int64_t shift = 0) const {
-    return bits_between(w, first_ - shift, end_[0] - shift);
+             extraction.dims.z - 1 - first_},
+        along_x_(words_of(extraction.dims.x)) {
+    for (std::int64_t x = 0; x < std::int64_t{extraction.dims.x}; ++x) {
+      BccAlongX& word = along_x_[static_cast<std::size_t>(x) / kWordBits];
+      const auto mark = [bit = Word{1} << x % kWordBits](Word& in, bool is_there) {
+        if (is_there) in |= bit;
+      };
+      mark(word.edges, x + 1 < std::int64_t{extraction.dims.x});
+      mark(word.cells, has_column(x));
+      mark(word.next, has_column(x + 1));
+      mark(word.last, has_column(x - 1));
+    }
   }
+
+  HWY_INLINE const BccAlongX& along_x(std::size_t w) const { return along_x_[w]; }
 
   bool has_row(std::int64_t y, std::int64_t z) const {
     return y >= first_ && y < end_[1] && has_plane(z);
   }
 
   bool has_cell(std::int64_t x, std::int64_t y, std::int64_t z) const {
-    return x >= first_ && x < end_[0] && has_row(y, z);
+    return has_column(x) && has_row(y, z);
   }
 
   bool has_plane(std::int64_t z) const { return z >= first_ && z < end_[2]; }
 
  private:
+  bool has_column(std::int64_t x) const { return x >= first_ && x < end_[0]; }
+
   std::int64_t first_;
   std::array<std::int64_t, 3> end_;
+  std::vector<BccAlongX> along_x_;
 };
 
 // The faces of one axis above 64 cells, or below them, that lie on one side.
@@ -79,11 +88,11 @@ class BccRow {
     const Word* next_z;
   };
 
-  BccRow(const Extraction& extraction, const SignPlane& low, const SignPlane& high,
-         const Centres& centres, std::uint32_t y, std::uint32_t z)
-      : shape_(extraction),
+  // `shape` must outlive the row.
+  BccRow(const Extraction& extraction, const BccShape& shape, const SignPlane& low,
+         const SignPlane& high, const Centres& centres, std::uint32_t y, std::uint32_t z)
+      : shape_(shape),
         centres_(centres),
-        end_x_(extraction.dims.x),
         has_y_(y + 1 < extraction.dims.y),
         has_z_(z + 1 < extraction.dims.z),
         has_phantoms_(extraction.margin != 0),
@@ -131,31 +140,31 @@ class BccRow {
   HWY_INLINE std::array<Word, kBccSlots> crossed_edges(std::size_t w,
                                                        const CornerWords& corners) const {
     std::array<Word, kBccSlots> crossed = {};
-    const Word along_x = bits_between(w, 0, std::int64_t{end_x_} - 1);
+    const BccAlongX& along_x = shape_.along_x(w);
     const Word cells = cells_of(w);
     if (has_centres_) {
       const Word centre = centres_.own[w];
       for (std::size_t c = 0; c < 8; ++c) crossed[c] = (corners[c] ^ centre) & cells;
-      crossed[11] = (centre ^ next(centres_.own, w)) & cells & shape_.cells_along_x(w, 1);
+      crossed[11] = (centre ^ next(centres_.own, w)) & cells & along_x.next;
       if (has_next_y_) crossed[12] = (centre ^ centres_.next_y[w]) & cells;
       if (has_next_z_) crossed[13] = (centre ^ centres_.next_z[w]) & cells;
     }
     if (has_phantoms_) crossed[0] |= (corners[0] ^ corners[7]) & split_in_six(w);
-    crossed[8] = (corners[0] ^ corners[1]) & along_x;
+    crossed[8] = (corners[0] ^ corners[1]) & along_x.edges;
     if (has_y_) crossed[9] = corners[0] ^ corners[2];
     if (has_z_) crossed[10] = corners[0] ^ corners[4];
     if (has_y_ && has_z_) {
-      crossed[14] = (corners[0] ^ corners[6]) & ~(cells & shape_.cells_along_x(w, -1));
+      crossed[14] = (corners[0] ^ corners[6]) & ~(cells & along_x.last);
     }
-    if (has_z_) crossed[15] = (corners[0] ^ corners[5]) & along_x & ~(has_last_y_ ? cells : 0);
-    if (has_y_) crossed[16] = (corners[0] ^ corners[3]) & along_x & ~(has_last_z_ ? cells : 0);
+    if (has_z_) crossed[15] = (corners[0] ^ corners[5]) & along_x.edges & ~(has_last_y_ ? cells : 0);
+    if (has_y_) crossed[16] = (corners[0] ^ corners[3]) & along_x.edges & ~(has_last_z_ ? cells : 0);
     return crossed;
   }
 
   // The cells that have no centre: those with a phantom.
   Word split_in_six(std::size_t w) const {
     if (!has_phantoms_ || !has_y_ || !has_z_) return 0;
-    return bits_between(w, 0, std::int64_t{end_x_} - 1) & ~cells_of(w);
+    return shape_.along_x(w).edges & ~cells_of(w);
   }
 
   // The faces of the cells of word w that the cells write the triangles of: each cell writes those
@@ -196,7 +205,7 @@ class BccRow {
  private:
   static Word next(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << 63; }
 
-  Word cells_of(std::size_t w) const { return has_centres_ ? shape_.cells_along_x(w) : 0; }
+  Word cells_of(std::size_t w) const { return has_centres_ ? shape_.along_x(w).cells : 0; }
 
   Word next_centres(std::size_t w, unsigned axis) const {
     if (axis == 0) return next(centres_.own, w);
@@ -205,19 +214,18 @@ class BccRow {
 
   // The cells of word w whose next or last one along the axis has a centre.
   Word has_next(std::size_t w, unsigned axis) const {
-    if (axis == 0) return shape_.cells_along_x(w, 1);
+    if (axis == 0) return shape_.along_x(w).next;
     return (axis == 1 ? has_next_y_ : has_next_z_) ? ~Word{0} : 0;
   }
   Word has_last(std::size_t w, unsigned axis) const {
-    if (axis == 0) return shape_.cells_along_x(w, -1);
+    if (axis == 0) return shape_.along_x(w).last;
     return (axis == 1 ? has_last_y_ : has_last_z_) ? ~Word{0} : 0;
   }
 
-  BccShape shape_;
+  const BccShape& shape_;
   std::array<const Word*, 4> samples_;    // as those of SignRow
   std::array<const Word*, 7> looked_at_;  // by may_cross
   Centres centres_;
-  std::uint32_t end_x_;
   bool has_y_;
   bool has_z_;
   bool has_phantoms_;
@@ -267,6 +275,8 @@ class BccField {
     for (std::size_t n = 0; n < kCentrePlanes; ++n) centres_.emplace_back(extraction.dims);
   }
 
+  const BccShape& shape() const { return shape_; }
+
   // Finds what rows of plane z need. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
     const std::uint32_t end = extraction_.dims.z;
@@ -284,6 +294,7 @@ class BccField {
     const SignPlane& next = centres_[(z + 1) % kCentrePlanes];
     const std::uint32_t behind = std::min(y + 1, extraction_.dims.y - 1);
     return {extraction_,
+            shape_,
             samples_[z % kSamplePlanes],
             samples_[above % kSamplePlanes],
             {here.row(y), here.row(behind), next.row(y)},
@@ -314,7 +325,7 @@ class BccField {
           any |= row[w] | next;
           all &= row[w] & next;
         }
-        const Word cells = shape_.cells_along_x(w);
+        const Word cells = shape_.along_x(w).cells;
         out[w] = all & cells;
         uncertain_[w] = any & ~all & cells;
         mixed |= uncertain_[w];

@@ -39,32 +39,51 @@ inline std::array<EdgeFrame, kBccSlots> bcc_frames(const LatticeToSpace& map) {
   return frames;
 }
 
-// A sample's record in a numbered row: the slots of the vertices that it owns, and the index of the
-// first. The others follow in the order of their slots.
-struct BccNumbers {
+// A sample's record in a numbered row: the index of the first vertex that the sample owns, and the
+// rank of each slot among them. Valid where the sample owns a vertex.
+struct BccRanks {
   static constexpr std::size_t kPlaces = kBccPlaces;
 
   HWY_INLINE static void write(std::uint32_t* numbers, unsigned slots, std::uint32_t first) {
-    numbers[0] = slots;
-    numbers[1] = first;
+    const unsigned low = slots & 0xFF;
+    const unsigned high = slots >> 8 & 0xFF;
+    const auto before = static_cast<unsigned>(std::popcount(low));
+    const std::uint64_t high_ranks = kRanks[high] + before * kOnes;
+    numbers[0] = first;
+    std::memcpy(numbers + 1, &kRanks[low], sizeof high_ranks);
+    std::memcpy(numbers + 3, &high_ranks, sizeof high_ranks);
+    numbers[5] = before + static_cast<unsigned>(std::popcount(high));
   }
   HWY_INLINE static std::uint32_t index(const std::uint32_t* numbers, unsigned slot) {
-    const std::uint32_t before = numbers[0] & ((std::uint32_t{1} << slot) - 1);
-    return numbers[1] + static_cast<std::uint32_t>(std::popcount(before));
+    return numbers[0] + reinterpret_cast<const std::uint8_t*>(numbers + 1)[slot];
   }
+
+ private:
+  static_assert(std::endian::native == std::endian::little);
+  static constexpr std::uint64_t kOnes = 0x0101010101010101;
+  // For each set of slots how many there are before each, a byte for each.
+  static constexpr auto kRanks = [] {
+    std::array<std::uint64_t, 256> ranks = {};
+    for (unsigned set = 0; set < 256; ++set) {
+      for (unsigned slot = 0; slot < 8; ++slot) {
+        const auto before = static_cast<unsigned>(std::popcount(set & ((1U << slot) - 1)));
+        ranks[set] |= std::uint64_t{before} << (8 * slot);
+      }
+    }
+    return ranks;
+  }();
 };
 
 // The surface as it is cut.
 class BccPlain {
  public:
-  using Numbers = BccNumbers;
+  using Numbers = BccRanks;
   static constexpr bool kHasClusters = false;
 
   BccPlain(const Extraction& /*extraction*/, std::uint32_t /*first*/) {}
 };
 
-// The numbers of the rows that cells still need: as in RowRing one plane and two rows. Valid where
-// a sample owns a vertex.
+// The numbers of the rows that cells still need: as in RowRing one plane and two rows.
 template <class Numbers>
 class BccRing {
  public:
@@ -103,7 +122,8 @@ class BccWriter {
         words_(words_of(extraction.dims.x)),
         // Places are written eight at a time, so there is room for one more sample.
         vertices_((std::size_t{extraction.dims.x} + 1) * kBccSlots),
-        frames_(bcc_frames(extraction.to_space)) {}
+        frames_(bcc_frames(extraction.to_space)),
+        end_(mesh.triangles.data() + mesh.layer_triangles[slab.end]) {}
 
   // The order of SlabWriter::write.
   void write() {
@@ -183,12 +203,8 @@ class BccWriter {
   // Whole groups of eight are written; only what is before the returned place is valid.
   HWY_INLINE static std::uint32_t* list_slots(std::size_t x, unsigned slots, std::uint32_t* next) {
     const auto base = static_cast<std::uint32_t>(x * kBccSlotRange);
-    for (unsigned half = 0; half < 2; ++half) {
-      const unsigned byte = slots >> (half * 8) & 0xFF;
-      const auto& members = kMembers[byte];
-      for (std::size_t i = 0; i < 8; ++i) next[i] = base + half * 8 + members[i];
-      next += std::popcount(byte);
-    }
+    next = list_members(base, slots & 0xFF, next);
+    next = list_members(base + 8, slots >> 8 & 0xFF, next);
     if ((slots >> 16) != 0) *next++ = base + 16;
     return next;
   }
@@ -213,7 +229,7 @@ class BccWriter {
   }
 
   bool joins_samples(std::uint32_t x, std::uint32_t y, std::uint32_t z, unsigned slot) const {
-    if (slot == 0) return !BccShape(extraction_).has_cell(x, y, z);
+    if (slot == 0) return !field_.shape().has_cell(x, y, z);
     return slot >= kBccAxisSlot && (slot < kBccCentreSlot || slot >= kBccDiagonalSlot);
   }
 
@@ -257,11 +273,9 @@ class BccWriter {
     for (std::size_t w = 0; w < words_; ++w) {
       if (!row.may_cross(w)) continue;
       const CornerWords corners = row.corners(w);
-      for (unsigned axis = 0; axis < 3; ++axis) {
-        for (const BccSide side : kBccSides) {
-          out = write_faces(w, axis, side, row.faces(w, axis, side, corners), out);
-        }
-      }
+      out = write_faces<0>(row, w, corners, out);
+      out = write_faces<1>(row, w, corners, out);
+      out = write_faces<2>(row, w, corners, out);
       if (const Word cells = row.split_in_six(w); cells != 0) {
         out = write_six(w, cells, corners, out);
       }
@@ -274,43 +288,64 @@ class BccWriter {
     return around_[corner >> 1] + (x + (corner & 1)) * Numbers::kPlaces;
   }
 
-  Triangle* write_faces(std::size_t w, unsigned axis, BccSide side, const BccFaceWords& words,
+  template <unsigned kAxis>
+  Triangle* write_faces(const BccRow& row, std::size_t w, const CornerWords& corners,
                         Triangle* out) const {
+    out = write_side<kAxis, BccSide::kInner>(row, w, corners, out);
+    out = write_side<kAxis, BccSide::kLow>(row, w, corners, out);
+    return write_side<kAxis, BccSide::kHigh>(row, w, corners, out);
+  }
+
+  template <unsigned kAxis, BccSide kSide>
+  HWY_INLINE Triangle* write_side(const BccRow& row, std::size_t w, const CornerWords& corners,
+                                  Triangle* out) const {
+    const BccFaceWords words = row.faces(w, kAxis, kSide, corners);
     if (words.faces == 0) return out;
-    const BccFace& face = faces_[axis][static_cast<std::size_t>(side)];
-    const unsigned plane = side == BccSide::kLow ? 0 : 1U << axis;
-    const std::array<unsigned, 4> corners = {0, plane, plane | 1U << (axis + 1) % 3,
-                                             plane | 1U << (axis + 2) % 3};
+    const BccFace& face = faces_[kAxis][static_cast<std::size_t>(kSide)];
+    constexpr unsigned kPlane = kSide == BccSide::kLow ? 0 : 1U << kAxis;
+    constexpr std::array kRecords = {0U, kPlane, kPlane | 1U << (kAxis + 1) % 3,
+                                     kPlane | 1U << (kAxis + 2) % 3};
+    constexpr auto kEdges = bcc_face_edges(kAxis, kSide);
     const auto cases = transpose(words.points);
     for (Word rest = words.faces; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
       const std::size_t x = w * kWordBits + bit;
-      std::array<const std::uint32_t*, 4> records;
-      for (unsigned r = 0; r < 4; ++r) records[r] = numbers_at(x, corners[r]);
-      out = write_face(face.cases[cases[bit]], records, out);
+      // All of them, because which are crossed is hard to foresee; others have no meaning.
+      std::array<std::uint32_t, kBccFaceEdges> indices;
+      for (std::size_t e = 0; e < kBccFaceEdges; ++e) {
+        const unsigned record = kRecords[static_cast<std::size_t>(kEdges[e].record)];
+        indices[e] = Numbers::index(numbers_at(x, record), kEdges[e].slot);
+      }
+      out = write_face(face.cases[cases[bit]], indices, out);
     }
     return out;
   }
 
-  HWY_INLINE static Triangle* write_face(const BccFaceCase& found,
-                                         const std::array<const std::uint32_t*, 4>& records,
-                                         Triangle* out) {
-    // How many edges are crossed is hard to foresee, so a fixed number is looked up.
-    std::array<std::uint32_t, kBccMostEdges> indices;
-    const auto look_up = [&](std::size_t e) {
-      const BccEdge& edge = found.edges[e];
-      indices[e] = Numbers::index(records[static_cast<std::size_t>(edge.record)], edge.slot);
-    };
-    for (std::size_t e = 0; e < kBccOftenEdges; ++e) look_up(e);
-    if (found.edge_count > kBccOftenEdges) look_up(kBccOftenEdges);
-    for (std::size_t t = 0; t < found.triangle_count; ++t) {
+  // Leaves out triangles of which two corners are one vertex.
+  HWY_INLINE Triangle* write_face(const BccFaceCase& found,
+                                  const std::array<std::uint32_t, kBccFaceEdges>& indices,
+                                  Triangle* out) const {
+    const auto write = [&](std::size_t t, Triangle* to) {
       const auto& [a, b, c] = found.triangles[t];
-      out = write_triangle({indices[a], indices[b], indices[c]}, out);
+      return write_triangle({indices[a], indices[b], indices[c]}, to);
+    };
+    if (end_ - out < std::ssize(found.triangles)) {
+      for (std::size_t t = 0; t < found.triangle_count; ++t) out = write(t, out);
+      return out;
     }
-    return out;
+    if constexpr (Joined::kHasClusters) {
+      for (std::size_t t = 0; t < found.triangle_count; ++t) out = write(t, out);
+      return out;
+    }
+    // Fixed numbers of them: how many there are is hard to foresee, too.
+    constexpr std::size_t kOften = 4;
+    for (std::size_t t = 0; t < kOften; ++t) write(t, out + t);
+    if (found.triangle_count > kOften) {
+      for (std::size_t t = kOften; t < found.triangles.size(); ++t) write(t, out + t);
+    }
+    return out + found.triangle_count;
   }
 
-  // Leaves out those of which two corners are one vertex.
   HWY_INLINE static Triangle* write_triangle(const Triangle& triangle, Triangle* out) {
     if constexpr (Joined::kHasClusters) {
       const auto& [a, b, c] = triangle;
@@ -352,6 +387,7 @@ class BccWriter {
   std::size_t found_ = 0;
   std::vector<double> shares_;
   const std::array<EdgeFrame, kBccSlots> frames_;
+  const Triangle* const end_;  // of the slab's triangles
   std::array<const std::uint32_t*, 4> around_ = {};  // the rows of the cells that are written
 };
 

@@ -110,11 +110,8 @@ class RegularCellWriter {
     for (Word rest = any; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
       const std::uint32_t cell = bit << kCellShift | unsigned{cells.cases[bit]} << kCaseShift;
-      for (unsigned half = 0; half < 2; ++half) {
-        const unsigned set = bytes[half][bit];
-        for (std::size_t i = 0; i < 8; ++i) next[i] = cell + half * 8 + kMembers[set][i];
-        next += std::popcount(set);
-      }
+      next = list_members(cell, bytes[0][bit], next);
+      next = list_members(cell + 8, bytes[1][bit], next);
     }
     const unsigned odd = row_.parity_at(0);
     for (const std::uint32_t* listed = list.data(); listed != next; ++listed) {
@@ -250,11 +247,8 @@ class RegularField : public SignField {
       *sum++ = Sum{.edges = static_cast<double>(std::popcount(component)), .x = x};
       for (unsigned first = 0; first < directions; first += 8) {
         const unsigned set = component >> first & 0xFF;
-        for (std::size_t i = 0; i < 8; ++i) {
-          edge[i] = x * kClusterPlaces + first + kMembers[set][i];
-          number[i] = vertex;
-        }
-        edge += std::popcount(set);
+        edge = list_members(x * kClusterPlaces + first, set, edge);
+        std::fill_n(number, 8, vertex);
         number += std::popcount(set);
       }
       ++vertex;

@@ -163,11 +163,7 @@ class SignRow : public RowShape {
 
   HWY_INLINE static std::uint32_t* list_edges(std::size_t x, unsigned directions,
                                               std::uint32_t* next) {
-    const auto& members = kMembers[directions];
-    for (std::size_t i = 0; i < kEdgePlaces; ++i) {
-      next[i] = static_cast<std::uint32_t>(x * kEdgePlaces) + members[i];
-    }
-    return next + std::popcount(directions);
+    return list_members(static_cast<std::uint32_t>(x * kEdgePlaces), directions, next);
   }
 
   // The cells that exist and have corners on both sides.

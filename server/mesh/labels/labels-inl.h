@@ -159,9 +159,7 @@ class LabelRow : public RowShape {
     if ((cells.several >> bit & 1) == 0) {
       const unsigned directions =
           splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x) & ~left_out;
-      const auto& members = kMembers[directions];
-      for (std::size_t i = 0; i < members.size(); ++i) next[i] = first + members[i];
-      return next + std::popcount(directions);
+      return list_members(first, directions, next);
     }
     for (std::uint32_t slots = slots_at(x) & ~left_out; slots != 0; slots &= slots - 1) {
       *next++ = first + static_cast<std::uint32_t>(std::countr_zero(slots));

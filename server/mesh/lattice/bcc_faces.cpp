@@ -58,26 +58,23 @@ class FaceBuilder {
     return result;
   }
 
+  // In the order of bcc_face_edges.
   void number_edges() {
-    const auto second = static_cast<std::uint8_t>((axis_ + 1) % 3);
-    const auto third = static_cast<std::uint8_t>((axis_ + 2) % 3);
-    if (side_ == BccSide::kInner) number(0, 1, BccRecord::kLower, kBccCentreSlot + axis_);
-    for (unsigned c = 0; c < 4; ++c) {
-      const unsigned corner = bcc_corners(axis_)[c];
-      const unsigned point = kFirstCorner + c;
-      if (side_ != BccSide::kLow) number(0, point, BccRecord::kLower, corner | 1U << axis_);
-      if (side_ != BccSide::kHigh) number(1, point, BccRecord::kUpper, corner);
+    auto number = [this, next = std::uint8_t{0}](unsigned a, unsigned b) mutable {
+      numbers_[a][b] = numbers_[b][a] = next++;
+    };
+    if (side_ == BccSide::kInner) {
+      number(0, 1);
+    } else {
+      number(2, 4);
     }
-    number(2, 3, BccRecord::kUpper, kBccAxisSlot + second);
-    number(3, 4, BccRecord::kSecond, kBccAxisSlot + third);
-    number(4, 5, BccRecord::kThird, kBccAxisSlot + second);
-    number(2, 5, BccRecord::kUpper, kBccAxisSlot + third);
-    if (side_ != BccSide::kInner) number(2, 4, BccRecord::kUpper, kBccDiagonalSlot + axis_);
-  }
-
-  void number(unsigned a, unsigned b, BccRecord record, unsigned slot) {
-    numbers_[a][b] = numbers_[b][a] = count_;
-    edges_[count_++] = {record, static_cast<std::uint8_t>(slot)};
+    for (unsigned centre = 0; centre < kFirstCorner; ++centre) {
+      for (unsigned corner = kFirstCorner; corner < kPoints; ++corner) number(centre, corner);
+    }
+    number(2, 3);
+    number(3, 4);
+    number(4, 5);
+    number(2, 5);
   }
 
   void add(const Points& tetrahedron, unsigned inside) {
@@ -112,31 +109,15 @@ class FaceBuilder {
 
   void add_triangle(BccFaceCase& result, Ends a, Ends b, Ends c, bool turn) const {
     if (turn != left_handed_) std::swap(b, c);
-    result.triangles[result.triangle_count++] = {named(result, a), named(result, b),
-                                                 named(result, c)};
+    result.triangles[result.triangle_count++] = {named(a), named(b), named(c)};
   }
 
-  // The place of an edge among those that the case crosses.
-  std::uint8_t named(BccFaceCase& result, const Ends& ends) const {
-    const BccEdge& edge = edges_[numbers_[ends[0]][ends[1]]];
-    const auto known = std::span(result.edges).first(result.edge_count);
-    const auto found = std::ranges::find_if(known, [&](const BccEdge& other) {
-      return other.record == edge.record && other.slot == edge.slot;
-    });
-    const auto place = static_cast<std::uint8_t>(found - known.begin());
-    if (found == known.end()) {
-      if (place == 0) result.edges.fill(edge);
-      result.edges[result.edge_count++] = edge;
-    }
-    return place;
-  }
+  std::uint8_t named(const Ends& ends) const { return numbers_[ends[0]][ends[1]]; }
 
   const unsigned axis_;
   const BccSide side_;
   const bool left_handed_;
   BccFace face_;
-  std::array<BccEdge, 13> edges_ = {};
-  std::uint8_t count_ = 0;
   std::array<std::array<std::uint8_t, kPoints>, kPoints> numbers_ = {};
 };
 

@@ -44,22 +44,16 @@ constexpr unsigned bcc_direction_of(unsigned slot) {
 // along the two axes after the face's normal, in the cyclic order x, y, z.
 enum class BccRecord : std::uint8_t { kLower, kUpper, kSecond, kThird };
 
-// The most of a face's 13 edges that its surface crosses; usually not more than eight.
-inline constexpr std::size_t kBccMostEdges = 9;
-inline constexpr std::size_t kBccOftenEdges = 8;
-
 struct BccEdge {
   BccRecord record = BccRecord::kLower;
   std::uint8_t slot = 0;
 };
 
-// The surface around a face in one case: the edges that it crosses, and its triangles, whose
-// corners are places in `edges`. Unused places repeat the first. Triangles are wound
-// counter-clockwise seen from outside in a right-handed lattice, clockwise in a left-handed one.
+// The triangles around a face in one case, whose corners are places in bcc_face_edges. They are
+// wound counter-clockwise seen from outside in a right-handed lattice, clockwise in a left-handed
+// one.
 struct BccFaceCase {
-  std::uint8_t edge_count = 0;
   std::uint8_t triangle_count = 0;
-  std::array<BccEdge, kBccMostEdges> edges = {};
   std::array<std::array<std::uint8_t, 3>, 8> triangles = {};
 };
 
@@ -87,6 +81,31 @@ constexpr std::array<unsigned, 4> bcc_corners(unsigned axis) {
   const unsigned second = 1U << (axis + 1) % 3;
   const unsigned third = 1U << (axis + 2) % 3;
   return {0, second, second | third, third};
+}
+
+// The edges of a face, by which the corners of its triangles are named: one between the centres
+// or, at the border, the diagonal of the square; those from the lower centre to the corners, and
+// from the upper one; and the sides of the square. At the border those of the missing centre have
+// no meaning.
+inline constexpr std::size_t kBccFaceEdges = 13;
+
+constexpr std::array<BccEdge, kBccFaceEdges> bcc_face_edges(unsigned axis, BccSide side) {
+  const auto slot = [](unsigned number) { return static_cast<std::uint8_t>(number); };
+  const std::uint8_t second = slot(kBccAxisSlot + (axis + 1) % 3);
+  const std::uint8_t third = slot(kBccAxisSlot + (axis + 2) % 3);
+  std::array<BccEdge, kBccFaceEdges> edges = {};
+  edges[0] = side == BccSide::kInner ? BccEdge{BccRecord::kLower, slot(kBccCentreSlot + axis)}
+                                     : BccEdge{BccRecord::kUpper, slot(kBccDiagonalSlot + axis)};
+  for (std::size_t c = 0; c < 4; ++c) {
+    const unsigned corner = bcc_corners(axis)[c];
+    edges[1 + c] = {BccRecord::kLower, slot(corner | 1U << axis)};
+    edges[5 + c] = {BccRecord::kUpper, slot(corner)};
+  }
+  edges[9] = {BccRecord::kUpper, second};
+  edges[10] = {BccRecord::kSecond, third};
+  edges[11] = {BccRecord::kThird, second};
+  edges[12] = {BccRecord::kUpper, third};
+  return edges;
 }
 
 // Indexed by axis and BccSide.

@@ -66,6 +66,19 @@ inline constexpr auto kMembers = [] {
   return members;
 }();
 
+// Lists `base` plus each of the members of a set, in order. Eight places of the list are written,
+// and only those before what is returned are valid.
+HWY_INLINE std::uint32_t* list_members(std::uint32_t base, unsigned set, std::uint32_t* next) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::CappedTag<std::uint32_t, 8> wide;
+  const hn::Rebind<std::uint8_t, decltype(wide)> narrow;
+  for (std::size_t i = 0; i < kMembers[set].size(); i += hn::Lanes(wide)) {
+    const auto members = hn::PromoteTo(wide, hn::LoadU(narrow, kMembers[set].data() + i));
+    hn::StoreU(hn::Add(hn::Set(wide, base), members), wide, next + i);
+  }
+  return next + std::popcount(set);
+}
+
 // The number of vertices that a word's samples own, and of triangles of its cells.
 struct WordCount {
   unsigned vertices = 0;
