@@ -34,6 +34,7 @@ class TokensTest : public testing::Test {
 
   const TemporaryFolder folder_;
   const std::string file_ = folder_ / "tokens";
+  const std::string ann_ = made("ann", "user");
   const std::string ct_ = made("ct", "user");
   const std::string mr_ = made("mr", "user");
   const std::string boss_ = made("boss", "admin");
@@ -90,6 +91,29 @@ TEST_F(TokensTest, AnAdministratorErasesWhatItSees) {
   EXPECT_EQ(daemon_.send("DELETE", volume, "", bearer(boss_)).status, 204);
   EXPECT_EQ(daemon_.get(volume, bearer(boss_)).status, 404);
   EXPECT_EQ(daemon_.get(volume, bearer(ct_)).status, 404);
+}
+
+TEST_F(TokensTest, LabelsHaveTheNamesOfTheOwnRecord) {
+  const auto segmentation = [](const std::string& name) {
+    std::string file =
+        "NRRD0004\ntype: unsigned char\ndimension: 3\nsizes: 4 4 4\nencoding: raw\n"
+        "space: left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+        "space origin: (0,0,0)\nSegment0_ID:=one\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
+        "Segment0_Name:=" +
+        name + "\n\n" + std::string(64, '\0');
+    file[file.size() - 30] = '\1';
+    return file;
+  };
+  for (const auto& [token, name] :
+       {std::pair{ann_, "Lung"}, {ct_, "Liver"}, {boss_, "Spleen"}, {mr_, "Heart"}}) {
+    const Answer uploaded = daemon_.send("POST", "/v1/volumes", segmentation(name), bearer(token));
+    ASSERT_EQ(uploaded.status, 201) << uploaded.body;
+    const std::string volume = volume_from_json(uploaded.body).id;
+    const Answer accepted = daemon_.send(
+        "POST", "/v1/jobs", R"({"labels": "all", "volume": ")" + volume + R"("})", bearer(token));
+    ASSERT_EQ(accepted.status, 202) << accepted.body;
+    EXPECT_THAT(accepted.body, HasSubstr(name));
+  }
 }
 
 // Nothing tells that something of another owner exists.
