@@ -387,7 +387,7 @@ class BccWriter {
   std::size_t found_ = 0;
   std::vector<double> shares_;
   const std::array<EdgeFrame, kBccSlots> frames_;
-  const Triangle* const end_;  // of the slab's triangles
+  const Triangle* const end_;                        // of the slab's triangles
   std::array<const std::uint32_t*, 4> around_ = {};  // the rows of the cells that are written
 };
 

@@ -78,6 +78,9 @@ class RowsOf final : public SampleRows {
         placement_(options, lattice.dims, lattice.to_space),
         // An edge from a centre to a corner takes half a step along each axis.
         half_edges_(options, std::min(2 * placement_.nearest(), kMostNearest)) {
+    for (unsigned slot = 0; slot < kBccSlots; ++slot) {
+      bcc_ends_[slot] = sample_offset(lattice.dims, bcc_end_of(slot));
+    }
     if (options.close) border_.emplace(lattice, options, smallest, placement_);
   }
 
@@ -150,26 +153,22 @@ class RowsOf final : public SampleRows {
   void bcc_shares(const BccRowEdges& edges, double* out) const override {
     const T* samples = row(edges.y, edges.z) - edges.margin;
     const auto [next_row, next_plane] = steps();
-    const std::array<std::ptrdiff_t, 3> next = {1, next_row, next_plane};
     std::uint32_t known = ~std::uint32_t{0};  // the cell whose mean is `centre`
     double centre = 0;
     for (const std::uint32_t edge : edges.edges) {
       const std::uint32_t x = edge / kBccSlotRange;
       const unsigned slot = edge % kBccSlotRange;
       const T* at = samples + x;
-      if (!is_from_centre(slot)) {
-        const T to = at[sample_offset(lattice_.dims, bcc_direction_of(slot))];
-        *out++ = placement_.share(*at, to);
-        continue;
+      const bool from_centre = is_from_centre(slot);
+      if (from_centre && std::exchange(known, x) != x) {
+        centre = mean_of_cell(at, next_row, next_plane);
       }
-      if (std::exchange(known, x) != x) centre = mean_of_cell(at, next_row, next_plane);
-      if (slot < kBccAxisSlot) {
-        const auto to = static_cast<double>(at[sample_offset(lattice_.dims, slot)]);
-        *out++ = half_edges_.share(centre, to);
-      } else {
-        const T* other = at + next[slot - kBccCentreSlot];
-        *out++ = placement_.share(centre, mean_of_cell(other, next_row, next_plane));
-      }
+      const double from = from_centre ? centre : static_cast<double>(*at);
+      const T* end = at + bcc_ends_[slot];
+      const double to = from_centre && slot >= kBccAxisSlot
+                            ? mean_of_cell(end, next_row, next_plane)
+                            : static_cast<double>(*end);
+      *out++ = (slot < kBccAxisSlot ? half_edges_ : placement_).share(from, to);
     }
   }
 
@@ -197,6 +196,13 @@ class RowsOf final : public SampleRows {
     }
   }
 
+  // As a corner of the sample's cell.
+  static unsigned bcc_end_of(unsigned slot) {
+    if (slot < kBccAxisSlot) return slot;
+    return slot >= kBccCentreSlot && slot < kBccDiagonalSlot ? 1U << (slot - kBccCentreSlot)
+                                                             : bcc_direction_of(slot);
+  }
+
   static bool is_from_centre(unsigned slot) {
     return slot < kBccAxisSlot || (slot >= kBccCentreSlot && slot < kBccDiagonalSlot);
   }
@@ -216,6 +222,8 @@ class RowsOf final : public SampleRows {
   const Nearness<T> nearness_;
   const Placement placement_;
   const Placement half_edges_;  // of the body-centred lattice
+  // From a sample to that, or to the cell, at the other end of the edge of each slot.
+  std::array<std::ptrdiff_t, kBccSlots> bcc_ends_ = {};
   std::optional<BorderPlacement<T>> border_;
 };
 
