@@ -40,8 +40,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .is_in_mesh = true},
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
-     .meaning = "Some samples are infinite or not a number. They got the smallest sample's value "
-                "and lie outside the surface.",
+     .meaning = "Some samples are infinite or not a number. They got the smallest sample's value, "
+                "so they lie outside the surface at any larger iso-value.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",

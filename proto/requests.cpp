@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <optional>
@@ -146,10 +147,13 @@ class Flaws {
   std::vector<std::string> halves_;
 };
 
-// Converts a query's text to the JSON value that a body would have.
+// Converts a query's text to the JSON value that a body would have. Numbers may also be written in
+// ways that JSON does not allow, such as ".5".
 Json value_of(const std::string& text) {
   const Json parsed = Json::parse(text, nullptr, false);
-  return parsed.is_number() || parsed.is_boolean() ? parsed : Json(text);
+  if (parsed.is_number() || parsed.is_boolean()) return parsed;
+  const auto number = parse_double(text);
+  return number && std::isfinite(*number) ? Json(*number) : Json(text);
 }
 
 Json list_of(const std::string& text) {

@@ -15,11 +15,12 @@ constexpr std::size_t kMostValues = 65536;
 // Halved, because the difference of two doubles may overflow.
 double half_width(const std::array<double, 2>& range) { return range[1] / 2 - range[0] / 2; }
 
-// The position in the range, 0..1, of the counts' b-th value.
-double position_of(const ValueCounts& values, std::size_t b) {
-  const auto count = static_cast<double>(values.counts.size());
-  if (!values.exact) return (static_cast<double>(b) + 0.5) / count;
-  return values.counts.size() > 1 ? static_cast<double>(b) / (count - 1) : 0;
+// The bin, of so many over the same range, of the counts' b-th value. In integers, because a value
+// on the edge of two bins is in the upper one.
+std::size_t bin_of(const ValueCounts& values, std::size_t b, std::size_t bins) {
+  const std::size_t count = values.counts.size();
+  if (!values.exact) return (2 * b + 1) * bins / (2 * count);
+  return count > 1 ? std::min(b * bins / (count - 1), bins - 1) : 0;
 }
 
 }  // namespace
@@ -44,8 +45,7 @@ void add_values(std::span<const std::byte> samples, SampleType type, ValueCounts
 std::vector<std::uint64_t> rebinned(const ValueCounts& values, std::size_t bins) {
   std::vector<std::uint64_t> result(bins);
   for (std::size_t b = 0; b < values.counts.size(); ++b) {
-    const double at = position_of(values, b) * static_cast<double>(bins);
-    result[std::min(static_cast<std::size_t>(at), bins - 1)] += values.counts[b];
+    result[bin_of(values, b, bins)] += values.counts[b];
   }
   return result;
 }

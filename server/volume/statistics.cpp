@@ -24,12 +24,18 @@ std::vector<std::uint64_t> count_samples(std::span<const Sample> samples, const 
   // Halved, because the difference of two doubles may overflow.
   const double low = bins.range[0] / 2;
   const double width = bins.range[1] / 2 - low;
+  const auto bin_count = static_cast<double>(bins.count);
+  // Multiplied first, integers on the edge of two bins come into the upper one.
+  const bool can_multiply = std::isfinite(width * bin_count);
+  const auto bin_of = [&](double value) {
+    if (!(width > 0)) return 0.0;
+    const double above = value / 2 - low;
+    return can_multiply ? above * bin_count / width : above / width * bin_count;
+  };
   for (const Sample sample : samples) {
     const auto value = static_cast<double>(sample);
     if (!(value >= bins.range[0] && value <= bins.range[1])) continue;
-    const double fraction = width > 0 ? (value / 2 - low) / width : 0;
-    const auto bin = static_cast<std::size_t>(fraction * static_cast<double>(bins.count));
-    ++counts[std::min(bin, bins.count - 1)];
+    ++counts[std::min(static_cast<std::size_t>(bin_of(value)), bins.count - 1)];
   }
   return counts;
 }

@@ -56,6 +56,12 @@ TEST(JobQuery, RefusesAnIsoThatIsNoNumber) {
   }
 }
 
+TEST(JobQuery, TakesNumbersThatJsonWouldNot) {
+  for (const auto& [text, number] : {std::pair{".5", 0.5}, {"5.", 5.0}, {"-.25", -0.25}}) {
+    EXPECT_EQ(parse_job_parameters(Query{{"iso", text}}, VolumeIn::kBody).iso, number) << text;
+  }
+}
+
 TEST(JobQuery, CallsParametersSo) {
   const auto error = thrown_by([] {
     parse_job_parameters(Query{{"iso", "1"}, {"isovalue", "1"}}, VolumeIn::kBody);

@@ -41,9 +41,23 @@ TEST(Histogram, IsThatOfTheSamplesThemselvesForAnyWidth) {
   // In two parts, as several threads count.
   add_values(bytes_of(samples).first(10'000), SampleType::kUint16, values);
   add_values(bytes_of(samples).subspan(10'000), SampleType::kUint16, values);
-  for (const std::size_t bins : {1U, 7U, 256U, 900U, 5000U}) {
+  for (const std::size_t bins : {1U, 7U, 31U, 256U, 900U, 5000U}) {
     EXPECT_EQ(rebinned(values, bins),
               histogram(bytes_of(samples), SampleType::kUint16, {{100, 999}, bins}))
+        << bins;
+  }
+}
+
+TEST(Histogram, ValuesOnAnEdgeAreInTheBinAboveIt) {
+  std::vector<std::uint16_t> samples(301);
+  std::iota(samples.begin(), samples.end(), std::uint16_t{0});
+  ValueCounts values = no_values(SampleType::kUint16, {0, 300});
+  add_values(bytes_of(samples), SampleType::kUint16, values);
+  for (const std::size_t bins : {2U, 30U, 75U, 100U, 150U, 300U}) {
+    std::vector<std::uint64_t> expected(bins, 300 / bins);
+    ++expected.back();  // the largest value
+    EXPECT_EQ(rebinned(values, bins), expected) << bins;
+    EXPECT_EQ(histogram(bytes_of(samples), SampleType::kUint16, {{0, 300}, bins}), expected)
         << bins;
   }
 }

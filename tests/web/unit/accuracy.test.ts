@@ -93,8 +93,8 @@ describe('the time of a job', () => {
 
 describe('a part that was picked', () => {
   it('is kept alone, at its place', () => {
-    expect(keepOnlyAt([1.23456, -2, 3])).toEqual({
-      components: { keep: null, min_triangles: null, nearest_to: [[1.235, -2, 3]] },
+    expect(keepOnlyAt([1.23456789, -2, 3])).toEqual({
+      components: { keep: null, min_triangles: null, nearest_to: [[1.234568, -2, 3]] },
     });
   });
 });

@@ -44,6 +44,16 @@ describe('two clients in one process', () => {
   });
 });
 
+describe('a window of huge values', () => {
+  it('is asked for as it is', async () => {
+    const window: [number, number] = [-1e30, 1e30];
+    for (const asking of [client.slicePicture('a', 'z', 0, window), client.previewFile('a', 9, window)]) {
+      await rejectionOf(asking);
+      expect(first.query.get('window')?.split(',').map(Number)).toEqual(window);
+    }
+  });
+});
+
 describe('the labels of a job', () => {
   it('come from all pages', async () => {
     expect((await client.labelsOfJob(id)).map(({ label }) => label)).toEqual([1, 2, 3]);

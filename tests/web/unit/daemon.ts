@@ -9,6 +9,7 @@ export class Daemon {
   // The job runs until `end`, unless a test begins with another state.
   state = 'running';
   readonly asked: string[] = [];
+  query = new URLSearchParams(); // of the last request
   readonly tokens = new Set<string | undefined>();
   uploaded = Buffer.alloc(0);
   // Keeps requests for the job without a response.
@@ -40,7 +41,8 @@ export class Daemon {
   }
 
   private async answer(request: IncomingMessage, response: ServerResponse): Promise<void> {
-    const path = request.url?.split('?')[0] ?? '';
+    const [path = '', query] = request.url?.split('?') ?? [];
+    this.query = new URLSearchParams(query);
     this.asked.push(`${request.method} ${path}`);
     this.tokens.add(request.headers.authorization);
     const keep = (all: Set<ServerResponse>): void => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { formatMilliseconds, formatNumber, formatValue } from '@/ui/format';
+import { formatMilliseconds, formatNumber, formatSize, formatValue } from '@/ui/format';
 import { placeText } from '@/views/slices/slice_looks';
 
 describe('a time', () => {
@@ -16,7 +16,14 @@ describe('a number that is rounded to zero', () => {
   it('has no sign', () => {
     expect([formatNumber(-0.04, 1), formatNumber(-0, 1), formatValue(-0)]).toEqual(['0', '0', '0']);
     expect([formatNumber(-0.06, 1), formatValue(-0.5)]).toEqual(['\u22120.1', '\u22120.5']);
-    expect(placeText([0, 0, -0.01], 'LPS')).toBe('LPS 0, 0, 0 mm');
-    expect(placeText([0, 0.01, 5], 'RAS')).toBe('RAS 0, 0, 5 mm');
+    expect(placeText([0, 0, -0.01], 'LPS', [1, 1, 1])).toBe('LPS 0, 0, 0 mm');
+    expect(placeText([0, 0.01, 5], 'RAS', [1, 1, 1])).toBe('RAS 0, 0, 5 mm');
+  });
+});
+
+describe('what is small', () => {
+  it('is not rounded to nothing', () => {
+    expect([0, 48.26, 1, 0.5, 0.03, 0.0412, 0.00000123].map(formatSize)).toEqual(['0', '48.3', '1', '0.5', '0.03', '0.0412', '1.23e-6']);
+    expect(placeText([0.15, -0.16, 0.155], 'LPS', [0.01, 0.01, 0.01])).toBe('LPS 0.15, \u22120.16, 0.155 mm');
   });
 });

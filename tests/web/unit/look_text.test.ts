@@ -15,12 +15,12 @@ describe('a look in the address', () => {
 
   it('has rulers to a hundredth of a millimetre', () => {
     const text = rulersToText([
-      { from: [1.234567, -2, 3], to: [4, 5, 6] },
+      { from: [1.2345678, -2, 3], to: [4, 5, 0.0351234] },
       { from: [0, 0, 0], to: [0, 0, 1] },
     ]);
-    expect(text).toBe('1.23,-2,3,4,5,6;0,0,0,0,0,1');
+    expect(text).toBe('1.23457,-2,3,4,5,0.0351234;0,0,0,0,0,1');
     expect(rulersOfText(text)).toEqual([
-      { from: [1.23, -2, 3], to: [4, 5, 6] },
+      { from: [1.23457, -2, 3], to: [4, 5, 0.0351234] },
       { from: [0, 0, 0], to: [0, 0, 1] },
     ]);
     expect(rulersOfText(';1,2,3;1,2,3,4,5,x')).toEqual([]);

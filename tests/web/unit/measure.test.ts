@@ -60,7 +60,7 @@ describe('the looks of slices', () => {
   });
 
   it('tell places in either space', () => {
-    expect(placeText([1, -2, 3.04], 'LPS')).toBe('LPS 1, \u22122, 3 mm');
-    expect(placeText([1, -2, 3.04], 'RAS')).toBe('RAS \u22121, 2, 3 mm');
+    expect(placeText([1, -2, 3.04], 'LPS', [2, 3, 4])).toBe('LPS 1, \u22122, 3 mm');
+    expect(placeText([1, -2, 3.04], 'RAS', [2, 3, 4])).toBe('RAS \u22121, 2, 3 mm');
   });
 });

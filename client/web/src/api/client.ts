@@ -121,13 +121,13 @@ export class Client {
     window: [number, number],
     signal?: GlobalAbortSignal,
   ): Promise<GlobalBlob> {
-    const query = `axis=${axis}&index=${index}&window=${window[0]},${window[1]}`;
+    const query = new URLSearchParams({ axis, index: String(index), window: window.join() }).toString();
     return (await this.connection.send(`${volumePath(id)}/slice.png?${query}`, { signal })).blob();
   }
 
   /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
-    const query = `size=${size}&window=${window[0]},${window[1]}`;
+    const query = new URLSearchParams({ size: String(size), window: window.join() }).toString();
     return (await this.connection.send(`${volumePath(id)}/preview?${query}`, { signal })).arrayBuffer();
   }
 

@@ -12,11 +12,12 @@ import {
 } from 'three';
 import { overLayer } from './cross';
 import { h } from '../ui/dom';
+import { formatSize } from '../ui/format';
 import type { Vec3 } from '../api/types';
 import { lengthOf, type Ruler } from './style';
 
 function labelOf(ruler: Ruler): string {
-  return `${lengthOf(ruler).toFixed(1)} mm`;
+  return `${formatSize(lengthOf(ruler))} mm`;
 }
 
 const mostRulers = 32;

@@ -26,6 +26,13 @@ export function formatValue(value: number): string {
   return formatNumber(value, Math.max(0, 3 - Math.floor(Math.log10(size))));
 }
 
+// Of lengths and areas one digit after the point, of small ones three digits that count.
+export function formatSize(value: number): string {
+  const size = Math.abs(value);
+  if (size >= 1 || size === 0) return formatNumber(value, 1);
+  return size < 1e-4 ? formatValue(value) : formatNumber(value, 2 - Math.floor(Math.log10(size)));
+}
+
 export function formatIso(iso: number | 'otsu'): string {
   return iso === 'otsu' ? 'Otsu' : formatValue(iso);
 }

@@ -1,6 +1,6 @@
 // Lengths, angles and areas of points in millimetres.
 import type { Vec3 } from '../api/types';
-import { formatNumber } from '../ui/format';
+import { formatNumber, formatSize } from '../ui/format';
 
 export type MeasureKind = 'length' | 'angle' | 'area';
 
@@ -37,7 +37,7 @@ export const pointsOf: Record<MeasureKind, number> = { length: 2, angle: 3, area
 // '' while points are missing.
 export function measureText(kind: MeasureKind, points: readonly Vec3[]): string {
   const [a, b, c] = points;
-  if (kind === 'length') return a && b ? `${formatNumber(Math.hypot(...between(a, b)), 1)} mm` : '';
+  if (kind === 'length') return a && b ? `${formatSize(Math.hypot(...between(a, b)))} mm` : '';
   if (!a || !b || !c) return '';
-  return kind === 'angle' ? `${formatNumber(angleAt(a, b, c), 1)}\u00b0` : `${formatNumber(areaOf(points), 1)} mm\u00b2`;
+  return kind === 'angle' ? `${formatNumber(angleAt(a, b, c), 1)}\u00b0` : `${formatSize(areaOf(points))} mm\u00b2`;
 }

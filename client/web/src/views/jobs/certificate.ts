@@ -2,7 +2,7 @@
 // openings.
 import type { DistanceSummary, Job, JobParameters, MeshSummary } from '../../api/types';
 import { button, h, svg, type Child } from '../../ui/dom';
-import { formatCount, formatValue, meshFormatTitle, millimetres } from '../../ui/format';
+import { formatCount, formatSize, formatValue, meshFormatTitle, millimetres } from '../../ui/format';
 
 type Certificate = NonNullable<MeshSummary['certificate']>;
 type MakeVariant = (variant: Partial<JobParameters>) => void;
@@ -124,7 +124,7 @@ export function intersectionsText({ quality }: MeshSummary): Child {
   if (!found) return '';
   if (found.pairs === 0) return 'none';
   const [first] = found.places;
-  const at = first ? ` The first pair is at ${first.map((value) => value.toFixed(1)).join(', ')} mm.` : '';
+  const at = first ? ` The first pair is at ${first.map(formatSize).join(', ')} mm.` : '';
   const pairs = found.pairs === 1 ? '1 pair' : `${formatCount(found.pairs)} pairs`;
   return h('span', { class: 'attention', title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
 }

@@ -6,7 +6,7 @@ import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets'
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
 import { button, h, type Child } from '../../ui/dom';
-import { formatBytes, formatCount, formatNumber, formatValue, meshFormatTitle } from '../../ui/format';
+import { formatBytes, formatCount, formatNumber, formatSize, formatValue, meshFormatTitle } from '../../ui/format';
 import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import { saveFile } from '../../ui/save';
@@ -66,7 +66,7 @@ function componentsText(job: Job, { components }: MeshSummary): Child {
 
 export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
   const [low, high] = mesh.bounds;
-  const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
+  const extent = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');
   const { mean, max } = mesh.displacement_mm;
   const rows: [string, Child][] = [
     ['Iso-value', mesh.iso === undefined ? '' : `${formatValue(mesh.iso)}${job.parameters.iso === 'otsu' ? ', by Otsu' : ''}`],

@@ -2,7 +2,7 @@
 import type { Vec3, Volume } from '../../api/types';
 import { parameterOf } from '../../job/table';
 import { checkbox, h } from '../../ui/dom';
-import { formatNumber } from '../../ui/format';
+import { formatSize } from '../../ui/format';
 import { NumberField } from '../../ui/number_field';
 import { wholeBox, within, type Box } from '../../volume/crop';
 
@@ -56,7 +56,7 @@ export class CropControl {
     this.tell();
     if (!box) return;
     const size = box[0].map((low, axis) => (box[1][axis as 0] - low) * this.volume.spacing[axis as 0]);
-    this.size.textContent = `${size.map((value) => formatNumber(value, 1)).join(' \u00d7 ')} mm. Drag the edges of the box in the slices.`;
+    this.size.textContent = `${size.map((value) => formatSize(value)).join(' \u00d7 ')} mm. Drag the edges of the box in the slices.`;
   }
 
   private tell(): void {

@@ -41,10 +41,11 @@ export function pixelsOf(name: ColourName): Uint32Array {
   });
 }
 
-// In millimetres.
-export function placeText([left, posterior, superior]: Vec3, space: Space): string {
+// In millimetres, with digits enough to tell neighbouring samples apart.
+export function placeText([left, posterior, superior]: Vec3, space: Space, spacing: Vec3): string {
+  const digits = Math.max(1, 1 - Math.floor(Math.log10(Math.min(...spacing))));
   const sign = space === 'RAS' ? -1 : 1;
-  return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value, 1)).join(', ')} mm`;
+  return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value, digits)).join(', ')} mm`;
 }
 
 function layoutChoice(): HTMLElement {

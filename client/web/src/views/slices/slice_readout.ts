@@ -32,7 +32,7 @@ export class SliceReadout {
   show(cursor: Vec3): void {
     const place = this.pointed ?? cursor;
     const value = this.valueAt(place).text;
-    const where = placeText(toPatient(this.host.volume, place), sliceSpace.value);
+    const where = placeText(toPatient(this.host.volume, place), sliceSpace.value, this.host.volume.spacing);
     const text = [value, where].filter(Boolean).join(' \u00b7 ');
     if (this.element.textContent === text) return;
     const reading = value !== '' && h('span', { class: 'slice-reading' }, value);

@@ -4,6 +4,7 @@ import type { Axis, Job, Volume } from '../../api/types';
 import type { LabelState } from '../../job/labels';
 import type { Surface } from '../../scene/surface';
 import { button, checkbox, h } from '../../ui/dom';
+import { formatSize } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import type { Scope } from '../../ui/signal';
 import { axisIndex, patientAxes } from '../../volume/geometry';
@@ -167,7 +168,7 @@ export class CutTool {
       this.place();
     };
     return [
-      ...this.slider(range, (depth) => `${depth.toFixed(1)} mm`, (depth) => (free.depth = depth)),
+      ...this.slider(range, (depth) => `${formatSize(depth)} mm`, (depth) => (free.depth = depth)),
       button('Turn to the view', () => change(() => free.faceView(this.surface)), { title: 'Cut parallel to the screen, as the surface is seen now' }),
       button('Other side', () => change(() => free.flip())),
     ];

@@ -55,7 +55,7 @@ export class FreeCut {
 
   // For the address.
   get text(): string {
-    return `f${[...this.normal, Number(this.depth.toFixed(2))].join(',')}`;
+    return `f${[...this.normal, Number(this.depth.toPrecision(5))].join(',')}`;
   }
 
   // False where that is none.

@@ -28,9 +28,9 @@ export function styleOfText(text: string): SurfaceStyle {
   };
 }
 
-// Six numbers in millimetres for each.
+// Six numbers in millimetres for each. The digits serve bodies of any size.
 export function rulersToText(rulers: readonly Ruler[]): string {
-  return rulers.map(({ from, to }) => [...from, ...to].map((value) => Number(value.toFixed(2))).join(',')).join(';');
+  return rulers.map(({ from, to }) => [...from, ...to].map((value) => Number(value.toPrecision(6))).join(',')).join(';');
 }
 
 export function rulersOfText(text: string): Ruler[] {

@@ -4,7 +4,7 @@ import type { PartFinder, PartSummary } from '../../mesh/part_finder';
 import type { Picked } from '../../scene/picked';
 import { isByLabels } from '../../job/table';
 import { button, h } from '../../ui/dom';
-import { formatCount, formatValue } from '../../ui/format';
+import { formatCount, formatSize, formatValue } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
 
 const slice = 8; // milliseconds for one step of the search for components
@@ -12,7 +12,7 @@ const slice = 8; // milliseconds for one step of the search for components
 const mostPlaces = 1000;
 
 function placeOf(point: Vec3): Vec3 {
-  return point.map((value) => Number(value.toFixed(3))) as Vec3;
+  return point.map((value) => Number(value.toPrecision(7))) as Vec3;
 }
 
 // The parameters that keep only the components at those points. Components that were dropped before stay dropped,
@@ -61,7 +61,7 @@ export class PickedPart {
     const isClosed = this.job.mesh?.quality.encloses_volume ?? false;
     const size = part
       ? [isClosed && `volume ${formatValue(part.volume)} mm\u00b3`, `area ${formatValue(part.area)} mm\u00b2`, `${formatCount(part.triangles)} triangles`]
-      : [`at ${point.map((value) => value.toFixed(1)).join(', ')} mm`];
+      : [`at ${point.map((value) => formatSize(value)).join(', ')} mm`];
     this.element.replaceChildren(
       h('span', {}, `One of ${formatCount(this.parts)} connected components: ${size.filter(Boolean).join(', ')}`),
       button('Keep only this component', () => this.make(keepOnlyAt(point)), {

@@ -12,7 +12,7 @@ import { withGlb } from '../../job/parameters';
 import { emptyReason } from '../../job/empty';
 import { changeLink, fileNameOf, makeVariant } from '../../job/variants';
 import { button, h, isTyping } from '../../ui/dom';
-import { formatCount } from '../../ui/format';
+import { formatCount, formatSize } from '../../ui/format';
 import { refusal, tell, tellError } from '../../ui/notices';
 import { saveBlob } from '../../ui/save';
 import { Scope } from '../../ui/signal';
@@ -259,7 +259,7 @@ export class SurfacePane {
     }
     const ruler = surface.rulers.add(picked.point);
     surface.draw();
-    this.announcement.textContent = ruler ? `${lengthOf(ruler).toFixed(1)} millimetres` : 'First point set';
+    this.announcement.textContent = ruler ? `${formatSize(lengthOf(ruler))} millimetres` : 'First point set';
   }
 
   private followLabels(surface: Surface): void {
