@@ -283,8 +283,10 @@ constinit const Parameter kComponents = {
     .name = "components",
     .help = "Which connected components to keep; the others are dropped before smoothing.",
     .more =
-        "With several members, `nearest_to` chooses first, `min_triangles` drops some of these, and "
-        "`keep` chooses among the rest. Components are ranked by their number of triangles, equal ones by "
+        "With several members, `nearest_to` chooses first, `min_triangles` drops some of these, "
+        "and "
+        "`keep` chooses among the rest. Components are ranked by their number of triangles, equal "
+        "ones by "
         "their first vertex. Without members all are kept. Labels do not allow it."};
 
 constinit const Parameter kFillCavities = {

@@ -202,7 +202,8 @@ Volume finish(CanonicalWriter& writer, Volume volume) {
     replace_non_finite(writer.samples(), volume.type, statistics.range[0]);
     statistics = volume::measure(writer.samples(), volume.type);
     volume.notes.push_back(
-        note_of(NoteCode::kNonFiniteSamples, count + ". At iso-values above the smallest sample they lie outside the surface."));
+        note_of(NoteCode::kNonFiniteSamples,
+                count + ". At iso-values above the smallest sample they lie outside the surface."));
   }
   note_labels(writer.samples(), volume);
   volume.range = statistics.range;

@@ -156,8 +156,10 @@ class BccRow {
     if (has_y_ && has_z_) {
       crossed[14] = (corners[0] ^ corners[6]) & ~(cells & along_x.last);
     }
-    if (has_z_) crossed[15] = (corners[0] ^ corners[5]) & along_x.edges & ~(has_last_y_ ? cells : 0);
-    if (has_y_) crossed[16] = (corners[0] ^ corners[3]) & along_x.edges & ~(has_last_z_ ? cells : 0);
+    if (has_z_)
+      crossed[15] = (corners[0] ^ corners[5]) & along_x.edges & ~(has_last_y_ ? cells : 0);
+    if (has_y_)
+      crossed[16] = (corners[0] ^ corners[3]) & along_x.edges & ~(has_last_z_ ? cells : 0);
     return crossed;
   }
 
