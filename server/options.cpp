@@ -103,7 +103,11 @@ CLI::Validator size_of_bytes(std::uint64_t least = 0) {
 
 // A page's origin such as "https://viewer.example", or `*` for all.
 std::string wrong_origin(const std::string& text) {
-  const bool is_origin = text == "*" || text.starts_with("http://") || text.starts_with("https://");
+  std::string_view rest = text;
+  if (rest.starts_with("http")) rest.remove_prefix(rest.starts_with("https") ? 5 : 4);
+  // Browsers send no path, so an origin with one would never match.
+  const bool is_origin = text == "*" || (rest.size() < text.size() && rest.starts_with("://") &&
+                                         rest.size() > 3 && rest.find('/', 3) == rest.npos);
   return is_origin ? "" : text + " is not an origin such as https://viewer.example";
 }
 

@@ -5,9 +5,9 @@ if(ISOMESH_HOSPITAL)
   install(TARGETS isomesh-dimse RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
 endif()
 
-# What is installed in /usr has its configuration in /etc and its data in /var.
+# What is installed in /usr has its configuration in /etc. systemd makes the unit's data folder in /var/lib with every prefix.
 set(config ${CMAKE_INSTALL_SYSCONFDIR}/isomesh)
-set(full_state ${CMAKE_INSTALL_FULL_LOCALSTATEDIR}/lib/isomesh)
+set(full_state /var/lib/isomesh)
 if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
   set(config ${CMAKE_INSTALL_FULL_SYSCONFDIR}/isomesh)
 endif()

@@ -63,6 +63,7 @@ TEST(Start, WrongUsageIsToldAndNotServed) {
                                              {"--max-disk", "99999999999999999999"},
                                              {"--max-upload", "0"},
                                              {"--cors-origin", "viewer.example"},
+                                             {"--cors-origin", "https://viewer.example/"},
                                              {"--allow-host", "a b"},
                                              {"--no-such-option"},
                                              {"--config", folder / "absent"}}) {

@@ -101,6 +101,9 @@ JobParameters complete_parameters(const App& app, const Request& request,
 
 Job submitted(App& app, const store::JobSpec& spec, Response& response) {
   const store::Submission submission = app.services.jobs.submit(spec);
+  if (submission.kind == store::Submission::Kind::kBusy && app.draining) {
+    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  }
   if (submission.retry_after.count() > 0) {
     response.set_header("Retry-After", std::to_string(submission.retry_after.count()));
   }

@@ -16,11 +16,29 @@
 namespace isomesh::store {
 namespace {
 
-void make_folders(std::initializer_list<std::filesystem::path> folders) {
+constexpr const char* kDataFolder = "the data folder";
+
+// Errors name files without the path above them.
+void make_folders(const std::string& place, std::initializer_list<std::filesystem::path> folders) {
   for (const auto& folder : folders) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
-    if (error) throw_system_error("making a folder", error.value());
+    if (!error) continue;
+    throw_system_error(place + ": making " + folder.filename().string(), error.value());
+  }
+}
+
+// Another user, such as root, may have used the data folder before. Only names of the daemon's own
+// are looked at: a file system of its own has lost+found.
+void check_access(const std::filesystem::path& root) {
+  for (const char* name : {"lock", "reserve", "scratch", "blobs", "blobs/identity", "quarantine",
+                           "erasing", "uploads", "isomesh.sqlite"}) {
+    const std::filesystem::path path = root / name;
+    if (::faccessat(AT_FDCWD, path.c_str(), R_OK | W_OK, AT_EACCESS) == 0 || errno == ENOENT) {
+      continue;
+    }
+    throw_system_error(kDataFolder + (": this user must be able to write to " + std::string(name)),
+                       errno);
   }
 }
 
@@ -38,7 +56,8 @@ BlobFolders shared_blob_folders(const std::filesystem::path& root) {
                                .quarantine = place / "quarantine",
                                .drafts = place / "drafts",
                                .holds = place / "holds"};
-  make_folders({folders.blobs, folders.quarantine, folders.drafts, folders.holds});
+  make_folders("the folder of --blobs",
+               {folders.blobs, folders.quarantine, folders.drafts, folders.holds});
   sync_folder(place);
   return folders;
 }
@@ -51,24 +70,25 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
     std::filesystem::permissions(root_, std::filesystem::perms::owner_all, error);
   }
   if (!error) root_ = std::filesystem::canonical(root_, error);
-  if (error) throw Error(ErrorCode::kInternal, "the data folder: " + error.message());
+  if (error) throw Error(ErrorCode::kInternal, kDataFolder + (": " + error.message()));
 
   if (std::filesystem::exists(root_ / kUnfinishedRestore, error)) {
     throw Error(ErrorCode::kUnavailable, root_.string() + ' ' + kRestoreAgain);
   }
   lock_ = ::open((root_ / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {
-    throw Error(ErrorCode::kInternal, std::string("the data folder: ") + std::strerror(errno));
+    throw Error(ErrorCode::kInternal, std::string(kDataFolder) + ": " + std::strerror(errno));
   }
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     ::close(lock_);
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }
+  check_access(root_);
   std::filesystem::remove_all(scratch());
   // Before anything is written: on a full disk this frees the necessary space.
   reserve_ =
       std::make_unique<Reserve>(root_ / "reserve", reserve.value_or(Reserve::usual_bytes(root_)));
-  make_folders({blobs(), quarantine(), scratch(), erasing()});
+  make_folders(kDataFolder, {blobs(), quarantine(), scratch(), erasing()});
   sync_folder(root_);
 }
 
@@ -94,7 +114,7 @@ BlobFolders DataFolder::cache_folders() const {
                                .quarantine = cache / "quarantine",
                                .drafts = scratch(),
                                .outlive_crashes = false};
-  make_folders({folders.blobs, folders.quarantine});
+  make_folders(kDataFolder, {folders.blobs, folders.quarantine});
   return folders;
 }
 

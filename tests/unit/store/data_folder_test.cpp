@@ -4,6 +4,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
@@ -91,6 +92,28 @@ TEST(DataFolder, ThatCannotBeMadeIsRefusedWithoutItsPath) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kInternal);
   EXPECT_EQ(std::string(error->what()).find(parent.path()), std::string::npos);
+}
+
+// As left by root, who started the daemon once.
+TEST(DataFolder, WithFilesOfAnotherUserIsRefusedWithTheirName) {
+  const TemporaryFolder parent;
+  { const DataFolder folder(parent / "data"); }
+  test::write_file(parent / "data/blobs/identity", "a name");
+  std::filesystem::permissions(parent.path(), std::filesystem::perms::all);
+  std::filesystem::permissions(parent / "data", std::filesystem::perms::all);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(parent / "data")) {
+    std::filesystem::permissions(entry, std::filesystem::perms::all);
+  }
+  std::filesystem::permissions(parent / "data/blobs/identity", std::filesystem::perms::owner_read);
+  const uid_t user = ::geteuid();
+  constexpr uid_t kNobody = 65534;
+  ASSERT_EQ(::seteuid(user == 0 ? kNobody : user), 0);
+  const auto error = test::thrown_by([&] { DataFolder folder(parent / "data"); });
+  ASSERT_EQ(::seteuid(user), 0);
+  ASSERT_TRUE(error);
+  EXPECT_STREQ(error->what(),
+               "the data folder: this user must be able to write to blobs/identity: Permission "
+               "denied");
 }
 
 TEST(ScratchFolder, GoesWithAllThatItHolds) {
