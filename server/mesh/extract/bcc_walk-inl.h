@@ -329,15 +329,11 @@ class BccWriter {
       const auto& [a, b, c] = found.triangles[t];
       return write_triangle({indices[a], indices[b], indices[c]}, to);
     };
-    if (end_ - out < std::ssize(found.triangles)) {
+    if (Joined::kHasClusters || end_ - out < std::ssize(found.triangles)) {
       for (std::size_t t = 0; t < found.triangle_count; ++t) out = write(t, out);
       return out;
     }
-    if constexpr (Joined::kHasClusters) {
-      for (std::size_t t = 0; t < found.triangle_count; ++t) out = write(t, out);
-      return out;
-    }
-    // Fixed numbers of them: how many there are is hard to foresee, too.
+    // Fixed numbers of them, because how many there are is hard to foresee, too.
     constexpr std::size_t kOften = 4;
     for (std::size_t t = 0; t < kOften; ++t) write(t, out + t);
     if (found.triangle_count > kOften) {
