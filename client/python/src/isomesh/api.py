@@ -390,10 +390,10 @@ Certify = bool
 
 
 class JobParametersComponents(TypedDict):
-    """Which connected components to keep; the others are dropped before smoothing. A component
-    must meet all members that are given: keep chooses among those that are large enough.
-    Components are ranked by their number of triangles, equal ones by their first vertex.
-    Without members all are kept. Labels do not allow it."""
+    """Which connected components to keep; the others are dropped before smoothing. With several
+    members, nearest_to chooses first, min_triangles drops some of these, and keep chooses among
+    the rest. Components are ranked by their number of triangles, equal ones by their first
+    vertex. Without members all are kept. Labels do not allow it."""
 
     #: Keep the N largest connected components.
     keep: NotRequired[Keep]
@@ -1067,10 +1067,10 @@ class JobOptions(TypedDict, total=False):
         smoothed. The rest is smoothed as if the surface were open.
 
     components
-        Which connected components to keep; the others are dropped before smoothing. A component
-        must meet all members that are given: keep chooses among those that are large enough.
-        Components are ranked by their number of triangles, equal ones by their first vertex.
-        Without members all are kept. Labels do not allow it.
+        Which connected components to keep; the others are dropped before smoothing. With
+        several members, nearest_to chooses first, min_triangles drops some of these, and keep
+        chooses among the rest. Components are ranked by their number of triangles, equal ones
+        by their first vertex. Without members all are kept. Labels do not allow it.
 
     fill_cavities
         Remove enclosed cavities: their walls and all connected components inside them. A cavity
