@@ -4,7 +4,6 @@ import type { Axis, Volume } from '../../api/types';
 import { checkbox, field, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { Signal, type Scope } from '../../ui/signal';
-import { axisIndex } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
 import { volumeName } from '../../volume/names';
 import type { Preview } from '../../volume/preview';
@@ -91,7 +90,7 @@ export class SliceLayers {
     void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
   }
 
-  // Samples outside the window of a preview are all alike, so that another window may need another preview.
+  // A preview does not tell apart the values beyond its window, so another window may need another preview.
   update(): void {
     if (!this.projection && !this.showsOblique) return;
     const [low, high] = this.host.window();
@@ -104,9 +103,8 @@ export class SliceLayers {
     const { volume } = this.host;
     const own = this.own.preview;
     if (!own || !projection) return null;
-    const reach = Math.max(1, Math.round(this.thickness / volume.spacing[axisIndex(axis)] / 2));
-    const slab: Slab = { reach, projection };
-    return this.projections.get(axis, [index, reach, projection, ...own.window].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
+    const slab: Slab = { thickness: this.thickness, projection };
+    return this.projections.get(axis, [index, slab.thickness, projection, ...own.window].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
   }
 
   // Draws the other volume over that slice, in whose samples the context counts.
