@@ -202,6 +202,22 @@ describe('slices before there is a mesh', () => {
     await expect.poll(() => whitePixels(axial)).toBeGreaterThan(1000);
   });
 
+  it('tell the value of the slab that is shown, and the iso-value is still that of a sample', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(insertNrrd(64));
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=-480&at=42,32,36&window=-1000,2000`);
+    const text = page.locator('[data-plane=axial] .slice-reading');
+    // Twelve units of the window are one of its eight bits.
+    const told = async (): Promise<number> => Number((await text.innerText()).replace('\u2212', '-').replace(/[^\d-]/g, ''));
+    await expect.poll(async () => Math.abs((await told()) - 40)).toBeLessThan(13);
+    await page.getByLabel('Show', { exact: true }).selectOption('maximum');
+    await expect.poll(async () => Math.abs((await told()) - 1200)).toBeLessThan(13);
+    expect(await text.innerText()).toMatch(/^about /);
+    await page.locator('[data-plane=axial] canvas').press('i');
+    await expect.poll(() => Math.abs(Number(noted(page, 'iso')) - 40)).toBeLessThan(13);
+  });
+
   it('are measured, and show it to those who hear them', async () => {
     const { page } = at;
     await open(page);
