@@ -1,6 +1,7 @@
 // Planes at any angle: one beside the slices, and one that cuts a surface. And how panes are laid out.
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
+import { insertNrrd, whitePixels } from './bright';
 import { ballNrrd, contourPixels, noted, setup, silhouette, still, surfaceLoaded } from './support';
 
 const at = setup();
@@ -79,6 +80,14 @@ describe('an oblique plane', () => {
     await expect.poll(() => filled(picture)).toBeLessThan(0.5 * disc);
     await page.getByLabel('Oblique plane', { exact: true }).uncheck();
     await expect.poll(() => picture.isVisible()).toBe(false);
+  });
+
+  it('shows bright structures over any window', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(insertNrrd(64));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=-480&at=42,32,32&window=0,1000`);
+    await page.getByLabel('Oblique plane', { exact: true }).check();
+    await expect.poll(() => whitePixels(page.locator('.oblique-picture'))).toBeGreaterThan(50);
   });
 
   it('is enlarged and taken away, and the panes are laid out otherwise', async () => {

@@ -1,6 +1,7 @@
 // Slices and parameters never show or use something else than what is asked for.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
+import { insertNrrd, whitePixels } from './bright';
 import { ballNrrd, contourPixels, noted, openedJob, settled, setup, tiltedNrrd } from './support';
 
 const at = setup();
@@ -182,6 +183,39 @@ describe('slices before there is a mesh', () => {
     await page.getByLabel('Show', { exact: true }).selectOption('maximum');
     await page.getByLabel('Thickness', { exact: true }).selectOption('40');
     await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(1.25 * few);
+  });
+
+  it('show bright structures in a slab over any window', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(insertNrrd(64));
+    const axial = page.locator('[data-plane=axial] canvas');
+    for (const at of ['42,32,32', '42,32,36']) {
+      await page.goto('about:blank');
+      await page.goto(`${daemon.url}/#/volumes/${volume}?iso=-480&at=${at}&window=0,1000`);
+      // A slab of 10 mm around the second place holds the insert, and its middle slice does not.
+      if (at === '42,32,32') await expect.poll(() => whitePixels(axial)).toBeGreaterThan(50);
+      await page.getByLabel('Show', { exact: true }).selectOption('maximum');
+      await expect.poll(() => whitePixels(axial)).toBeGreaterThan(50);
+    }
+    // The first window once more: what is in it is seen again as before, and the insert stays.
+    await page.getByRole('button', { name: 'Reset window' }).click();
+    await expect.poll(() => whitePixels(axial)).toBeGreaterThan(1000);
+  });
+
+  it('tell the value of the slab that is shown, and the iso-value is still that of a sample', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(insertNrrd(64));
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=-480&at=42,32,36&window=-1000,2000`);
+    const text = page.locator('[data-plane=axial] .slice-reading');
+    // Twelve units of the window are one of its eight bits.
+    const told = async (): Promise<number> => Number((await text.innerText()).replace('\u2212', '-').replace(/[^\d-]/g, ''));
+    await expect.poll(async () => Math.abs((await told()) - 40)).toBeLessThan(13);
+    await page.getByLabel('Show', { exact: true }).selectOption('maximum');
+    await expect.poll(async () => Math.abs((await told()) - 1200)).toBeLessThan(13);
+    expect(await text.innerText()).toMatch(/^about /);
+    await page.locator('[data-plane=axial] canvas').press('i');
+    await expect.poll(() => Math.abs(Number(noted(page, 'iso')) - 40)).toBeLessThan(13);
   });
 
   it('are measured, and show it to those who hear them', async () => {

@@ -10,7 +10,7 @@ const keys: [string, string][] = [
   ['[', 'move the focus to the line in the histogram'],
   ['arrows', 'slice: next or previous slice; histogram line: iso-value; surface: turn'],
   ['Ctrl wheel + \u2212 0', 'slice: zoom; 0 shows the whole slice'],
-  ['i', 'slice: use the value at the cross as the iso-value'],
+  ['i', 'slice: use the value at the cross as the iso-value; in a slab, the value in its middle slice'],
   ['Shift arrows', 'slice: change window and level; surface: move'],
   ['+ \u2212', 'zoom'],
   ['a p l r s i', 'surface: standard views'],

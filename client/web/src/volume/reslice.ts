@@ -1,13 +1,14 @@
 // A volume's values where the samples of another one's slice lie in the patient, and through a slab around that slice.
 import type { Axis, Vec3, Volume } from '../api/types';
 import { axisDirection, axisIndex, pictureAxes, toPatient, toSamples } from './geometry';
+import { cross, dot } from './oblique';
 import type { Preview } from './preview';
 
 export type Projection = 'maximum' | 'mean';
 
 export interface Slab {
-  // In samples of the slice's volume, at each side of the slice.
-  reach: number;
+  // In millimetres, half of it at each side of the slice.
+  thickness: number;
   projection: Projection;
 }
 
@@ -62,56 +63,79 @@ function nearest({ dims, samples }: Preview): (x: number, y: number, z: number) 
   };
 }
 
+interface Layer {
+  // In steps along the normal.
+  at: number;
+  // Its part of the mean.
+  part: number;
+}
+
 // A picture of a plane, whose layers lie behind each other.
 interface Layers {
   width: number;
   height: number;
-  // The middle of the first sample of the first layer, and where a step along rows, columns and layers leads, in millimetres.
+  // The middle of the first sample of the layer at 0, and where a step along rows, columns and the normal leads, in millimetres.
   first: Vec3;
   steps: [Vec3, Vec3, Vec3];
-  count: number;
+  layers: readonly Layer[];
   projection: Projection;
   // Between samples: the nearest one's value, as numbers of labels need it.
   isNearest?: boolean;
 }
 
-function projected(preview: Preview, { width, height, first, steps, count, projection, isNearest = false }: Layers): Resliced {
-  const { at, step } = inSamplesOf(preview);
+function projected(preview: Preview, { width, height, first, steps, layers, projection, isNearest = false }: Layers): Resliced {
+  const { at: placeOf, step } = inSamplesOf(preview);
   const [u, v, w] = steps.map(step) as [Vec3, Vec3, Vec3];
-  const [x0, y0, z0] = at(first);
+  const [x0, y0, z0] = placeOf(first);
   const sample = isNearest ? nearest(preview) : sampler(preview);
   const values = new Uint8Array(width * height);
   for (let row = 0; row < height; row += 1) {
     for (let column = 0; column < width; column += 1) {
-      let [x, y, z] = [x0 + column * u[0] + row * v[0], y0 + column * u[1] + row * v[1], z0 + column * u[2] + row * v[2]];
+      const [x, y, z] = [x0 + column * u[0] + row * v[0], y0 + column * u[1] + row * v[1], z0 + column * u[2] + row * v[2]];
       let most = 0;
-      let sum = 0;
-      for (let layer = 0; layer < count; layer += 1) {
-        const value = sample(x, y, z);
-        sum += value;
+      let mean = 0;
+      for (const { at, part } of layers) {
+        const value = sample(x + at * w[0], y + at * w[1], z + at * w[2]);
+        mean += part * value;
         if (value > most) most = value;
-        x += w[0];
-        y += w[1];
-        z += w[2];
       }
-      values[row * width + column] = Math.round(projection === 'mean' ? sum / count : most);
+      values[row * width + column] = Math.round(projection === 'mean' ? mean : most);
     }
   }
   return { width, height, values };
 }
 
+// The distance between neighbouring slices. Those of a tilted gantry lean, and lie nearer to each other than their samples.
+function sliceDistance(volume: Volume, axis: Axis): number {
+  const normal = axisIndex(axis);
+  const [across, downwards] = pictureAxes(axis);
+  const upright = cross(axisDirection(volume, across), axisDirection(volume, downwards));
+  return (volume.spacing[normal] * Math.abs(dot(axisDirection(volume, normal), upright))) / Math.hypot(...upright);
+}
+
+// The ends of the slab and all slices between them. Values between slices are interpolated linearly, so the maximum of the slab is
+// at one of these layers, and its mean is that of the trapezoids between them.
+function layersOf(middle: number, reach: number, last: number): Layer[] {
+  const low = Math.max(0, middle - reach);
+  const high = Math.min(last, middle + reach);
+  if (low === high) return [{ at: low, part: 1 }];
+  const places = [low];
+  for (let at = Math.floor(low) + 1; at < high; at += 1) places.push(at);
+  places.push(high);
+  return places.map((at, index) => ({ at, part: ((places[index + 1] ?? at) - (places[index - 1] ?? at)) / (2 * (high - low)) }));
+}
+
 export function resliced(preview: Preview, volume: Volume, axis: Axis, index: number, slab: Slab | null = null): Resliced {
   const normal = axisIndex(axis);
   const [across, downwards] = pictureAxes(axis);
-  const low = Math.max(0, index - (slab?.reach ?? 0));
-  const high = Math.min(volume.dims[normal] - 1, index + (slab?.reach ?? 0));
+  const reach = slab ? slab.thickness / sliceDistance(volume, axis) / 2 : 0;
   const stepAlong = (one: 0 | 1 | 2): Vec3 => axisDirection(volume, one).map((value) => value * volume.spacing[one]) as Vec3;
   return projected(preview, {
     width: volume.dims[across],
     height: volume.dims[downwards],
-    first: toPatient(volume, [0, 1, 2].map((one) => (one === normal ? low : 0)) as Vec3),
+    first: toPatient(volume, [0, 0, 0]),
     steps: [stepAlong(across), stepAlong(downwards), stepAlong(normal)],
-    count: high - low + 1,
+    layers: layersOf(index, reach, volume.dims[normal] - 1),
     projection: slab?.projection ?? 'maximum',
   });
 }
@@ -132,5 +156,5 @@ export function sampledSquare(preview: Preview, { middle, right, down, size, pix
   const scaled = (vector: Vec3): Vec3 => vector.map((value) => value * step) as Vec3;
   const [u, v] = [scaled(right), scaled(down)];
   const first = middle.map((value, axis) => value - half * (u[axis as 0] + v[axis as 0])) as Vec3;
-  return projected(preview, { width: pixels, height: pixels, first, steps: [u, v, [0, 0, 0]], count: 1, projection: 'maximum', isNearest });
+  return projected(preview, { width: pixels, height: pixels, first, steps: [u, v, [0, 0, 0]], layers: [{ at: 0, part: 1 }], projection: 'maximum', isNearest });
 }

@@ -89,7 +89,7 @@ export function sliceHelp(): HTMLElement {
     h('li', { class: 'by-mouse' }, h('b', {}, 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', {}, 'Shift and drag'), ': move; 0: show the whole slice'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Two fingers'), ': zoom and move'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': move the other slices to this point'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: use the value at this point as the iso-value'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: use the value at this point as the iso-value; in a slab, the value in its middle slice'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' beside a slider, or the button there: show one view alone, or all'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below a slice: choose the slice'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': move the other slices to this point'),

@@ -108,7 +108,7 @@ class Prepare {
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
     this.oblique = new ObliqueView({ volume, setCursor: (cursor) => this.setCursor(cursor), cursor: () => this.cursor, window: () => this.window }, scope);
-    this.layers = new SliceLayers(volume, common, this.oblique, scope);
+    this.layers = new SliceLayers({ volume, commonWindow: common, window: () => this.window, oblique: this.oblique }, scope);
     const host: SliceHost = {
       volume,
       source: new SliceSource(volume, scope.signal),
@@ -360,7 +360,7 @@ class Prepare {
   private update(): void {
     this.undoButton.hidden = !this.history.canUndo;
     choose(this.surfaceKind, kindOf(this.parameters));
-    for (const view of [...this.slices, this.oblique]) view.update();
+    for (const view of [...this.slices, this.layers, this.oblique]) view.update();
     if (isByLabels(this.parameters)) this.live.showLabels(this.labelLook, this.cursor);
     else this.live.show(this.iso, this.cursor);
     this.live.showCrop(this.box);

@@ -1,16 +1,16 @@
 // Layers of slices beside their own samples: another volume over them, and a projection of the slab around them.
-import { client } from '../../client';
+import { client, connected } from '../../client';
 import type { Axis, Volume } from '../../api/types';
 import { checkbox, field, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { Signal, type Scope } from '../../ui/signal';
-import { axisIndex } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
 import { volumeName } from '../../volume/names';
 import type { Preview } from '../../volume/preview';
 import { fetchPreview, largestPreview } from '../../volume/preview_file';
+import { PreviewLoader } from '../../volume/preview_loader';
 import { resliced, type Projection, type Slab } from '../../volume/reslice';
-import type { Slice, Window } from '../../volume/slices';
+import { windowToFetch, type Slice, type Window } from '../../volume/slices';
 import type { ObliqueView } from './oblique_view';
 import { pixelsOf } from './slice_looks';
 
@@ -39,12 +39,20 @@ class Kept<T> {
   }
 }
 
+export interface LayersHost {
+  volume: Volume;
+  commonWindow: Window;
+  // As it is shown now.
+  window: () => Window;
+  oblique: ObliqueView;
+}
+
 export class SliceLayers {
   readonly element: HTMLElement;
   // They are to be drawn anew.
   readonly changes = new Signal(0);
   private other: Layer | null = null;
-  private own: Preview | null = null;
+  private readonly own: PreviewLoader;
   private projection: Projection | null = null;
   private thickness = 10;
   private showsOblique = false;
@@ -55,12 +63,22 @@ export class SliceLayers {
   private wanted = new AbortController();
 
   constructor(
-    private readonly volume: Volume,
-    private readonly window: Window,
-    private readonly oblique: ObliqueView,
+    private readonly host: LayersHost,
     private readonly scope: Scope,
   ) {
+    this.own = new PreviewLoader({
+      fetch: (window) => fetchPreview(host.volume.id, largestPreview, window, scope.signal),
+      onChange: () => this.showOwn(),
+      onError: (error) => {
+        if (!scope.isOver) tellError(error);
+      },
+    });
     scope.onEnd(() => this.wanted.abort());
+    scope.onEnd(
+      connected.subscribe((isConnected) => {
+        if (isConnected) this.own.retry();
+      }),
+    );
     this.opacity.hidden = true;
     this.opacity.addEventListener('input', () => this.changed());
     this.choice.addEventListener('change', () => void this.show(this.choice.value).catch(tellError));
@@ -72,18 +90,27 @@ export class SliceLayers {
     void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
   }
 
+  // A preview does not tell apart the values beyond its window, so another window may need another preview.
+  update(): void {
+    if (!this.projection && !this.showsOblique) return;
+    const [low, high] = this.host.window();
+    this.own.want(windowToFetch([low, high], (low + high) / 2, this.host.commonWindow));
+  }
+
   // A projection instead of that slice; null where none is wanted or there.
   projected(axis: Axis, index: number): Slice | null {
-    const { own, projection, volume } = this;
+    const { projection } = this;
+    const { volume } = this.host;
+    const own = this.own.preview;
     if (!own || !projection) return null;
-    const reach = Math.max(1, Math.round(this.thickness / volume.spacing[axisIndex(axis)] / 2));
-    const slab: Slab = { reach, projection };
-    return this.projections.get(axis, [index, reach, projection].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
+    const slab: Slab = { thickness: this.thickness, projection };
+    return this.projections.get(axis, [index, slab.thickness, projection, ...own.window].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
   }
 
   // Draws the other volume over that slice, in whose samples the context counts.
   paint(context: CanvasRenderingContext2D, axis: Axis, index: number): void {
-    const { other, volume } = this;
+    const { other } = this;
+    const { volume } = this.host;
     if (!other) return;
     const before = context.globalAlpha;
     context.globalAlpha *= this.opacity.valueAsNumber;
@@ -113,7 +140,8 @@ export class SliceLayers {
     kind.addEventListener('change', () => {
       this.projection = kind.value === '' ? null : (kind.value as Projection);
       thickness.hidden = this.projection === null;
-      void this.loadOwn().then(() => this.changed(), tellError);
+      this.askForOwn();
+      this.changed();
     });
     thick.addEventListener('change', () => {
       this.thickness = Number(thick.value);
@@ -125,19 +153,26 @@ export class SliceLayers {
   private obliqueControl(): HTMLElement {
     return checkbox('Oblique plane', false, (isOn) => {
       this.showsOblique = isOn;
-      void this.loadOwn().then(() => this.oblique.show(this.showsOblique ? this.own : null), tellError);
+      this.askForOwn();
+      this.showOwn();
     });
   }
 
   private async list(): Promise<boolean> {
     const { volumes } = await client.listVolumes('', this.scope.signal);
-    const others = volumes.filter(({ id }) => id !== this.volume.id);
+    const others = volumes.filter(({ id }) => id !== this.host.volume.id);
     this.choice.append(...others.map((one) => h('option', { value: one.id }, volumeName(one))));
     return others.length > 0;
   }
 
-  private async loadOwn(): Promise<void> {
-    if (this.projection || this.showsOblique) this.own ??= await fetchPreview(this.volume.id, largestPreview, this.window, this.scope.signal);
+  private askForOwn(): void {
+    this.own.retry();
+    this.update();
+  }
+
+  private showOwn(): void {
+    this.host.oblique.show(this.showsOblique ? this.own.preview : null);
+    this.changed();
   }
 
   // That one over the slices; '' for none.

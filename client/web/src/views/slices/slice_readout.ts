@@ -5,7 +5,7 @@ import { h } from '../../ui/dom';
 import { formatValue } from '../../ui/format';
 import { axisIndex, pictureAxes, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
-import { onlyInteger, valueIn, type Slice } from '../../volume/slices';
+import { onlyInteger, valueIn, type Slice, type ValueRange } from '../../volume/slices';
 import { placeText, sliceSpace } from './slice_looks';
 
 export interface ReadoutHost {
@@ -13,8 +13,25 @@ export interface ReadoutHost {
   isInteger: boolean;
   // The slice that is shown, if it is there.
   slice: () => Slice | null;
+  // Shown instead of that slice; null for none.
+  slabOf: (slice: Slice) => Slice | null;
   // Null where samples are values.
   labels: () => LabelLook | null;
+}
+
+interface Reading {
+  text: string;
+  value: number | null;
+}
+
+// Keeps the digits that the eight bits of a picture tell.
+function rounded({ low, high }: ValueRange): Reading {
+  if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
+  if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
+  const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
+  const middle = Math.round((low + high) / 2 / digits) * digits;
+  const value = Number(middle.toPrecision(6));
+  return { text: `about ${formatValue(value)}`, value };
 }
 
 export class SliceReadout {
@@ -31,7 +48,7 @@ export class SliceReadout {
 
   show(cursor: Vec3): void {
     const place = this.pointed ?? cursor;
-    const value = this.valueAt(place).text;
+    const value = this.textAt(place);
     const where = placeText(toPatient(this.host.volume, place), sliceSpace.value, this.host.volume.spacing);
     const text = [value, where].filter(Boolean).join(' \u00b7 ');
     if (this.element.textContent === text) return;
@@ -39,8 +56,17 @@ export class SliceReadout {
     this.element.replaceChildren(...[reading, h('span', { class: 'slice-where' }, text.slice(value.length))].filter((part) => part !== false));
   }
 
-  // Rounded to what the picture's eight bits tell; null where they tell no value.
-  valueAt(place: Vec3 | null): { text: string; value: number | null } {
+  // Says what is seen at that place.
+  private textAt(place: Vec3): string {
+    const slice = this.host.slice();
+    const slab = slice && this.host.slabOf(slice);
+    if (!slab || place[axisIndex(slab.axis)] !== slab.index) return this.valueAt(place).text;
+    const [column, row] = pictureAxes(slab.axis);
+    return rounded(valueIn(slab, place[column], place[row])).text;
+  }
+
+  // Reads the slice, also while a slab is shown: the mean of a slab is the value of no sample. Null where the picture tells no value.
+  valueAt(place: Vec3 | null): Reading {
     const slice = this.host.slice();
     if (!slice || place?.[axisIndex(slice.axis)] !== slice.index) return { text: '', value: null };
     const [column, row] = pictureAxes(slice.axis);
@@ -50,14 +76,8 @@ export class SliceReadout {
       return { text: label ? labelTitle(label) : 'no label', value: null };
     }
     const range = valueIn(slice, place[column], place[row]);
-    const { low, high } = range;
-    if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
-    if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
     const exact = this.host.isInteger ? onlyInteger(range) : null;
     if (exact !== null) return { text: formatValue(exact), value: exact };
-    const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
-    const middle = Math.round((low + high) / 2 / digits) * digits;
-    const value = Number(middle.toPrecision(6));
-    return { text: `about ${formatValue(value)}`, value };
+    return rounded(range);
   }
 }

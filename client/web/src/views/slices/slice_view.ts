@@ -108,6 +108,7 @@ export class SliceView {
       volume: host.volume,
       isInteger: host.isInteger,
       slice: () => this.loader.slice,
+      slabOf: ({ axis, index }) => host.layers?.projected(axis, index) ?? null,
       labels: () => host.state().labels,
     });
     this.zoom = new SliceZoom(this.canvas, scope, () => this.draw());
