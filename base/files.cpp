@@ -101,4 +101,17 @@ std::string read_whole(const std::filesystem::path& path) {
   return file.text(0, file.size());
 }
 
+std::filesystem::path behind_links(const std::filesystem::path& path) {
+  constexpr int kMostLinks = 40;  // the kernel's limit
+  std::filesystem::path place = path;
+  for (int links = 0; links <= kMostLinks; ++links) {
+    std::error_code unknown;
+    const std::filesystem::path target = std::filesystem::read_symlink(place, unknown);
+    if (unknown) return place;
+    place = place.parent_path() / target;  // the target alone if it is absolute
+  }
+  throw Error(ErrorCode::kInvalidParameter,
+              path.string() + " leads through too many symbolic links");
+}
+
 }  // namespace isomesh

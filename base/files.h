@@ -77,4 +77,9 @@ bool same_bytes(const std::filesystem::path& one, const std::filesystem::path& o
 // The file's whole text. Throws Error kNotFound or kInternal.
 std::string read_whole(const std::filesystem::path& path);
 
+// The place that `path` leads to if it is a symbolic link, or a chain of them; else `path`. The
+// last link may lead to a file that does not exist. For files that are replaced by renaming, which
+// would replace the link. Throws Error kInvalidParameter for a loop.
+std::filesystem::path behind_links(const std::filesystem::path& path);
+
 }  // namespace isomesh

@@ -334,7 +334,7 @@ int main(int argc, char** argv) {
     try {
       cli.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {
-      tell_failure(log_format, describe_config_error(error.what()));
+      tell_failure(log_format, std::string("the file of --config: ") + error.what());
       return kWrongUsage;
     } catch (const CLI::ParseError& error) {
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version

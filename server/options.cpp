@@ -5,9 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <istream>
 #include <map>
-#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -15,22 +13,10 @@
 #include <unistd.h>
 
 #include "base/command_line/closest.h"
+#include "server/config_file.h"
 
 namespace isomesh {
 namespace {
-
-std::string quoted(const std::string& value) {
-  const bool is_number = !value.empty() &&
-                         value.find_first_not_of("0123456789.") == std::string::npos &&
-                         std::ranges::count(value, '.') <= 1;
-  if (is_number || value == "true" || value == "false") return value;
-  std::string text = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') text += '\\';
-    text += c;
-  }
-  return text + '"';
-}
 
 const std::map<std::string, LogLevel> kLogLevels = {{"debug", LogLevel::kDebug},
                                                     {"info", LogLevel::kInfo},
@@ -202,27 +188,6 @@ void add_check(CLI::App& cli, Options& options) {
       ->callback([&options] { options.check_only = true; });
 }
 
-// In CLI11 the file overrides the environment. Here the environment overrides the file, so that
-// variables of a container or a unit change an installed configuration.
-class FileBelowEnvironment : public CLI::ConfigTOML {
- public:
-  explicit FileBelowEnvironment(const CLI::App& cli) : cli_(cli) {}
-
-  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
-    std::vector<CLI::ConfigItem> found = CLI::ConfigTOML::from_config(input);
-    std::erase_if(found, [&](const CLI::ConfigItem& item) {
-      const CLI::Option* option = cli_.get_option_no_throw("--" + item.name);
-      if (option == nullptr || option->get_envname().empty()) return false;
-      const char* value = std::getenv(option->get_envname().c_str());
-      return value != nullptr && *value != '\0';
-    });
-    return found;
-  }
-
- private:
-  const CLI::App& cli_;
-};
-
 // For a single start, so neither in a file nor in the environment.
 void add_operator_overrides(CLI::App& cli, Options& options) {
   cli.add_flag("--adopt", options.overrides.adopt,
@@ -240,10 +205,8 @@ void add_options(CLI::App& cli, Options& options) {
   cli.set_version_flag("--version", ISOMESH_VERSION);
   const char* config = std::getenv("ISOMESH_CONFIG");
   cli.set_config("--config", config == nullptr ? "" : config,
-                 "Read options from this file (TOML or INI); also ISOMESH_CONFIG",
-                 config != nullptr);
-  cli.config_formatter(std::make_shared<FileBelowEnvironment>(cli));
-  cli.allow_config_extras(CLI::config_extras_mode::error);
+                 "Read options from this file (TOML); also ISOMESH_CONFIG", config != nullptr);
+  cli.config_formatter(config_file(cli));
   cli.add_option("--listen", options.listen,
                  "Address to listen on: HOST:PORT, HOST:0 for a free port, or unix:PATH")
       ->envname("ISOMESH_LISTEN")
@@ -397,25 +360,11 @@ std::string as_config(const CLI::App& cli, Remarks remarks) {
     const std::string value = value_of(*option);
     if (remarks == Remarks::kYes) text += "# " + option->get_description() + ".\n";
     text += (is_set ? "" : "# ") + option->get_lnames().front();
-    text += (value.empty() ? "" : " = " + quoted(value)) + '\n';
+    if (is_set || !value.empty()) text += " = " + as_toml(*option, value);
+    text += '\n';
     if (remarks == Remarks::kYes) text += '\n';
   }
   return text;
-}
-
-std::string describe_config_error(const std::string& library_text) {
-  constexpr std::string_view kUnknown = "INI was not able to parse ";
-  if (!library_text.starts_with(kUnknown)) return "the file of --config: " + library_text;
-  std::string name = library_text.substr(kUnknown.size());
-  // The library's name for the beginning of a section.
-  constexpr std::string_view kSection = ".++";
-  if (name.ends_with(kSection)) {
-    name.resize(name.size() - kSection.size());
-    return "the file of --config: there is no section [" + name +
-           "]; it has none, and those of a hospital belong in the file of --hospital";
-  }
-  return "the file of --config: there is no option \"" + name +
-         "\"; `isomeshd --help` lists all options";
 }
 
 }  // namespace isomesh

@@ -70,7 +70,4 @@ enum class Remarks { kNo, kYes };
 // options.
 std::string as_config(const CLI::App& cli, Remarks remarks);
 
-// The message for an error in the file of --config.
-std::string describe_config_error(const std::string& library_text);
-
 }  // namespace isomesh

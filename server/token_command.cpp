@@ -96,18 +96,19 @@ void tell(const std::string& text) {
 }  // namespace
 
 void add_token(const TokenRequest& request) {
+  const fs::path file = behind_links(request.file);
   const auto role = http::role_from(request.role);
   if (!role) throw invalid_parameter("role", "must be user, admin or monitor");
   const std::string token = http::make_token();
   const std::string line = http::token_line(request.name, *role, token);
-  if (!request.file.empty()) {
-    const Descriptor lock = lock_folder_of(request.file);
+  if (!file.empty()) {
+    const Descriptor lock = lock_folder_of(file);
     std::vector<std::string> lines;
-    if (fs::exists(request.file)) lines = lines_of(request.file);
+    if (fs::exists(file)) lines = lines_of(file);
     const bool has_tokens = std::ranges::any_of(
         lines, [](const std::string& each) { return !parsed(each).name.empty(); });
     // The next start would reject it otherwise.
-    if (has_tokens) const http::Tokens readable(request.file, http::ReadBy::kAdministrator);
+    if (has_tokens) const http::Tokens readable(file, http::ReadBy::kAdministrator);
     for (const std::string& each : lines) {
       const TokenLine other = parsed(each);
       if (other.name == request.name && other.role != request.role) {
@@ -117,7 +118,7 @@ void add_token(const TokenRequest& request) {
     }
     lines.push_back(line);
     tell(token);  // first: an unseen token is useless, and its hash would stay
-    replace(request.file, lines);
+    replace(file, lines);
     return;
   }
   tell(token + '\n' + line);
@@ -137,12 +138,13 @@ void list_tokens(const TokenRequest& request) {
 
 void revoke_tokens(const TokenRequest& request) {
   check_is_given(request.file);
-  const Descriptor lock = lock_folder_of(request.file);
-  const http::Tokens readable(request.file, http::ReadBy::kAdministrator);
+  const fs::path file = behind_links(request.file);
+  const Descriptor lock = lock_folder_of(file);
+  const http::Tokens readable(file, http::ReadBy::kAdministrator);
   std::vector<std::string> kept;
   std::size_t revoked = 0;
   std::size_t left = 0;
-  for (const std::string& line : lines_of(request.file)) {
+  for (const std::string& line : lines_of(file)) {
     const TokenLine token = parsed(line);
     if (token.name == request.name && token.hash.starts_with(request.hash)) {
       ++revoked;
@@ -160,7 +162,7 @@ void revoke_tokens(const TokenRequest& request) {
                             "no token would be left, and a daemon rejects a file without tokens: "
                             "add another token first, or stop the daemon");
   }
-  replace(request.file, kept);
+  replace(file, kept);
   std::cout << "revoked " << revoked << (revoked == 1 ? " token" : " tokens")
             << "; send SIGHUP to a running daemon" << std::endl;
 }

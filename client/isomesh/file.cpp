@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/files.h"
 #include "base/ids.h"
 #include "proto/error.h"
 
@@ -26,8 +27,7 @@ std::filesystem::path resolve(const std::filesystem::path& target) {
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     throw Error(ErrorCode::kInvalidParameter, target.string() + ": is not a regular file");
   }
-  const bool link = std::filesystem::is_symlink(std::filesystem::symlink_status(target, error));
-  return link ? std::filesystem::weakly_canonical(target, error) : target;
+  return behind_links(target);
 }
 
 std::filesystem::path part_beside(const std::filesystem::path& target) {

@@ -1,7 +1,10 @@
 // Starting, listening, and what a restart keeps.
 #include <algorithm>
 #include <csignal>
+#include <random>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -173,6 +176,99 @@ TEST(Configuration, IsToldWithoutAStart) {
   write_file(folder / "told.toml", told.output);
   const Finished again = run({ISOMESHD, "check", "--config", folder / "told.toml"});
   EXPECT_EQ(again.output, told.output) << again.errors;
+}
+
+// The output of `isomeshd check` with a file of --config of that text.
+Finished checked(const TemporaryFolder& folder, const std::string& text) {
+  write_file(folder / "config.toml", text);
+  return run({ISOMESHD, "check", "--config", folder / "config.toml"});
+}
+
+// A folder that is not the one in the file would be empty.
+TEST(Configuration, ValuesAreReadAsToml) {
+  const TemporaryFolder folder;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {R"(data = "/srv/ab#cd" # a comment)", R"(data = "/srv/ab#cd")"},
+      {R"(data = 'x#y')", R"(data = "x#y")"},
+      {R"(data = 'C:\x')", R"(data = "C:\\x")"},
+      {R"(data = "a\"b\\c")", R"(data = "a\"b\\c")"},
+      {R"(data = "x\ty")", R"(data = "x\u0009y")"},
+      {R"(data = "\u00e9")", "data = \"\u00e9\""},
+      {"data = \"\"\"\nx; y\"\"\"", R"(data = "x; y")"},
+      {R"(data = "[a, b]")", R"(data = "[a, b]")"},
+      {R"(data = "5")", R"(data = "5")"},
+      {"max-upload = 8_000_000", "max-upload = 8000000"},
+      {"max-upload = 0x10", "max-upload = 16"},
+      {R"(max-upload = "1KiB")", "max-upload = 1024"},
+      {"keep-days = 2.50", "keep-days = 2.5"},
+      {"open-network = true", "open-network = true"},
+      {R"(cors-origin = ["https://x", 'https://y'])", R"(cors-origin = "https://x,https://y")"},
+      {"callback-allow = [\n  # none\n]", "# callback-allow"}};
+  for (const auto& [text, line] : cases) {
+    const Finished told = checked(folder, "# \xc2\xa7 1\r\n" + text + '\n');
+    EXPECT_EQ(told.status, 0) << text << told.errors;
+    EXPECT_THAT('\n' + told.output, HasSubstr('\n' + line + '\n')) << text;
+  }
+}
+
+TEST(Configuration, AWrongLineIsToldWithItsNumber) {
+  const TemporaryFolder folder;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"data = /srv/x", "must be TOML"},
+      {"open-network", "must be TOML"},
+      {"data = \"x", "must be TOML"},
+      {"data = 'x'\ndata = 'y'", "must be TOML"},
+      {"data = \"\xff\"", "must be TOML"},
+      {"data = 5", "data must be a string in quotes"},
+      {"data = ['x']", "data must be a string in quotes"},
+      {"data = 1979-05-27", "data must be a string in quotes"},
+      {R"(data = "a\u0000b")", "U+0000"},
+      {"data.x = 'y'", "data must be a string in quotes"},
+      {"workers = true", "workers must be a number"},
+      {"open-network = 1", "open-network must be true or false"},
+      {"cors-origin = [1]", "cors-origin must be a string or a list of strings"},
+      {"adopt = true", "\"adopt\" is only for the command line"},
+      {"config = 'x'", "\"config\" is only for the command line"},
+      {"[audit]\nverify = true", "no section [audit]"},
+      {"[token.add]\nrole = 'admin'", "no section [token]"},
+      {"[[pacs]]\nname = 'x'", "no section [pacs]"}};
+  for (const auto& [text, message] : cases) {
+    const Finished told = checked(folder, "\n" + text + '\n');
+    EXPECT_EQ(told.status, 2) << text << told.output;
+    EXPECT_THAT(told.errors, testing::ContainsRegex("the file of --config: line [23]: ")) << text;
+    EXPECT_THAT(told.errors, HasSubstr(message)) << text;
+  }
+}
+
+TEST(Configuration, EveryStringThatIsToldReadsBack) {
+  const TemporaryFolder folder;
+  const std::vector<std::string> parts = {
+      "#",    "\"",     "\"\"\"", "'",      "\\",     "\\u",    "\\n",       "\n",
+      "\r",   "\t",     "\x01",   "\x7f",   " ",      ",",      "=",         ";",
+      "[",    "]",      "{",      "}",      "$",      "%",      "5",         ".",
+      "true", "\u00e9", "\u0085", "\u2028", "\ufeff", "\ufffe", "\U0001f9e0"};
+  std::mt19937 random(1);
+  for (int round = 0; round < 50; ++round) {
+    std::string value;
+    const auto count = 1 + random() % 6;
+    for (std::size_t i = 0; i < count; ++i) value += parts[random() % parts.size()];
+    const Finished told = run({ISOMESHD, "check", "--data=" + value, "--store", ""});
+    ASSERT_EQ(told.status, 0) << value << told.errors;
+    const Finished again = checked(folder, told.output);
+    EXPECT_EQ(again.output, told.output) << value << again.errors;
+  }
+}
+
+TEST(Configuration, NumbersThatTomlDoesNotHaveReadBack) {
+  const TemporaryFolder folder;
+  for (const std::string option :
+       {"--workers=010", "--keep-days=.5", "--keep-days=1e3", "--keep-days=7.", "--keep-days=0.10",
+        "--max-disk=18446744073709551615", "--max-disk=10000000000"}) {
+    const Finished told = run({ISOMESHD, "check", option});
+    ASSERT_EQ(told.status, 0) << option << told.errors;
+    const Finished again = checked(folder, told.output);
+    EXPECT_EQ(again.output, told.output) << option << again.errors;
+  }
 }
 
 TEST(Configuration, TheCommandLineIsBeforeTheEnvironmentAndThatBeforeTheFile) {

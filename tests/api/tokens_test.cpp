@@ -277,6 +277,34 @@ TEST(TokenCommand, ListsAndRevokes) {
   EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0600));
 }
 
+// A daemon that reads the file by its own name would keep revoked tokens.
+TEST(TokenCommand, WritesThroughLinks) {
+  const TemporaryFolder folder;
+  const std::string real = folder / "secret" / "tokens";
+  const std::string link = folder / "tokens";
+  std::filesystem::create_directory(folder / "secret");
+  std::filesystem::create_symlink("../chained", folder / "secret" / "link");
+  std::filesystem::create_symlink(real, folder / "chained");
+  std::filesystem::create_symlink("secret/link", link);
+  ASSERT_EQ(token_command({"add", "ct"}, link).status, 0) << "the last link leads to no file yet";
+  std::filesystem::permissions(real, std::filesystem::perms(0640));
+  ASSERT_EQ(run({ISOMESHD, "token", "add", "mr", "--into", link}).status, 0);
+  EXPECT_EQ(std::ranges::count(token_command({"list"}, real).output, '\n'), 2);
+  ASSERT_EQ(token_command({"revoke", "ct"}, link).status, 0);
+  EXPECT_THAT(token_command({"list"}, real).output, testing::StartsWith("mr user "));
+  EXPECT_EQ(std::filesystem::status(real).permissions(), std::filesystem::perms(0640));
+  for (const std::string each :
+       {folder / "secret" / "link", folder / "chained", folder / "tokens"}) {
+    EXPECT_TRUE(std::filesystem::is_symlink(each)) << each;
+  }
+
+  std::filesystem::create_symlink("loop", folder / "loop");
+  const Finished looped = token_command({"add", "ct"}, folder / "loop");
+  EXPECT_EQ(looped.status, 1);
+  EXPECT_THAT(looped.errors, HasSubstr("too many symbolic links"));
+  EXPECT_EQ(looped.output, "");
+}
+
 TEST(TokenCommand, ManyAtOnceLoseNoLine) {
   const TemporaryFolder folder;
   const std::string file = folder / "tokens";

@@ -6,7 +6,6 @@
 #include <set>
 #include <sstream>
 
-// Only this file compiles the parser.
 #include <toml++/toml.h>
 
 #include "base/files.h"

@@ -43,6 +43,24 @@ TEST(PartFile, FollowsALink) {
   EXPECT_EQ(test::read_file(folder / "real.drc"), "new");
 }
 
+TEST(PartFile, FollowsLinksToAFileThatDoesNotExist) {
+  TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "there");
+  std::filesystem::create_symlink("there/link.drc", folder / "link.drc");
+  std::filesystem::create_symlink("new.drc", folder / "there" / "link.drc");
+  PartFile file(folder / "link.drc");
+  file.write("new");
+  file.publish();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.drc"));
+  EXPECT_EQ(test::read_file(folder / "there" / "new.drc"), "new");
+}
+
+TEST(PartFile, RefusesALoopOfLinks) {
+  TemporaryFolder folder;
+  std::filesystem::create_symlink("loop", folder / "loop");
+  EXPECT_EQ(error_of([&] { PartFile(folder / "loop"); }).code(), ErrorCode::kInvalidParameter);
+}
+
 // Renaming onto a device would replace it for the whole machine.
 TEST(PartFile, RefusesWhatIsNoRegularFile) {
   TemporaryFolder folder;
