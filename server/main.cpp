@@ -216,8 +216,9 @@ int run(const Options& options, const sigset_t& signals) {
   retention_options.max_bytes = options.max_disk;
   retention_options.now = [&records] { return records->now(); };
   store::Retention retention(jobs, volumes, blobs, folder.scratch(), retention_options);
-  blobs.limit_room(options.max_disk,
-                   [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
+  blobs.limit_room(options.max_disk, [&retention](const store::Incoming& incoming) {
+    retention.make_room(incoming);
+  });
   jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
   runner.program = program_of_ours("isomesh-import");

@@ -177,6 +177,7 @@ constexpr std::array kFormats = {
            .milliseconds_per_triangle = 3.0e-5,
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
+           .has_exact_bytes = true,
            .memory_bytes = no_memory,
            .shows_topology = never,
            .encode = encode_in_frame<encode_stl>},
@@ -187,6 +188,7 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
                },
+           .has_exact_bytes = true,
            .memory_bytes = no_memory,
            .shows_topology = never,
            .encode = encode_in_frame<encode_ply>,
@@ -263,6 +265,7 @@ constexpr std::array kFormats = {
                  return 200 + 12 * as_double(surface.vertices) +
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
+           .has_exact_bytes = true,
            .memory_bytes = no_memory,
            .shows_topology = never,
            .encode = encode_in_frame<encode_vtk>,
@@ -275,6 +278,7 @@ constexpr std::array kFormats = {
                  return 4000 + 12 * as_double(surface.vertices) +
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
+           .has_exact_bytes = true,
            .memory_bytes = no_memory,
            .shows_topology = never,
            .encode = encode_with_provenance<encode_vtp>,

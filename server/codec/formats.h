@@ -34,6 +34,8 @@ struct Format {
   double milliseconds_per_triangle;
   // The estimated size of the file.
   double (*bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
+  // True if that is exact but for the header.
+  bool has_exact_bytes = false;
   // The encoder's peak memory without the mesh; an upper estimate.
   std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
   // True if encoding nearly always yields the mesh's topology.

@@ -75,8 +75,15 @@ struct Swept {
 
 // Returns true if a record names the blob with that key.
 using Names = std::function<bool(const std::string& key)>;
-// Frees that many bytes, or throws Error kOutOfSpace.
-using MakeRoom = std::function<void(std::uint64_t bytes)>;
+// Bytes that need space, and whose they will be.
+struct Incoming {
+  std::string owner = {};
+  std::uint64_t bytes = 0;
+  // Further bytes of the owner that are being written, so no record names them yet.
+  std::uint64_t unfinished = 0;
+};
+// Frees space for the bytes, or throws Error kOutOfSpace.
+using MakeRoom = std::function<void(const Incoming& incoming)>;
 using Steady = std::chrono::steady_clock::time_point;
 
 // Blobs appear atomically and never change. Several daemons may share a store: no daemon erases or
@@ -104,7 +111,9 @@ class BlobStore {
   virtual std::string mark() const = 0;
   virtual void set_mark(const std::string& text) = 0;
 
-  virtual std::unique_ptr<BlobWriter> begin() = 0;
+  // `owner`: whose data the blob will be, for sharing limited space between owners. Its bytes count
+  // as his until the writer is destroyed, and then as those of the records that name the blob.
+  virtual std::unique_ptr<BlobWriter> begin(const std::string& owner) = 0;
 
   // False if space is so short that no new work should start.
   virtual bool has_room() const = 0;
@@ -118,9 +127,10 @@ class BlobStore {
   virtual std::uint64_t capacity() const = 0;
 
   // Turns a finished local file into a blob that survives a crash, and removes the file. `blob` is
-  // the recent result of digest_of(file), so that is_intact() need not read it again. Throws Error
-  // kOutOfSpace.
-  virtual void adopt(const std::filesystem::path& file, const Blob& blob) = 0;
+  // the recent result of digest_of(file), so that is_intact() need not read it again. `owner`: as
+  // for begin(). Throws Error kOutOfSpace.
+  virtual void adopt(const std::filesystem::path& file, const Blob& blob,
+                     const std::string& owner) = 0;
 
   // Opens a local copy: a remote blob is first fetched and verified. Throws Error kNotFound;
   // kInternal if its bytes do not match the key.

@@ -80,7 +80,7 @@ Retention::Gone Retention::enforce() {
   {
     const Lock lock(mutex_);
     expire_old(now, gone);
-    if (options_.max_bytes > 0) shrink_to(options_.max_bytes, gone);
+    if (options_.max_bytes > 0) shrink_for({}, gone);
     gone.blobs += erase_garbage();
   }
   sweep_blobs(gone);
@@ -89,11 +89,11 @@ Retention::Gone Retention::enforce() {
   return gone;
 }
 
-void Retention::make_room(std::uint64_t bytes) {
+void Retention::make_room(const Incoming& incoming) {
   if (options_.max_bytes == 0) return;
   const Lock lock(mutex_);
   Gone gone;
-  if (bytes <= options_.max_bytes && shrink_to(options_.max_bytes - bytes, gone)) return;
+  if (incoming.bytes <= options_.max_bytes && shrink_for(incoming, gone)) return;
   throw Error(ErrorCode::kOutOfSpace, "the space for volumes and meshes is used up");
 }
 
@@ -115,7 +115,8 @@ void Retention::expire_old(Time now, Gone& gone) {
   }
 }
 
-bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
+bool Retention::shrink_for(const Incoming& incoming, Gone& gone) {
+  const std::uint64_t max_bytes = options_.max_bytes - incoming.bytes;
   Report report("--max-disk");
   while (true) {
     const std::uint64_t used = blobs_.bytes();
@@ -129,7 +130,7 @@ bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
     // for it.
     const std::uint64_t going = garbage_bytes();
     if (used <= max_bytes + going) return false;
-    const Superfluous superfluous = this->superfluous();
+    const Superfluous superfluous = this->superfluous(incoming);
     if (superfluous.items.empty()) return false;
     expire(superfluous.items, std::min(used - max_bytes - going, superfluous.enough), gone, report);
   }
@@ -143,9 +144,10 @@ std::uint64_t Retention::garbage_bytes() const {
 
 // The oldest data of the owner with most data, so that one owner's many uploads do not displace
 // those of others (longest queue drop: Suter, Lakshman, Stiliadis and Choudhury, 1998).
-Retention::Superfluous Retention::superfluous() const {
+Retention::Superfluous Retention::superfluous(const Incoming& incoming) const {
   OwnedBytes owned = volumes_.owned_bytes();
   for (const auto& [owner, bytes] : jobs_.owned_bytes()) owned[owner] += bytes;
+  owned[incoming.owner] += incoming.bytes + incoming.unfinished;
   std::vector<std::pair<std::uint64_t, std::string>> most;
   for (const auto& [owner, bytes] : owned) most.emplace_back(bytes, owner);
   std::ranges::sort(most, std::greater());

@@ -58,9 +58,9 @@ class Retention {
   // periodically. Throws Error kOutOfSpace or kInternal.
   Gone enforce();
 
-  // Expires the oldest data of the owner with most data until `bytes` more fit. Throws Error
-  // kOutOfSpace if that is impossible.
-  void make_room(std::uint64_t bytes);
+  // Expires the oldest data of the owner with most data, counted with what comes, until that fits.
+  // Throws Error kOutOfSpace if that is impossible.
+  void make_room(const Incoming& incoming);
 
   // Total size of the blobs that records name; each counts once.
   std::uint64_t named_bytes() const;
@@ -68,15 +68,15 @@ class Retention {
  private:
   Names names() const;
   void expire_old(Time now, Gone& gone) ISOMESH_REQUIRES(mutex_);
-  // Returns false if queued and running jobs need more than that.
-  bool shrink_to(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
+  // Keeps the limit. Returns false if queued and running jobs need too much for that.
+  bool shrink_for(const Incoming& incoming, Gone& gone) ISOMESH_REQUIRES(mutex_);
   std::uint64_t garbage_bytes() const ISOMESH_REQUIRES(mutex_);
   std::vector<Expirable> oldest(const ExpiryFilter& filter, Ended which) const;
   struct Superfluous {
     std::vector<Expirable> items;
     std::uint64_t enough = 0;  // bytes to free before another owner may have more data
   };
-  Superfluous superfluous() const;
+  Superfluous superfluous(const Incoming& incoming) const;
   class Report;
   void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone, Report& report)
       ISOMESH_REQUIRES(mutex_);

@@ -114,6 +114,7 @@ TEST_F(Disk, AJobThatCanNeverFitFailsAndSaysSo) {
 
 TEST_F(Disk, AJobThatMayFitLaterWaitsAndSaysSo) {
   start();
+  ASSERT_TRUE(becomes_ready());
   const RawUpload raw = raw_upload(noise<std::uint8_t>({0, 100}, {48, 48, 48}, 11));
   const Volume volume = upload(daemon(), raw);
   disk_.fill("foreign", 8 * kMebibyte);
@@ -126,9 +127,15 @@ TEST_F(Disk, AJobThatMayFitLaterWaitsAndSaysSo) {
   })) << daemon().errors();
   EXPECT_EQ(seen.state, JobState::kQueued);
   EXPECT_EQ(seen.waiting_for, WaitingFor::kDisk);
-  const Answer ready = daemon().get("/readyz");
-  EXPECT_TRUE(is_problem(ready, ErrorCode::kUnavailable));
-  EXPECT_THAT(ready.body, HasSubstr("disk"));
+  const auto is_told = [&] {
+    const std::string metrics = daemon().get("/metrics").body;
+    return metrics.find("isomesh_jobs_waiting_for_disk 1\n") != std::string::npos;
+  };
+  EXPECT_TRUE(eventually(is_told)) << "while it is not tried again";
+  // Others still fit.
+  EXPECT_EQ(daemon().get("/readyz").status, 200);
+  EXPECT_EQ(daemon().client().job(id).waiting_for, WaitingFor::kDisk);
+  EXPECT_EQ(finished_job(daemon(), "\"passes\": 1").state, JobState::kSucceeded);
   std::filesystem::remove(disk_.outside() / "foreign");
   const Job done = daemon().client().wait(id);
   EXPECT_EQ(done.state, JobState::kSucceeded);

@@ -233,7 +233,7 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
     const std::filesystem::path file = folder / object.file;
     const store::Blob blob = store::digest_of(file);
     if (!has_room(blob.bytes)) return DimseVerdict::kNoRoom;
-    services_.blobs.adopt(file, blob);
+    services_.blobs.adopt(file, blob, "");  // the owner of its order is not known yet
     services_.received.add({.route = object.called, .study = object.study, .series = object.series},
                            {.instance = object.instance, .blob = blob.key, .bytes = blob.bytes});
     services_.blobs.mark_named(blob.key);

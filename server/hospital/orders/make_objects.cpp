@@ -278,7 +278,7 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
     if (document.kind == dicom::DocumentKind::kMtl) materials_uid = object.sop_instance_uid;
     const std::uint64_t bytes = bytes_of(envelope, document);
     if (bytes > most_bytes) throw_too_large(bytes, most_bytes, record.work);
-    const auto writer = blobs.begin();
+    const auto writer = blobs.begin(record.owner);
     write(envelope.before, *writer);
     write(document.text, *writer);
     if (!document.blob.empty()) copy(*blobs.open(document.blob), document, *writer);

@@ -56,14 +56,13 @@ bool has_ended(const Services& services, const std::string& id) {
   }
 }
 
-// The reason why the service accepts no work; empty if it does.
+// The reason why the service accepts no work; empty if it does. Jobs that wait for disk space are
+// no reason: smaller jobs and uploads still fit, and every daemon of a cluster sees the same jobs.
 std::string unready_reason(const Services& services) {
   if (!services.jobs.responds()) return "the database does not respond";
   if (services.jobs.is_full()) return "the queue is full";
   if (!services.blobs.responds()) return "the storage of volumes and meshes does not respond";
-  if (!services.blobs.has_room()) return "the disk is full: nothing new is accepted";
-  const bool has_waiting = services.jobs.depth(std::nullopt).waiting_for_disk > 0;
-  return has_waiting ? "jobs are waiting for disk space" : "";
+  return services.blobs.has_room() ? "" : "the disk is full: nothing new is accepted";
 }
 
 // Rejects requests that are malformed for every route. The HTTP library would wait for a body of

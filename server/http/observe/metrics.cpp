@@ -150,6 +150,8 @@ struct Metrics::State {
 
   Family<Gauge>& queued = gauge("isomesh_queued_jobs", "Waiting jobs by priority");
   Gauge& running = gauge("isomesh_running_jobs", "Running jobs").Add({});
+  Gauge& waiting_for_disk =
+      gauge("isomesh_jobs_waiting_for_disk", "Waiting jobs that need more disk space").Add({});
   Gauge& uploads = gauge("isomesh_uploads_in_progress", "Uploads in progress").Add({});
   Gauge& waiting_callbacks =
       gauge("isomesh_waiting_callbacks", "Callbacks that are not delivered yet").Add({});
@@ -222,6 +224,7 @@ std::string Metrics::text(const Levels& levels) const {
         .Set(static_cast<double>(levels.queued[i]));
   }
   state.running.Set(static_cast<double>(levels.running));
+  state.waiting_for_disk.Set(static_cast<double>(levels.waiting_for_disk));
   state.uploads.Set(static_cast<double>(levels.uploads));
   state.waiting_callbacks.Set(static_cast<double>(levels.callbacks));
   state.disk_used.Set(static_cast<double>(levels.disk_used_bytes));

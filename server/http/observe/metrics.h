@@ -46,8 +46,9 @@ struct MeasuredFamily {
 struct Levels {
   std::array<std::uint64_t, 3> queued = {};  // by Priority
   std::uint64_t running = 0;
-  std::uint64_t uploads = 0;    // in progress
-  std::uint64_t callbacks = 0;  // waiting for delivery
+  std::uint64_t waiting_for_disk = 0;  // of the queued jobs
+  std::uint64_t uploads = 0;           // in progress
+  std::uint64_t callbacks = 0;         // waiting for delivery
   std::uint64_t disk_used_bytes = 0;
   std::uint64_t disk_free_bytes = 0;
   std::vector<MeasuredFamily> others = {};

@@ -17,6 +17,7 @@ Levels levels_of(const App& app) {
   Levels levels;
   for (std::size_t i = 0; i < levels.queued.size(); ++i) levels.queued[i] = depth.queued[i];
   levels.running = depth.running;
+  levels.waiting_for_disk = depth.waiting_for_disk;
   levels.uploads = app.uploads.taken();
   levels.callbacks = app.services.outbox.count();
   levels.disk_used_bytes = app.services.retention.named_bytes();

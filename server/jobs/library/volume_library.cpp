@@ -55,8 +55,10 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   const std::shared_lock lock(mutex_);
   // Also required if another owner has the same samples; otherwise the outcome on a full disk would
   // reveal that.
-  if (!volumes_.contains(owner, blob.key)) retention_.make_room(blob.bytes);
-  blobs_.adopt(canonical_in(scratch), blob);
+  if (!volumes_.contains(owner, blob.key)) {
+    retention_.make_room({.owner = owner, .bytes = blob.bytes});
+  }
+  blobs_.adopt(canonical_in(scratch), blob, owner);
   volume.id = blob.key;
   volume.created = timestamp();
   auto [stored, is_new] = volumes_.add(owner, volume);

@@ -58,8 +58,9 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, std::uint64_t sample
 std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
   double bytes = 0;
   for (const MeshFormat format : files_of(parameters)) {
-    const double guess = codec::describe(format).bytes(surface, parameters);
-    bytes += format == MeshFormat::kStl ? guess : guess / 2;
+    const codec::Format& row = codec::describe(format);
+    const double guess = row.bytes(surface, parameters);
+    bytes += row.has_exact_bytes ? guess : guess / 2;
   }
   return static_cast<std::uint64_t>(bytes);
 }

@@ -29,8 +29,8 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, std::uint64_t sa
 void check_memory(const mesh::SurfaceSize& surface, std::uint64_t samples,
                   const MeshRequest& request);
 
-// Throws Error kTooLarge if the disk could never hold the files of the mesh. The size of STL is
-// exact; of the guesses for other formats half counts. Call it with the mesh that is written.
+// Throws Error kTooLarge if the disk could never hold the files of the mesh. Half counts of sizes
+// that are guesses. Call it with the mesh that is written.
 void check_disk(const mesh::Mesh& mesh, const MeshRequest& request);
 
 }  // namespace isomesh::jobs

@@ -34,7 +34,8 @@ std::string mesher_version(std::string_view backend) {
 
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, store::BlobStore& blobs,
-                            JobProcess& process, std::stop_token stop, const Report& report) {
+                            JobProcess& process, std::stop_token stop, const Report& report,
+                            const std::string& owner) {
   const auto began = Clock::now();
   report(Stage::kLoad, 0, {});
   const store::LocalBlob file = intact_volume(blobs, volume.id, stop);
@@ -46,7 +47,7 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   const std::vector<MeshFormat> files = files_of(parameters);
   // One more than files: the last is for the list of labels, if it is long.
   for (std::size_t i = 0; i <= files.size(); ++i) {
-    store::BlobWriter& writer = *writers.emplace_back(blobs.begin());
+    store::BlobWriter& writer = *writers.emplace_back(blobs.begin(owner));
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
   }
   const auto with_checking = [&](Timing timing) {

@@ -31,12 +31,13 @@ inline constexpr const char* kMesherVersion = "16";
 std::string mesher_version(std::string_view backend = kDefaultBackend);
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the
-// results. The same volume and parameters give the same bytes. Throws Error kCancelled if `stop` is
-// requested; kTooLarge with the estimate if the job would exceed the limits (before it allocates
-// memory); kUnusableVolume if the stored samples are corrupt; kOutOfSpace, kInternal, and
-// ProcessEnded.
+// results as data of `owner`. The same volume and parameters give the same bytes. Throws Error
+// kCancelled if `stop` is requested; kTooLarge with the estimate if the job would exceed the limits
+// (before it allocates memory); kUnusableVolume if the stored samples are corrupt; kOutOfSpace,
+// kInternal, and ProcessEnded.
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, store::BlobStore& blobs,
-                            JobProcess& process, std::stop_token stop, const Report& report);
+                            JobProcess& process, std::stop_token stop, const Report& report,
+                            const std::string& owner = "");
 
 }  // namespace isomesh::jobs

@@ -164,11 +164,12 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
   store::Outcome outcome;
   try {
     const Volume volume = volumes_.get(lease.owner, lease.parameters.volume);
-    PipelineResult result =
-        run_pipeline(volume, lease.parameters, options_.limits, blobs_, process, run->token(),
-                     [&](Stage stage, double share, const Timing& so_far) {
-                       if (run->advance({stage, share, so_far})) renew(*run);
-                     });
+    PipelineResult result = run_pipeline(
+        volume, lease.parameters, options_.limits, blobs_, process, run->token(),
+        [&](Stage stage, double share, const Timing& so_far) {
+          if (run->advance({stage, share, so_far})) renew(*run);
+        },
+        lease.owner);
     outcome.mesh = std::move(result.mesh);
     outcome.timing = result.timing;
   } catch (const ProcessEnded& end) {

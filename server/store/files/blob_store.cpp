@@ -130,15 +130,17 @@ auto FileBlobStore::write_in_folder(const Write& write) const {
 
 class FileBlobStore::Writer : public BlobWriter {
  public:
-  explicit Writer(FileBlobStore& store)
+  Writer(FileBlobStore& store, std::string owner)
       : store_(store),
+        owner_(std::move(owner)),
         path_(store.folders_.drafts / (random_hex(8) + ".blob")),
         file_(store.write_in_folder([&] { return File::create(path_); })) {}
 
   ~Writer() override {
     std::error_code ignored;  // a committed blob has moved away
     std::filesystem::remove(path_, ignored);
-    store_.room_.give(taken_);
+    if (!is_committed_) store_.room_.give(taken_);
+    store_.room_.finish(taken_, owner_);
   }
 
   void write(std::span<const std::byte> bytes) override {
@@ -147,7 +149,7 @@ class FileBlobStore::Writer : public BlobWriter {
       throw Error(ErrorCode::kTooLarge, "the file is larger than all available space");
     }
     store_.reserve_.check_room();  // the reserve must not be used for new blobs
-    store_.room_.take(bytes.size());
+    store_.room_.take(bytes.size(), owner_);
     taken_ += bytes.size();
     store_.write_in_folder([&] { file_.write(bytes); });
     digest_.update(bytes);
@@ -159,17 +161,19 @@ class FileBlobStore::Writer : public BlobWriter {
     if (store_.holds_) store_.check_is_there();
     store_.believe(
         key, store_.write_in_folder([&] { return store_.publish_as(path_, file_, key, bytes_); }));
-    taken_ = 0;
+    is_committed_ = true;
     return {key, bytes_};
   }
 
  private:
   FileBlobStore& store_;
+  const std::string owner_;
   std::filesystem::path path_;
   File file_;
   Sha256 digest_;
   std::uint64_t bytes_ = 0;
-  std::uint64_t taken_ = 0;  // from the room, until committed
+  std::uint64_t taken_ = 0;  // from the room
+  bool is_committed_ = false;
 };
 
 // Registers the check of a blob, so that others that need it wait for its result.
@@ -277,29 +281,35 @@ std::uint64_t FileBlobStore::capacity() const {
   return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
 }
 
-std::unique_ptr<BlobWriter> FileBlobStore::begin() { return std::make_unique<Writer>(*this); }
+std::unique_ptr<BlobWriter> FileBlobStore::begin(const std::string& owner) {
+  return std::make_unique<Writer>(*this, owner);
+}
 
-void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) {
+void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
+                          const std::string& owner) {
   if (holds_) {
-    copy_in(file, blob);
+    copy_in(file, blob, owner);
     return;
   }
   reserve_.check_room();
   // An existing blob is replaced, so only the difference takes room.
   const std::uint64_t more = blob.bytes - std::min(blob.bytes, size(blob.key).value_or(0));
-  room_.take(more);
+  room_.take(more, owner);
   try {
     believe(blob.key, publish_as(file, File::open(file), blob.key, more));
   } catch (...) {
+    room_.finish(more, owner);
     room_.give(more);
     throw;
   }
+  room_.finish(more, owner);
 }
 
 // A shared folder is on another file system, so the file cannot be moved.
-void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob) {
+void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob,
+                            const std::string& owner) {
   const File source = File::open(file);
-  const std::unique_ptr<BlobWriter> writer = begin();
+  const std::unique_ptr<BlobWriter> writer = begin(owner);
   std::vector<std::byte> block(kBlockBytes);
   std::uint64_t offset = 0;
   while (const std::size_t count = source.read_at(offset, block)) {

@@ -42,11 +42,12 @@ class FileBlobStore : public BlobStore {
   bool is_empty() const override;
   std::string mark() const override;
   void set_mark(const std::string& text) override;
-  std::unique_ptr<BlobWriter> begin() override;
+  std::unique_ptr<BlobWriter> begin(const std::string& owner) override;
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
-  void adopt(const std::filesystem::path& file, const Blob& blob) override;
+  void adopt(const std::filesystem::path& file, const Blob& blob,
+             const std::string& owner) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
   // A verified file is trusted for an hour, unless its device, inode, size or times change.
@@ -102,7 +103,7 @@ class FileBlobStore : public BlobStore {
   void make_folder_for(const std::filesystem::path& place);
   // As path_of, for reading: brings the blob back from quarantine.
   std::filesystem::path found(const std::string& key) const;
-  void copy_in(const std::filesystem::path& file, const Blob& blob);
+  void copy_in(const std::filesystem::path& file, const Blob& blob, const std::string& owner);
   // Size of the disk that has the blobs.
   std::uint64_t disk_capacity() const;
   // For a shared folder: erases the blob unless it is held or named. Returns false if it still

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
@@ -14,9 +16,12 @@ class Room {
   // Call before the first take(). 0: no limit but the disk.
   void limit(std::uint64_t max_bytes, MakeRoom make);
 
-  // Takes room for bytes to be written; lets `make` free space if necessary. Throws Error
-  // kOutOfSpace.
-  void take(std::uint64_t bytes);
+  // Takes room for bytes to be written for `owner`; lets `make` free space if necessary. They are
+  // unfinished until finish(). Throws Error kOutOfSpace.
+  void take(std::uint64_t bytes, const std::string& owner);
+
+  // Records name the bytes now, or they are given back.
+  void finish(std::uint64_t bytes, const std::string& owner);
 
   // Replaces `taken` bytes by the `bytes` that were stored in the end.
   void correct(std::uint64_t taken, std::uint64_t bytes);
@@ -31,12 +36,14 @@ class Room {
   std::uint64_t max_bytes() const { return max_bytes_; }
 
  private:
-  bool try_take(std::uint64_t bytes);
+  bool try_take(std::uint64_t bytes, const std::string& owner);
+  std::uint64_t unfinished(const std::string& owner) const;
 
   std::uint64_t max_bytes_ = 0;
   MakeRoom make_;
   mutable Mutex mutex_;
   std::uint64_t used_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, std::uint64_t> unfinished_ ISOMESH_GUARDED_BY(mutex_);  // by owner
 };
 
 }  // namespace isomesh::store

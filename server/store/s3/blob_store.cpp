@@ -13,7 +13,10 @@ namespace isomesh::store {
 
 class S3BlobStore::Writer : public BlobWriter {
  public:
-  explicit Writer(S3BlobStore& store) : store_(store), copy_(store.cache_.files().begin()) {}
+  Writer(S3BlobStore& store, std::string owner)
+      : store_(store), owner_(std::move(owner)), copy_(store.cache_.files().begin(owner_)) {}
+
+  ~Writer() override { store_.room_.finish(stored_, owner_); }
 
   void write(std::span<const std::byte> bytes) override {
     bytes_ += bytes.size();
@@ -25,14 +28,17 @@ class S3BlobStore::Writer : public BlobWriter {
 
   Blob commit() override {
     const Blob blob = copy_->commit();
-    store_.store(blob);
+    store_.store(blob, owner_);
+    stored_ = blob.bytes;
     return blob;
   }
 
  private:
   S3BlobStore& store_;
+  const std::string owner_;
   const std::unique_ptr<BlobWriter> copy_;
   std::uint64_t bytes_ = 0;
+  std::uint64_t stored_ = 0;
 };
 
 // Registers the fetch of a blob, so that others wait for it.
@@ -89,14 +95,19 @@ std::uint64_t S3BlobStore::capacity() const {
   return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
 }
 
-std::unique_ptr<BlobWriter> S3BlobStore::begin() { return std::make_unique<Writer>(*this); }
-
-void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob) {
-  cache_.files().adopt(file, blob);
-  store(blob);
+std::unique_ptr<BlobWriter> S3BlobStore::begin(const std::string& owner) {
+  return std::make_unique<Writer>(*this, owner);
 }
 
-void S3BlobStore::store(const Blob& blob) {
+void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
+                        const std::string& owner) {
+  cache_.files().adopt(file, blob, owner);
+  store(blob, owner);
+  room_.finish(blob.bytes, owner);
+}
+
+// The caller finishes the bytes.
+void S3BlobStore::store(const Blob& blob, const std::string& owner) {
   const auto in_use = cache_.use(blob.key);
   cache_.files().mark_named(blob.key);   // records name the blob in the bucket, not this copy
   if (!cache_.files().size(blob.key)) {  // evicting an older copy may have removed the new one
@@ -104,13 +115,14 @@ void S3BlobStore::store(const Blob& blob) {
   }
   cache_.note(blob.key, blob.bytes);
   cache_.make_room(0);
-  room_.take(blob.bytes);
+  room_.take(blob.bytes, owner);
   const std::string hold = hold_object(blob.key);
   try {
     client_.put_text(hold, "");
     wait_until_not_going(blob.key);
     put(blob);
   } catch (...) {
+    room_.finish(blob.bytes, owner);
     room_.give(blob.bytes);
     client_.try_to_erase(hold);
     throw;
@@ -185,7 +197,7 @@ bool S3BlobStore::fetch_once(const std::string& key, std::uint64_t bytes,
                              const std::stop_token& stop) const {
   cache_.make_room(bytes);
   if (!has_room()) throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
-  const std::unique_ptr<BlobWriter> copy = cache_.files().begin();
+  const std::unique_ptr<BlobWriter> copy = cache_.files().begin("");
   const S3Sink sink = [&](std::span<const std::byte> piece) { copy->write(piece); };
   client_.get(blob_object(key), bytes, sink, stop);
   const Blob blob = copy->commit();

@@ -54,12 +54,13 @@ class S3BlobStore : public BlobStore {
   bool is_empty() const override;
   std::string mark() const override;
   void set_mark(const std::string& text) override;
-  std::unique_ptr<BlobWriter> begin() override;
+  std::unique_ptr<BlobWriter> begin(const std::string& owner) override;
   // About the local disk; removes copies first if it is full.
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
-  void adopt(const std::filesystem::path& file, const Blob& blob) override;
+  void adopt(const std::filesystem::path& file, const Blob& blob,
+             const std::string& owner) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
   // Checks the local copy as FileBlobStore does; fetches one if there is none.
@@ -81,7 +82,7 @@ class S3BlobStore : public BlobStore {
   class Fetching;
 
   // Uploads the local copy as a blob.
-  void store(const Blob& blob);
+  void store(const Blob& blob, const std::string& owner);
   void put(const Blob& blob);
   void wait_until_not_going(const std::string& key);
   bool fetch(const std::string& key, const std::stop_token& stop) const;

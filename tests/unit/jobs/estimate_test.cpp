@@ -1,11 +1,15 @@
 #include "server/jobs/queue/estimate.h"
 
+#include <cstdint>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include <gmock/gmock.h>
 
 #include "server/jobs/library/histograms.h"
 #include "server/jobs/making/make_mesh.h"
+#include "server/jobs/making/mesh_cost.h"
 #include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/workers.h"
 #include "tests/support/errors.h"
@@ -25,6 +29,35 @@ class EstimateTest : public test::JobsFixture {
 
   Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}, job_program()};
 };
+
+// A job that is rejected too late is tried forever.
+TEST(CheckDisk, RejectsFilesThatCanNeverFit) {
+  mesh::Mesh mesh;
+  mesh.positions.resize_for_overwrite(500'000);
+  mesh.triangles.resize_for_overwrite(1'000'000);
+  const Volume volume;
+  const auto code_of = [&](MeshFormat format, std::uint64_t disk_bytes) {
+    MeshParameters parameters;
+    parameters.formats = {format};
+    return test::code_thrown_by([&] {
+      check_disk(mesh, {.volume = volume,
+                        .parameters = parameters,
+                        .iso = 0,
+                        .certify = false,
+                        .memory_bytes = 0,
+                        .disk_bytes = disk_bytes});
+    });
+  };
+  using Case = std::pair<MeshFormat, std::uint64_t>;
+  for (const auto& [format, bytes] :
+       {Case(MeshFormat::kStl, 50'000'000), Case(MeshFormat::kPly, 19'000'000),
+        Case(MeshFormat::kVtk, 22'000'000)}) {
+    EXPECT_EQ(code_of(format, bytes - 1), ErrorCode::kTooLarge) << to_string(format);
+    EXPECT_EQ(code_of(format, bytes + 4000), std::nullopt) << to_string(format);
+  }
+  // A guess of 39 MB.
+  EXPECT_EQ(code_of(MeshFormat::kObj, 20'000'000), std::nullopt);
+}
 
 TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {
   const Volume volume = add(test::constant<std::uint8_t>(7, {5, 4, 3}), SampleType::kUint8);

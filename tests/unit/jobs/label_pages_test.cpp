@@ -42,7 +42,7 @@ std::string file_of(const std::vector<LabelSummary>& labels) {
 class LabelPagesTest : public test::JobsFixture {
  protected:
   Job job_with(const std::string& file, std::size_t count) {
-    const auto writer = blobs_.begin();
+    const auto writer = blobs_.begin("");
     writer->write(std::as_bytes(std::span(file)));
     const store::Blob blob = writer->commit();
     Job job;

@@ -97,6 +97,24 @@ TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
   EXPECT_EQ(add_as("", bytes_), std::nullopt);
 }
 
+TEST_F(VolumeLibraryTest, AnUploadMakesRoomAsDataOfItsOwner) {
+  const auto add_as = [&](VolumeLibrary& library, const std::string& owner, char letter) {
+    test::write_file(folder_ / "upload", std::string(bytes_.size(), letter));
+    return library.add(owner, folder_ / "upload", raw()).first.id;
+  };
+  const std::string oldest = add_as(library_, "other", '1');
+  add_as(library_, "other", '2');
+  const std::string first = add_as(library_, "", '3');
+  add_as(library_, "", '4');
+  store::Retention full(jobs_, volumes_, blobs_, data_.scratch(),
+                        {.max_bytes = blobs_.bytes(), .grace = std::chrono::hours(-1)});
+  VolumeLibrary library(data_, blobs_, volumes_, full, {},
+                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  add_as(library, "", '5');
+  EXPECT_TRUE(volumes_.contains("other", oldest));
+  EXPECT_FALSE(volumes_.contains("", first));
+}
+
 // As after a process that died between the response and the erasing, and a sweep since then: the
 // files stay, and what no record names lies in quarantine.
 TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {

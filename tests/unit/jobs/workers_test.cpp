@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 
 #include "base/log.h"
+#include "proto/error.h"
 #include "server/mesh/parallel.h"
 #include "tests/support/jobs.h"
 #include "tests/support/process.h"
@@ -79,6 +80,23 @@ TEST_F(WorkersTest, AFailureOfOursTellsNothingAndIsTriedThreeTimes) {
   EXPECT_EQ(job.error->detail.find(folder_.path()), std::string::npos);
 }
 
+TEST_F(WorkersTest, RoomForAMeshIsMadeForTheOwnerOfItsJob) {
+  const Volume volume = add_sphere();
+  volumes_.add("other", volume);
+  add_much();  // the mesh would fit in its place
+  std::string asked;
+  blobs_.limit_room(blobs_.bytes() + 1, [&](const store::Incoming& incoming) {
+    asked = incoming.owner;
+    throw Error(ErrorCode::kTooLarge, "no room");
+  });
+  const std::string id = job_of(jobs_.submit({"other", parameters_of(volume, 0), "", ""})).id;
+  {
+    const Workers workers(threads(1), jobs_, volumes_, blobs_);
+    EXPECT_EQ(test::end_of(jobs_, "other", id).state, JobState::kFailed);
+  }
+  EXPECT_EQ(asked, "other");
+}
+
 // The service is at fault, and not for long.
 TEST_F(WorkersTest, AJobThatFindsNoDescriptorIsPutBackUncharged) {
   const std::string id = submit(parameters_of(add_sphere(), 0));
@@ -112,7 +130,7 @@ TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
   store::FileBlobStore shared(store::shared_blob_folders(folder_ / "shared"), data_.reserve());
   shared.set_mark("ours 1\n");
   const std::string bytes = blob(volume.id);
-  const auto writer = shared.begin();
+  const auto writer = shared.begin("");
   writer->write(test::as_span(bytes));
   writer->commit();
   std::filesystem::rename(folder_ / "shared", folder_ / "elsewhere");

@@ -323,7 +323,7 @@ class OrdersTest : public test::JobsFixture {
     last_parameters_ = lease->parameters;
     std::string stl(84 + std::size_t{50} * triangles, '\0');
     stl[80] = 1;
-    const auto writer = blobs_.begin();
+    const auto writer = blobs_.begin("");
     writer->write(std::as_bytes(std::span(stl)));
     const store::Blob blob = writer->commit();
     store::Outcome outcome;

@@ -180,7 +180,7 @@ class ReceivedOrdersTest : public OrdersTest {
   void receive(int from, int to, const std::string& title = "BONE") {
     for (int slice = from; slice < to; ++slice) {
       const std::string file = slice_file(slice);
-      const auto writer = blobs_.begin();
+      const auto writer = blobs_.begin("");
       writer->write(std::as_bytes(std::span(file)));
       const store::Blob blob = writer->commit();
       received_.add({title, kStudy, kSeries}, {instance_of(slice), blob.key, blob.bytes});

@@ -46,7 +46,7 @@ class BackupOfAHospitalTest : public testing::Test {
   }
 
   static std::string put(BlobStore& blobs, const std::string& text) {
-    const auto writer = blobs.begin();
+    const auto writer = blobs.begin("");
     writer->write(test::as_span(text));
     return writer->commit().key;
   }

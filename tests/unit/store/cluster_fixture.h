@@ -99,7 +99,7 @@ class ClusterTest : public testing::Test {
     return outcome;
   }
   Blob put(const std::string& text) {
-    const auto writer = blobs_.begin();
+    const auto writer = blobs_.begin("");
     writer->write(test::as_span(text));
     return writer->commit();
   }

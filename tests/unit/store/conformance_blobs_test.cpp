@@ -38,7 +38,7 @@ class Blobs : public testing::TestWithParam<NamedBlobEngine> {
   }
 
   static Blob put(BlobStore& blobs, std::string_view text) {
-    const auto writer = blobs.begin();
+    const auto writer = blobs.begin("");
     writer->write(as_span(text));
     return writer->commit();
   }
@@ -75,7 +75,7 @@ TEST_P(Blobs, ABlobIsNamedByItsBytes) {
 }
 
 TEST_P(Blobs, AreThereOnlyAfterTheirCommit) {
-  const auto writer = blobs_->begin();
+  const auto writer = blobs_->begin("");
   writer->write(as_span("hel"));
   writer->write(as_span("lo"));
   EXPECT_TRUE(blobs_->is_empty());
@@ -87,7 +87,7 @@ TEST_P(Blobs, AreThereOnlyAfterTheirCommit) {
 
 TEST_P(Blobs, AWriterThatIsGivenUpLeavesNothing) {
   {
-    const auto writer = blobs_->begin();
+    const auto writer = blobs_->begin("");
     writer->write(as_span("hello"));
     EXPECT_EQ(engine_->leftovers().size(), 1U);
   }
@@ -139,7 +139,7 @@ TEST_P(Blobs, AFinishedFileIsTakenOver) {
   const std::string text(3 << 20, 'x');
   const std::filesystem::path file = engine_->write_file(text);
   const Blob blob = digest_of(file);
-  blobs_->adopt(file, blob);
+  blobs_->adopt(file, blob, "");
   EXPECT_EQ(blob.bytes, text.size());
   EXPECT_EQ(blob.key, put(text).key);
   EXPECT_FALSE(std::filesystem::exists(file));
@@ -209,8 +209,8 @@ TEST_P(Blobs, AnswerAndHaveRoom) {
 
 TEST_P(Blobs, WhatDoesNotFitIsRefusedOrMakesRoom) {
   std::uint64_t asked = 0;
-  blobs_->limit_room(8, [&](std::uint64_t bytes) {
-    asked = bytes;
+  blobs_->limit_room(8, [&](const Incoming& incoming) {
+    asked = incoming.bytes;
     blobs_->erase(kHelloKey);
   });
   put("hello");
@@ -220,6 +220,27 @@ TEST_P(Blobs, WhatDoesNotFitIsRefusedOrMakesRoom) {
   EXPECT_EQ(asked, 5U);
   EXPECT_EQ(blobs_->size(kHelloKey), std::nullopt);
   EXPECT_EQ(blobs_->bytes(), 5U);
+}
+
+TEST_P(Blobs, RoomIsMadeForTheOwnerOfTheBytes) {
+  std::vector<Incoming> asked;
+  blobs_->limit_room(10, [&](const Incoming& incoming) {
+    asked.push_back(incoming);
+    blobs_->erase(kHelloKey);
+  });
+  put("hello");
+  const auto first = blobs_->begin("one");
+  first->write(as_span("12345"));
+  first->commit();
+  {
+    const auto second = blobs_->begin("one");
+    second->write(as_span("678"));
+    second->commit();
+  }
+  ASSERT_EQ(asked.size(), 1U);
+  EXPECT_EQ(asked[0].owner, "one");
+  EXPECT_EQ(asked[0].bytes, 3U);
+  EXPECT_EQ(asked[0].unfinished, 5U) << "another file of the same job";
 }
 
 TEST_P(Blobs, WhatIsNotNamedGoesIntoQuarantine) {

@@ -28,7 +28,7 @@ class RetentionConformance : public test::EngineTest {
   }
 
   Blob put(const std::string& text) {
-    const auto writer = blobs().begin();
+    const auto writer = blobs().begin("");
     writer->write(test::as_span(text));
     return writer->commit();
   }
@@ -187,14 +187,14 @@ TEST_P(RetentionConformance, MakesRoomForAnUploadOrSaysThatThereIsNone) {
   const std::string volume = add_volume('v', 100);
   const std::string job = finish(volume, std::string(50, 'm'));
   Retention retention = this->retention(200);
-  retention.make_room(50);
+  retention.make_room({.bytes = 50});
   EXPECT_TRUE(is_job(job));
-  retention.make_room(100);
+  retention.make_room({.bytes = 100});
   EXPECT_TRUE(is_gone(job));
   EXPECT_TRUE(volumes().contains("", volume));
   submit(volume, 1000);
-  EXPECT_EQ(code_thrown_by([&] { retention.make_room(101); }), ErrorCode::kOutOfSpace);
-  EXPECT_EQ(code_thrown_by([&] { retention.make_room(1000); }), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(code_thrown_by([&] { retention.make_room({.bytes = 101}); }), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(code_thrown_by([&] { retention.make_room({.bytes = 1000}); }), ErrorCode::kOutOfSpace);
   EXPECT_TRUE(volumes().contains("", volume));
 }
 
@@ -244,7 +244,7 @@ TEST_P(RetentionConformance, RoomThatSeveralMakeIsMadeOnce) {
   Retention retention = this->retention(500);
   std::vector<std::jthread> threads;
   for (int thread = 0; thread < 4; ++thread) {
-    threads.emplace_back([&] { retention.make_room(50); });
+    threads.emplace_back([&] { retention.make_room({.bytes = 50}); });
   }
   threads.clear();
   EXPECT_EQ(retention.named_bytes(), 450U);
@@ -255,27 +255,45 @@ TEST_P(RetentionConformance, WhoeverHasMostMakesTheRoom) {
   const std::string first = add_volume('1', 100);
   const std::string second = add_volume('2', 90);
   const std::string third = add_volume('3', 80);
-  retention(300).make_room(50);  // of 370 that are there, 120 have to go
+  retention(300).make_room({.bytes = 50});  // of 370 that are there, 120 have to go
   EXPECT_TRUE(volumes().contains("other", others));
   EXPECT_FALSE(volumes().contains("", first));
   EXPECT_FALSE(volumes().contains("", second));
   EXPECT_TRUE(volumes().contains("", third));
   // Now the other one has most, and then nobody has anything.
-  retention(300).make_room(150);
+  retention(300).make_room({.owner = "new", .bytes = 150});
   EXPECT_FALSE(volumes().contains("other", others));
   EXPECT_TRUE(volumes().contains("", third));
-  retention(300).make_room(300);
+  retention(300).make_room({.bytes = 300});
   EXPECT_FALSE(volumes().contains("", third));
+}
+
+TEST_P(RetentionConformance, WhatComesCountsAsItsOwners) {
+  const std::string others = add_volume('o', 100, "other");  // the oldest
+  const std::string first = add_volume('1', 50);
+  const std::string second = add_volume('2', 50);
+  retention(220).make_room({.bytes = 60});
+  EXPECT_TRUE(volumes().contains("other", others));
+  EXPECT_FALSE(volumes().contains("", first));
+  EXPECT_TRUE(volumes().contains("", second));
+  // A file that is written in small pieces is as large as all of them.
+  retention(159).make_room({.bytes = 10, .unfinished = 50});
+  EXPECT_TRUE(volumes().contains("other", others));
+  EXPECT_FALSE(volumes().contains("", second));
+  // Its owner has nothing left that may expire.
+  retention(159).make_room({.bytes = 150});
+  EXPECT_FALSE(volumes().contains("other", others));
 }
 
 TEST_P(RetentionConformance, WhatARunningJobNeedsMakesNoRoom) {
   const std::string needed = add_volume('n', 200);
   submit(needed, 1);
   const std::string others = add_volume('o', 50, "other");
-  retention(250).make_room(40);
+  retention(250).make_room({.bytes = 40});
   EXPECT_TRUE(volumes().contains("", needed));
   EXPECT_FALSE(volumes().contains("other", others));
-  EXPECT_EQ(code_thrown_by([&] { retention(250).make_room(60); }), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(code_thrown_by([&] { retention(250).make_room({.bytes = 60}); }),
+            ErrorCode::kOutOfSpace);
 }
 
 // --- What retention asks of the stores

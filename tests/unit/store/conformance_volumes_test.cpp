@@ -188,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(Engines, BlobConformance, testing::ValuesIn(test::all_e
                          test::name_of);
 
 TEST_P(BlobConformance, IsThereWholeAfterItsCommit) {
-  const auto writer = blobs().begin();
+  const auto writer = blobs().begin("");
   writer->write(test::as_span("some "));
   writer->write(test::as_span("bytes"));
   const Blob blob = writer->commit();

@@ -231,7 +231,7 @@ store::Lease EngineTest::claimed(std::chrono::milliseconds lease) {
 }
 
 std::string EngineTest::put_blob(const std::string& text) {
-  const auto writer = blobs().begin();
+  const auto writer = blobs().begin("");
   writer->write(as_span(text));
   return writer->commit().key;
 }

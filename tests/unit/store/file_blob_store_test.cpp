@@ -28,7 +28,7 @@ constexpr const char* kHello = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e
 class FileBlobStoreTest : public testing::Test {
  protected:
   Blob put(std::string_view text) {
-    const auto writer = blobs_.begin();
+    const auto writer = blobs_.begin("");
     writer->write(as_span(text));
     return writer->commit();
   }
@@ -56,7 +56,7 @@ TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
   sync_folder(outer.path());
   FileBlobStore blobs(data);
   std::filesystem::create_directory(blobs.path_of(kHello).parent_path());
-  const auto writer = blobs.begin();
+  const auto writer = blobs.begin("");
   writer->write(as_span("hello"));
   writer->commit();
   power.leave(folder_ / "left");
@@ -65,7 +65,7 @@ TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
 
 TEST_F(FileBlobStoreTest, AWriterThatIsGivenUpLeavesNothing) {
   {
-    const auto writer = blobs_.begin();
+    const auto writer = blobs_.begin("");
     writer->write(as_span("hello"));
     EXPECT_EQ(scratch_files(), 1U);
   }
@@ -103,7 +103,7 @@ TEST_F(FileBlobStoreTest, AdoptsAFinishedFileByMovingIt) {
   const std::string text(3 << 20, 'x');
   test::write_file(data_.scratch() / "made", text);
   const Blob blob = digest_of(data_.scratch() / "made");
-  blobs_.adopt(data_.scratch() / "made", blob);
+  blobs_.adopt(data_.scratch() / "made", blob, "");
   EXPECT_EQ(blob.bytes, text.size());
   EXPECT_EQ(blob.key, put(text).key);
   EXPECT_FALSE(std::filesystem::exists(data_.scratch() / "made"));
@@ -138,7 +138,7 @@ TEST_F(FileBlobStoreTest, WhatWasHashedToBeAdoptedIsNotReadAgain) {
   std::stop_source stopped;
   stopped.request_stop();
   test::write_file(data_.scratch() / "made", "hello");
-  blobs_.adopt(data_.scratch() / "made", digest_of(data_.scratch() / "made"));
+  blobs_.adopt(data_.scratch() / "made", digest_of(data_.scratch() / "made"), "");
   EXPECT_TRUE(blobs_.is_intact(kHello, stopped.get_token()));
   test::write_file(blobs_.path_of(kHello), "hallo");
   EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, stopped.get_token()); }),
@@ -152,7 +152,7 @@ TEST_F(FileBlobStoreTest, WhatIsChangedRightAfterItsAdoptionIsReadAgain) {
     const std::string text = std::to_string(1000 + n);
     test::write_file(data_.scratch() / "made", text);
     const Blob blob = digest_of(data_.scratch() / "made");
-    blobs_.adopt(data_.scratch() / "made", blob);
+    blobs_.adopt(data_.scratch() / "made", blob, "");
     test::write_file(blobs_.path_of(blob.key), "more");
     EXPECT_FALSE(blobs_.is_intact(blob.key, {}));
   }
@@ -260,7 +260,7 @@ class MovedAway : public SharedFolder, public testing::WithParamInterface<const 
   }
 
   std::string store_hello(FileBlobStore& blobs) {
-    const auto writer = blobs.begin();
+    const auto writer = blobs.begin("");
     writer->write(as_span("hello"));
     std::string key = writer->commit().key;
     blobs.mark_named(key);
@@ -275,7 +275,7 @@ TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
   FileBlobStore blobs(shared_blob_folders(shared()), data_.reserve());
   blobs.set_mark("ours 1\n");
   store_hello(blobs);
-  const auto begun = blobs.begin();
+  const auto begun = blobs.begin("");
   begun->write(as_span("begun"));
   const auto nothing = [](const std::string& /*key*/) { return false; };
   const auto later = Steady::clock::now() + std::chrono::hours(1);
@@ -317,7 +317,7 @@ TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
 
 TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {
   FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
-  const auto writer = blobs.begin();
+  const auto writer = blobs.begin("");
   writer->write(as_span("hello"));
   writer->commit();
   blobs.mark_named(kHello);

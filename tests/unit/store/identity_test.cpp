@@ -25,7 +25,7 @@ class IdentityTest : public testing::Test {
     FileBlobStore blobs(data);
     Identity identity(database, blobs, overrides, {});
     if (!bytes.empty()) {
-      const auto writer = blobs.begin();
+      const auto writer = blobs.begin("");
       writer->write(test::as_span(bytes));
       Volume volume;
       volume.id = writer->commit().key;

@@ -53,7 +53,7 @@ class S3Blobs : public testing::Test {
   }
 
   std::string put(std::string_view text) {
-    const auto writer = blobs_->begin();
+    const auto writer = blobs_->begin("");
     writer->write(as_span(text));
     std::string key = writer->commit().key;
     blobs_->mark_named(key);

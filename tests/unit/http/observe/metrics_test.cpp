@@ -87,10 +87,13 @@ TEST(Metrics, CountJobsByTheirEndAndTheirStages) {
 TEST(Metrics, TellTheLevelsAndTheProcess) {
   const Metrics metrics;
   EXPECT_THAT(
-      metrics.text({.queued = {1, 2, 3}, .running = 4, .disk_free_bytes = 5'000'000'000}),
+      metrics.text({.queued = {1, 2, 3},
+                    .running = 4,
+                    .waiting_for_disk = 2,
+                    .disk_free_bytes = 5'000'000'000}),
       AllOf(HasSubstr("isomesh_queued_jobs{priority=\"stat\"} 1\n"),
             HasSubstr("isomesh_queued_jobs{priority=\"bulk\"} 3\n"),
-            HasSubstr("isomesh_running_jobs 4\n"),
+            HasSubstr("isomesh_running_jobs 4\n"), HasSubstr("isomesh_jobs_waiting_for_disk 2\n"),
             HasSubstr("isomesh_disk_free_bytes 5000000000\n"),
             ContainsRegex("process_resident_memory_bytes [1-9]"),
             ContainsRegex("process_open_fds [1-9]"), ContainsRegex("process_threads [1-9]")));
