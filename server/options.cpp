@@ -89,12 +89,13 @@ CLI::Validator size_of_bytes(std::uint64_t least = 0) {
 
 // A page's origin such as "https://viewer.example", or `*` for all.
 std::string wrong_origin(const std::string& text) {
-  std::string_view rest = text;
-  if (rest.starts_with("http")) rest.remove_prefix(rest.starts_with("https") ? 5 : 4);
+  constexpr std::string_view kMark = "://";
+  const std::string scheme = text.substr(0, text.find(kMark));
+  const std::size_t host = scheme.size() + kMark.size();
   // Browsers send no path, so an origin with one would never match.
-  const bool is_origin = text == "*" || (rest.size() < text.size() && rest.starts_with("://") &&
-                                         rest.size() > 3 && rest.find('/', 3) == rest.npos);
-  return is_origin ? "" : text + " is not an origin such as https://viewer.example";
+  const bool is_origin = (scheme == "http" || scheme == "https") && host < text.size() &&
+                         text.find('/', host) == std::string::npos;
+  return is_origin || text == "*" ? "" : text + " is not an origin such as https://viewer.example";
 }
 
 std::string wrong_host(const std::string& text) {

@@ -25,7 +25,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// What there is along x of the samples and cells of a word.
+// The samples and cells of a word that have neighbours along x, a bit for each.
 struct BccAlongX {
   Word edges = 0;  // the samples that have a next one
   Word cells = 0;  // the cells that have a centre, and those whose next or last one has
@@ -156,10 +156,12 @@ class BccRow {
     if (has_y_ && has_z_) {
       crossed[14] = (corners[0] ^ corners[6]) & ~(cells & along_x.last);
     }
-    if (has_z_)
+    if (has_z_) {
       crossed[15] = (corners[0] ^ corners[5]) & along_x.edges & ~(has_last_y_ ? cells : 0);
-    if (has_y_)
+    }
+    if (has_y_) {
       crossed[16] = (corners[0] ^ corners[3]) & along_x.edges & ~(has_last_z_ ? cells : 0);
+    }
     return crossed;
   }
 

@@ -26,7 +26,7 @@ export function formatValue(value: number): string {
   return formatNumber(value, Math.max(0, 3 - Math.floor(Math.log10(size))));
 }
 
-// Of lengths and areas one digit after the point, of small ones three digits that count.
+// Lengths and areas have one digit after the point, small ones three digits that count.
 export function formatSize(value: number): string {
   const size = Math.abs(value);
   if (size >= 1 || size === 0) return formatNumber(value, 1);
