@@ -226,10 +226,11 @@ int run(const Options& options, const sigset_t& signals) {
   http::Metrics metrics;
   callbacks::Callbacks callbacks(records->outbox(), targets, callback_options(options),
                                  http::callback_reporter(metrics));
-  const jobs::JobProgram job_program = {.file = program_of_ours("isomesh-job"),
-                                        .setup = {.threads = mesh::thread_count()}};
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
+  const jobs::JobProgram job_program = {
+      .file = program_of_ours("isomesh-job"),
+      .setup = {.threads = mesh::thread_count(), .memory_bytes = limits.memory_bytes}};
   const jobs::Housekeeper housekeeper(retention, library, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
   jobs::LabelLists labels(blobs);

@@ -306,7 +306,8 @@ void add_options(CLI::App& cli, Options& options) {
                  "Memory for one job, in bytes. 0: three quarters of the memory of the machine or "
                  "control group, divided by --workers")
       ->envname("ISOMESH_JOB_MEMORY")
-      ->transform(size_of_bytes());
+      ->transform(size_of_bytes())
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50));
   cli.add_option("--drain-seconds", options.drain_seconds,
                  "Seconds that running jobs have to finish after SIGTERM")
       ->envname("ISOMESH_DRAIN_SECONDS")

@@ -11,6 +11,7 @@
 #include <string>
 
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <linux/landlock.h>
 #include <linux/sched.h>
 #include <seccomp.h>
@@ -171,8 +172,10 @@ class Filter {
   void allow(int call) {
     check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 0, nullptr));
   }
-  void allow(int call, const scmp_arg_cmp& condition) {
-    check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 1, &condition));
+  // If all conditions hold.
+  void allow(int call, std::initializer_list<scmp_arg_cmp> conditions) {
+    check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call,
+                                   static_cast<unsigned>(conditions.size()), conditions.begin()));
   }
   void fail(int call, int error) {
     check(::seccomp_rule_add_array(context_, SCMP_ACT_ERRNO(error), call, 0, nullptr));
@@ -192,6 +195,20 @@ scmp_arg_cmp argument_is(unsigned index, std::uint64_t value) {
   return {index, SCMP_CMP_EQ, value, 0};
 }
 
+scmp_arg_cmp argument_is_without(unsigned index, std::uint64_t bits) {
+  return {index, SCMP_CMP_MASKED_EQ, bits, 0};
+}
+
+// Memory never becomes executable, and RLIMIT_DATA counts all of it: neither shared memory that no
+// file backs nor memory that grows as a stack does.
+void allow_memory(Filter& filter) {
+  const scmp_arg_cmp not_executable = argument_is_without(2, PROT_EXEC);
+  filter.allow(SCMP_SYS(mprotect), {not_executable});
+  filter.allow(SCMP_SYS(mmap), {not_executable, argument_is_without(3, MAP_SHARED | MAP_GROWSDOWN)});
+  filter.allow(SCMP_SYS(mmap),
+               {not_executable, argument_is_without(3, MAP_ANONYMOUS | MAP_GROWSDOWN)});
+}
+
 // Activities of a process other than reading and writing files.
 enum class Doing { kNothing, kTalk, kThreads };
 
@@ -203,23 +220,20 @@ void filter_calls(Doing doing) {
   if (doing == Doing::kThreads) {
     // A thread, never a process. seccomp cannot inspect clone3; without it the C library uses
     // clone.
-    filter.allow(SCMP_SYS(clone), {0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD});
+    filter.allow(SCMP_SYS(clone), {{0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD}});
     filter.fail(SCMP_SYS(clone3), ENOSYS);
     filter.allow(SCMP_SYS(sched_setaffinity));
     filter.allow(SCMP_SYS(recvmsg));  // it has only one socket
-    filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_NAME));
+    filter.allow(SCMP_SYS(prctl), {argument_is(0, PR_SET_NAME)});
   }
   for (const int call : kAllowedCalls) filter.allow(call);
-  // Memory must never become executable.
-  const scmp_arg_cmp not_executable = {2, SCMP_CMP_MASKED_EQ, PROT_EXEC, 0};
-  filter.allow(SCMP_SYS(mmap), not_executable);
-  filter.allow(SCMP_SYS(mprotect), not_executable);
+  allow_memory(filter);
   // For confine_to(), which then forbids it.
   for (const int call : kConfiningCalls) filter.allow(call);
-  filter.allow(SCMP_SYS(prlimit64), argument_is(0, 0));  // the calling process
+  filter.allow(SCMP_SYS(prlimit64), {argument_is(0, 0)});  // the calling process
   // abort() signals its own thread.
-  filter.allow(SCMP_SYS(tgkill), argument_is(0, static_cast<std::uint64_t>(::getpid())));
-  filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_VMA));  // malloc names its memory
+  filter.allow(SCMP_SYS(tgkill), {argument_is(0, static_cast<std::uint64_t>(::getpid()))});
+  filter.allow(SCMP_SYS(prctl), {argument_is(0, PR_SET_VMA)});  // malloc names its memory
   filter.load();
 }
 
@@ -246,6 +260,13 @@ bool has_landlock() { return landlock_version() >= 1; }
 
 namespace {
 
+// Root could raise its limits again.
+void drop_capabilities() {
+  __user_cap_header_struct header = {.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
+  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> none = {};
+  require(::syscall(SYS_capset, &header, none.data()) == 0, "capset");
+}
+
 void confine_process(Doing doing) {
   constexpr std::uint64_t kMostOpenFiles = 64;
   become_first_victim();
@@ -263,27 +284,33 @@ void confine_ahead() { confine_process(Doing::kNothing); }
 void confine_ahead_to_talk() { confine_process(Doing::kTalk); }
 
 void confine_job() {
+  drop_capabilities();
   confine_process(Doing::kThreads);
   limit(RLIMIT_FSIZE, 0);
   restrict_files({}, {});
 }
 
-MemoryLimit::MemoryLimit() : usage_(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {
+MemoryLimit::MemoryLimit(std::uint64_t most_more_bytes)
+    : usage_(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {
   require(usage_.number() >= 0, "open");
+  if constexpr (kLimitMemory) limit(RLIMIT_DATA, with_present(most_more_bytes));
 }
 
 void MemoryLimit::set(std::uint64_t more_bytes) const {
   if constexpr (!kLimitMemory) return;
+  rlimit bounds = {};
+  require(::getrlimit(RLIMIT_DATA, &bounds) == 0, "getrlimit");
+  bounds.rlim_cur = std::min<rlim_t>(bounds.rlim_max, with_present(more_bytes));
+  require(::setrlimit(RLIMIT_DATA, &bounds) == 0, "setrlimit");
+}
+
+std::uint64_t MemoryLimit::with_present(std::uint64_t more_bytes) const {
   std::array<char, 256> text = {};
   require(::pread(usage_.number(), text.data(), text.size() - 1, 0) > 0, "pread");
   std::istringstream numbers(text.data());
   std::uint64_t present = 0;  // in pages; the sixth number is data and stack
   for (int number = 0; number < 6; ++number) numbers >> present;
-  present *= static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  rlimit bounds = {};
-  require(::getrlimit(RLIMIT_DATA, &bounds) == 0, "getrlimit");
-  bounds.rlim_cur = std::min<rlim_t>(bounds.rlim_max, sum({present, more_bytes}));
-  require(::setrlimit(RLIMIT_DATA, &bounds) == 0, "setrlimit");
+  return sum({present * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)), more_bytes});
 }
 
 void confine_to(const Confinement& confinement) {

@@ -33,23 +33,27 @@ void confine_ahead_to_talk();
 // above. Call once. Throws as they do; a kernel without Landlock is not an error.
 void confine_to(const Confinement& confinement);
 
-// Confines a long-running process with threads. It may open no files and write none. It has the
-// calls of confine_ahead(), those that create threads, and those that receive descriptors, its only
-// input. Throws as that does. Call once, before a second thread is started, and instead of the
-// functions above.
+// Confines a long-running process with threads. It may open no files and write none, and has no
+// capabilities even as root. It has the calls of confine_ahead(), those that create threads, and
+// those that receive descriptors, its only input. Throws as that does. Call once, before a second
+// thread is started, and instead of the functions above.
 void confine_job();
 
-// Limits the process's private memory (RLIMIT_DATA) repeatedly. Construct it before the process is
+// Limits the process's memory (RLIMIT_DATA) repeatedly. All of its memory is private: a confined
+// process cannot map memory that this limit does not count. Construct it before the process is
 // confined. Not thread safe.
 class MemoryLimit {
  public:
-  // Throws Error kInternal, as set() does.
-  MemoryLimit();
+  // The process can never have more than `most_more_bytes` beside what it uses now. Throws Error
+  // kInternal, as set() does.
+  explicit MemoryLimit(std::uint64_t most_more_bytes);
 
-  // Allows the process that many bytes more than it uses now.
+  // Allows the process that many bytes more than it uses now, up to the most.
   void set(std::uint64_t more_bytes) const;
 
  private:
+  std::uint64_t with_present(std::uint64_t more_bytes) const;
+
   Descriptor usage_;  // a confined process could not open it
 };
 

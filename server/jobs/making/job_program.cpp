@@ -38,9 +38,11 @@ using namespace isomesh;
 using namespace isomesh::jobs;
 
 // The memory that is kept between jobs: enough for a surface of some twenty million triangles, but
-// at most this fraction of what a job may use.
-constexpr std::uint64_t kMostKeptBytes = std::uint64_t{1} << 30;
-constexpr std::uint64_t kKeptShare = 4;
+// at most a quarter of what a job may use.
+std::uint64_t kept_bytes(std::uint64_t memory_bytes) {
+  return std::min(std::uint64_t{1} << 30, memory_bytes / 4);
+}
+
 // Beside a job's memory: for the C library, and for each thread's stack and the like.
 constexpr std::uint64_t kHeadroomBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kThreadBytes = std::uint64_t{16} << 20;
@@ -281,7 +283,8 @@ int main() {
   const JobSetup setup = setup_from(lines.next());
   const std::uint64_t headroom =
       kHeadroomBytes + kThreadBytes * static_cast<std::uint64_t>(setup.threads);
-  const process::MemoryLimit memory;
+  const process::MemoryLimit memory(setup.memory_bytes + kept_bytes(setup.memory_bytes) +
+                                    headroom);
   process::confine_job();
   mesh::set_thread_count(setup.threads);
   Desk desk;
@@ -293,7 +296,7 @@ int main() {
     const std::uint64_t memory_bytes = task.order.memory_bytes;
     memory.set(memory_bytes + headroom);
     const Ending ending = work(std::move(task), setup, stop, speaker, workspace);
-    if (!ending.is_last) workspace.trim(std::min(kMostKeptBytes, memory_bytes / kKeptShare));
+    if (!ending.is_last) workspace.trim(kept_bytes(memory_bytes));
     speaker.say(ending.answer);
     if (ending.is_last) std::_Exit(EXIT_SUCCESS);
   }

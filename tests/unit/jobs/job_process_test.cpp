@@ -1,7 +1,9 @@
 #include "server/jobs/queue/job_process.h"
 
 #include <algorithm>
+#include <array>
 #include <csignal>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -298,26 +300,35 @@ TEST(JobMessage, AnotherFormIsRefused) {
 // Under the sanitizers memory is not limited.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
-// The value of a line of /proc/PID/limits, in bytes.
-std::string soft_limit_of(pid_t process, const std::string& name) {
-  const std::string limits = test::read_file("/proc/" + std::to_string(process) + "/limits");
-  const std::size_t line = limits.find(name);
-  if (line == std::string::npos) return "";
-  const std::size_t begin = limits.find_first_not_of(' ', line + name.size());
-  return limits.substr(begin, limits.find(' ', begin) - begin);
+constexpr std::uint64_t kGibibyte = std::uint64_t{1} << 30;
+
+// The limit of a process's memory and the most that it can raise that to, in bytes.
+std::array<std::uint64_t, 2> memory_limits_of(pid_t process) {
+  rlimit limits = {};
+  EXPECT_EQ(::prlimit(process, RLIMIT_DATA, nullptr, &limits), 0);
+  return {limits.rlim_cur, limits.rlim_max};
 }
 
 TEST_F(JobProcessTest, AJobHasTheMemoryOfItsOrder) {
   const Volume sphere = add_sphere();
   JobOrder order = order_of(sphere, 0);
-  for (const std::uint64_t memory : {std::uint64_t{1} << 30, std::uint64_t{1} << 28}) {
+  for (const std::uint64_t memory : {kGibibyte, kGibibyte / 4}) {
     order.memory_bytes = memory;
     make(process_, order);
-    const std::string limit = soft_limit_of(*started().begin(), "Max data size");
-    ASSERT_NE(limit, "unlimited");
-    EXPECT_GE(std::stoull(limit), memory);
-    EXPECT_LE(std::stoull(limit), memory + (std::uint64_t{512} << 20));
+    const auto [limit, most] = memory_limits_of(*started().begin());
+    EXPECT_GE(limit, memory);
+    EXPECT_LE(limit, memory + kGibibyte / 2);
   }
+}
+
+TEST_F(JobProcessTest, NoProcessCanHaveMoreThanTheMostOfAnOrder) {
+  JobProgram program = job_program();
+  program.setup.memory_bytes = kGibibyte;
+  JobProcess process(program);
+  make(process, order_of(add_sphere(), 0));
+  const auto [limit, most] = memory_limits_of(*started().begin());
+  EXPECT_GE(most, limit);
+  EXPECT_LE(most, 2 * kGibibyte);
 }
 
 // The shell gives the process less than the order says.

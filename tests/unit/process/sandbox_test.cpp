@@ -16,6 +16,7 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/shm.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -245,6 +246,24 @@ TEST_F(JobSandbox, LeavesThreadsAndTakesProcessesAndSockets) {
   EXPECT_TRUE(confined([] { return fails(::kill(::getppid(), 0), EPERM); }));
 }
 
+// RLIMIT_DATA counts private memory that is writable, and no stacks.
+TEST_F(JobSandbox, TakesAllMemoryThatNoLimitCounts) {
+  const auto mapped = [](int flags, int file) {
+    return ::mmap(nullptr, 4096, PROT_READ, flags, file, 0) != MAP_FAILED;
+  };
+  const Descriptor upload(::open((folder_ / "upload").c_str(), O_RDONLY));
+  EXPECT_TRUE(confined([&] {
+    return mapped(MAP_PRIVATE | MAP_ANONYMOUS, -1) && mapped(MAP_PRIVATE, upload.number()) &&
+           mapped(MAP_SHARED, upload.number());
+  }));
+  for (const int flags : {MAP_SHARED | MAP_ANONYMOUS, MAP_SHARED_VALIDATE | MAP_ANONYMOUS,
+                          MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN}) {
+    EXPECT_TRUE(confined([&] { return !mapped(flags, -1) && errno == EPERM; })) << flags;
+  }
+  EXPECT_TRUE(confined([] { return fails(::memfd_create("memory", 0), EPERM); }));
+  EXPECT_TRUE(confined([] { return fails(::shmget(IPC_PRIVATE, 4096, 0600), EPERM); }));
+}
+
 // Under the sanitizers memory is not limited.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
@@ -258,17 +277,30 @@ TEST_F(JobSandbox, LimitsMemoryAgainAndAgain) {
   };
   constexpr std::size_t kMebibyte = 1 << 20;
   const int status = status_of([&] {
-    const MemoryLimit limit;
+    const MemoryLimit limit(300 * kMebibyte);
     confine_job();
     limit.set(64 * kMebibyte);
     if (!can_have(60 * kMebibyte) || can_have(80 * kMebibyte)) return false;
     limit.set(256 * kMebibyte);
     if (!can_have(200 * kMebibyte)) return false;
+    limit.set(1000 * kMebibyte);
+    if (!can_have(280 * kMebibyte) || can_have(320 * kMebibyte)) return false;
     limit.set(64 * kMebibyte);
     return !can_have(80 * kMebibyte);
   });
   EXPECT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+// Root may raise limits, unless it has no capabilities.
+TEST_F(JobSandbox, CannotRaiseTheMostMemory) {
+  const int status = status_of([&] {
+    const MemoryLimit limit(std::uint64_t{64} << 20);
+    confine_job();
+    const rlimit more = {.rlim_cur = RLIM_INFINITY, .rlim_max = RLIM_INFINITY};
+    return fails(::setrlimit(RLIMIT_DATA, &more), EPERM);
+  });
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
 #endif
