@@ -36,9 +36,7 @@ class TallyCellWriter {
     const int borders = is_at_border(x, separation_.dims.x) + is_at_border(y_, separation_.dims.y) +
                         is_at_border(z_, separation_.dims.z);
     if (borders == 0) {
-      visit_triangles(x, places, [&](const Missing& missing) {
-        for (std::size_t k = 0; k < 3; ++k) give(missing.fan(tally_, k), missing.volumes[k]);
-      });
+      visit_triangles(x, places, [&](const Missing& missing) { give(missing); });
       return out;
     }
     std::array<Missing, kMostTriangles> triangles;
@@ -116,11 +114,30 @@ class TallyCellWriter {
     }
   }
 
-  void give(std::uint32_t fan, double volume) const {
+  void give(const Missing& missing) const {
+    std::array<std::int64_t, 3> units;
+    for (std::size_t k = 0; k < 3; ++k) units[k] = in_units(missing.volumes[k]);
+    // Most triangles have two corners that were joined, which share one addition.
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = k == 2 ? 0 : k + 1;
+      if (missing.vertices[k] == missing.vertices[next]) {
+        units[next] += std::exchange(units[k], 0);
+      }
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (units[k] != 0) add(missing.fan(tally_, k), units[k]);
+    }
+  }
+
+  void give(std::uint32_t fan, double volume) const { add(fan, in_units(volume)); }
+
+  static std::int64_t in_units(double volume) {
+    return static_cast<std::int64_t>(volume / VolumeTally::kUnit);
+  }
+
+  void add(std::uint32_t fan, std::int64_t units) const {
     if (fan == WallFans::kNone) return;
-    std::atomic_ref(tally_.units[fan])
-        .fetch_add(static_cast<std::int64_t>(volume / VolumeTally::kUnit),
-                   std::memory_order_relaxed);
+    std::atomic_ref(tally_.units[fan]).fetch_add(units, std::memory_order_relaxed);
   }
 
   Missing missing_at(const WallTriangle& triangle, WallSides sides, double owed, Double4 corner,
@@ -158,8 +175,8 @@ class TallyCellWriter {
   }
 
   static Double4 cross(Double4 a, Double4 b) {
-    return Double4{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
-                   0};
+    const auto rotated = [](Double4 v) { return __builtin_shufflevector(v, v, 1, 2, 0, 3); };
+    return rotated(a * rotated(b) - rotated(a) * b);
   }
 
   // The triangle's area vector in the mean over its way: a corner's way times it, a third, is that
@@ -169,7 +186,7 @@ class TallyCellWriter {
     const Double4 e2 = at[2] - at[0];
     const Double4 f1 = way[1] - way[0];
     const Double4 f2 = way[2] - way[0];
-    return (cross(e1, e2) + (cross(e1, f2) + cross(f1, e2)) * 0.5 + cross(f1, f2) / 3.0) * 0.5;
+    return (cross(e1, e2 + f2 * 0.5) + cross(f1, e2 * 0.5 + f2 * (1 / 3.0))) * 0.5;
   }
 
   const Separation& separation_;

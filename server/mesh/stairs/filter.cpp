@@ -38,21 +38,19 @@ std::vector<float> flat_series(int degree, double time) {
 void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>& shares,
             std::span<const float> series, const Context& context, WallShape& shape) {
   const std::vector<Lanes> first = shape.at;
-  std::vector<Lanes> before = first;  // T[j - 1], T[j] and T[j + 1]
-  std::vector<Lanes> now = first;
-  std::vector<Lanes> next = first;
+  std::vector<Lanes> before = first;  // T[j - 2], then T[j]
+  std::vector<Lanes> now = first;     // T[j - 1]
   for (std::size_t j = 1; j < series.size(); ++j) {
     for_runs(context, vertices.size(), [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t v = vertices[i];
         const Lanes step = shape.kept(v, shares[v] * (shape.mean(v, now) - now[v]));
         const Lanes moved = now[v] + step;
-        next[v] = j == 1 ? moved : 2.0F * moved - before[v];
-        shape.at[v] += series[j] * (next[v] - first[v]);  // the sum of all is 1
+        before[v] = j == 1 ? moved : 2.0F * moved - before[v];
+        shape.at[v] += series[j] * (before[v] - first[v]);  // the sum of all is 1
       }
     });
     before.swap(now);
-    now.swap(next);
   }
 }
 

@@ -22,9 +22,9 @@ float swept(const WallShape& shape, std::size_t v, const Spoke& spoke) {
   const Lanes way = shape.at[v] - start[v];
   const Lanes f1 = shape.at[spoke.next] - start[spoke.next] - way;
   const Lanes f2 = shape.at[spoke.previous] - start[spoke.previous] - way;
-  const Lanes area =
-      0.5F * (cross(e1, e2) + 0.5F * (cross(e1, f2) + cross(f1, e2)) + (1 / 3.0F) * cross(f1, f2));
-  return dot(way, area) / 3;
+  // Twice the area vector, in the mean over the way.
+  const Lanes area = cross(e1, e2 + 0.5F * f2) + cross(f1, 0.5F * e2 + (1 / 3.0F) * f2);
+  return dot(way, area) / 6;
 }
 
 }  // namespace
@@ -37,6 +37,7 @@ VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility,
       missing_(missing),
       series_(series),
       context_(context),
+      kept_(shape.fans().size()),
       shares_(shape.fans().size()),
       areas_(shape.fans().size()) {
   const WallFans& fans = shape.fans();
@@ -46,6 +47,7 @@ VolumeKeeper::VolumeKeeper(const WallShape& shape, const Mobility& mobility,
     for (const Spoke& spoke : fans.spokes(fan)) area += length(shape.normal(v, spoke)) / 6;
     areas_[fan] = area;
     const auto count = static_cast<float>(fans.neighbors(fan).size());
+    kept_[fan] = 1 - mobility.spread[v];
     shares_[fan] = mobility.spread[v] / std::max(1.0F, count);
   });
   find_areas();
@@ -71,12 +73,12 @@ void VolumeKeeper::find_areas() {
 
 std::vector<float> VolumeKeeper::diffused(std::vector<float> values, Way way) const {
   const WallFans& fans = shape_.fans();
-  std::vector<float> before = values;
-  std::vector<float> next(values.size());
+  std::vector<float> before(values.size());  // T[j - 2], then T[j]; values is T[j - 1]
   std::vector<float> sum(values.size());
   std::vector<float> given(way == Way::kSpread ? values.size() : 0);
   for (std::size_t i = 0; i < values.size(); ++i) sum[i] = series_[0] * values[i];
   for (std::size_t j = 1; j < series_.size(); ++j) {
+    const float twice = j == 1 ? 1 : 2;
     if (way == Way::kSpread) {
       for_each(context_, values.size(),
                [&](std::size_t fan) { given[fan] = values[fan] * shares_[fan]; });
@@ -86,13 +88,10 @@ std::vector<float> VolumeKeeper::diffused(std::vector<float> values, Way way) co
       float mean = 0;
       for (const std::uint32_t neighbor : fans.neighbors(fan)) mean += from[neighbor];
       if (way == Way::kAverage) mean *= shares_[fan];
-      const float kept = 1 - mobility_.spread[fans.vertex(fan)];
-      const float moved = mean + kept * values[fan];
-      next[fan] = j == 1 ? moved : 2 * moved - before[fan];
-      sum[fan] += series_[j] * next[fan];
+      before[fan] = twice * (mean + kept_[fan] * values[fan]) - before[fan];
+      sum[fan] += series_[j] * before[fan];
     });
     before.swap(values);
-    values.swap(next);
   }
   return sum;
 }

@@ -40,6 +40,7 @@ class VolumeKeeper {
   const std::vector<float>& series_;
   const Context& context_;
   bool holds_curves_ = false;
+  std::vector<float> kept_;    // by fan: of itself in the mean
   std::vector<float> shares_;  // by fan: of a neighbour in the mean
   std::vector<float> areas_;   // by fan, at the start
   std::vector<float> room_;    // those that may take volume, spread

@@ -1,6 +1,7 @@
 #include "server/mesh/stairs/wall_shape.h"
 
-#include <map>
+#include <algorithm>
+#include <utility>
 
 #include "server/mesh/points.h"
 
@@ -66,17 +67,18 @@ bool WallShape::is_cap(const Triangle& triangle) const {
 
 // Those with which other than two triangles join a vertex, of walls or of caps.
 std::vector<std::uint32_t> WallShape::neighbors_along_curves(std::size_t v) const {
-  std::map<std::uint32_t, std::array<int, 2>> triangles;
+  std::vector<std::pair<std::uint32_t, bool>> ends;  // of triangles, and whether those are caps
   visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
-    const std::size_t kind = fans_.wall(fan).is_cap ? 1 : 0;
-    ++triangles[spoke.next][kind];
-    ++triangles[spoke.previous][kind];
+    const bool is_cap = fans_.wall(fan).is_cap;
+    ends.emplace_back(spoke.next, is_cap);
+    ends.emplace_back(spoke.previous, is_cap);
   });
+  std::ranges::sort(ends);
   std::vector<std::uint32_t> found;
-  for (const auto& [neighbor, counts] : triangles) {
-    const bool is_inner =
-        std::ranges::all_of(counts, [](int count) { return count == 0 || count == 2; });
-    if (!is_inner) found.push_back(neighbor);
+  for (auto begin = ends.begin(), end = begin; begin != ends.end(); begin = end) {
+    end = std::find_if(begin, ends.end(), [&](const auto& other) { return other != *begin; });
+    const std::uint32_t neighbor = begin->first;
+    if (end - begin != 2 && (found.empty() || found.back() != neighbor)) found.push_back(neighbor);
   }
   return found;
 }

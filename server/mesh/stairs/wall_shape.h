@@ -24,7 +24,10 @@ inline float dot(Lanes a, Lanes b) {
 }
 
 inline Lanes cross(Lanes a, Lanes b) {
-  return Lanes{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0};
+  const auto rotated = [](Lanes lanes) {
+    return __builtin_shufflevector(lanes, lanes, 1, 2, 0, 3);
+  };
+  return rotated(a * rotated(b) - rotated(a) * b);
 }
 
 inline float length(Lanes a) { return std::sqrt(dot(a, a)); }
