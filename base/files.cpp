@@ -1,5 +1,6 @@
 #include "base/files.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -66,7 +67,8 @@ void InputFile::read_exactly(std::uint64_t offset, std::span<std::byte> target) 
 }
 
 std::string InputFile::text(std::uint64_t offset, std::size_t count) const {
-  std::string result(count, '\0');
+  const std::uint64_t left = offset < size_ ? size_ - offset : 0;
+  std::string result(static_cast<std::size_t>(std::min<std::uint64_t>(count, left)), '\0');
   result.resize(read(offset, std::as_writable_bytes(std::span(result))));
   return result;
 }
