@@ -67,6 +67,7 @@ class Finder {
       for_vertices([&](std::size_t v) {
         Bends most = bends[v];
         shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+          if (shape_.is_curve(neighbor) != shape_.is_curve(v)) return;
           most.out = std::max(most.out, bends[neighbor].out - kBendLoss);
           most.in = std::max(most.in, bends[neighbor].in - kBendLoss);
         });
@@ -96,17 +97,28 @@ class Finder {
     const Lanes in_samples = normal * shape_.spacing();
     const float size = length(in_samples);
     if (size > 0) found_.spread[v] = size / length(normal) / shape_.largest_spacing();
-    const Lanes way =
-        without_fourth((shape_.mean(v, shape_.at) - shape_.at[v]) / divisor(shape_.spacing()));
     Bends bends;
     if (shape_.is_curve(v)) {
-      bends.out = bends.in = clamped(kBendsPerSample * length(way));
+      bends.out = bends.in = clamped(kBendsPerSample * length(way_to_mean(v)));
     } else if (size > 0) {
-      const float bend = kBendsPerSample * dot(way, in_samples) / size;
-      bends = {clamped(bend), clamped(-bend)};
+      const auto add = [&](Lanes way, float loss) {
+        const float bend = kBendsPerSample * dot(way, in_samples) / size;
+        bends.out = std::max(bends.out, clamped(bend) - loss);
+        bends.in = std::max(bends.in, clamped(-bend) - loss);
+      };
+      add(way_to_mean(v), 0);
+      // A curve bends a wall beside it one way only, even where it goes around an edge.
+      shape_.visit_neighbors(v, [&](std::uint32_t neighbor) {
+        if (shape_.is_curve(neighbor)) add(way_to_mean(neighbor), kBendLoss);
+      });
     }
     found_.owes[v] = std::max(bends.out, bends.in);
     return bends;
+  }
+
+  // In samples.
+  Lanes way_to_mean(std::size_t v) const {
+    return without_fourth((shape_.mean(v, shape_.at) - shape_.at[v]) / divisor(shape_.spacing()));
   }
 
   static Lanes divisor(Lanes spacing) {

@@ -274,6 +274,25 @@ TEST(Stairs, OfABoxAreNone) {
   EXPECT_GT(seen, 500U);
 }
 
+// The wall ends in a groove of the faces, which is no reason to move all around it outward.
+TEST(Stairs, OfABoxInTwoHalvesAreNone) {
+  const auto label = [](const Point& p) {
+    if (std::abs(p[0]) > 12 || std::abs(p[1]) > 12 || std::abs(p[2]) > 12) return 0;
+    return p[0] < 0 ? 1 : 2;
+  };
+  const Smoothed smoothed = without_stairs(labels_of(label, 13, {1, 1, 1}), joined(2));
+  constexpr double kFace = 12.5;
+  std::size_t seen = 0;
+  for (const Vec3& at : smoothed.surface.mesh.positions) {
+    const double beyond = std::abs(at[2]) - kFace;
+    const double edge = kFace - std::max(std::abs(at[0]), std::abs(at[1]));
+    if (beyond < -0.75 || edge < 2 || std::abs(at[0]) < 2) continue;
+    EXPECT_NEAR(beyond, 0, edge < 5 ? 0.15 : 0.05) << at[0] << ' ' << at[1];
+    ++seen;
+  }
+  EXPECT_GT(seen, 500U);
+}
+
 TEST(Stairs, LeaveWhatIsThinItsVolume) {
   const Point axis = {0.48, 0.36, 0.8};
   const auto is_voxel = [](const Point& p) { return test::length(p) < 0.5 ? 1 : 0; };
