@@ -375,6 +375,9 @@ TEST_F(JobsTest, ALongListComesInPieces) {
   EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=1000&state=succeeded"), 0, 250), "");
   const Answer old = answer_to(daemon_.url(), "GET /v1/jobs?limit=1000 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(expect_page(old, 0, 250), "");
+  const Answer plain = daemon_.get("/v1/jobs?limit=1000", {{"Accept-Encoding", "gzip, br"}});
+  EXPECT_EQ(plain.header("content-encoding"), "");
+  EXPECT_EQ(expect_page(plain, 0, 250), "");
 }
 
 }  // namespace

@@ -193,6 +193,7 @@ class HttplibServer : public httplib::Server {
 
   // Takes the decoded path and query from the library, and gives it the headers it needs.
   void exchange_heads(httplib::Request& in) {
+    in_ = &in;
     request_.path = std::move(in.path);
     request_.query.assign(in.params.begin(), in.params.end());
     in.path = "/";
@@ -228,6 +229,8 @@ class HttplibServer : public httplib::Server {
     out.set_header("Cross-Origin-Resource-Policy", "same-origin");
     for (const auto& [name, value] : response_.headers) out.set_header(name, value);
     if (response_.stream) {
+      // The sender does not compress, so the library must not say so in the head.
+      if (in_ != nullptr) in_->headers.erase("Accept-Encoding");
       announce(*response_.stream, out);
     } else if (!response_.body.empty()) {
       out.set_content(std::move(response_.body), response_.media_type);
@@ -254,6 +257,7 @@ class HttplibServer : public httplib::Server {
   net::IncomingBody& body_;
   Response& response_;
   const std::function<void()>& handle_;
+  httplib::Request* in_ = nullptr;  // the library's, while it handles the request
   bool is_answered_ = false;
 };
 

@@ -1,6 +1,6 @@
 // Many volumes and many jobs, and what others do meanwhile.
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, noiseNrrd, setup } from './support';
+import { ballNrrd, Daemon, noiseNrrd, openPage, setup } from './support';
 import { smallNrrd } from './files';
 
 const at = setup();
@@ -69,5 +69,34 @@ describe('jobs that are waited for', () => {
     // Nobody listens any more.
     await page.goto(`${daemon.url}/#/volumes/${first}`);
     await page.locator('.prepare').waitFor();
+  });
+});
+
+describe('the list of jobs', () => {
+  it('has what runs and is next behind more than a page of newer jobs, until it has ended', async () => {
+    const { browser } = at;
+    const slow = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
+    try {
+      const running = await slow.submit({ volume: await slow.upload(noiseNrrd(96)), iso: 128, passes: 1000, formats: ['stl'] });
+      const volume = await slow.upload(smallNrrd());
+      const waiting: string[] = [];
+      for (let n = 0; n < 110; n += 1) waiting.push((await slow.submit({ volume, iso: 98 + n / 10, formats: ['stl'] })).id);
+      const { page, faults } = await openPage(browser, slow.url);
+      await page.goto(`${slow.url}/#/jobs`);
+      const stateOf = (id: string | undefined): Promise<string> => page.locator(`tr[data-job="${id}"] td`).nth(1).innerText();
+      await expect.poll(() => stateOf(running.id)).toBe('running');
+      expect([await stateOf(waiting[0]), await stateOf(waiting[31]), await stateOf(waiting[109])]).toEqual(
+        [1, 32, 110].map((place) => `queued, number ${place}`),
+      );
+      await page.getByRole('button', { name: 'Older jobs' }).click();
+      await slow.json(`/v1/jobs/${running.id}`, { method: 'DELETE' });
+      await expect.poll(() => stateOf(running.id)).toBe('cancelled');
+      await expect.poll(() => stateOf(waiting[109])).toBe('succeeded');
+      await expect.poll(() => page.locator('tr .state.succeeded').count()).toBe(110);
+      expect(faults).toEqual([]);
+      await page.close();
+    } finally {
+      await slow.remove();
+    }
   });
 });

@@ -39,11 +39,21 @@ describe('several files', () => {
     const { daemon, page } = at;
     // The daemon's own tests hold real series; here it matters what the page does with the refusal.
     const asked: string[] = [];
+    const choices = {
+      series: [
+        { parameter: 'series', value: '1.2.840.1', title: 'head, 93 slices' },
+        { parameter: 'series', value: '1.2.840.2', title: 'chest, 40 slices' },
+      ],
+      spacing: [{ parameter: 'spacing', value: '1,1,1', title: '1 mm in all directions' }],
+    };
     await page.route('**/v1/volumes*', async (route) => {
       const url = new URL(route.request().url());
       if (route.request().method() !== 'POST') return route.continue();
-      asked.push(url.searchParams.get('series') ?? '');
-      if (url.searchParams.has('series')) return route.continue({ url: `${daemon.url}/v1/volumes` });
+      const [series, spacing] = ['series', 'spacing'].map((name) => url.searchParams.get(name));
+      asked.push([series, spacing].filter(Boolean).join(' '));
+      if (spacing === '1,1,1') return route.continue({ url: `${daemon.url}/v1/volumes` });
+      // The first series is damaged, and the server likes no distances but one.
+      const open = series === null ? { choices: choices.series } : series === '1.2.840.2' && spacing === null ? { choices: choices.spacing } : {};
       return route.fulfill({
         status: 422,
         contentType: 'application/problem+json',
@@ -51,11 +61,8 @@ describe('several files', () => {
           type: 'urn:isomesh:problem:unusable-volume',
           title: 'Unusable volume',
           status: 422,
-          detail: 'the upload holds 2 series',
-          choices: [
-            { parameter: 'series', value: '1.2.840.1', title: 'head, 93 slices' },
-            { parameter: 'series', value: '1.2.840.2', title: 'chest, 40 slices' },
-          ],
+          detail: `the upload cannot be used with ${asked.at(-1)}`,
+          ...open,
         }),
       });
     });
@@ -63,11 +70,26 @@ describe('several files', () => {
     await drop(page, [{ name: 'study.nrrd', bytes: ballNrrd(16, 5, 3) }]);
     await page.getByRole('heading', { name: 'Which series?' }).waitFor();
     // It is a question and no error, in words that are no names of parameters.
-    expect(await page.locator('.drop .refusal').count()).toBe(0);
+    const refusal = page.locator('.drop .refusal');
+    expect(await refusal.count()).toBe(0);
     expect(await page.locator('.drop').innerText()).not.toMatch(/series=|1\.2\.840/);
+    // An answer that fails leaves the question open.
+    await page.getByRole('button', { name: 'head, 93 slices' }).click();
+    await expect.poll(() => refusal.innerText()).toContain('cannot be used with 1.2.840.1');
+    expect(await page.getByRole('list', { name: 'Which series?' }).getByRole('button').count()).toBe(2);
     await page.getByRole('button', { name: 'chest, 40 slices' }).click();
+    await page.getByRole('heading', { name: 'Which distance between samples?' }).waitFor();
+    const own = page.getByLabel('Millimetres along x, y and z', { exact: true });
+    await own.fill('0.5 0.5');
+    await own.press('Enter');
+    expect(await page.locator('.drop .fault').innerText()).toContain('three numbers');
+    await own.fill('0.5 x 0,5 x 2');
+    await own.press('Enter');
+    await expect.poll(() => refusal.innerText()).toContain('cannot be used with 1.2.840.2 0.5,0.5,2');
+    expect(await own.inputValue()).toBe('0.5,0.5,2');
+    await page.getByRole('button', { name: '1 mm in all directions' }).click();
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-    expect(asked).toEqual(['', '1.2.840.2']);
+    expect(asked).toEqual(['', '1.2.840.1', '1.2.840.2', '1.2.840.2 0.5,0.5,2', '1.2.840.2 1,1,1']);
   });
 });
 

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { formatNumber, formatValue } from '@/ui/format';
-import { numberOf, stepped, textFault } from '@/ui/numbers';
+import { numberOf, numbersOf, stepped, textFault } from '@/ui/numbers';
 
 describe('a number that is typed', () => {
   it('has a point or one comma before its decimals', () => {
@@ -44,5 +44,18 @@ describe('the arrow keys', () => {
     expect(stepped(null, 1, { step: 0.01 })).toBe(0.01);
     expect(stepped(null, -1, { min: 4 })).toBe(4);
     expect(stepped(10, 1, { max: 10 })).toBe(10);
+  });
+});
+
+describe('numbers in one text', () => {
+  it('are separated in any way that people type', () => {
+    const texts = ['0.5 0.5 2', '0.5,0.5,2', '0.5, 0.5, 2', '0.5 , 0.5 , 2', '0.5x0.5x2', '0.5 \u00d7 0.5 \u00d7 2 mm', '0,5 0,5 2', '0,5; 0,5; 2', ' .5;.5;2mm '];
+    for (const text of texts) expect(numbersOf(text), text).toEqual([0.5, 0.5, 2]);
+  });
+
+  it('are not guessed', () => {
+    for (const text of ['0.5 0.5 two', '1,250 1 1', '(1, 1, 1)', '1,,1', '']) expect(numbersOf(text).some(Number.isNaN), text).toBe(true);
+    expect(numbersOf('0,5,0,5,2')).toHaveLength(5);
+    expect(numbersOf('1 2,3')).toEqual([1, 2.3]);
   });
 });

@@ -14,6 +14,7 @@ import type {
   Job,
   JobList,
   JobRequest,
+  JobState,
   LabelSummary,
   LabelSummaryList,
   MeshFormat,
@@ -36,6 +37,12 @@ const submitRetries = 3;
 // randomUUID only behind TLS.
 function randomKey(): string {
   return Array.from({ length: 16 }, () => Math.floor(256 * Math.random()).toString(16).padStart(2, '0')).join('');
+}
+
+// With its question mark; '' if there is nothing to say.
+function queryOf(values: Readonly<Record<string, string | number | undefined>>): string {
+  const given = Object.entries(values).filter(([, value]) => value !== undefined && value !== '');
+  return given.length === 0 ? '' : `?${new URLSearchParams(given.map(([name, value]) => [name, String(value)])).toString()}`;
 }
 
 function volumePath(id: string): string {
@@ -167,8 +174,9 @@ export class Client {
     return follow(this, id, signal, onChange);
   }
 
-  listJobs(cursor = ''): Promise<JobList> {
-    return this.connection.json(`/v1/jobs${cursor === '' ? '' : `?cursor=${encodeURIComponent(cursor)}`}`);
+  /** Lists the newest first, in pages of at most 1000: all jobs, or those in one state. */
+  listJobs(cursor = '', { state, limit }: { state?: JobState; limit?: number } = {}): Promise<JobList> {
+    return this.connection.json(`/v1/jobs${queryOf({ state, limit, cursor })}`);
   }
 
   /** Returns at once, or with `waitSeconds` when the job has finished or the time is over. */
@@ -212,9 +220,7 @@ export class Client {
 
   /** Lists the newest first, in pages. An empty state lists all. */
   listOrders(state: OrderState | '', cursor = '', signal?: GlobalAbortSignal): Promise<OrderList> {
-    const query = new URLSearchParams(Object.entries({ state, cursor }).filter(([, value]) => value !== ''));
-    const text = query.toString();
-    return this.connection.json(`/v1/orders${text === '' ? '' : `?${text}`}`, { signal });
+    return this.connection.json(`/v1/orders${queryOf({ state, cursor })}`, { signal });
   }
 
   cancelOrder(id: string): Promise<Order> {

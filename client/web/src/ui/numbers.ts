@@ -31,6 +31,15 @@ export function textFault(text: string): string {
   return hasMany ? 'Enter a number with one decimal point, and nothing between its thousands.' : 'Enter a number.';
 }
 
+// The numbers of "0.5, 0.5, 2", "0.5x0.5x2", "0,5 0,5 2" or "0,5; 0,5; 2 mm"; NaN for a part that is no number. A comma between
+// digits belongs to its number where something else separates the numbers.
+export function numbersOf(text: string): number[] {
+  const given = text.trim().replace(/\s*mm$/i, '');
+  const byOthers = given.split(/\s*[;x\u00d7*]\s*|\s+/i);
+  const isOne = byOthers.length > 1 && byOthers.every((part) => part !== '' && !part.endsWith(',') && !part.startsWith(','));
+  return (isOne ? byOthers : given.split(/\s*,\s*/)).map((part) => numberOf(part) ?? NaN);
+}
+
 export interface Steps {
   step?: number;
   min?: number | undefined;

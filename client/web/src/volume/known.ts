@@ -12,9 +12,9 @@ export class KnownVolumes {
     for (const volume of volumes) this.known.set(volume.id, volume);
   }
 
-  // Throws when nobody answers; what was learnt until then stays.
-  async find(ids: Iterable<string>): Promise<void> {
-    const unknown = [...new Set(ids)].filter((id) => !this.known.has(id));
+  // Asks for the first `most` of those that are unknown. Throws when nobody answers; what was learnt until then stays.
+  async find(ids: Iterable<string>, most = Infinity): Promise<void> {
+    const unknown = [...new Set(ids)].filter((id) => !this.known.has(id)).slice(0, most);
     await Promise.all(
       unknown.map(async (id) => {
         try {

@@ -1,8 +1,8 @@
 // All jobs: what waits in which order, what runs, what is done. #/jobs
-import { client } from '../../client';
+import { client, token } from '../../client';
 import { isFinal, type Job } from '../../api/types';
+import { inOrder, JobList, mostOfState } from '../../job/job_list';
 import { inWords, surfaceInWords } from '../../job/parameters';
-import { priorities } from '../../job/table';
 import { button, h } from '../../ui/dom';
 import { formatCount, formatMilliseconds, formatTime, shortId } from '../../ui/format';
 import { tellError } from '../../ui/notices';
@@ -12,16 +12,12 @@ import { cell, row, table } from '../../ui/table';
 import { KnownVolumes } from '../../volume/known';
 
 const refreshEvery = 1500;
+// Names that are asked for at each refresh.
+const mostNames = 100;
 const mostCompared = 4;
 const mostTogether = 8;
 const columns = ['Choose', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', 'Action'];
 const unseen = ['Choose', 'Action'];
-
-// As the daemon takes them: by priority, then by age.
-export function inOrder(jobs: readonly Job[]): Job[] {
-  const rank = (job: Job): number => priorities.indexOf(job.priority);
-  return [...jobs].sort((a, b) => rank(a) - rank(b) || (a.id < b.id ? -1 : 1));
-}
 
 function progressOf(job: Job): Node | string {
   if (job.state === 'running') {
@@ -38,8 +34,8 @@ function progressOf(job: Job): Node | string {
   return '';
 }
 
-function stateCell(job: Job, place: number): HTMLElement {
-  const text = job.state === 'queued' ? `queued, number ${place + 1}` : job.state;
+function stateCell(job: Job, place: number | undefined): HTMLElement {
+  const text = job.state === 'queued' && place !== undefined ? `queued, number ${place}` : job.state;
   return cell(h('span', { class: `state ${job.state}` }), text);
 }
 
@@ -57,7 +53,7 @@ export async function queueView(scope: Scope, { query }: Route): Promise<HTMLEle
   queue.restore((query.get('chosen') ?? '').split(','));
   const timer = setInterval(() => {
     // A lost connection is said at the top of the page.
-    if (!document.hidden) queue.refresh().catch(() => undefined);
+    if (!document.hidden && !queue.isBusy) queue.refresh().catch(() => undefined);
   }, refreshEvery);
   scope.onEnd(() => clearInterval(timer));
   return queue.element;
@@ -70,8 +66,12 @@ class Queue {
   private readonly together: HTMLButtonElement;
   private readonly more: HTMLButtonElement;
   private readonly chosen = new Set<string>();
-  private jobs: Job[] = [];
-  private next: string | null = null;
+  private readonly note = h(
+    'p',
+    { class: 'hint', hidden: true },
+    `More than ${mostOfState} jobs wait. The list has the newest ${mostOfState} of them, without their places.`,
+  );
+  private readonly list = new JobList(client);
   private readonly volumes = new KnownVolumes();
 
   constructor() {
@@ -92,37 +92,44 @@ class Queue {
         this.together,
         this.compare,
       ),
+      this.note,
       this.body,
       h('div', { class: 'actions' }, this.more),
     );
   }
 
-  // Takes the newest jobs over; older ones that were asked for stay as they are.
+  get isBusy(): boolean {
+    return this.list.isBusy;
+  }
+
   async refresh(): Promise<void> {
-    const page = await client.listJobs();
-    const newest = new Set(page.jobs.map((job) => job.id));
-    const older = this.jobs.filter((job) => !newest.has(job.id) && job.id < (page.jobs.at(-1)?.id ?? ''));
-    if (older.length === 0) this.next = page.next;
-    this.jobs = [...page.jobs, ...older];
-    await this.volumes.find(this.jobs.map(({ volume }) => volume));
-    this.show();
+    await this.list.refresh();
+    await this.showNamed();
   }
 
   private async showMore(): Promise<void> {
-    if (this.next === null) return;
-    const page = await client.listJobs(this.next);
-    this.jobs = [...this.jobs, ...page.jobs];
-    this.next = page.next;
-    await this.volumes.find(this.jobs.map(({ volume }) => volume));
+    await this.list.loadOlder();
+    await this.showNamed();
+  }
+
+  private async showNamed(): Promise<void> {
+    await this.volumes.find(this.ordered().map(({ volume }) => volume), mostNames);
     this.show();
   }
 
+  private ordered(): Job[] {
+    const { jobs } = this.list;
+    const running = jobs.filter(({ state }) => state === 'running');
+    const waiting = inOrder(jobs.filter(({ state }) => state === 'queued'));
+    return [...running, ...waiting, ...jobs.filter(({ state }) => isFinal(state))];
+  }
+
   private show(): void {
-    const waiting = inOrder(this.jobs.filter((job) => job.state === 'queued'));
-    const running = this.jobs.filter((job) => job.state === 'running');
-    const done = this.jobs.filter((job) => isFinal(job.state));
-    const rows = [...running, ...waiting, ...done].map((job) => this.row(job, waiting.indexOf(job)));
-    this.more.hidden = this.next === null;
+    // Jobs of others, whose owners take turns with the token's, may not be listed.
+    const places = token.value === '' ? this.list.places() : new Map<string, number>();
+    const rows = this.ordered().map((job) => this.row(job, places.get(job.id)));
+    this.more.hidden = this.list.next === null;
+    this.note.hidden = this.list.hasWholeQueue;
     this.keepFocus(() =>
       this.body.replaceChildren(
         rows.length === 0 ? h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.') : table(columns, unseen, rows),
@@ -140,7 +147,7 @@ class Queue {
     this.body.querySelector<HTMLElement>(`tr[data-job="${job}"] [aria-label="${label}"]`)?.focus();
   }
 
-  private row(job: Job, place: number): HTMLElement {
+  private row(job: Job, place: number | undefined): HTMLElement {
     const time = isFinal(job.state) && job.timing.total ? formatMilliseconds(job.timing.total) : '';
     return row(
       { 'data-job': job.id },
@@ -183,7 +190,7 @@ class Queue {
 
   // The jobs of the address that are listed and can be shown.
   restore(ids: readonly string[]): void {
-    const listed = this.jobs.filter(({ id, state }) => ids.includes(id) && state === 'succeeded');
+    const listed = this.list.jobs.filter(({ id, state }) => ids.includes(id) && state === 'succeeded');
     if (listed.length === 0) return;
     for (const { id } of listed) this.chosen.add(id);
     this.show();

@@ -8,7 +8,8 @@ const most = 3;
 
 export function madeSurfaces(volumeId: string): HTMLElement {
   const element = h('div', { class: 'made' });
-  client.listJobs().then(
+  // So that jobs without a surface take no place of the page.
+  client.listJobs('', { state: 'succeeded' }).then(
     ({ jobs }) => {
       const made = jobs.filter(({ volume, mesh }) => volume === volumeId && mesh).slice(0, most);
       if (made.length === 0) return;

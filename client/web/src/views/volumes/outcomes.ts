@@ -6,7 +6,7 @@ import { formatDims } from '../../ui/format';
 import { hashOf } from '../../ui/route';
 import { skippedText } from '../../volume/skipped';
 import type { NamedFile } from '../../volume/tar';
-import { acceptButton, choiceLists, questionOf, type Choices } from './remedies';
+import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices } from './remedies';
 
 // Either a volume or an error.
 export interface Outcome {
@@ -16,19 +16,22 @@ export interface Outcome {
   error: ApiError | null;
   // The choices with which the member was requested.
   choices: Choices;
+  // The last question about it, which an answer that was rejected leaves open.
+  asked: Asked | null;
 }
 
 // The member that stands for all DICOM files of an upload.
 const dicomMember = '*.dcm';
 
-export function outcomeOf({ member, status, volume, problem }: UploadedVolume, before: Choices): Outcome {
-  return {
-    member,
-    volume,
-    wasThere: status === 200,
-    error: problem && errorOfProblem(problem),
-    choices: { ...before, member },
-  };
+export function outcomeOf({ member, status, volume, problem }: UploadedVolume, before: Choices, asked: Asked | null = null): Outcome {
+  const error = problem && errorOfProblem(problem);
+  const choices = { ...before, member };
+  return { member, volume, wasThere: status === 200, error, choices, asked: error && openQuestion(error, choices, asked) };
+}
+
+// After another attempt with these choices that was rejected.
+export function rejected(outcome: Outcome, choices: Choices, error: ApiError): Outcome {
+  return { ...outcome, choices, error, asked: openQuestion(error, choices, outcome.asked) };
 }
 
 function storedRow({ id, dims }: Volume, name: string, wasThere: boolean): Node[] {
@@ -41,7 +44,7 @@ function storedRow({ id, dims }: Volume, name: string, wasThere: boolean): Node[
 function refusedRow(
   error: ApiError,
   name: string,
-  choices: Choices,
+  { choices, asked }: Outcome,
   files: readonly NamedFile[],
   onAgain: (choices: Choices) => void,
 ): (Node | false)[] {
@@ -49,7 +52,7 @@ function refusedRow(
     h('b', {}, name),
     h('p', {}, questionOf(error, choices) || error.detail || error.title),
     acceptButton(error, choices, onAgain),
-    ...choiceLists(error, choices, files, onAgain),
+    ...choiceLists(asked, choices, files, onAgain),
   ];
 }
 
@@ -66,7 +69,7 @@ export function outcomeList(
       'li',
       { 'data-member': member, class: !error ? 'stored' : questionOf(error, outcome.choices) ? 'asked' : 'refused' },
       ...(volume ? storedRow(volume, name, wasThere) : []),
-      ...(error ? refusedRow(error, name, outcome.choices, files, (choices) => onAgain(outcome, choices)) : []),
+      ...(error ? refusedRow(error, name, outcome, files, (choices) => onAgain(outcome, choices)) : []),
     );
   };
   const skipped = skippedText(outcomes.flatMap(({ volume }) => volume ?? []));

@@ -36,21 +36,23 @@ function triple(label: string, values: Triple): TripleField {
 
 const positive = 'The spacing must be positive.';
 
-// Asks for what raw samples do not say themselves.
-export function rawForm(size: number, onDescribed: (raw: RawDescription) => void): HTMLElement {
-  const dims = triple('Samples', [0, 0, 0]);
-  const spacing = triple('Spacing in mm', [1, 1, 1]);
+const unknown: RawDescription = { dims: [0, 0, 0], type: 'int16', spacing: [1, 1, 1], byteOrder: 'little' };
+
+// Asks for what raw samples do not say themselves. `described`: as they were described before.
+export function rawForm(size: number, onDescribed: (raw: RawDescription) => void, described = unknown): HTMLElement {
+  const dims = triple('Samples', described.dims);
+  const spacing = triple('Spacing in mm', described.spacing);
   const type = h(
     'select',
     {},
-    ...Object.keys(sampleBytes).map((name) => h('option', { value: name, selected: name === 'int16' }, name)),
+    ...Object.keys(sampleBytes).map((name) => h('option', { value: name, selected: name === described.type }, name)),
   );
   const chosenType = (): SampleType => type.value as SampleType;
   const order = h(
     'select',
     {},
     h('option', { value: 'little' }, 'little-endian'),
-    h('option', { value: 'big' }, 'big-endian'),
+    h('option', { value: 'big', selected: described.byteOrder === 'big' }, 'big-endian'),
   );
   const fault = h('p', { class: 'warning', role: 'status' });
   const submit = button(
@@ -85,5 +87,6 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
     h('div', { class: 'actions' }, submit),
   );
   form.addEventListener('input', check);
+  if (described !== unknown) check();
   return form;
 }

@@ -1,13 +1,25 @@
 // The options that a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../../api/problem';
 import type { Choice } from '../../api/types';
-import { button, h } from '../../ui/dom';
+import { button, h, uniqueId } from '../../ui/dom';
+import { numbersOf } from '../../ui/numbers';
 import { grouped, peekAtSeries, type Peek } from '../../volume/dicom_peek';
 import type { NamedFile } from '../../volume/tar';
 import { paintPicture, timeChoice } from './time_choice';
 
 // The values of the query's parameters that choose or accept something.
 export type Choices = Readonly<Record<string, string>>;
+
+// A rejection that asks, and the choices with which the upload was sent.
+export interface Asked {
+  error: ApiError;
+  choices: Choices;
+}
+
+// Still to be answered after this rejection of the last answer: its own question, or else the one of before.
+export function openQuestion(error: ApiError, choices: Choices, before: Asked | null): Asked | null {
+  return choicesOf(error).size > 0 ? { error, choices } : before;
+}
 
 // Repeats the upload and accepts the cause of its rejection, in addition to what was accepted before.
 export function acceptButton(
@@ -59,6 +71,7 @@ function choiceList(
   parameter: Choice['parameter'],
   choices: readonly Choice[],
   files: readonly NamedFile[],
+  answered: string,
   onChoice: (value: string) => void,
 ): HTMLElement {
   const rows = choices.map(({ value, title }) => {
@@ -67,7 +80,7 @@ function choiceList(
     const text = h('span', { class: 'choice-text' }, h('b', {}, title === '' ? `${nouns[parameter]} ${value}` : title), facts);
     return { value, thumbnail, facts, element: h('li', {}, button(h('span', { class: 'choice' }, thumbnail, text), () => onChoice(value))) };
   });
-  const own = parameter === 'spacing' && h('li', {}, spacingForm(onChoice));
+  const own = parameter === 'spacing' && h('li', {}, spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
   const list = h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
   if (parameter === 'series') {
     peekAtSeries(files.map(({ file }) => file), choices.map(({ value }) => value)).then(
@@ -88,25 +101,53 @@ function choiceList(
   return h('div', { class: 'stack' }, timeChoice(choices, only.file, onChoice), list);
 }
 
+// For the server, or why they cannot be sent.
+export function spacingOf(text: string): { value: string; fault: '' } | { value: null; fault: string } {
+  const lengths = numbersOf(text);
+  if (lengths.length !== 3 || lengths.some(Number.isNaN)) {
+    return { value: null, fault: 'Enter three numbers, such as 0.5 0.5 1.' };
+  }
+  if (lengths.some((length) => length <= 0)) return { value: null, fault: 'The distances must be positive.' };
+  return { value: lengths.join(','), fault: '' };
+}
+
 // Other distances than those that the server offers.
-function spacingForm(onChoice: (value: string) => void): HTMLElement {
-  const input = h('input', { type: 'text', placeholder: '0.5,0.5,1', 'aria-label': 'Millimetres along x, y and z' });
-  const form = h('form', { class: 'choice' }, input, h('button', { type: 'submit' }, 'Use these millimetres along x, y and z'));
+function spacingForm(answered: string, onChoice: (value: string) => void): HTMLElement {
+  const fault = h('p', { class: 'fault', id: uniqueId('fault'), role: 'alert', hidden: true });
+  const input = h('input', {
+    type: 'text',
+    value: answered,
+    placeholder: '0.5 0.5 1',
+    autocomplete: 'off',
+    'aria-label': 'Millimetres along x, y and z',
+    'aria-errormessage': fault.id,
+  });
+  const mark = (text: string): void => {
+    input.setAttribute('aria-invalid', String(text !== ''));
+    fault.textContent = text;
+    fault.hidden = text === '';
+  };
+  input.addEventListener('input', () => mark(''));
+  const form = h('form', { class: 'choice' }, input, h('button', { type: 'submit' }, 'Use these millimetres along x, y and z'), fault);
   form.addEventListener('submit', (event) => {
     event.preventDefault();
-    if (input.value.trim() !== '') onChoice(input.value.trim());
+    const spacing = spacingOf(input.value);
+    mark(spacing.fault);
+    if (spacing.value === null) input.focus();
+    else onChoice(spacing.value);
   });
   return form;
 }
 
-// A list for each parameter that the rejection leaves to be chosen.
+// A list for each parameter that the rejection leaves to be chosen. `now` are the choices of the last attempt.
 export function choiceLists(
-  error: ApiError,
-  before: Choices,
+  asked: Asked | null,
+  now: Choices,
   files: readonly NamedFile[],
   onChoices: (choices: Choices) => void,
 ): HTMLElement[] {
-  return [...choicesOf(error)].map(([parameter, choices]) =>
-    choiceList(parameter, choices, files, (value) => onChoices({ ...before, [parameter]: value })),
+  if (!asked) return [];
+  return [...choicesOf(asked.error)].map(([parameter, choices]) =>
+    choiceList(parameter, choices, files, now[parameter] ?? '', (value) => onChoices({ ...asked.choices, [parameter]: value })),
   );
 }

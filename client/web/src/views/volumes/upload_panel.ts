@@ -12,9 +12,9 @@ import { noteTexts, volumeName } from '../../volume/names';
 import { skippedText } from '../../volume/skipped';
 import { faultOf } from '../../volume/sniff';
 import type { NamedFile } from '../../volume/tar';
-import { outcomeList, outcomeOf, type Outcome } from './outcomes';
+import { outcomeList, outcomeOf, rejected, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
-import { acceptButton, choiceLists, questionOf, type Choices } from './remedies';
+import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices } from './remedies';
 import { UploadProgress } from './upload_progress';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
@@ -23,6 +23,8 @@ const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 interface Addition {
   raw?: RawDescription;
   choices?: Choices;
+  // The last question, which `choices` answer.
+  asked?: Asked | null;
   // The results of the upload's volumes; `choices` names the one to retry.
   outcomes?: readonly Outcome[];
 }
@@ -123,7 +125,7 @@ export class UploadPanel {
     this.running = null;
     // The server takes no empty file.
     const anyway = gathered.body.size > 0 && button('Upload it anyway', () => void this.send(gathered));
-    this.showProblem(fault, gathered, anyway);
+    this.showProblem(fault, gathered, [anyway]);
   }
 
   private async send(gathered: Gathered, addition: Addition = {}): Promise<void> {
@@ -209,7 +211,7 @@ export class UploadPanel {
     if (outcomes) {
       const shown = isCancelled
         ? outcomes
-        : outcomes.map((each) => (each.member === choices['member'] ? { ...each, choices, error: asApiError(error) } : each));
+        : outcomes.map((each) => (each.member === choices['member'] ? rejected(each, choices, asApiError(error)) : each));
       this.showOutcomes(shown, gathered);
     } else if (isCancelled) {
       this.showIdle();
@@ -249,15 +251,16 @@ export class UploadPanel {
   private showRefused(error: ApiError, gathered: Gathered, before: Addition): void {
     const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
     const known = before.choices ?? {};
-    const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices });
+    const asked = openQuestion(error, known, before.asked ?? null);
+    const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices, asked });
     const accept = acceptButton(error, known, sendWith);
     const question = questionOf(error, known);
-    const lists = choiceLists(error, known, gathered.files, sendWith);
+    const lists = choiceLists(asked, known, gathered.files, sendWith);
     if (question !== '' && !accept) {
       this.showQuestion(question, gathered, lists);
       return;
     }
-    this.showProblem(error, gathered, again, accept);
+    this.showProblem(error, gathered, [again, accept], before.raw);
     this.body.append(...lists);
   }
 
@@ -271,13 +274,14 @@ export class UploadPanel {
     this.reveal();
   }
 
-  private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
+  private showProblem(error: ApiError, gathered: Gathered, actions: readonly (HTMLElement | false)[], described?: RawDescription): void {
     this.element.classList.remove('busy');
     this.state.value = 'Upload: your choice is needed';
     if (!isPanelShown()) tellError(error);
     this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
-    if (error.status === 415 && gathered.count === 1 && gathered.body.size > 0) {
-      this.body.append(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
+    const mayBeRaw = error.status === 415 && gathered.count === 1 && gathered.body.size > 0;
+    if (mayBeRaw || described) {
+      this.body.append(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw }), described));
     }
     this.reveal();
   }
@@ -322,7 +326,7 @@ function isPanelShown(): boolean {
 }
 
 function withOutcome(outcomes: readonly Outcome[], choices: Choices, uploaded: UploadedVolume): Outcome[] {
-  return outcomes.map((each) => (each.member === uploaded.member ? outcomeOf(uploaded, choices) : each));
+  return outcomes.map((each) => (each.member === uploaded.member ? outcomeOf(uploaded, choices, each.asked) : each));
 }
 
 export const uploads = new UploadPanel();

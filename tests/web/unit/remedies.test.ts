@@ -1,0 +1,35 @@
+import { describe, expect, it } from 'vitest';
+import { ApiError } from '@/api/problem';
+import type { UploadedVolume } from '@/api/types';
+import { outcomeOf, rejected } from '@/views/volumes/outcomes';
+import { openQuestion, spacingOf } from '@/views/volumes/remedies';
+
+const question = new ApiError(422, 'Unusable volume', 'two series', [], { choices: [{ parameter: 'series', value: '1.2', title: 'head' }] });
+const wrong = new ApiError(422, 'Unusable volume', 'slices are missing');
+
+describe('a question of the server', () => {
+  it('stays open after an answer that was rejected, until there is another one', () => {
+    const first = openQuestion(question, {}, null);
+    expect(first).toEqual({ error: question, choices: {} });
+    expect(openQuestion(wrong, { series: '1.2' }, first)).toBe(first);
+    expect(openQuestion(question, { member: 'a' }, first)).toEqual({ error: question, choices: { member: 'a' } });
+    expect(openQuestion(wrong, {}, null)).toBeNull();
+  });
+
+  it('about one of several volumes, too', () => {
+    const problem = { title: question.title, detail: question.detail, status: 422, choices: question.remedy.choices };
+    const uploaded = { member: 'a.dcm', status: 422, volume: null, problem } as unknown as UploadedVolume;
+    const asked = outcomeOf(uploaded, {}).asked;
+    expect(asked?.choices).toEqual({ member: 'a.dcm' });
+    const after = rejected(outcomeOf(uploaded, {}), { member: 'a.dcm', series: '1.2' }, wrong);
+    expect([after.error, after.asked]).toEqual([wrong, asked]);
+  });
+});
+
+describe('the distances between samples', () => {
+  it('are checked before they are sent', () => {
+    expect(spacingOf('0.5 0.5 2')).toEqual({ value: '0.5,0.5,2', fault: '' });
+    for (const text of ['', '1 1', '1 1 1 1', 'a b c']) expect(spacingOf(text).fault, text).toContain('three numbers');
+    for (const text of ['0 1 1', '1 -1 1']) expect(spacingOf(text).fault, text).toContain('positive');
+  });
+});
