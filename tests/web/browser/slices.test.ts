@@ -232,6 +232,30 @@ describe('slices before there is a mesh', () => {
     await canvas.click({ position: { x: box.width / 2 + 10 * scale, y: box.height / 2 } });
     await expect.poll(() => canvas.getAttribute('aria-label')).toMatch(/, (19\.[5-9]|20(\.[0-5])?) mm$/);
     expect(noted(page, 'at')).toBe(place);
+    // The length stands on its ground, 8 pixels from the point, and not over the point.
+    const coloured = (from: number, to: number): Promise<number> =>
+      canvas.evaluate(
+        (one: HTMLCanvasElement, [left, right, middle]) => {
+          const { data = [] } = one.getContext('2d', { willReadFrequently: true })?.getImageData(left, middle - 6, right - left, 4) ?? {};
+          let count = 0;
+          for (let i = 0; i < data.length; i += 4) if ((data[i] ?? 0) > (data[i + 2] ?? 0) + 60) count += 1;
+          return count;
+        },
+        [Math.round(box.width / 2 + 10 * scale) + from, Math.round(box.width / 2 + 10 * scale) + to, Math.round(box.height / 2)] as const,
+      );
+    await expect.poll(() => coloured(8, 60)).toBeGreaterThan(10);
+    expect(await coloured(-40, 6)).toBe(0);
+    // Keys that are pressed in a dialog are the dialog's.
+    await page.keyboard.press('?');
+    const dialog = page.locator('dialog.help');
+    await dialog.waitFor();
+    await page.keyboard.press('Control+Enter');
+    await page.keyboard.press('Delete');
+    await dialog.getByRole('heading').click();
+    for (const key of ['?', 'Delete', 'Escape']) await page.keyboard.press(key);
+    await expect.poll(() => dialog.count()).toBe(0);
+    await expect.poll(() => canvas.getAttribute('aria-label')).toContain('mm');
+    expect(page.url()).toContain('#/volumes/');
     await page.keyboard.press('Escape');
     await expect.poll(() => canvas.getAttribute('aria-label')).not.toContain('mm');
   });

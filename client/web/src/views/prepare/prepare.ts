@@ -6,7 +6,7 @@ import { changed, defaultParameters, estimateQuery, jobRequest, parametersOfQuer
 import { kindOf, kinds, withKind, type Kind } from '../../job/kinds';
 import { trianglesOf } from '../../job/labels';
 import { isByLabels, withLabels } from '../../job/table';
-import { button, choose, h, isTyping, segmented } from '../../ui/dom';
+import { button, choose, h, isBehindDialog, isTyping, segmented } from '../../ui/dom';
 import { formatValue } from '../../ui/format';
 import { History } from '../../ui/history';
 import { refusal } from '../../ui/notices';
@@ -17,6 +17,7 @@ import { defaultWindow, type Histogram } from '../../volume/histogram';
 import { SliceSource, windowOfText, type Window } from '../../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
+import { isCt } from '../../volume/looks';
 import type { LabelLook } from '../../volume/label_map';
 import { eachLabel, isInteger, volumeName } from '../../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
@@ -29,7 +30,7 @@ import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
 import { paneArea } from '../slices/pane_area';
-import { sliceControls } from '../slices/slice_looks';
+import { sliceControls, WindowChoice } from '../slices/slice_looks';
 import { SliceLayers } from '../slices/slice_layers';
 import { ObliqueView } from '../slices/oblique_view';
 import { SliceMeasures } from '../slices/slice_measure';
@@ -87,6 +88,7 @@ class Prepare {
   private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
   private readonly problem = h('div');
   private readonly windowText = h('span', { class: 'window-text faint' });
+  private readonly windowChoice: WindowChoice | null;
   private readonly resetWindow = h('button', { type: 'button', class: 'chip' }, 'Reset window');
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
@@ -105,6 +107,7 @@ class Prepare {
     this.history = new History(this.parameters);
     const common = defaultWindow(counts, volume.suggested_iso);
     this.window = windowOfText(route.query.get('window') ?? '') ?? common;
+    this.windowChoice = isCt(volume) ? new WindowChoice(common, (window) => this.setWindow(window)) : null;
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
     this.oblique = new ObliqueView({ volume, setCursor: (cursor) => this.setCursor(cursor), cursor: () => this.cursor, window: () => this.window }, scope);
@@ -162,12 +165,13 @@ class Prepare {
     scope.listen(window, 'pointerdown', () => this.history.hold(), { capture: true });
     for (const end of ['pointerup', 'pointercancel'] as const) scope.listen(window, end, () => this.history.release());
     scope.listen(window, 'keydown', (event: KeyboardEvent) => {
+      if (isBehindDialog()) return;
       if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
       else if (event.key.toLowerCase() === 'z' && (event.ctrlKey || event.metaKey) && !isTyping(event)) {
         event.preventDefault();
         this.goBack(event.shiftKey ? this.history.redo() : this.history.undo());
       } else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
-      else if (event.key === 'Escape') this.measures.takeBack();
+      else if (event.key === 'Escape' && !isTyping(event)) this.measures.takeBack();
       else if (event.key === 'Delete' && !isTyping(event)) this.measures.clear();
     });
   }
@@ -274,7 +278,7 @@ class Prepare {
         this.isoPart,
         this.labelPart,
         this.windowRow(common),
-        sliceControls(volume, this.measures, (window) => this.setWindow(window ?? common)),
+        sliceControls(this.windowChoice, this.measures),
         this.layers.element,
         this.crop?.element ?? '',
         ...notedOf(volume),
@@ -369,6 +373,7 @@ class Prepare {
     const [low, high] = this.window;
     // Labels are seen as they are.
     this.windowText.hidden = this.resetWindow.hidden = isByLabels(this.parameters);
+    this.windowChoice?.show(this.window);
     this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
     this.isoField.show(this.iso);
     noteInAddress({
