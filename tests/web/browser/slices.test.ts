@@ -198,8 +198,19 @@ describe('slices before there is a mesh', () => {
       await expect.poll(() => whitePixels(axial)).toBeGreaterThan(50);
     }
     // The first window once more: what is in it is seen again as before, and the insert stays.
+    const choice = page.getByLabel('Window', { exact: true });
+    const chosen = (): Promise<string | undefined> => choice.evaluate((one: HTMLSelectElement) => one.selectedOptions[0]?.textContent ?? undefined);
+    expect(await chosen()).toBe('Custom');
     await page.getByRole('button', { name: 'Reset window' }).click();
     await expect.poll(() => whitePixels(axial)).toBeGreaterThan(1000);
+    expect(await chosen()).toBe('Usual');
+    // A window for CT that was left by a drag can be chosen again.
+    for (const key of ['Shift+ArrowRight', 'Shift+ArrowUp']) {
+      await choice.selectOption('Lung');
+      await expect.poll(() => noted(page, 'window')).toBe('-1350,150');
+      await axial.press(key);
+      await expect.poll(chosen).toBe('Custom');
+    }
   });
 
   it('tell the value of the slab that is shown, and the iso-value is still that of a sample', async () => {

@@ -7,14 +7,14 @@ import { kindOf, kinds, withKind, type Kind } from '../../job/kinds';
 import { trianglesOf } from '../../job/labels';
 import { isByLabels, withLabels } from '../../job/table';
 import { button, choose, h, isBehindDialog, isTyping, segmented } from '../../ui/dom';
-import { formatValue } from '../../ui/format';
+import { formatValue, shortened } from '../../ui/format';
 import { History } from '../../ui/history';
 import { refusal } from '../../ui/notices';
 import { go, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { cssColour, theme } from '../../ui/theme';
 import { defaultWindow, type Histogram } from '../../volume/histogram';
-import { SliceSource, windowOfText, type Window } from '../../volume/slices';
+import { SliceSource, textOfWindow, windowOfText, type Window } from '../../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
 import { isCt } from '../../volume/looks';
@@ -39,17 +39,16 @@ import { SliceView, type SliceHost } from '../slices/slice_view';
 const mostBins = 1024;
 const estimateDelay = 300;
 
-// Enough digits for any iso-value, and few enough to be read.
-function shortened(iso: number): number {
-  return Number(iso.toPrecision(6));
-}
-
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
   const volume = await client.getVolume(route.path[1] ?? '');
   // A bin for each value where there are few: more bins would leave gaps between the values.
   const values = isInteger(volume) ? volume.range[1] - volume.range[0] + 1 : mostBins;
   const histogram = await client.histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
   return new Prepare(scope, route, volume, histogram).element;
+}
+
+function spanOf({ range: [low, high] }: Volume): number {
+  return high - low;
 }
 
 function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
@@ -102,7 +101,7 @@ class Prepare {
     private readonly volume: Volume,
     counts: Histogram,
   ) {
-    this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso));
+    this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso, spanOf(volume)));
     this.parameters = startOfQuery(route.query, volume, this.defaults);
     this.history = new History(this.parameters);
     const common = defaultWindow(counts, volume.suggested_iso);
@@ -312,8 +311,9 @@ class Prepare {
 
   private isoRow(): HTMLElement {
     const { suggested_iso: otsu, presets } = this.volume;
+    const span = spanOf(this.volume);
     const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
-      button(`${name} ${formatValue(iso)}`, () => this.setIso(shortened(iso)), { class: 'chip' }),
+      button(`${name} ${formatValue(iso, span)}`, () => this.setIso(shortened(iso, span)), { class: 'chip' }),
     );
     return h(
       'div',
@@ -374,11 +374,11 @@ class Prepare {
     // Labels are seen as they are.
     this.windowText.hidden = this.resetWindow.hidden = isByLabels(this.parameters);
     this.windowChoice?.show(this.window);
-    this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
+    this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2, high - low)}`;
     this.isoField.show(this.iso);
     noteInAddress({
       ...queryOfParameters(this.parameters, this.defaults),
-      window: this.window.map((value) => Number(value.toPrecision(5))).join(','),
+      window: textOfWindow(this.window),
       at: this.cursor.join(','),
     });
   }

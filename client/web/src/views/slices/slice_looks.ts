@@ -5,7 +5,7 @@ import { field, h, segmented } from '../../ui/dom';
 import { formatNumber } from '../../ui/format';
 import { Signal } from '../../ui/signal';
 import type { MeasureKind } from '../../volume/measure';
-import type { Window } from '../../volume/slices';
+import { textOfWindow, type Window } from '../../volume/slices';
 import { layoutNames, paneLayout, type Layout } from './pane_area';
 import type { SliceMeasures } from './slice_measure';
 
@@ -60,9 +60,10 @@ function select<T extends string>(label: string, options: readonly (readonly [T,
 }
 
 // The name of a window for CT; '' for any other one.
-export function windowName([low, high]: Window, usual: Window): string {
+export function windowName(window: Window, usual: Window): string {
   const windows = [['Usual', usual] as const, ...ctWindows];
-  return windows.find(([, known]) => known[0] === low && known[1] === high)?.[0] ?? '';
+  // An address has fewer digits than the usual window.
+  return windows.find(([, known]) => textOfWindow(known) === textOfWindow(window))?.[0] ?? '';
 }
 
 // Says which of the windows for CT is shown.
