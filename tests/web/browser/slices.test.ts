@@ -198,8 +198,19 @@ describe('slices before there is a mesh', () => {
       await expect.poll(() => whitePixels(axial)).toBeGreaterThan(50);
     }
     // The first window once more: what is in it is seen again as before, and the insert stays.
+    const choice = page.getByLabel('Window', { exact: true });
+    const chosen = (): Promise<string | undefined> => choice.evaluate((one: HTMLSelectElement) => one.selectedOptions[0]?.textContent ?? undefined);
+    expect(await chosen()).toBe('Custom');
     await page.getByRole('button', { name: 'Reset window' }).click();
     await expect.poll(() => whitePixels(axial)).toBeGreaterThan(1000);
+    expect(await chosen()).toBe('Usual');
+    // A window for CT that was left by a drag can be chosen again.
+    for (const key of ['Shift+ArrowRight', 'Shift+ArrowUp']) {
+      await choice.selectOption('Lung');
+      await expect.poll(() => noted(page, 'window')).toBe('-1350,150');
+      await axial.press(key);
+      await expect.poll(chosen).toBe('Custom');
+    }
   });
 
   it('tell the value of the slab that is shown, and the iso-value is still that of a sample', async () => {
@@ -232,6 +243,30 @@ describe('slices before there is a mesh', () => {
     await canvas.click({ position: { x: box.width / 2 + 10 * scale, y: box.height / 2 } });
     await expect.poll(() => canvas.getAttribute('aria-label')).toMatch(/, (19\.[5-9]|20(\.[0-5])?) mm$/);
     expect(noted(page, 'at')).toBe(place);
+    // The length stands on its ground, 8 pixels from the point, and not over the point.
+    const coloured = (from: number, to: number): Promise<number> =>
+      canvas.evaluate(
+        (one: HTMLCanvasElement, [left, right, middle]) => {
+          const { data = [] } = one.getContext('2d', { willReadFrequently: true })?.getImageData(left, middle - 6, right - left, 4) ?? {};
+          let count = 0;
+          for (let i = 0; i < data.length; i += 4) if ((data[i] ?? 0) > (data[i + 2] ?? 0) + 60) count += 1;
+          return count;
+        },
+        [Math.round(box.width / 2 + 10 * scale) + from, Math.round(box.width / 2 + 10 * scale) + to, Math.round(box.height / 2)] as const,
+      );
+    await expect.poll(() => coloured(8, 60)).toBeGreaterThan(10);
+    expect(await coloured(-40, 6)).toBe(0);
+    // Keys that are pressed in a dialog are the dialog's.
+    await page.keyboard.press('?');
+    const dialog = page.locator('dialog.help');
+    await dialog.waitFor();
+    await page.keyboard.press('Control+Enter');
+    await page.keyboard.press('Delete');
+    await dialog.getByRole('heading').click();
+    for (const key of ['?', 'Delete', 'Escape']) await page.keyboard.press(key);
+    await expect.poll(() => dialog.count()).toBe(0);
+    await expect.poll(() => canvas.getAttribute('aria-label')).toContain('mm');
+    expect(page.url()).toContain('#/volumes/');
     await page.keyboard.press('Escape');
     await expect.poll(() => canvas.getAttribute('aria-label')).not.toContain('mm');
   });

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { formatMilliseconds, formatNumber, formatSize, formatValue } from '@/ui/format';
+import { formatMilliseconds, formatNumber, formatSize, formatValue, shortened } from '@/ui/format';
 import { placeText } from '@/views/slices/slice_looks';
 
 describe('a time', () => {
@@ -25,5 +25,22 @@ describe('what is small', () => {
   it('is not rounded to nothing', () => {
     expect([0, 48.26, 1, 0.5, 0.03, 0.0412, 0.00000123].map(formatSize)).toEqual(['0', '48.3', '1', '0.5', '0.03', '0.0412', '1.23e-6']);
     expect(placeText([0.15, -0.16, 0.155], 'LPS', [0.01, 0.01, 0.01])).toBe('LPS 0.15, \u22120.16, 0.155 mm');
+  });
+});
+
+describe('a value far from zero', () => {
+  it('has the digits that tell it apart within its range', () => {
+    expect(shortened(1_000_004.482_421_875, 9)).toBe(1_000_004.48242);
+    expect(shortened(-1_000_004.482_421_875, 0.5)).toBe(-1_000_004.482422);
+    expect(formatValue(1_000_004.482_421_875, 9)).toBe('1\u202f000\u202f004.48');
+    expect(formatValue(1e6, 9)).toBe('1\u202f000\u202f000');
+    expect([1.0001e-5, 1.0002e-5].map((value) => formatValue(value, 1e-9))).toEqual(['1.000100e-5', '1.000200e-5']);
+  });
+
+  it('has as few as ever in a wide range', () => {
+    expect([shortened(250.5, 4095), shortened(300, 4e9), shortened(1 / 3, 1)]).toEqual([250.5, 300, 0.333333]);
+    expect([250.5, 1234.5, 0.25].map((value) => formatValue(value, 4095))).toEqual([250.5, 1234.5, 0.25].map((value) => formatValue(value)));
+    // Also where all samples are equal.
+    expect([shortened(0, 9), shortened(12.3456789, 0), formatValue(12.3456, 0)]).toEqual([0, 12.3457, '12.35']);
   });
 });

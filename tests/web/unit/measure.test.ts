@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { angleAt, areaOf, measureText } from '@/volume/measure';
-import { pixelsOf, placeText } from '@/views/slices/slice_looks';
+import { pixelsOf, placeText, windowName } from '@/views/slices/slice_looks';
+import { rounded } from '@/views/slices/slice_readout';
 import { SliceMeasures } from '@/views/slices/slice_measure';
 import { slicePlane } from '@/volume/geometry';
 import type { Volume } from '@/api/types';
@@ -57,6 +58,19 @@ describe('the looks of slices', () => {
       const sums = [...pixelsOf(name)].map((pixel) => (pixel & 255) + ((pixel >> 8) & 255) + ((pixel >> 16) & 255));
       expect(sums[255]).toBeGreaterThan((sums[0] ?? 0) + 300);
     }
+  });
+
+  it('tell which window is shown', () => {
+    const usual: [number, number] = [-1023.456, 1500];
+    expect([windowName([0, 80], usual), windowName(usual, usual), windowName([-1023.46, 1500], usual)]).toEqual(['Brain', 'Usual', 'Usual']);
+    expect(windowName([0, 81], usual)).toBe('');
+  });
+
+  it('tell values with the digits that their window needs', () => {
+    const window: [number, number] = [1_000_000, 1_000_009];
+    expect(rounded({ low: 1_000_004.47, high: 1_000_004.5 }, window)).toEqual({ text: 'about 1\u202f000\u202f004.49', value: 1_000_004.49 });
+    expect(rounded({ low: -Infinity, high: 1_000_000.02 }, window).text).toBe('at most 1\u202f000\u202f000.02');
+    expect(rounded({ low: 34.2, high: 50.1 }, [-1000, 3000])).toEqual({ text: 'about 40', value: 40 });
   });
 
   it('tell places in either space', () => {

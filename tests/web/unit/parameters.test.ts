@@ -16,7 +16,7 @@ import { commandSnippet, curlSnippet, librarySnippet } from '@/job/snippets';
 import { parameterOf } from '@/job/table';
 import { rawFault } from '@/volume/raw';
 import { draggedWindow } from '@/volume/slices';
-import { inSlice, windowToFetch } from '@/volume/slices';
+import { inSlice, textOfWindow, windowOfText, windowToFetch } from '@/volume/slices';
 import { fitDistance, placeOfText, placeToText, turned } from '@/scene/views';
 
 const defaults = defaultParameters('v'.repeat(64), 60);
@@ -193,6 +193,16 @@ describe('slices', () => {
     expect(low).toBe(300);
     expect(high).toBeGreaterThan(400);
     expect(windowToFetch([-500, 900], 300, common)[0]).toBe(-500);
+  });
+
+  it('have windows with the digits that their width needs', () => {
+    const common: [number, number] = [1_000_000, 1_000_009];
+    const [low, high] = windowToFetch([1_000_004.1, 1_000_004.3], 1_000_004.2, common);
+    expect(low).toBeCloseTo(1_000_004.02, 4);
+    expect(high).toBeCloseTo(1_000_004.38, 4);
+    expect(textOfWindow(common)).toBe('1000000,1000009');
+    expect(windowOfText(textOfWindow([1_000_004.1, 1_000_004.3]))).toEqual([1_000_004.1, 1_000_004.3]);
+    expect(textOfWindow([-1024.123456, 3071])).toBe('-1024.12,3071');
   });
 
   it('measure the iso-value in their own values', () => {

@@ -11,11 +11,12 @@ export function emptyReason({ parameters, mesh }: Job, volume: Pick<Volume, 'ran
     return `The surface is empty: ${components} dropped. Keep more components.`;
   }
   const iso = mesh?.iso ?? parameters.iso;
-  const at = typeof iso === 'number' ? `at the iso-value ${formatValue(iso)}` : 'at this iso-value';
+  const span = volume ? volume.range[1] - volume.range[0] : undefined;
+  const at = typeof iso === 'number' ? `at the iso-value ${formatValue(iso, span)}` : 'at this iso-value';
   const where = parameters.crop ? ' within the box' : '';
   if (!volume) return `There is no surface ${at}${where}.`;
   const [low, high] = volume.range;
-  const samples = `the volume's samples range from ${formatValue(low)} to ${formatValue(high)}`;
+  const samples = `the volume's samples range from ${formatValue(low, span)} to ${formatValue(high, span)}`;
   if (typeof iso === 'number' && (iso <= low || iso > high)) {
     return `There is no surface ${at}: ${samples}. Choose an iso-value between these limits.`;
   }

@@ -108,6 +108,7 @@ export class Rulers {
   paintLabels(context: CanvasRenderingContext2D, camera: Camera, scale: number): void {
     const { width, height } = context.canvas;
     const size = 12 * scale;
+    context.save();
     context.font = `600 ${size}px system-ui, sans-serif`;
     context.textAlign = 'center';
     context.textBaseline = 'middle';
@@ -122,6 +123,7 @@ export class Rulers {
       context.fillStyle = '#fff';
       context.fillText(text, place.x, place.y);
     }
+    context.restore();
   }
 
   private middleOf({ from, to }: Ruler): Vector3 {

@@ -135,8 +135,14 @@ export function bringIntoView(element: Element): void {
   element.scrollIntoView({ block: 'nearest', behavior: isCalm ? 'instant' : 'smooth' });
 }
 
-// True while a control takes what is typed, so that the keys are no shortcuts of the page.
+// True while a dialog covers the page, so that all keys are the dialog's.
+export function isBehindDialog(): boolean {
+  return document.querySelector('dialog[open]') !== null;
+}
+
+// True while a control or a dialog takes what is typed, so that the keys are no shortcuts of the page.
 export function isTyping(event: KeyboardEvent): boolean {
   const target = event.target as HTMLElement | null;
-  return target?.closest('input:not([type=checkbox]):not([type=radio]):not([type=range]):not([type=color]), textarea, select, dialog') != null;
+  // A click on a dialog's text leaves the focus to the page's body.
+  return isBehindDialog() || target?.closest('input:not([type=checkbox]):not([type=radio]):not([type=range]):not([type=color]), textarea, select') != null;
 }

@@ -17,13 +17,27 @@ export function formatNumber(value: number, digits = 2): string {
     .replace('-', '\u2212');
 }
 
-// Four digits that count, for values of any size.
-export function formatValue(value: number): string {
+// Of the first digit of a number: 2 for hundreds.
+function magnitudeOf(value: number): number {
+  return Math.floor(Math.log10(Math.abs(value)));
+}
+
+const mostDigits = 17; // a double has no more
+
+// As short as tells it apart from others in a range of that length, however far from zero that range lies.
+export function shortened(value: number, span: number, least = 6): number {
+  const needed = value !== 0 && span > 0 ? 6 + magnitudeOf(value) - magnitudeOf(span) : least;
+  return Number(value.toPrecision(Math.min(mostDigits, Math.max(least, needed))));
+}
+
+// Four digits that count, for values of any size; more where values of a range of that length need them to be told apart.
+export function formatValue(value: number, span = Infinity): string {
   if (value === 0) return '0';
   const size = Math.abs(value);
-  if (size >= 1000) return formatNumber(value, 0);
-  if (size < 1e-4) return value.toExponential(2);
-  return formatNumber(value, Math.max(0, 3 - Math.floor(Math.log10(size))));
+  const needed = span > 0 ? 2 - magnitudeOf(span) : 0; // digits after the point
+  if (size < 1e-4) return value.toExponential(Math.min(mostDigits, Math.max(2, needed + magnitudeOf(size))));
+  const usual = size >= 1000 ? 0 : Math.max(0, 3 - magnitudeOf(size));
+  return formatNumber(value, Math.min(mostDigits, Math.max(usual, needed)));
 }
 
 // Lengths and areas have one digit after the point, small ones three digits that count.

@@ -1,6 +1,7 @@
 // Slices of a volume as samples: fetched as pictures of 8 bits over a window, kept while they are near.
 import { client } from '../client';
 import type { Axis, Volume } from '../api/types';
+import { shortened } from '../ui/format';
 import type { LabelMap } from './label_map';
 
 export type Window = [number, number];
@@ -98,7 +99,11 @@ export function windowToFetch(shown: Window, iso: number, common: Window): Windo
   const high = Math.max(shown[1], iso + margin);
   const covered = low >= common[0] && high <= common[1];
   if (covered && common[1] - common[0] <= 4 * (high - low)) return common;
-  return [Number(low.toPrecision(6)), Number(high.toPrecision(6))];
+  return [shortened(low, high - low), shortened(high, high - low)];
+}
+
+export function textOfWindow([low, high]: Window): string {
+  return [low, high].map((value) => shortened(value, high - low, 5)).join(',');
 }
 
 // As an address says it; null if it does not.

@@ -68,7 +68,7 @@ function factsOf(volume: Volume): string {
     volume.modality,
     `${formatDims(volume.dims)}, ${volume.type}`,
     formatSpacing(volume.spacing),
-    `values ${formatValue(volume.range[0])} to ${formatValue(volume.range[1])}`,
+    `values ${volume.range.map((value) => formatValue(value, volume.range[1] - volume.range[0])).join(' to ')}`,
   ]
     .filter(Boolean)
     .join(' \u00b7 ');

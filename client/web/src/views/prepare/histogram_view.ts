@@ -1,6 +1,6 @@
 // The histogram with the iso-value as a line to drag.
 import { h, svg } from '../../ui/dom';
-import { formatValue } from '../../ui/format';
+import { formatValue, shortened } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
 import { barHeights, binWidth, niceStep, quantile, ticks, type Histogram } from '../../volume/histogram';
 import type { Window } from '../../volume/slices';
@@ -64,7 +64,7 @@ export class HistogramView {
         'div',
         { class: 'ticks', 'aria-hidden': 'true' },
         ...marks.map((value) => {
-          const label = h('span', {}, formatValue(value));
+          const label = h('span', {}, formatValue(value, this.high - this.low));
           label.style.left = `${(100 * this.toX(value)) / width}%`;
           return label;
         }),
@@ -90,7 +90,7 @@ export class HistogramView {
     this.band.setAttribute('x', String(left));
     this.band.setAttribute('width', String(Math.max(0, right - left)));
     this.thumb.setAttribute('aria-valuenow', String(iso));
-    this.thumb.setAttribute('aria-valuetext', `iso-value ${formatValue(iso)}`);
+    this.thumb.setAttribute('aria-valuetext', `iso-value ${formatValue(iso, this.high - this.low)}`);
   }
 
   private toX(value: number): number {
@@ -114,7 +114,7 @@ export class HistogramView {
 
   private rounded(value: number): number {
     const whole = Math.round(value / this.step) * this.step;
-    return Number(Math.max(this.low, Math.min(this.high, whole)).toPrecision(9));
+    return shortened(Math.max(this.low, Math.min(this.high, whole)), this.high - this.low, 9);
   }
 
   private listen(): void {

@@ -172,7 +172,7 @@ export class LiveView {
 
   private showIso(): void {
     if (!this.surface || !this.preview || this.iso === null || Number.isNaN(this.preview.window[0])) return;
-    this.showPlace(`Preview of the surface at iso-value ${formatValue(this.iso)}`);
+    this.showPlace(`Preview of the surface at iso-value ${formatValue(this.iso, this.host.window[1] - this.host.window[0])}`);
     this.surface.setIso(this.iso);
   }
 

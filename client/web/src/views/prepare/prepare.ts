@@ -6,17 +6,18 @@ import { changed, defaultParameters, estimateQuery, jobRequest, parametersOfQuer
 import { kindOf, kinds, withKind, type Kind } from '../../job/kinds';
 import { trianglesOf } from '../../job/labels';
 import { isByLabels, withLabels } from '../../job/table';
-import { button, choose, h, isTyping, segmented } from '../../ui/dom';
-import { formatValue } from '../../ui/format';
+import { button, choose, h, isBehindDialog, isTyping, segmented } from '../../ui/dom';
+import { formatValue, shortened } from '../../ui/format';
 import { History } from '../../ui/history';
 import { refusal } from '../../ui/notices';
 import { go, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { cssColour, theme } from '../../ui/theme';
 import { defaultWindow, type Histogram } from '../../volume/histogram';
-import { SliceSource, windowOfText, type Window } from '../../volume/slices';
+import { SliceSource, textOfWindow, windowOfText, type Window } from '../../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
+import { isCt } from '../../volume/looks';
 import type { LabelLook } from '../../volume/label_map';
 import { eachLabel, isInteger, volumeName } from '../../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
@@ -29,7 +30,7 @@ import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
 import { paneArea } from '../slices/pane_area';
-import { sliceControls } from '../slices/slice_looks';
+import { sliceControls, WindowChoice } from '../slices/slice_looks';
 import { SliceLayers } from '../slices/slice_layers';
 import { ObliqueView } from '../slices/oblique_view';
 import { SliceMeasures } from '../slices/slice_measure';
@@ -38,17 +39,16 @@ import { SliceView, type SliceHost } from '../slices/slice_view';
 const mostBins = 1024;
 const estimateDelay = 300;
 
-// Enough digits for any iso-value, and few enough to be read.
-function shortened(iso: number): number {
-  return Number(iso.toPrecision(6));
-}
-
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
   const volume = await client.getVolume(route.path[1] ?? '');
   // A bin for each value where there are few: more bins would leave gaps between the values.
   const values = isInteger(volume) ? volume.range[1] - volume.range[0] + 1 : mostBins;
   const histogram = await client.histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
   return new Prepare(scope, route, volume, histogram).element;
+}
+
+function spanOf({ range: [low, high] }: Volume): number {
+  return high - low;
 }
 
 function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
@@ -87,6 +87,7 @@ class Prepare {
   private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
   private readonly problem = h('div');
   private readonly windowText = h('span', { class: 'window-text faint' });
+  private readonly windowChoice: WindowChoice | null;
   private readonly resetWindow = h('button', { type: 'button', class: 'chip' }, 'Reset window');
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
@@ -100,11 +101,12 @@ class Prepare {
     private readonly volume: Volume,
     counts: Histogram,
   ) {
-    this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso));
+    this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso, spanOf(volume)));
     this.parameters = startOfQuery(route.query, volume, this.defaults);
     this.history = new History(this.parameters);
     const common = defaultWindow(counts, volume.suggested_iso);
     this.window = windowOfText(route.query.get('window') ?? '') ?? common;
+    this.windowChoice = isCt(volume) ? new WindowChoice(common, (window) => this.setWindow(window)) : null;
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
     this.oblique = new ObliqueView({ volume, setCursor: (cursor) => this.setCursor(cursor), cursor: () => this.cursor, window: () => this.window }, scope);
@@ -162,12 +164,13 @@ class Prepare {
     scope.listen(window, 'pointerdown', () => this.history.hold(), { capture: true });
     for (const end of ['pointerup', 'pointercancel'] as const) scope.listen(window, end, () => this.history.release());
     scope.listen(window, 'keydown', (event: KeyboardEvent) => {
+      if (isBehindDialog()) return;
       if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
       else if (event.key.toLowerCase() === 'z' && (event.ctrlKey || event.metaKey) && !isTyping(event)) {
         event.preventDefault();
         this.goBack(event.shiftKey ? this.history.redo() : this.history.undo());
       } else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
-      else if (event.key === 'Escape') this.measures.takeBack();
+      else if (event.key === 'Escape' && !isTyping(event)) this.measures.takeBack();
       else if (event.key === 'Delete' && !isTyping(event)) this.measures.clear();
     });
   }
@@ -274,7 +277,7 @@ class Prepare {
         this.isoPart,
         this.labelPart,
         this.windowRow(common),
-        sliceControls(volume, this.measures, (window) => this.setWindow(window ?? common)),
+        sliceControls(this.windowChoice, this.measures),
         this.layers.element,
         this.crop?.element ?? '',
         ...notedOf(volume),
@@ -308,8 +311,9 @@ class Prepare {
 
   private isoRow(): HTMLElement {
     const { suggested_iso: otsu, presets } = this.volume;
+    const span = spanOf(this.volume);
     const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
-      button(`${name} ${formatValue(iso)}`, () => this.setIso(shortened(iso)), { class: 'chip' }),
+      button(`${name} ${formatValue(iso, span)}`, () => this.setIso(shortened(iso, span)), { class: 'chip' }),
     );
     return h(
       'div',
@@ -369,11 +373,12 @@ class Prepare {
     const [low, high] = this.window;
     // Labels are seen as they are.
     this.windowText.hidden = this.resetWindow.hidden = isByLabels(this.parameters);
-    this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
+    this.windowChoice?.show(this.window);
+    this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2, high - low)}`;
     this.isoField.show(this.iso);
     noteInAddress({
       ...queryOfParameters(this.parameters, this.defaults),
-      window: this.window.map((value) => Number(value.toPrecision(5))).join(','),
+      window: textOfWindow(this.window),
       at: this.cursor.join(','),
     });
   }

@@ -205,6 +205,7 @@ export class ObliqueView {
 
   private paintLetters(context: CanvasRenderingContext2D, right: Vec3, down: Vec3): void {
     const opposite = (vector: Vec3): Vec3 => vector.map((value) => -value) as Vec3;
+    context.save();
     context.font = '600 11px system-ui, sans-serif';
     context.fillStyle = 'rgba(255, 255, 255, 0.75)';
     context.textAlign = 'center';
@@ -217,6 +218,7 @@ export class ObliqueView {
       [opposite(down), pixels / 2, edge],
     ];
     for (const [vector, x, y] of places) context.fillText(sideOf(vector), x, y);
+    context.restore();
   }
 
   // A drag turns it, the wheel moves it along its normal, and a click sends the slices there.

@@ -1,12 +1,11 @@
 // How slices are looked at, on the whole page: their colours, and the coordinates that are told.
-import type { Vec3, Volume } from '../../api/types';
+import type { Vec3 } from '../../api/types';
 import { colourTable } from '../../scene/colour_map';
 import { field, h, segmented } from '../../ui/dom';
 import { formatNumber } from '../../ui/format';
 import { Signal } from '../../ui/signal';
-import { isCt } from '../../volume/looks';
 import type { MeasureKind } from '../../volume/measure';
-import type { Window } from '../../volume/slices';
+import { textOfWindow, type Window } from '../../volume/slices';
 import { layoutNames, paneLayout, type Layout } from './pane_area';
 import type { SliceMeasures } from './slice_measure';
 
@@ -60,14 +59,42 @@ function select<T extends string>(label: string, options: readonly (readonly [T,
   return field(label, element);
 }
 
-// `setWindow` gets null for the usual window.
-export function sliceControls(volume: Volume, measures: SliceMeasures, setWindow: (window: Window | null) => void): HTMLElement {
-  const windows = [['Usual', null] as const, ...ctWindows];
-  const presets =
-    isCt(volume) &&
-    select('Window', windows.map(([name]) => [name, name] as const), 'Usual', (name) =>
-      setWindow(windows.find(([known]) => known === name)?.[1] ?? null),
-    );
+// The name of a window for CT; '' for any other one.
+export function windowName(window: Window, usual: Window): string {
+  const windows = [['Usual', usual] as const, ...ctWindows];
+  // An address has fewer digits than the usual window.
+  return windows.find(([, known]) => textOfWindow(known) === textOfWindow(window))?.[0] ?? '';
+}
+
+// Says which of the windows for CT is shown.
+export class WindowChoice {
+  readonly element: HTMLElement;
+  private readonly choice: HTMLSelectElement;
+  // Cannot be chosen: it is the window that was made by dragging, or that an address says.
+  private readonly custom = h('option', { value: '', hidden: true }, 'Custom');
+
+  constructor(
+    private readonly usual: Window,
+    setWindow: (window: Window) => void,
+  ) {
+    const windows = [['Usual', usual] as const, ...ctWindows];
+    this.choice = h('select', {}, ...windows.map(([name]) => h('option', { value: name }, name)), this.custom);
+    this.choice.addEventListener('change', () => {
+      const chosen = windows.find(([name]) => name === this.choice.value);
+      if (chosen) setWindow(chosen[1]);
+    });
+    this.element = field('Window', this.choice);
+  }
+
+  show(window: Window): void {
+    const name = windowName(window, this.usual);
+    this.custom.hidden = name !== '';
+    this.choice.value = name;
+  }
+}
+
+// `windows` is null where the usual windows for CT mean nothing.
+export function sliceControls(windows: WindowChoice | null, measures: SliceMeasures): HTMLElement {
   const kinds = [
     { value: 'none', label: 'Off' },
     { value: 'length', label: 'Length', title: 'Click two points' },
@@ -80,7 +107,7 @@ export function sliceControls(volume: Volume, measures: SliceMeasures, setWindow
     h(
       'div',
       { class: 'row' },
-      presets,
+      windows?.element,
       select('Colours', Object.entries(colourNames) as [ColourName, string][], sliceColours.value, (name) => (sliceColours.value = name)),
       layoutChoice(),
       select('Coordinates', [['LPS', 'LPS'], ['RAS', 'RAS']], sliceSpace.value, (space) => (sliceSpace.value = space)),

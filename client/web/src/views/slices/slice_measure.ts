@@ -111,6 +111,7 @@ function inPatient(volume: Volume, normal: SlicePlane['normal'], index: number, 
 // On a ground of its own, since slices may be white.
 function paintText(context: CanvasRenderingContext2D, text: string, x: number, y: number, ratio: number): void {
   context.font = `600 ${fontSize * ratio}px system-ui, sans-serif`;
+  context.textAlign = 'left';
   context.textBaseline = 'middle';
   const width = context.measureText(text).width + 8 * ratio;
   const left = Math.min(x, context.canvas.width - width);

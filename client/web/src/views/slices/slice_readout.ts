@@ -2,10 +2,10 @@
 import type { Vec3, Volume } from '../../api/types';
 import { labelTitle } from '../../job/labels';
 import { h } from '../../ui/dom';
-import { formatValue } from '../../ui/format';
+import { formatValue, shortened } from '../../ui/format';
 import { axisIndex, pictureAxes, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
-import { onlyInteger, valueIn, type Slice, type ValueRange } from '../../volume/slices';
+import { onlyInteger, valueIn, type Slice, type ValueRange, type Window } from '../../volume/slices';
 import { placeText, sliceSpace } from './slice_looks';
 
 export interface ReadoutHost {
@@ -24,14 +24,15 @@ interface Reading {
   value: number | null;
 }
 
-// Keeps the digits that the eight bits of a picture tell.
-function rounded({ low, high }: ValueRange): Reading {
-  if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
-  if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
-  const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
+// Keeps the digits that the eight bits of a picture over that window tell.
+export function rounded({ low, high }: ValueRange, [from, to]: Window): Reading {
+  if (low === -Infinity) return { text: `at most ${formatValue(high, to - from)}`, value: null };
+  if (high === Infinity) return { text: `at least ${formatValue(low, to - from)}`, value: null };
+  const span = high - low;
+  const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, span)));
   const middle = Math.round((low + high) / 2 / digits) * digits;
-  const value = Number(middle.toPrecision(6));
-  return { text: `about ${formatValue(value)}`, value };
+  const value = shortened(middle, span);
+  return { text: `about ${formatValue(value, span)}`, value };
 }
 
 export class SliceReadout {
@@ -62,7 +63,7 @@ export class SliceReadout {
     const slab = slice && this.host.slabOf(slice);
     if (!slab || place[axisIndex(slab.axis)] !== slab.index) return this.valueAt(place).text;
     const [column, row] = pictureAxes(slab.axis);
-    return rounded(valueIn(slab, place[column], place[row])).text;
+    return rounded(valueIn(slab, place[column], place[row]), slab.window).text;
   }
 
   // Reads the slice, also while a slab is shown: the mean of a slab is the value of no sample. Null where the picture tells no value.
@@ -78,6 +79,6 @@ export class SliceReadout {
     const range = valueIn(slice, place[column], place[row]);
     const exact = this.host.isInteger ? onlyInteger(range) : null;
     if (exact !== null) return { text: formatValue(exact), value: exact };
-    return rounded(range);
+    return rounded(range, slice.window);
   }
 }

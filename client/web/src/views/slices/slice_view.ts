@@ -272,6 +272,7 @@ export class SliceView {
   private paintLetters(context: CanvasRenderingContext2D, ratio: number): void {
     const { width, height } = this.canvas;
     const { right, down } = this.layout;
+    context.save();
     context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
     context.fillStyle = 'rgba(255, 255, 255, 0.75)';
     context.textAlign = 'center';
@@ -281,6 +282,7 @@ export class SliceView {
     context.fillText(right.end, width - edge, height / 2);
     context.fillText(down.begin, width / 2, edge);
     context.fillText(down.end, width / 2, height - edge);
+    context.restore();
   }
 
   // The column and row of the picture under a point of the screen.
