@@ -198,8 +198,16 @@ class WatchedOrders : public store::SqlOrderStore {
   }
   store::Time idle_at() const { return idle_at_; }
 
+  // A thread asks this before it sleeps because it has nothing to do.
+  std::optional<store::Time> next_after(store::Time now) const override {
+    looked_at_ = now;
+    return SqlOrderStore::next_after(now);
+  }
+  store::Time looked_at() const { return looked_at_; }
+
  private:
   mutable std::atomic<store::Time> idle_at_ = store::Time();
+  mutable std::atomic<store::Time> looked_at_ = store::Time();
 };
 
 // Counts how often somebody has begun to look at what is held.
@@ -258,7 +266,9 @@ class OrdersTest : public test::JobsFixture {
                                                      .received = received_,
                                                      .peers = peers_},
                                        settings_,
-                                       OrderOptions{.now = [this] { return now(); }, .threads = 3});
+                                       OrderOptions{.now = [this] { return now(); },
+                                                    .keep_orders = [this] { return keep(); },
+                                                    .threads = 3});
     orders_->on_end([](const std::string&) {});
   }
 
@@ -276,6 +286,11 @@ class OrdersTest : public test::JobsFixture {
   Order get(const std::string& id) const { return orders_->get(std::nullopt, id); }
 
   store::Time now() const { return std::chrono::system_clock::now() + ahead_.load(); }
+
+  // As when another process takes the orders, and as when it ends.
+  void lose_orders() { are_lost_ = true; }
+  void regain_orders() { are_lost_ = false; }
+  std::string keep() const { return are_lost_ ? "another process has them" : ""; }
 
   void pass(milliseconds time) {
     ahead_ = ahead_.load() + time;
@@ -338,6 +353,7 @@ class OrdersTest : public test::JobsFixture {
   }
 
   std::atomic<milliseconds> ahead_ = milliseconds(0);
+  std::atomic<bool> are_lost_ = false;
   HospitalSettings settings_;
   Peers peers_;
   FakePacs* main_ = nullptr;

@@ -75,6 +75,29 @@ TEST_F(OrdersTest, HaveTheNamesOfTheirOwnSegments) {
   EXPECT_EQ(main_->stores, 2);
 }
 
+// The step in progress leaves no trace, because the other process makes it.
+TEST_F(OrdersTest, PauseWhileAnotherProcessHasThem) {
+  main_->hangs = true;
+  const std::string begun = submit();
+  ASSERT_TRUE(until([&] { return main_->calls > 0; }));
+  lose_orders();
+  ASSERT_TRUE(until([&] { return orders_->is_paused(); }));
+  const int calls = main_->calls;
+  main_->hangs = false;
+  const std::string later = submit();
+  const store::Time paused = now();
+  ASSERT_TRUE(until([&] { return store_.looked_at() > paused; }));
+  EXPECT_EQ(main_->calls, calls);
+  for (const std::string& id : {begun, later}) {
+    EXPECT_EQ(get(id).state, OrderState::kWaiting);
+    EXPECT_EQ(get(id).attempts, 0U);
+  }
+  regain_orders();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(begun, OrderState::kSucceeded));
+  EXPECT_FALSE(orders_->is_paused());
+}
+
 class UnusableOrdersTest : public OrdersTest {
  protected:
   // The error of an order of a series with these files.
