@@ -93,6 +93,7 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::atomic<bool> hangs = false;
   std::atomic<int> retry_after = 0;
   std::atomic<int> calls = 0;
+  std::atomic<int> aborted = 0;
   std::atomic<int> stores = 0;
   std::atomic<int> fetches = 0;
   std::atomic<int> sent_slices = kSlices;  // of those that it lists
@@ -173,7 +174,10 @@ class FakePacs : public Archive, public ObjectReceiver {
   void answer(const std::stop_token& stop) {
     ++calls;
     while (hangs) {
-      if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
+      if (stop.stop_requested()) {
+        ++aborted;
+        throw Error(ErrorCode::kCancelled, "stopped");
+      }
       std::this_thread::sleep_for(milliseconds(2));
     }
     if (is_down) {
