@@ -192,6 +192,13 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   return 0;
 }
 
+void take_orders(RecordStores& records) {
+  const std::string reason = records.keep_orders();
+  if (reason.empty()) return;
+  throw Error(ErrorCode::kUnavailable,
+              "only one daemon may have --hospital, and this one cannot: " + reason);
+}
+
 int run(const Options& options, const sigset_t& signals) {
   std::jthread starting = end_start_on_signal(signals);
   const net::Address address = net::parse_address(options.listen);
@@ -239,7 +246,7 @@ int run(const Options& options, const sigset_t& signals) {
   server_options.tls = files.tls.get();
   server_options.part_bytes = options.max_disk / 4;
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
-  if (!options.hospital.empty()) records->take_orders();
+  if (!options.hospital.empty()) take_orders(*records);
   const std::unique_ptr<http::Wing> hospital =
       hospital::open({.file = options.hospital,
                       .max_upload_bytes = options.http.upload.max_bytes,
@@ -254,7 +261,8 @@ int run(const Options& options, const sigset_t& signals) {
                       .orders = records->orders(),
                       .audit = records->audit(),
                       .received = records->received(),
-                      .believed_now = [&records] { return records->now(); }});
+                      .believed_now = [&records] { return records->now(); },
+                      .keep_orders = [&records] { return records->keep_orders(); }});
   const http::Services services = {.folder = folder,
                                    .blobs = blobs,
                                    .volumes = volumes,

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 #include <unistd.h>
@@ -11,7 +10,7 @@
 #include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/store/postgresql/database.h"
-#include "server/store/postgresql/exclusive_task.h"
+#include "server/store/postgresql/held_task.h"
 #include "server/store/postgresql/identity.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
@@ -37,8 +36,13 @@ store::JobStoreOptions job_options(const Options& options) {
 // Common to all databases; they are opened first.
 class SqlStores : public RecordStores {
  public:
-  explicit SqlStores(store::SqlDatabase& database)
-      : volumes_(database), orders_(database), audit_(database), received_(database) {}
+  explicit SqlStores(
+      store::SqlDatabase& database,
+      store::SqlOrderStore::IsOurs has_orders = [](store::SqlConnection&) { return true; })
+      : volumes_(database),
+        orders_(database, std::move(has_orders)),
+        audit_(database),
+        received_(database) {}
 
   store::VolumeStore& volumes() override { return volumes_; }
   store::OrderStore& orders() override { return orders_; }
@@ -66,7 +70,7 @@ class FolderStores : public SqlStores {
   store::JobStore& jobs() override { return jobs_; }
   store::Outbox& outbox() override { return outbox_; }
   store::Time now() override { return identity_.now(); }
-  void take_orders() override {}
+  std::string keep_orders() override { return ""; }
 
  private:
   std::unique_ptr<store::Database> database_;
@@ -88,29 +92,25 @@ class SharedStores : public SqlStores {
  public:
   SharedStores(const Options& options, std::unique_ptr<store::postgresql::Database> database,
                store::BlobStore& blobs, std::chrono::milliseconds tolerance)
-      : SqlStores(*database),
+      : SqlStores(*database,
+                  [this](store::SqlConnection& connection) { return task_.is_ours(connection); }),
         database_(std::move(database)),
         identity_(*database_, blobs, options.overrides, tolerance),
         jobs_(*database_, blobs, job_options(options)),
-        outbox_(*database_) {}
+        outbox_(*database_),
+        task_(*database_, "orders") {}
 
   store::JobStore& jobs() override { return jobs_; }
   store::Outbox& outbox() override { return outbox_; }
   store::Time now() override { return identity_.now(); }
-  void take_orders() override {
-    task_.emplace(database_->url(), "orders");
-    if (task_->is_ours()) return;
-    throw Error(
-        ErrorCode::kUnavailable,
-        "another isomeshd with this database already has --hospital: only one may process orders");
-  }
+  std::string keep_orders() override { return task_.keep(); }
 
  private:
   std::unique_ptr<store::postgresql::Database> database_;
   store::postgresql::Identity identity_;
   store::postgresql::PostgresJobStore jobs_;
   store::postgresql::PostgresOutbox outbox_;
-  std::optional<store::postgresql::ExclusiveTask> task_;
+  store::postgresql::HeldTask task_;
 };
 
 }  // namespace

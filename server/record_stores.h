@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <string>
 
 #include "server/options.h"
 #include "server/store/audit_trail.h"
@@ -30,9 +31,10 @@ class RecordStores {
   // The current time, as far as the clock is plausible (store/believed_clock.h).
   virtual store::Time now() = 0;
 
-  // Makes this process responsible for orders. Throws Error kUnavailable if another process that
-  // shares the records is.
-  virtual void take_orders() = 0;
+  // Makes this process responsible for orders, or keeps it so. Returns an empty text if it is until
+  // the next call, which must come within a second or so; otherwise why it is not, for example
+  // because another process that shares the records is. Does not throw.
+  virtual std::string keep_orders() = 0;
 };
 
 // Opens the stores of --store; `tolerance` is how far a clock may be ahead. Throws Error

@@ -86,6 +86,7 @@ class OpenHospital {
                 settings_,
                 {.keep = settings.keep,
                  .believed_now = services.believed_now,
+                 .keep_orders = services.keep_orders,
                  .cut_off = [this, &services] {
                    responses_.stop();
                    if (dimse_) dimse_->stop();
@@ -180,6 +181,12 @@ http::MeasuredFamily oldest_of(const store::OrderCounts& counts) {
           .values = {{{}, std::chrono::duration<double>(age).count()}}};
 }
 
+http::MeasuredFamily paused(bool is_paused) {
+  return {.name = "isomesh_orders_paused",
+          .help = "1 while another daemon processes the orders, or the database does not respond",
+          .values = {{{}, is_paused ? 1.0 : 0.0}}};
+}
+
 class HospitalWing final : public http::Wing {
  public:
   HospitalWing(const http::WingSettings& settings, const http::WingServices& services)
@@ -213,7 +220,8 @@ class HospitalWing final : public http::Wing {
   std::vector<http::MeasuredFamily> measure() const override {
     if (!hospital_) return {};
     const store::OrderCounts counts = hospital_->orders().counts();
-    return {orders_of(counts), failures_of(hospital_->orders().attempts()), oldest_of(counts)};
+    return {orders_of(counts), failures_of(hospital_->orders().attempts()), oldest_of(counts),
+            paused(hospital_->orders().is_paused())};
   }
 
   void begin_drain() override {

@@ -105,7 +105,7 @@ class OrderStore {
   // Saves a step and the time of the next one. From now on the order names exactly the blobs of its
   // work; in a final state it names none. Entering a final state also adds its callback, in the
   // same transaction. Returns false, without changes, if the order is already in a final state
-  // because it was cancelled.
+  // because it was cancelled, or if another process carries out the orders now.
   virtual bool save(const OrderRecord& record, Time next) = 0;
 
   // The blobs that the order names.

@@ -274,6 +274,34 @@ TEST_F(Cluster, ARunOutlivesAnOutageThatIsLongerThanItsLease) {
   EXPECT_TRUE(comes_to(0, running.id, JobState::kCancelled));
 }
 
+TEST_F(Cluster, OneDaemonProcessesOrdersAlsoAfterARestartOfTheDatabase) {
+  const std::filesystem::path hospital = folder_ / "hospital.toml";
+  write_file(hospital, "[[pacs]]\nname = \"main\"\ndicomweb = \"http://127.0.0.1:9\"\n");
+  const auto is_paused = [&](std::size_t node, const std::string& value) {
+    const std::string line = "\nisomesh_orders_paused " + value + '\n';
+    return eventually(
+        [&] { return this->node(node).get("/metrics").body.find(line) != std::string::npos; });
+  };
+  start(0, {"--workers", "0", "--hospital", hospital});
+  postgres_->stop_at_once();
+  postgres_->start();
+  ASSERT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
+  const Finished second =
+      run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder_ / "second", "--store", store_,
+           "--blobs", folder_ / "shared", "--hospital", hospital});
+  EXPECT_EQ(second.status, 1);
+  EXPECT_THAT(second.errors, HasSubstr("only one daemon may have --hospital"));
+  EXPECT_TRUE(is_paused(0, "0"));
+  // As if the first had not reached the database for longer than its lease. A statement, so that it
+  // cannot renew in between.
+  ask("UPDATE tasks SET node = gen_random_uuid(), folder = '', held_until = isomesh_now() + "
+      "600000000");
+  EXPECT_TRUE(is_paused(0, "1"));
+  EXPECT_EQ(node(0).get("/readyz").status, 200);
+  ask("DELETE FROM tasks");
+  EXPECT_TRUE(is_paused(0, "0"));
+}
+
 // A server that takes connections and answers nothing, whatever the URL says of time.
 TEST_F(Cluster, ADatabaseThatStandsStillIsToldAfterFiveSeconds) {
   store_ += (store_.find('?') == std::string::npos ? "?" : "&") + std::string("connect_timeout=60");

@@ -57,12 +57,11 @@ Orders::Orders(const OrderServices& services, const HospitalSettings& settings,
       steps_(services, settings, options_.now) {
   services_.audit.add({.event = store::AuditEvent::kStart});
   for (const PacsSettings& each : settings_.pacs) status_[each.name].name = each.name;
-  // Their jobs may have ended while no process waited for them.
-  for (const Order& order :
-       services_.orders.list(std::nullopt, {.state = OrderState::kMeshing}, "", kMostMeshing)) {
-    services_.orders.hurry(order.id);
-  }
+  look_at_jobs();
   try {
+    if (options_.keep_orders) {
+      threads_.emplace_back([this](const std::stop_token& stop) { keep(stop); });
+    }
     for (std::size_t n = 0; n < options_.threads; ++n) {
       threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
     }
@@ -94,6 +93,54 @@ void Orders::stop() {
   } catch (const std::exception& error) {
     log_error("the audit trail lacks the entry of this stop: {}", error.what());
   }
+}
+
+void Orders::look_at_jobs() {
+  for (const Order& order :
+       services_.orders.list(std::nullopt, {.state = OrderState::kMeshing}, "", kMostMeshing)) {
+    services_.orders.hurry(order.id);
+  }
+}
+
+void Orders::keep(const std::stop_token& stop) {
+  constexpr seconds kPause{1};
+  while (!stop.stop_requested()) {
+    try {
+      if (const std::string reason = options_.keep_orders(); !reason.empty()) {
+        pause(reason);
+      } else if (is_paused()) {
+        go_on();
+      }
+    } catch (const std::exception& error) {
+      log_error("orders stay paused, and going on is retried: {}", error.what());
+    }
+    Lock lock(mutex_);
+    changed_.wait_for(lock, stop, kPause, [] { return false; });
+  }
+}
+
+// Running steps end without a trace, as those of a process that ends: another one repeats them.
+void Orders::pause(const std::string& reason) {
+  const Lock lock(mutex_);
+  for (auto& [id, running] : running_) running.stop.request_stop();
+  if (paused_ == reason) return;
+  paused_ = reason;
+  log_warning("orders are paused here: {}", reason);
+}
+
+void Orders::go_on() {
+  look_at_jobs();
+  {
+    const Lock lock(mutex_);
+    paused_.clear();
+  }
+  log_info("orders are processed here again");
+  changed();
+}
+
+bool Orders::is_paused() const {
+  const Lock lock(mutex_);
+  return !paused_.empty();
 }
 
 std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest& request,
@@ -186,6 +233,7 @@ void Orders::changed() {
 }
 
 std::optional<std::string> Orders::take(std::stop_token& cancelled) {
+  if (is_paused()) return std::nullopt;
   // More orders than were fetched may wait for a PACS that hangs.
   for (std::size_t limit = kFirstDue;; limit *= 4) {
     const std::vector<store::OrderRecord> due = services_.orders.due(options_.now(), limit);
@@ -199,6 +247,7 @@ std::optional<std::string> Orders::take_one_of(const std::vector<store::OrderRec
   for (const store::OrderRecord& record : due) {
     const std::string pacs = OrderSteps::pacs_of(record);
     const Lock lock(mutex_);
+    if (!paused_.empty()) return std::nullopt;
     const auto busy = std::ranges::count_if(running_, [&](const auto& running) {
       return !pacs.empty() && running.second.pacs == pacs;
     });
@@ -328,7 +377,7 @@ void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Erro
   order.error = to_problem(error, "/v1/orders/" + order.id);
   const Time next = now + std::min<milliseconds>(delay, settings_.give_up);
   order.next_attempt = timestamp_of(next);
-  services_.orders.save(record, next);
+  if (!services_.orders.save(record, next)) return;
   log(record, std::string(describe(error.code()).name));
   if (error.code() == ErrorCode::kInternal) {
     log_error("a step of order {} failed and is retried: {}", order.id, error.what());
@@ -356,7 +405,7 @@ void Orders::save_failed(store::OrderRecord& record, const Problem& problem,
   order.finished = timestamp_of(options_.now());
   order.next_attempt.reset();
   order.error = problem;
-  services_.orders.save(record, options_.now());
+  if (!services_.orders.save(record, options_.now())) return;
   log(record, reason);
   ended(order.id);
   changed();

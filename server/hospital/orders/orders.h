@@ -28,6 +28,9 @@ struct OrderOptions {
   std::function<store::Time()> now = [] { return std::chrono::system_clock::now(); };
   // The believed clock, which decides what expires; empty: the same as `now`.
   std::function<store::Time()> believed_now = {};
+  // Makes this process responsible for orders or keeps it so; called each second. While it returns
+  // a text, this process makes no steps and no orders of its own accord. Empty: always responsible.
+  std::function<std::string()> keep_orders = {};
   // Called on stop; aborts long operations of steps, such as imports.
   std::function<void()> cut_off = {};
   std::size_t threads = 6;
@@ -80,6 +83,9 @@ class Orders {
   std::vector<Attempts> attempts() const;
   store::OrderCounts counts() const { return services_.orders.counts(); }
 
+  // True while this process is not responsible for orders.
+  bool is_paused() const;
+
   // Checks for due orders; call after setting the clock.
   void wake();
 
@@ -89,6 +95,11 @@ class Orders {
     std::stop_source stop;
   };
 
+  void keep(const std::stop_token& stop);
+  void pause(const std::string& reason);
+  void go_on();
+  // Makes orders due whose jobs may have ended while no process waited for them.
+  void look_at_jobs();
   void work(const std::stop_token& stop);
   void watch(const std::stop_token& stop);
   void forget();
@@ -128,6 +139,7 @@ class Orders {
   Condition changed_;
   std::function<void(const std::string&)> on_end_ ISOMESH_GUARDED_BY(mutex_);
   std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::string paused_ ISOMESH_GUARDED_BY(mutex_);                         // why; empty: not paused
   std::map<std::string, Running> running_ ISOMESH_GUARDED_BY(mutex_);     // by order
   std::map<std::string, std::string> by_job_ ISOMESH_GUARDED_BY(mutex_);  // waiting orders by job
   std::map<std::string, PacsStatus> status_ ISOMESH_GUARDED_BY(mutex_);

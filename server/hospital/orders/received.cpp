@@ -137,10 +137,13 @@ void Orders::receive(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       const store::Time now = options_.now();
+      if (is_paused()) waiting.clear();
       std::erase_if(waiting, [&](const auto& each) { return each.second <= now; });
       for (const store::HeldSeries& held : services_.received.held()) {
-        if (std::max(held.last, begun) + settings_.settle > now || waiting.contains(held.series))
+        if (is_paused() || std::max(held.last, begun) + settings_.settle > now ||
+            waiting.contains(held.series)) {
           continue;
+        }
         // Set first, so that a series that fails also waits and does not block others.
         waiting[held.series] = now + settings_.poll;
         if (look_at_received(held) == store::ReceivedFate::kDone) waiting.erase(held.series);

@@ -60,6 +60,23 @@ void check_count_of_objects(const Order& order, const Job& job) {
                   " objects; order fewer labels, or send them as obj");
 }
 
+// An object with such a text would rename the patient in the PACS, or be filed under another one.
+void check_identity(const DicomIdentity& identity) {
+  for (const auto& [name, text] : {std::pair{"Patient's Name", &identity.patient_name},
+                                   {"Patient ID", &identity.patient_id},
+                                   {"Issuer of Patient ID", &identity.issuer_of_patient_id},
+                                   {"Patient's Birth Date", &identity.patient_birth_date},
+                                   {"Patient's Sex", &identity.patient_sex},
+                                   {"Accession Number", &identity.accession_number},
+                                   {"Study ID", &identity.study_id}}) {
+    if (text->find("\xEF\xBF\xBD") == text->npos) continue;
+    throw Error(ErrorCode::kUnusableVolume,
+                std::string("the ") + name +
+                    " of the images has bytes that mean nothing in their Specific Character Set: "
+                    "correct the images, and submit the order again");
+  }
+}
+
 // Resets the list of instances, the images, and all results from them.
 void forget_images(store::OrderRecord& record) {
   record.order.state = OrderState::kWaiting;
@@ -214,6 +231,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
                          .study = source.study,
                          .instances = record.work.listed.size(),
                          .patient_id = identity.patient_id});
+    if (!record.order.send.empty()) check_identity(identity);
     record.order.volume = volume.id;
     record.work.identity = std::move(identity);
     if (record.order.parameters.labels) record.work.labels = std::move(volume.labels);
@@ -404,6 +422,7 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
 }
 
 Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) const {
+  if (!record.order.results.empty()) check_identity(record.work.identity.value());
   for (std::size_t index = 0; index < record.order.results.size(); ++index) {
     OrderResult& result = record.order.results[index];
     if (result.stored) continue;

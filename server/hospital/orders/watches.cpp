@@ -77,7 +77,7 @@ void Orders::watch(const std::stop_token& stop) {
   store::Time next_forgetting = options_.now();
   while (!stop.stop_requested()) {
     for (const Rule& rule : settings_.rules) {
-      if (rule.watch && !stop.stop_requested()) look_at_rule(rule, stop);
+      if (rule.watch && !stop.stop_requested() && !is_paused()) look_at_rule(rule, stop);
     }
     try {
       const store::Time now = options_.now();

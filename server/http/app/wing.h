@@ -47,6 +47,8 @@ struct WingServices {
   store::AuditTrail& audit;
   store::ReceivedStore& received;
   std::function<store::Time()> believed_now;
+  // Makes this process responsible for orders; see RecordStores.
+  std::function<std::string()> keep_orders;
 };
 
 // Each file with the setting that names it; a path may be empty.

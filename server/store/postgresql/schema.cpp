@@ -225,6 +225,14 @@ CREATE TABLE turns(                    -- of owners' last claims; see fair_queue
   finish_tag bigint NOT NULL,
   PRIMARY KEY(priority, owner)
 ) WITH (fillfactor = 50);
+)sql",
+                                R"sql(
+CREATE TABLE tasks(                    -- that one process has at a time; see HeldTask
+  name text COLLATE "C" PRIMARY KEY,
+  node uuid NOT NULL,
+  folder text NOT NULL,                -- its data folder; a process that starts there is its successor
+  held_until bigint NOT NULL
+) WITH (fillfactor = 50);
 )sql"};
 
 constexpr auto kNewest = static_cast<std::int64_t>(kTables.size());

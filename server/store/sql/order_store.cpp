@@ -267,6 +267,7 @@ std::optional<Time> SqlOrderStore::next_after(Time now) const {
 bool SqlOrderStore::save(const OrderRecord& record, Time next) {
   return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
+    if (!is_ours_(connection)) return false;
     const auto known = find(connection, std::nullopt, record.order.id, connection.for_update());
     if (!known) return false;
     if (is_final(known->order.state)) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/store/order_store.h"
@@ -8,11 +10,16 @@
 
 namespace isomesh::store {
 
-// Orders in a database, which must outlive this object. One of the processes that share the
-// database carries them out.
+// Orders in a database, which must outlive this object.
 class SqlOrderStore : public OrderStore {
  public:
-  explicit SqlOrderStore(SqlDatabase& database) : database_(database) {}
+  // True if this process carries out the orders, until the transaction ends.
+  using IsOurs = std::function<bool(SqlConnection&)>;
+
+  // Only a process that carries out the orders can save steps.
+  explicit SqlOrderStore(
+      SqlDatabase& database, IsOurs is_ours = [](SqlConnection&) { return true; })
+      : database_(database), is_ours_(std::move(is_ours)) {}
 
   OrderSubmission submit(const OrderSpec& spec, std::size_t most_open) override;
   bool submit_watched(const OrderSpec& spec, const WatchedSeries& series,
@@ -35,6 +42,7 @@ class SqlOrderStore : public OrderStore {
 
  private:
   SqlDatabase& database_;
+  const IsOurs is_ours_;
 };
 
 }  // namespace isomesh::store

@@ -93,6 +93,7 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::atomic<bool> hangs = false;
   std::atomic<int> retry_after = 0;
   std::atomic<int> calls = 0;
+  std::atomic<int> aborted = 0;
   std::atomic<int> stores = 0;
   std::atomic<int> fetches = 0;
   std::atomic<int> sent_slices = kSlices;  // of those that it lists
@@ -173,7 +174,10 @@ class FakePacs : public Archive, public ObjectReceiver {
   void answer(const std::stop_token& stop) {
     ++calls;
     while (hangs) {
-      if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
+      if (stop.stop_requested()) {
+        ++aborted;
+        throw Error(ErrorCode::kCancelled, "stopped");
+      }
       std::this_thread::sleep_for(milliseconds(2));
     }
     if (is_down) {
@@ -198,8 +202,16 @@ class WatchedOrders : public store::SqlOrderStore {
   }
   store::Time idle_at() const { return idle_at_; }
 
+  // A thread asks this before it sleeps because it has nothing to do.
+  std::optional<store::Time> next_after(store::Time now) const override {
+    looked_at_ = now;
+    return SqlOrderStore::next_after(now);
+  }
+  store::Time looked_at() const { return looked_at_; }
+
  private:
   mutable std::atomic<store::Time> idle_at_ = store::Time();
+  mutable std::atomic<store::Time> looked_at_ = store::Time();
 };
 
 // Counts how often somebody has begun to look at what is held.
@@ -258,7 +270,9 @@ class OrdersTest : public test::JobsFixture {
                                                      .received = received_,
                                                      .peers = peers_},
                                        settings_,
-                                       OrderOptions{.now = [this] { return now(); }, .threads = 3});
+                                       OrderOptions{.now = [this] { return now(); },
+                                                    .keep_orders = [this] { return keep(); },
+                                                    .threads = 3});
     orders_->on_end([](const std::string&) {});
   }
 
@@ -276,6 +290,11 @@ class OrdersTest : public test::JobsFixture {
   Order get(const std::string& id) const { return orders_->get(std::nullopt, id); }
 
   store::Time now() const { return std::chrono::system_clock::now() + ahead_.load(); }
+
+  // As when another process takes the orders, and as when it ends.
+  void lose_orders() { are_lost_ = true; }
+  void regain_orders() { are_lost_ = false; }
+  std::string keep() const { return are_lost_ ? "another process has them" : ""; }
 
   void pass(milliseconds time) {
     ahead_ = ahead_.load() + time;
@@ -338,6 +357,7 @@ class OrdersTest : public test::JobsFixture {
   }
 
   std::atomic<milliseconds> ahead_ = milliseconds(0);
+  std::atomic<bool> are_lost_ = false;
   HospitalSettings settings_;
   Peers peers_;
   FakePacs* main_ = nullptr;

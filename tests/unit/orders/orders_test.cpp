@@ -75,6 +75,30 @@ TEST_F(OrdersTest, HaveTheNamesOfTheirOwnSegments) {
   EXPECT_EQ(main_->stores, 2);
 }
 
+// The step in progress leaves no trace, because the other process makes it.
+TEST_F(OrdersTest, PauseWhileAnotherProcessHasThem) {
+  main_->hangs = true;
+  const std::string begun = submit();
+  ASSERT_TRUE(until([&] { return main_->calls > 0; }));
+  lose_orders();
+  ASSERT_TRUE(until([&] { return main_->aborted > 0; }));
+  EXPECT_TRUE(orders_->is_paused());
+  main_->hangs = false;
+  const std::string later = submit();
+  const store::Time paused = now();
+  ASSERT_TRUE(until([&] { return store_.looked_at() > paused; }));
+  EXPECT_EQ(main_->calls, 1);
+  for (const std::string& id : {begun, later}) {
+    EXPECT_EQ(get(id).state, OrderState::kWaiting);
+    EXPECT_EQ(get(id).attempts, 0U);
+  }
+  orders_->cancel(std::nullopt, later);
+  regain_orders();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(begun, OrderState::kSucceeded));
+  EXPECT_FALSE(orders_->is_paused());
+}
+
 class UnusableOrdersTest : public OrdersTest {
  protected:
   // The error of an order of a series with these files.
@@ -98,6 +122,22 @@ TEST_F(UnusableOrdersTest, NameTheImageByItsInstance) {
               testing::StartsWith("Instance number 9 (SOP Instance UID 1.2.2.2): "));
   files[1] = "nothing";
   EXPECT_THAT(error_of(files).detail, testing::StartsWith("Part 2 of the response: "));
+}
+
+// The PACS would show the study with a name of question marks, or file the mesh under another
+// patient.
+TEST_F(UnusableOrdersTest, OfAPatientIdThatCannotBeReadFailAtOnce) {
+  std::vector<std::string> files;
+  for (int slice = 0; slice < kSlices; ++slice) {
+    std::string file = slice_file(slice, "PAT-\xe4");
+    file.insert(file.find(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2")),
+                element(8, 5, "CS", "ISO_IR 192"));
+    files.push_back(file);
+  }
+  const Problem error = error_of(files);
+  EXPECT_EQ(error.type, "urn:isomesh:problem:unusable-volume");
+  EXPECT_THAT(error.detail, testing::HasSubstr("the Patient ID of the images"));
+  EXPECT_EQ(main_->stores, 0);
 }
 
 TEST_F(UnusableOrdersTest, DoNotOfferParametersThatOrdersLack) {

@@ -4,7 +4,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/store/postgresql/exclusive_task.h"
+#include "server/store/postgresql/held_task.h"
 #include "server/store/postgresql/identity.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
@@ -40,7 +40,8 @@ TEST_F(ClusterTest, ADatabaseThatIsNotOfUtf8IsRefusedWithItsEncoding) {
 TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
   const std::string id = submit();
   ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
-      "queued_owners; DROP TABLE turns; DROP INDEX jobs_by_turn; ALTER TABLE jobs DROP COLUMN "
+      "queued_owners; DROP TABLE turns; DROP TABLE tasks; DROP INDEX jobs_by_turn; ALTER TABLE "
+      "jobs DROP COLUMN "
       "cost; "
       "CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; UPDATE isomesh_version SET "
       "version = 1");
@@ -118,14 +119,81 @@ TEST_F(ClusterTest, AClockThatIsTrustedLetsExpireWhatWasOldBefore) {
 
 // --- Orders
 
-// Who carries them out has the task as long as it lives, and takes orders meanwhile.
-TEST_F(ClusterTest, OrdersAreTakenByWhoCarriesThemOut) {
-  const ExclusiveTask orders(url_, "orders");
-  ASSERT_TRUE(orders.is_ours());
+OrderSpec an_order() {
   OrderSpec order;
   order.record.order.id = "an order";
   order.record.order.created = "2024-01-01T00:00:00.000Z";
-  EXPECT_EQ(SqlOrderStore(one().database).submit(order, 1).kind, OrderSubmission::Kind::kNew);
+  return order;
+}
+
+SqlOrderStore orders_of(Node& node, const HeldTask& task) {
+  return SqlOrderStore(node.database,
+                       [&](SqlConnection& connection) { return task.is_ours(connection); });
+}
+
+TEST_F(ClusterTest, OneCarriesOutOrdersAtATime) {
+  HeldTask second(two().database, "orders");
+  {
+    HeldTask first(one().database, "orders");
+    EXPECT_EQ(first.keep(), "");
+    EXPECT_THAT(second.keep(), testing::HasSubstr("another isomeshd"));
+    EXPECT_EQ(first.keep(), "");
+  }
+  EXPECT_EQ(second.keep(), "") << "the first has ended";
+}
+
+// As after a restart of the database: a lock would be gone with its session.
+TEST_F(ClusterTest, OrdersStayWithTheirHolderWhenItsConnectionsAreLost) {
+  HeldTask first(one().database, "orders");
+  HeldTask second(two().database, "orders");
+  ASSERT_EQ(first.keep(), "");
+  cut_connections();
+  EXPECT_NE(second.keep(), "");
+  EXPECT_EQ(first.keep(), "");
+}
+
+TEST_F(ClusterTest, WhoLostTheOrdersSavesNoStep) {
+  SetClock clock;
+  HeldTask first(one().database, "orders", {.now = clock.reader()});
+  HeldTask second(two().database, "orders");
+  ASSERT_EQ(first.keep(), "");
+  SqlOrderStore of_first = orders_of(one(), first);
+  SqlOrderStore of_second = orders_of(two(), second);
+  OrderSpec order = an_order();
+  // Who does not carry them out accepts them, too.
+  ASSERT_EQ(of_second.submit(order, 1).kind, OrderSubmission::Kind::kNew);
+  const Time now = std::chrono::system_clock::now();
+  order.record.order.attempts = 1;
+  EXPECT_TRUE(of_first.save(order.record, now));
+  EXPECT_FALSE(of_second.save(order.record, now));
+  ask("UPDATE tasks SET held_until = 0");
+  EXPECT_TRUE(of_first.save(order.record, now)) << "nobody has taken them yet";
+  ASSERT_EQ(second.keep(), "");
+  order.record.order.attempts = 2;
+  EXPECT_FALSE(of_first.save(order.record, now));
+  EXPECT_EQ(of_second.get({}, order.record.order.id).attempts, 1U);
+  EXPECT_TRUE(of_second.save(order.record, now));
+  EXPECT_NE(first.keep(), "");
+}
+
+// In the data folder of the one that was killed there is one process at a time.
+TEST_F(ClusterTest, ASuccessorOnTheSameDataFolderTakesTheOrdersAtOnce) {
+  HeldTask first(one().database, "orders");
+  ASSERT_EQ(first.keep(), "");
+  Node again(url_, "one", blobs_);
+  EXPECT_EQ(HeldTask(again.database, "orders").keep(), "");
+}
+
+TEST_F(ClusterTest, AHolderReliesOnTheOrdersForAPartOfTheLeaseWithoutTheDatabase) {
+  SetClock clock;
+  HeldTask task(one().database, "orders", {.now = clock.reader()});
+  ASSERT_EQ(task.keep(), "");
+  ask("ALTER TABLE tasks RENAME TO missing");
+  EXPECT_EQ(task.keep(), "");
+  clock.pass(seconds(20));
+  EXPECT_NE(task.keep(), "");
+  ask("ALTER TABLE missing RENAME TO tasks");
+  EXPECT_EQ(task.keep(), "");
 }
 
 // --- Callbacks

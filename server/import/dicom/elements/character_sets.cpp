@@ -36,6 +36,7 @@ struct CharacterSet {
 };
 
 constexpr const char* kAscii = "US-ASCII";
+constexpr const char* kLatin1 = "ISO-8859-1";
 constexpr const char* kJapanesePairs = "EUC-JP";
 
 // PS3.3, tables C.12-2 to C.12-5. Katakana (13) is often Shift JIS in fact, which includes it; of
@@ -44,7 +45,7 @@ constexpr const char* kJapanesePairs = "EUC-JP";
 // tilde. The last row is an older edition of 87.
 constexpr std::array kCharacterSets = {
     CharacterSet{"6", kAscii, Bytes::kLower, "(B"},
-    CharacterSet{"100", "ISO-8859-1", Bytes::kUpper, "-A"},
+    CharacterSet{"100", kLatin1, Bytes::kUpper, "-A"},
     CharacterSet{"101", "ISO-8859-2", Bytes::kUpper, "-B"},
     CharacterSet{"109", "ISO-8859-3", Bytes::kUpper, "-C"},
     CharacterSet{"110", "ISO-8859-4", Bytes::kUpper, "-D"},
@@ -160,11 +161,28 @@ struct State {
   const char* upper = kAscii;  // the name of a converter
 };
 
+// True if no term gives the bytes of the upper half a meaning, because there are none or unknown
+// ones. Programs that write such bytes nevertheless mostly mean Latin-1 or UTF-8.
+bool is_undeclared(const std::vector<std::string_view>& terms) {
+  return std::ranges::all_of(terms, [](std::string_view term) {
+    const CharacterSet* set = set_of(term);
+    return set == nullptr || set == &kDefaultSet;
+  });
+}
+
+// True if the text has letters beyond ASCII, all of them in UTF-8, and no escape sequences.
+bool looks_like_utf8(std::string_view text) {
+  const bool is_ascii =
+      std::ranges::all_of(text, [](char byte) { return static_cast<unsigned char>(byte) < 0x80; });
+  return !is_ascii && text.find(kEscape) == text.npos &&
+         within_unicode(Converter("UTF-8").convert(text)) == text;
+}
+
 // The state in which a text begins. Some programs omit the escape sequence of the only set with an
 // upper half, which is Korean or Chinese mostly: no other meaning of such bytes is possible.
 State first_state(const std::vector<std::string_view>& terms) {
   const CharacterSet* first = set_of(terms.front());
-  if (first == nullptr) return {};
+  if (first == nullptr || is_undeclared(terms)) return {.upper = kLatin1};
   if (first->bytes == Bytes::kUpper) return {.upper = first->name};
   std::set<std::string_view> others;
   const char* other = kAscii;
@@ -262,6 +280,7 @@ std::string decoded(std::string_view text, std::string_view terms, TextKind kind
   if (first != nullptr && first->bytes == Bytes::kAll) {
     return printable(within_unicode(Converter(first->name).convert(text)));
   }
+  if (is_undeclared(parts) && looks_like_utf8(text)) return printable(text);
   return printable(Decoder(first_state(parts), kind).decode(text));
 }
 

@@ -9,8 +9,9 @@ namespace isomesh::import::dicom {
 
 enum class TextKind { kText, kPersonName };
 
-// Converts a stored text to UTF-8. `terms` is the value of Specific Character Set. Bytes without a
-// meaning and control characters become U+FFFD; the result is valid UTF-8 and at most three times
+// Converts a stored text to UTF-8. `terms` is the value of Specific Character Set. Without a known
+// term, bytes beyond ASCII are UTF-8 if they can be, otherwise Latin-1. Bytes without a meaning and
+// control characters become U+FFFD; the result is valid UTF-8 and at most three times
 // as long as `text`. Never throws because of the bytes.
 std::string decoded(std::string_view text, std::string_view terms, TextKind kind);
 

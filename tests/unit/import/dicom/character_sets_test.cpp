@@ -86,24 +86,26 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Damage, CodeExtensions,
-    testing::Values(SwitchCase{"UnknownEscape", "\\ISO 2022 IR 144", "a\x1b-Zb",
-                               "a" REPLACED "-Zb"},
-                    SwitchCase{"CutEscape", "\\ISO 2022 IR 87", "a\x1b$", "a" REPLACED "$"},
-                    SwitchCase{"LoneEscape", "\\ISO 2022 IR 87", "a\x1b", "a" REPLACED},
-                    SwitchCase{"HalfAPair", "\\ISO 2022 IR 87", "\x1b$B;3E", "山" REPLACED},
-                    SwitchCase{"WrongPair", "\\ISO 2022 IR 87", "\x1b$B~~;3", REPLACED "山"},
-                    SwitchCase{"UpperByteWithoutSet", "\\ISO 2022 IR 87", "a\xfc", "a" REPLACED},
-                    SwitchCase{"SeveralPossibleSets", "\\ISO 2022 IR 144\\ISO 2022 IR 126", "a\xfc",
-                               "a" REPLACED},
-                    SwitchCase{"UnknownFirstSet", "ISO_IR 999\\ISO 2022 IR 144", "\xfc\x1b-L\xbb",
-                               REPLACED "Л"},
-                    SwitchCase{"EscapeInUtf8", "ISO_IR 192", "a\x1b-Lb", "a" REPLACED "-Lb"},
-                    SwitchCase{"BeyondUnicode", "ISO_IR 192",
-                               "a\xf5\x80\x80\x80"
-                               "b\xf4\x90\x80\x80",
-                               "a" REPLACED "b" REPLACED},
-                    SwitchCase{"OnlySeparators", "\\\\\\", "a\xfc", "a" REPLACED},
-                    SwitchCase{"Nothing", "ISO 2022 IR 100", "", ""}),
+    testing::Values(
+        SwitchCase{"UnknownEscape", "\\ISO 2022 IR 144", "a\x1b-Zb", "a" REPLACED "-Zb"},
+        SwitchCase{"CutEscape", "\\ISO 2022 IR 87", "a\x1b$", "a" REPLACED "$"},
+        SwitchCase{"LoneEscape", "\\ISO 2022 IR 87", "a\x1b", "a" REPLACED},
+        SwitchCase{"HalfAPair", "\\ISO 2022 IR 87", "\x1b$B;3E", "山" REPLACED},
+        SwitchCase{"WrongPair", "\\ISO 2022 IR 87", "\x1b$B~~;3", REPLACED "山"},
+        SwitchCase{"UpperByteWithoutSet", "\\ISO 2022 IR 87", "a\xfc", "a" REPLACED},
+        SwitchCase{"SeveralPossibleSets", "\\ISO 2022 IR 144\\ISO 2022 IR 126", "a\xfc",
+                   "a" REPLACED},
+        SwitchCase{"UnknownFirstSet", "ISO_IR 999\\ISO 2022 IR 144", "\xfc\x1b-L\xbb", "üЛ"},
+        SwitchCase{"EscapeInUtf8", "ISO_IR 192", "a\x1b-Lb", "a" REPLACED "-Lb"},
+        SwitchCase{"BeyondUnicode", "ISO_IR 192",
+                   "a\xf5\x80\x80\x80"
+                   "b\xf4\x90\x80\x80",
+                   "a" REPLACED "b" REPLACED},
+        SwitchCase{"OnlySeparators", "\\\\\\", "a\xfc", "aü"},
+        SwitchCase{"UndeclaredLatin", "", "\xc3\x84 \xc4", "Ã" REPLACED " Ä"},
+        SwitchCase{"UndeclaredUtf8", "", "\xc3\x84^\xd0\x9b", "Ä^Л"},
+        SwitchCase{"UndeclaredEscape", "", "\xfc\x1b-L\xbb", "üЛ"},
+        SwitchCase{"Nothing", "ISO 2022 IR 100", "", ""}),
     case_name);
 
 std::string random_text(std::mt19937& random) {

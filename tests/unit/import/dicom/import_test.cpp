@@ -373,7 +373,8 @@ INSTANTIATE_TEST_SUITE_P(
     Sets, DicomCharacterSet,
     testing::Values(
         CharacterSetCase{"Default", "", "Adams^John", "Adams^John"},
-        CharacterSetCase{"DefaultWithForeignLetters", "", "B\xe4r", "B\xEF\xBF\xBDr"},
+        CharacterSetCase{"DefaultWithLatin1", "", "B\xe4r", "Bär"},
+        CharacterSetCase{"DefaultWithUtf8", "", "B\xc3\xa4r", "Bär"},
         CharacterSetCase{"Latin2", "ISO_IR 101",
                          "W\xb3"
                          "adys\xb3"
@@ -391,7 +392,7 @@ INSTANTIATE_TEST_SUITE_P(
         CharacterSetCase{"Japanese", "\\ISO 2022 IR 87", "Yamada=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B",
                          "Yamada=山田^太郎"},
         CharacterSetCase{"Korean", "\\ISO 2022 IR 149", "Hong=\x1b$)C\xfb\xf3", "Hong=洪"},
-        CharacterSetCase{"Unknown", "ISO_IR 999", "B\xe4r", "B\xEF\xBF\xBDr"},
+        CharacterSetCase{"Unknown", "ISO_IR 999", "B\xe4r", "Bär"},
         CharacterSetCase{"ControlCharacters", "ISO_IR 100", "a\nb",
                          "a\xEF\xBF\xBD"
                          "b"}),
