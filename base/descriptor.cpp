@@ -1,7 +1,9 @@
 #include "base/descriptor.h"
 
 #include <cerrno>
+#include <tuple>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include "base/error.h"
@@ -18,6 +20,15 @@ void write_all(const Descriptor& file, std::span<const std::byte> bytes) {
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throw_system_error("writing a file", errno);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+void hold_standard_descriptors() {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    // open() returns the lowest number that is free: all lower ones are held by now.
+    if (::fcntl(number, F_GETFD) < 0) {
+      std::ignore = ::open("/dev/null", number == STDOUT_FILENO ? O_RDONLY : O_WRONLY);
+    }
   }
 }
 

@@ -29,4 +29,9 @@ class Descriptor {
 // Writes all of `bytes`. Throws Error kOutOfSpace or kInternal.
 void write_all(const Descriptor& file, std::span<const std::byte> bytes);
 
+// Opens /dev/null for each of the descriptors 0 to 2 that is closed; otherwise the next opened file
+// would get its number, and what is meant for standard output would go there. Reading 0 and writing
+// to 1 then still fail; text for 2 is discarded. Call it first in main.
+void hold_standard_descriptors();
+
 }  // namespace isomesh

@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "base/command_line/help.h"
+#include "base/descriptor.h"
 #include "base/log.h"
 #include "base/niceness.h"
 #include "server/blobs.h"
@@ -328,6 +329,7 @@ std::string usage_message(const CLI::App* cli, const CLI::Error& error) {
 
 int main(int argc, char** argv) {
   constexpr int kWrongUsage = 2;
+  hold_standard_descriptors();
   LogFormat log_format = LogFormat::kText;
   try {
     end_clearly_without_memory();

@@ -190,10 +190,22 @@ int labels(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
+// Replaces an error that speaks of a field and of null, which this command does not have.
+Volume renamed(Client& client, const std::string& id, const std::optional<std::string>& name) {
+  try {
+    return client.rename_volume(id, name);
+  } catch (const Error& error) {
+    if (error.fields().empty() || error.fields().front().field != "name") throw;
+    throw Error(error.code(),
+                "NAME must have 1 to 255 bytes on one line, or be \"\", which removes the name");
+  }
+}
+
 int rename(const Options& options, const std::stop_token& stop) {
   const auto name = options.name.empty() ? std::nullopt : std::optional(options.name);
   Client client = client_of(options, stop);
-  const Volume volume = client.rename_volume(volume_id(client, options.id), name);
+  const std::string id = volume_id(client, options.id);
+  const Volume volume = renamed(client, id, name);
   std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
   return kDone;
 }

@@ -7,6 +7,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include "base/descriptor.h"
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/options.h"
@@ -23,6 +24,7 @@ bool reader_has_left() {
 
 int main(int argc, char** argv) {
   using namespace isomesh::cli;
+  isomesh::hold_standard_descriptors();
   // If the reader of the output ends, writing fails instead of ending the process.
   std::signal(SIGPIPE, SIG_IGN);
   // The same for a file beyond `ulimit -f`, so that the unfinished file is removed.

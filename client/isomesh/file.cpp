@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <string>
 #include <system_error>
+#include <tuple>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -34,15 +35,22 @@ std::filesystem::path part_beside(const std::filesystem::path& target) {
   return target.parent_path() / ("." + target.filename().string() + "." + random_hex(8) + ".part");
 }
 
-// 0666, reduced by the process's umask, like the output of any program.
-int create(const std::filesystem::path& path) {
-  return ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+// A file that is replaced keeps its mode. A new one has 0666, reduced by the process's umask, like
+// the output of any program.
+int create(const std::filesystem::path& part, const std::filesystem::path& target) {
+  struct stat old = {};
+  const bool is_there = ::stat(target.c_str(), &old) == 0;
+  const mode_t mode = is_there ? old.st_mode & 0777U : 0666U;
+  const int file = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+  // Adds what the umask took. Where that fails, as on some network drives, the mode is narrower.
+  if (is_there && file >= 0) std::ignore = ::fchmod(file, mode);
+  return file;
 }
 
 }  // namespace
 
 PartFile::PartFile(const std::filesystem::path& target)
-    : target_(resolve(target)), part_(part_beside(target_)), file_(create(part_)) {
+    : target_(resolve(target)), part_(part_beside(target_)), file_(create(part_, target_)) {
   if (file_.number() < 0) fail(target, errno);
 }
 

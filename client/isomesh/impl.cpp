@@ -15,6 +15,8 @@ using std::chrono::milliseconds;
 
 constexpr int kTries = 4;
 constexpr milliseconds kFirstPause{100};
+// For the server to end the import of a cancelled upload, or to finish storing its volume.
+constexpr milliseconds kPartingSilence{30'000};
 
 TransportOptions transport_options(ClientOptions&& options) {
   const bool sendable =
@@ -29,6 +31,14 @@ TransportOptions transport_options(ClientOptions&& options) {
           .silence_timeout = options.silence_timeout,
           .stall_timeout = options.stall_timeout,
           .stop = std::move(options.stop)};
+}
+
+// The time limits are short, because the user waits.
+TransportOptions parting_options(ClientOptions&& options) {
+  options.stop = {};
+  options.connect_timeout = std::chrono::seconds{2};
+  options.silence_timeout = std::min<milliseconds>(options.silence_timeout, kPartingSilence);
+  return transport_options(std::move(options));
 }
 
 // For errors of intermediaries, which do not send our problem documents.
@@ -99,7 +109,9 @@ Error refusal(const HttpResponse& response) {
 }
 
 Client::Impl::Impl(ClientOptions&& options)
-    : stop_(options.stop), transport_(transport_options(std::move(options))) {}
+    : stop_(options.stop),
+      transport_(transport_options(ClientOptions(options))),
+      parting_(parting_options(std::move(options))) {}
 
 HttpResponse Client::Impl::exchange(const HttpRequest& request) const {
   HttpResponse response = transport_.send(request);

@@ -51,10 +51,11 @@ class Client::Impl {
  private:
   std::string begin_upload(const HttpRequest& request) const;
   HttpResponse finish_upload(const HttpRequest& request, const std::string& place) const;
-  void give_up(const std::string& place) const;
+  std::string give_up(const std::string& place) const;
 
   std::stop_token stop_;
   Transport transport_;
+  Transport parting_;  // for a last request, also after a stop request
 };
 
 }  // namespace isomesh

@@ -6,10 +6,12 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/text.h"
 #include "client/isomesh/impl.h"
 #include "client/isomesh/transport.h"
+#include "proto/json.h"
 
 namespace isomesh {
 namespace {
@@ -59,6 +61,20 @@ HttpRequest reading_of(const HttpRequest& upload, const std::string& place) {
 bool may_pass(int status) {
   constexpr std::array kPassing = {408, 409, 429, 502, 503, 504};
   return std::ranges::count(kPassing, status) > 0;
+}
+
+// True if somebody else has cancelled the upload.
+bool is_cancelled(const HttpResponse& response) {
+  return response.status == 409 && refusal(response).code() == ErrorCode::kCancelled;
+}
+
+// The volumes that were stored before the upload was cancelled.
+std::string told_volumes(const std::vector<Volume>& volumes) {
+  std::string ids;
+  for (const Volume& volume : volumes) ids += (ids.empty() ? "" : ", ") + volume.id;
+  if (ids.empty()) return {};
+  return std::string("; it was too late to cancel ") +
+         (volumes.size() == 1 ? "the volume " : "the volumes ") + ids;
 }
 
 struct Progress {
@@ -117,19 +133,23 @@ HttpResponse Client::Impl::resumed(const HttpRequest& request) const {
   } catch (const Error& error) {
     // It has expired, or another daemon answered.
     if (error.code() == ErrorCode::kGone) return exchange(request);
-    give_up(place);
-    throw;
+    const std::string left = give_up(place);
+    if (left.empty()) throw;
+    throw Error(error.code(), error.what() + left, error.fields()).with_remedy(error.remedy());
   } catch (...) {
     give_up(place);
     throw;
   }
 }
 
-void Client::Impl::give_up(const std::string& place) const {
+// Cancels the upload, and returns what the user should know about its volumes.
+std::string Client::Impl::give_up(const std::string& place) const {
   try {
-    transport_.send({.method = "DELETE", .target = place});
+    const HttpResponse response = parting_.send({.method = "DELETE", .target = place});
+    return response.status == 200 ? told_volumes(volumes_from_json(response.body)) : std::string();
   } catch (const Error&) {
-    return;  // the rest expires on the server
+    // An incomplete upload expires on the server.
+    return "; the server did not confirm that the upload was cancelled";
   }
 }
 
@@ -152,7 +172,9 @@ HttpResponse Client::Impl::finish_upload(const HttpRequest& request,
                                                    : rest_of(request, place, known->offset));
         if (is_success(response)) return response;
       }
-      if (!may_pass(response.status) || patience.is_over()) throw refusal(response);
+      if (!may_pass(response.status) || is_cancelled(response) || patience.is_over()) {
+        throw refusal(response);
+      }
     } catch (const NoResponse&) {
       if (patience.is_over()) throw;
     }

@@ -293,9 +293,42 @@ TEST_F(CommandTest, ADryRunThatIsRefusedLeavesNothingBehindEither) {
 TEST_F(CommandTest, SaysWhenItsOutputCannotBeWritten) {
   for (const std::string program :
        {ISOMESH " --help", ISOMESH " completion bash", ISOMESHD " config"}) {
-    const Finished full = run({"/bin/sh", "-c", program + " > /dev/full"});
-    EXPECT_EQ(full.status, 1) << program;
-    EXPECT_THAT(full.errors, HasSubstr("standard output cannot be written to"));
+    for (const std::string output : {" > /dev/full", " >&-"}) {
+      const Finished full = run({"/bin/sh", "-c", program + output});
+      EXPECT_EQ(full.status, 1) << program;
+      EXPECT_THAT(full.errors, HasSubstr("standard output cannot be written to"));
+    }
+  }
+}
+
+TEST_F(CommandTest, SaysWhenItsOutputIsClosed) {
+  const auto sh = [&](const std::string& words) {
+    return run({"/bin/sh", "-c", words}, {"ISOMESH_SERVER=" + daemon_.url()});
+  };
+  const std::string mesh = ISOMESH " mesh " + (folder_ / "sphere.raw").string() +
+                           " --dims 21,20,19 --type uint8 --iso 100 -o - --format stl";
+  for (const std::string& words : {mesh, std::string(ISOMESH " list")}) {
+    const Finished closed = sh(words + " >&-");
+    EXPECT_EQ(closed.status, 1) << words;
+    EXPECT_THAT(closed.errors, HasSubstr("standard output cannot be written to"));
+    EXPECT_EQ(sh(words + " >&- 2>&-").status, 1) << words;
+  }
+  EXPECT_EQ(sh(ISOMESH " mesh - --dims 21,20,19 --type uint8 --iso 100 -o " +
+               (folder_ / "closed.stl").string() + " <&-")
+                .status,
+            1);
+  EXPECT_EQ(sh(mesh + " 2>&- <&-").output, sh(mesh).output);
+}
+
+TEST_F(CommandTest, ExplainsAWrongNameInItsOwnWords) {
+  const std::string id = daemon_.command(raw({"upload", folder_ / "sphere.raw"})).output;
+  for (const std::string& name :
+       {std::string("new\nname"), std::string(256, 'a'), std::string(" ")}) {
+    const Finished wrong = daemon_.command({"rename", id.substr(0, id.find('\n')), name});
+    EXPECT_EQ(wrong.status, 1);
+    EXPECT_EQ(wrong.errors,
+              "isomesh: NAME must have 1 to 255 bytes on one line, or be \"\", which removes the "
+              "name\n");
   }
 }
 

@@ -1,6 +1,7 @@
 // Starting, listening, and what a restart keeps.
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 #include <random>
 #include <string>
 #include <utility>
@@ -29,6 +30,25 @@ TEST(Start, TellsWhereItListensOnItsFirstLine) {
   EXPECT_THAT(daemon.url(), testing::MatchesRegex("http://127\\.0\\.0\\.1:[1-9][0-9]*"));
   EXPECT_EQ(daemon.get("/livez").body, "ok\n");
   EXPECT_EQ(daemon.get("/readyz").body, "ok\n");
+}
+
+// A file that the daemon opens must not become its standard output or its log.
+TEST(Start, WithoutStandardDescriptors) {
+  const TemporaryFolder folder;
+  const std::string url = "unix:" + (folder / "socket").string();
+  Process daemon({"/bin/sh", "-c", R"(exec "$@" <&- >&- 2>&-)", "sh", ISOMESHD, "--listen", url,
+                  "--data", folder / "data"});
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(folder / "socket"); }));
+  const RawUpload raw = sphere_upload();
+  const std::string body = request("POST", "/v1/volumes?" + raw.query, raw.bytes);
+  EXPECT_EQ(answer_to(url, body).status, 201);
+  for (const std::string number : {"0", "1", "2"}) {
+    EXPECT_EQ(
+        std::filesystem::read_symlink("/proc/" + std::to_string(daemon.pid()) + "/fd/" + number),
+        "/dev/null");
+  }
+  daemon.send_signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
 }
 
 TEST(Start, HelpAndVersion) {

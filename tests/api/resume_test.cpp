@@ -1,6 +1,10 @@
 // Uploads that come in parts, over cut connections and a killed daemon.
+#include <algorithm>
+#include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -270,6 +274,118 @@ TEST_F(ResumeTest, OneThatIsGivenUpLeavesNothing) {
   EXPECT_EQ(daemon_->send("HEAD", place).status, 410);
   EXPECT_EQ(daemon_->send("DELETE", place).status, 410);
   EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
+}
+
+TEST_F(ResumeTest, CancellingAVolumeThatIsStoredTellsItsId) {
+  const std::string place = begun();
+  const Answer last = daemon_->send("PATCH", place, raw_.bytes, part(0, true));
+  ASSERT_EQ(last.status, 201) << last.body;
+  const Answer told = daemon_->send("DELETE", place);
+  EXPECT_EQ(told.status, 200);
+  ASSERT_EQ(volumes_from_json(told.body).size(), 1U);
+  EXPECT_EQ(volumes_from_json(told.body).front().id, volume_from_json(last.body).id);
+  EXPECT_EQ(daemon_->send("HEAD", place).status, 410);
+  EXPECT_EQ(daemon_->client().volumes().size(), 1U);
+  EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
+}
+
+TEST_F(ResumeTest, CancellingKnowsTheVolumeOfAnEarlierProcess) {
+  const std::string place = begun();
+  ASSERT_EQ(daemon_->send("PATCH", place, raw_.bytes, part(0, true)).status, 201);
+  daemon_->stop();
+  daemon_.emplace(folder_ / "data", "127.0.0.1:0");
+  const Answer told = daemon_->send("DELETE", place);
+  EXPECT_EQ(told.status, 200);
+  EXPECT_EQ(volumes_from_json(told.body).size(), 1U);
+}
+
+TEST_F(ResumeTest, CancellingAfterTheVolumeWasDeletedTellsNone) {
+  const std::string place = begun();
+  const Answer last = daemon_->send("PATCH", place, raw_.bytes, part(0, true));
+  ASSERT_EQ(daemon_->send("DELETE", last.header("location")).status, 204);
+  EXPECT_EQ(daemon_->send("DELETE", place).status, 204);
+}
+
+// Imports with faulty_import.cpp, which never ends for the upload "hang".
+class SlowImportTest : public ResumeTest {
+ protected:
+  SlowImportTest() {
+    namespace fs = std::filesystem;
+    raw_ = {.bytes = "hang", .query = "dims=2,2,1&type=uint8", .options = {}};
+    // A daemon runs the programs beside its own file.
+    const fs::path programs = folder_ / "programs";
+    fs::create_directory(programs);
+    fs::copy_file(ISOMESHD, programs / "isomeshd");
+    fs::create_symlink(ISOMESH_JOB, programs / "isomesh-job");
+    fs::create_symlink(FAULTY_IMPORT, programs / "isomesh-import");
+    const std::string replace = "shift; exec " + (programs / "isomeshd").string() + " \"$@\"";
+    daemon_.emplace(folder_ / "slow", "127.0.0.1:0", std::vector<std::string>{},
+                    std::vector<std::string>{"bash", "-c", replace, "bash"});
+  }
+
+  // True once the only upload is complete, so that its import runs or is about to.
+  bool is_read() const {
+    const std::vector<std::string> files = files_of_uploads(daemon_->data());
+    return std::ranges::any_of(files, [&](const std::string& file) {
+      return file.ends_with(".json") &&
+             read_file(daemon_->data() / file).find("\"complete\":true") != std::string::npos;
+    });
+  }
+};
+
+TEST_F(SlowImportTest, CancellingEndsTheImport) {
+  const std::string place = begun();
+  Answer last;
+  std::jthread sender([&] { last = daemon_->send("PATCH", place, raw_.bytes, part(0, true)); });
+  ASSERT_TRUE(eventually([&] { return is_read(); }));
+  EXPECT_EQ(daemon_->send("DELETE", place).status, 204);
+  sender.join();
+  EXPECT_TRUE(is_problem(last, ErrorCode::kCancelled));
+  EXPECT_EQ(daemon_->send("DELETE", place).status, 410);
+  EXPECT_TRUE(daemon_->client().volumes().empty());
+  EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
+}
+
+// Also one that was asked for again, because its response was lost.
+TEST_F(SlowImportTest, CancellingEndsAllImportsOfTheUpload) {
+  const std::string place = begun();
+  Answer last;
+  Answer again;
+  std::jthread sender([&] { last = daemon_->send("PATCH", place, raw_.bytes, part(0, true)); });
+  ASSERT_TRUE(eventually([&] { return is_read(); }));
+  std::jthread asker([&] {
+    again = daemon_->send(
+        "POST", "/v1/volumes?" + raw_.query + "&upload=" + place.substr(place.rfind('/') + 1));
+  });
+  EXPECT_EQ(daemon_->send("DELETE", place).status, 204);
+  sender.join();
+  asker.join();
+  EXPECT_TRUE(is_problem(last, ErrorCode::kCancelled));
+  EXPECT_TRUE(again.status == 409 || again.status == 410) << again.body;
+}
+
+TEST_F(SlowImportTest, AClientThatIsStoppedCancelsTheImport) {
+  write_file(folder_ / "body", raw_.bytes);
+  std::stop_source stop;
+  Client client({.server = daemon_->url(), .stop = stop.get_token()});
+  UploadOptions options;
+  options.raw.emplace().dims = {2, 2, 1};
+  options.resumable_bytes = 1;
+  std::optional<ErrorCode> code;
+  std::jthread sender([&] {
+    try {
+      client.upload(folder_ / "body", options);
+    } catch (const Error& error) {
+      code = error.code();
+    }
+  });
+  ASSERT_TRUE(eventually([&] { return is_read(); }));
+  stop.request_stop();
+  sender.join();
+  EXPECT_EQ(code, ErrorCode::kCancelled);
+  EXPECT_TRUE(daemon_->client().volumes().empty());
+  // They go with the import's request, which may end after that of the client.
+  EXPECT_TRUE(eventually([&] { return files_of_uploads(daemon_->data()).empty(); }));
 }
 
 TEST_F(ResumeTest, AKilledDaemonGoesOnWhereItWas) {

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import unittest
+import warnings
 
 import isomesh
 import nibabel
@@ -41,6 +42,44 @@ class Arrays(DaemonTest):
         of_file = self.client.upload(file)
         self.assertEqual(self.client.upload(nibabel.load(file))["id"], of_file["id"])
         self.assertEqual(of_file["name"], "ball.nii.gz")
+
+    def test_an_image_has_the_size_of_its_file_in_any_unit(self):
+        for unit, scale in (("unknown", 1), ("mm", 1), ("meter", 1000), ("micron", 0.001)):
+            with self.subTest(unit):
+                image = nibabel.Nifti1Image(ball(), turned() @ numpy.diag([2.0, 4.0, 8.0, 1.0]))
+                image.header.set_xyzt_units(unit)
+                nibabel.save(image, self.folder / "unit.nii")
+                of_file, of_image = self.client.upload(self.folder / "unit.nii"), self.client.upload(image)
+                steps = numpy.linalg.norm(image.affine[:3, :3], axis=0)
+                numpy.testing.assert_allclose(of_image["spacing"], steps * scale, rtol=1e-6)
+                for member in ("spacing", "origin", "direction"):
+                    numpy.testing.assert_allclose(of_image[member], of_file[member], rtol=1e-6, atol=1e-9)
+        in_mm = self.client.upload(image, affine=image.affine)
+        numpy.testing.assert_allclose(in_mm["spacing"], steps, err_msg="an affine of the caller is in millimetres")
+
+    def test_an_image_in_an_unknown_unit_is_refused(self):
+        image = nibabel.Nifti1Image(ball(), turned())
+        image.header["xyzt_units"] = 5
+        with self.assertRaisesRegex(ValueError, "spatial unit 5 of the image's header is unknown"):
+            self.client.upload(image)
+
+    def test_forms_of_an_image_that_differ_give_a_warning(self):
+        image = nibabel.Nifti1Image(ball(), turned())
+        image.set_qform(turned(), code=1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.client.upload(image)
+        other = turned()
+        other[0, 3] += 5000
+        image.set_qform(other, code=1)
+        image.header.set_xyzt_units("micron")
+        with self.assertWarnsRegex(isomesh.VolumeWarning, r"up to 5\.0 mm apart.*\(forms-differ\)$") as warned:
+            volume = self.client.upload(image)
+        self.assertEqual(warned.filename, __file__)
+        self.assertAlmostEqual(volume["origin"][0], -turned()[0, 3] / 1000, places=6)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.client.upload(image, affine=image.get_qform() / 1000)
 
     def test_a_spacing_may_be_an_array(self):
         spacing = numpy.array([0.5, 0.75, 1.25])
@@ -113,6 +152,14 @@ class Arrays(DaemonTest):
         self.assertEqual(set(mesh.labels.tolist()), {3, 7})
         self.assertEqual(len(mesh.labels), len(mesh.faces))
         self.assertEqual([each["name"] for each in mesh.job["mesh"]["labels"]], ["left", "right"])
+        left, right = numpy.unique(samples[samples > 0])  # numpy's numbers
+        mesh = self.client.mesh(
+            samples, labels="all", label_names={left: "one", right: "two"}, label_colors={str(left): "#ff0000"}
+        )
+        self.assertEqual([each["name"] for each in mesh.job["mesh"]["labels"]], ["one", "two"])
+        self.assertEqual(mesh.job["mesh"]["labels"][0]["color"], "#ff0000")
+        with self.assertRaisesRegex(TypeError, "integer"):
+            self.client.mesh(samples, labels="all", label_names={1.5: "x"})
         middle = mesh.vertices[mesh.faces[mesh.labels == 3]].mean()
         self.assertLess(middle, mesh.vertices[mesh.faces[mesh.labels == 7]].mean())
 

@@ -1,5 +1,6 @@
 """Files, jobs, errors and broken connections."""
 
+import json
 import os
 import subprocess
 import signal
@@ -10,6 +11,7 @@ from unittest import mock
 
 import isomesh
 import numpy
+from isomesh.transport import Transport
 from support import DAEMON, Canned, DaemonTest, Relay, UploadRelay, ball
 
 
@@ -119,6 +121,16 @@ class Jobs(DaemonTest):
             self.client.download(done, self.folder / "ball.obj")
         with self.assertRaisesRegex(ValueError, "'ply'"):
             self.client.fetch(done)
+
+    def test_a_file_that_is_replaced_keeps_its_mode(self):
+        job = self.client.wait(self.client.submit(self.client.upload(ball()), iso=-8, formats=["stl"]))
+        path = self.folder / "secret.stl"
+        for mode in (0o600, 0o640):
+            path.write_bytes(b"old")
+            path.chmod(mode)
+            self.client.download(job, path)
+            self.assertEqual(path.stat().st_mode & 0o777, mode)
+            self.assertGreater(path.stat().st_size, 84)
 
     @staticmethod
     def mask():
@@ -288,6 +300,23 @@ class Connections(DaemonTest):
         self.assertEqual(volume["id"], self.client.upload(samples)["id"])
         methods = [each.split()[0] for each in relay.requests]
         self.assertEqual(methods, ["POST", "PATCH", "HEAD", "PATCH", "HEAD", "PATCH"])
+
+    def test_an_interrupt_of_its_response_names_the_volume_that_is_stored(self):
+        send = Transport.send
+
+        def interrupted(transport, request):
+            answer = send(transport, request)
+            if request.method != "PATCH":
+                return answer
+            stored.append(json.loads(answer.text())["id"])
+            raise KeyboardInterrupt
+
+        stored = []
+        with mock.patch.object(Transport, "send", interrupted), self.assertRaises(KeyboardInterrupt):
+            with self.assertWarnsRegex(isomesh.VolumeWarning, "cancelled too late: .* volume [0-9a-f]{64}$") as warned:
+                self.client.upload(numpy.zeros((128, 128, 128), "float32"))
+        self.assertIn(stored[0], str(warned.warnings[0].message))
+        self.assertEqual(self.client.volume(stored[0])["id"], stored[0])
 
     def test_an_upload_that_is_refused_is_not_tried_again(self):
         with UploadRelay(self.url, cuts=0, after=0) as relay, self.assertRaises(isomesh.Refused) as refused:

@@ -9,6 +9,7 @@
 #include "base/ids.h"
 #include "base/log.h"
 #include "proto/error.h"
+#include "proto/json.h"
 
 namespace isomesh::http {
 namespace {
@@ -112,6 +113,11 @@ KeptUploads::Partial KeptUploads::find_partial(const std::string& owner, const s
   return entry->partial;
 }
 
+KeptUploads::Partial KeptUploads::partial_of(const std::string& owner, const std::string& name) {
+  const Lock lock(mutex_);
+  return found(owner, name)->partial;
+}
+
 std::string KeptUploads::became(const std::string& owner, const std::string& name) {
   const Lock lock(mutex_);
   const auto entry = found(owner, name);
@@ -146,6 +152,20 @@ void KeptUploads::let_go(const std::string& owner, const std::string& name) {
   const Lock lock(mutex_);
   const auto entry = look_up(owner, name);
   if (entry != kept_.end()) erase(entry);
+}
+
+std::vector<std::string> KeptUploads::cancel(const std::string& owner, const std::string& name) {
+  Lock lock(mutex_);
+  const auto entry = found(owner, name);
+  const Partial partial = entry->partial;
+  if (!partial) throw gone();
+  erase(entry);
+  lock.unlock();
+  std::vector<std::string> stored = partial->cancel();
+  const std::string volume = partial->note().volume;
+  // An earlier process may have stored it.
+  if (stored.empty() && !volume.empty()) stored.push_back(volume_from_json(volume).id);
+  return stored;
 }
 
 void KeptUploads::let_all_go() {

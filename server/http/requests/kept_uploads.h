@@ -11,6 +11,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "base/mutex.h"
 #include "server/http/requests/partial_upload.h"
@@ -60,6 +61,9 @@ class KeptUploads {
   // Throws Error kGone as find does, and for uploads in one request.
   Partial find_partial(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
+  // The same, but null for uploads in one request.
+  Partial partial_of(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
+
   // The volume, as JSON, that a resumable upload has become; empty for all others.
   std::string became(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
@@ -70,6 +74,11 @@ class KeptUploads {
 
   // A missing one is not an error.
   void let_go(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
+
+  // Lets a resumable upload go, and cancels what reads it. Returns the ids of the volumes that were
+  // stored before; none are stored later. Throws Error kGone as find_partial does.
+  std::vector<std::string> cancel(const std::string& owner, const std::string& name)
+      ISOMESH_EXCLUDES(mutex_);
 
   // Deletes all uploads that no client is sending, for lack of room.
   void let_all_go() ISOMESH_EXCLUDES(mutex_);

@@ -1,5 +1,6 @@
 #include "server/http/requests/partial_upload.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <fstream>
@@ -210,6 +211,40 @@ void PartialUpload::let_go() {
   is_let_go_ = true;
   if (bytes_file_) bytes_file_->goes = true;
   ++lease_;
+}
+
+PartialUpload::Reading::Reading(std::shared_ptr<PartialUpload> upload)
+    : upload_(std::move(upload)) {
+  if (!upload_) return;
+  const Lock lock(upload_->mutex_);
+  if (upload_->cancelled_.stop_requested()) {
+    throw Error(ErrorCode::kCancelled, "the upload was cancelled");
+  }
+  ++upload_->readings_;
+}
+
+PartialUpload::Reading::~Reading() {
+  if (!upload_) return;
+  const Lock lock(upload_->mutex_);
+  --upload_->readings_;
+  upload_->reading_ended_.notify_all();
+}
+
+std::stop_token PartialUpload::Reading::cancelled() const {
+  return upload_ ? upload_->cancelled_.get_token() : std::stop_token();
+}
+
+void PartialUpload::Reading::stored(const std::string& id) const {
+  if (!upload_) return;
+  const Lock lock(upload_->mutex_);
+  if (std::ranges::count(upload_->stored_, id) == 0) upload_->stored_.push_back(id);
+}
+
+std::vector<std::string> PartialUpload::cancel() {
+  cancelled_.request_stop();
+  Lock lock(mutex_);
+  reading_ended_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return readings_ == 0; });
+  return stored_;
 }
 
 std::uint64_t PartialUpload::offset() const {

@@ -2,13 +2,16 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/descriptor.h"
 #include "base/mutex.h"
@@ -83,6 +86,27 @@ class PartialUpload {
   // Deletes both files with this object.
   void let_go() ISOMESH_EXCLUDES(mutex_);
 
+  // One per request that makes volumes of the complete upload, for as long as that takes.
+  class Reading {
+   public:
+    // `upload` is null for an upload that cannot be cancelled. Throws Error kCancelled if it was.
+    explicit Reading(std::shared_ptr<PartialUpload> upload);
+    ~Reading();
+    Reading(const Reading&) = delete;
+    Reading& operator=(const Reading&) = delete;
+
+    std::stop_token cancelled() const;
+    // Call with the id of each stored volume.
+    void stored(const std::string& id) const;
+
+   private:
+    const std::shared_ptr<PartialUpload> upload_;
+  };
+
+  // Cancels all readings, waits until they have ended and returns the ids of the volumes that they
+  // had stored by then. So nothing is stored later.
+  std::vector<std::string> cancel() ISOMESH_EXCLUDES(mutex_);
+
  private:
   // The file of the bytes; its last owner removes it if `goes` is set.
   struct File {
@@ -110,6 +134,10 @@ class PartialUpload {
   std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
   std::uint64_t lease_ ISOMESH_GUARDED_BY(mutex_) = 0;
   bool is_let_go_ ISOMESH_GUARDED_BY(mutex_) = false;
+  std::stop_source cancelled_;
+  Condition reading_ended_;
+  std::size_t readings_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::vector<std::string> stored_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 }  // namespace isomesh::http

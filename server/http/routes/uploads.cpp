@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/text.h"
 #include "proto/json.h"
@@ -133,12 +134,26 @@ void append(App& app, const Request& request, Response& response) {
   response.set_header(kComplete, "?1");
   Request asked = request;
   asked.query = upload->note().query;
-  answer_volumes(app, asked, response, {upload->body(), upload->name()});
+  answer_volumes(app, asked, response, {upload->body(), upload->name(), upload});
 }
 
+// A client that cancels its upload may not have received the response with the volume. This
+// response names it then.
 void cancel(App& app, const Request& request, Response& response) {
-  app.kept.let_go(owner_of(request), upload_of(app, request)->name());
+  check_known(request, {});
+  const std::string owner = owner_of(request);
+  std::vector<Volume> stored;
+  for (const std::string& id : app.kept.cancel(owner, request.path_parameter("id"))) {
+    try {
+      stored.push_back(app.services.volumes.get(owner, id));
+      stored.back().dicom.reset();  // as in lists
+    } catch (const Error& error) {
+      // It was deleted since.
+      if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+    }
+  }
   response.status = 204;
+  if (!stored.empty()) answer_json(response, 200, to_json(stored));
 }
 
 }  // namespace

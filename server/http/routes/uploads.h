@@ -12,10 +12,12 @@ namespace isomesh::http {
 // A received body, and its name if it is already kept.
 struct KeptBody {
   KeptUploads::Kept file;
-  std::string name;
+  std::string name = {};
+  KeptUploads::Partial partial = {};  // null unless the upload is resumable
 };
 
-// Answers with the volumes read from the body as the query says.
+// Answers with the volumes read from the body as the query says. Throws Error kCancelled if the
+// upload is cancelled meanwhile.
 void answer_volumes(App& app, const Request& request, Response& response, const KeptBody& body);
 
 // True if the body is the first part of an upload. Throws Error kInvalidParameter if the header

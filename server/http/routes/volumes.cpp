@@ -29,7 +29,8 @@ bool is_to_be_kept(const Request& request) {
 KeptBody body_of(App& app, const Request& request) {
   if (request.has_parameter("upload")) {
     std::string name(request.parameter("upload"));
-    return {app.kept.find(owner_of(request), name), std::move(name)};
+    KeptUploads::Partial partial = app.kept.partial_of(owner_of(request), name);
+    return {app.kept.find(owner_of(request), name), std::move(name), std::move(partial)};
   }
   check_told_length(request, request.content_length);
   make_room_for(app, request.content_length.value_or(0));
@@ -38,7 +39,7 @@ KeptBody body_of(App& app, const Request& request) {
   if (!request.content_length) {
     check_told_length(request, std::filesystem::file_size(upload->body().path));
   }
-  return {{upload, &upload->body()}, {}};
+  return {.file = {upload, &upload->body()}};
 }
 
 // True if another request may succeed: with a selection, or with a description of raw samples.
@@ -55,10 +56,14 @@ std::vector<UploadedVolume> imported(App& app, const Request& request, Response&
                                      const KeptBody& body) {
   const process::ImportOptions options = import_options_of(request);
   const bool is_kept = is_to_be_kept(request);
+  const PartialUpload::Reading reading(body.partial);
+  const jobs::ImportControl control = {
+      .cancelled = reading.cancelled(),
+      .stored = [&reading](const std::string& id) { reading.stored(id); }};
   try {
     std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
       return app.services.library.add_all(owner_of(request), body.file->path, options,
-                                          body.file->name, party_of(request));
+                                          body.file->name, party_of(request), control);
     });
     bool is_helped = false;
     for (const UploadedVolume& each : volumes) {

@@ -94,18 +94,31 @@ ImportRunner::ImportRunner(const RunnerOptions& options)
   }
 }
 
-Volume ImportRunner::run(const process::ImportTask& task, const std::string& party) {
+void throw_cancelled() { throw Error(ErrorCode::kCancelled, "the upload was cancelled"); }
+
+Volume ImportRunner::run(const process::ImportTask& task, const std::string& party,
+                         const std::stop_token& cancelled) {
   // Checked here because a JSON message cannot carry non-finite numbers.
   if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
   const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
-  return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds}), party), task);
+  std::stop_source stop;
+  const auto request_stop = [&stop] { stop.request_stop(); };
+  const std::stop_callback on_end(stop_.get_token(), request_stop);
+  const std::stop_callback on_cancel(cancelled, request_stop);
+  const std::string message = process::to_message(process::ImportOrder{task, bounds});
+  try {
+    return volume_of(report_of(message, party, stop.get_token()), task);
+  } catch (const Error&) {
+    if (cancelled.stop_requested()) throw_cancelled();
+    throw;
+  }
 }
 
 process::PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
   const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
   try {
-    process::ImportReport report =
-        report_of(process::to_message(process::ResponseOrder{{file}, bounds}), "");
+    process::ImportReport report = report_of(
+        process::to_message(process::ResponseOrder{{file}, bounds}), "", stop_.get_token());
     if (report.error) throw *report.error;
     if (!report.response) throw_lying();
     return *std::move(report.response);
@@ -115,25 +128,26 @@ process::PeersResponse ImportRunner::read_response(const std::filesystem::path& 
   }
 }
 
-process::ImportReport ImportRunner::report_of(const std::string& message,
-                                              const std::string& party) {
-  const ImportPlaces::Place place = places_.take(party, stop_.get_token());
+process::ImportReport ImportRunner::report_of(const std::string& message, const std::string& party,
+                                              const std::stop_token& stop) {
+  const ImportPlaces::Place place = places_.take(party, stop);
   const auto deadline = Clock::now() + options_.bounds.time;
   // A process that died while idle has not touched the file. Several in a row are a defect.
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
-    if (auto report = run_in(prepared_.take(deadline), message)) return *std::move(report);
+    if (auto report = run_in(prepared_.take(deadline), message, stop)) return *std::move(report);
     log_warning("a prepared import process ended before its import began; another one takes over");
   }
   throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");
 }
 
 std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
-                                                          const std::string& message) {
+                                                          const std::string& message,
+                                                          const std::stop_token& stop) {
   using Ending = process::Output::Ending;
   child.send_last(message);
   const auto deadline = Clock::now() + options_.bounds.time;
-  const process::Output output = child.receive(kMostResponseBytes, deadline, stop_.get_token());
+  const process::Output output = child.receive(kMostResponseBytes, deadline, stop);
   if (output.ending == Ending::kStopped) {
     throw Error(ErrorCode::kUnavailable, "the service is shutting down");
   }

@@ -24,6 +24,8 @@ struct RunnerOptions {
 // if it is malicious. Honest uploads are read at many megabytes per second.
 process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
 
+[[noreturn]] void throw_cancelled();
+
 // Thread safe.
 class ImportRunner {
  public:
@@ -33,8 +35,10 @@ class ImportRunner {
   // is (ImportPlaces). The process has ended
   // when this returns or throws, and leaves files only in the scratch folder. The returned volume
   // has been compared with the canonical file. Throws what import_volume throws; Error
-  // kUnusableVolume if the process crashes or exceeds its bounds; kUnavailable after stop().
-  Volume run(const process::ImportTask& task, const std::string& party = {});
+  // kUnusableVolume if the process crashes or exceeds its bounds; kUnavailable after stop();
+  // kCancelled after a stop request to `cancelled`.
+  Volume run(const process::ImportTask& task, const std::string& party = {},
+             const std::stop_token& cancelled = {});
 
   // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
   // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
@@ -46,9 +50,11 @@ class ImportRunner {
  private:
   // Sends `message` to a process and returns its report. The process has ended when this returns.
   // Throws as run() does if the report has neither a result nor an error.
-  process::ImportReport report_of(const std::string& message, const std::string& party);
+  process::ImportReport report_of(const std::string& message, const std::string& party,
+                                  const std::stop_token& stop);
   // Returns nothing if the process ended before it began its work.
-  std::optional<process::ImportReport> run_in(process::Child child, const std::string& message);
+  std::optional<process::ImportReport> run_in(process::Child child, const std::string& message,
+                                              const std::stop_token& stop);
 
   const RunnerOptions options_;
   std::stop_source stop_;

@@ -21,37 +21,41 @@ std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const std::filesystem::path& upload,
                                            const process::ImportOptions& options,
-                                           const std::string& name, const std::string& party) {
+                                           const std::string& name, const std::string& party,
+                                           const ImportControl& control) {
   const store::ScratchFolder scratch(folder_.scratch());
-  Volume volume = import_file(upload, options, party, scratch);
+  Volume volume = import_file(upload, options, party, scratch, control.cancelled);
   if (!volume.name && !name.empty()) volume.name = name;
-  return keep(owner, std::move(volume), scratch);
+  return keep(owner, std::move(volume), scratch, control);
 }
 
 std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& owner,
                                                           const std::filesystem::path& response,
                                                           const process::PeersSeries& series) {
   const store::ScratchFolder scratch(folder_.scratch());
-  Volume volume = import_file(response, {.peers = series}, owner, scratch);
+  Volume volume = import_file(response, {.peers = series}, owner, scratch, {});
   if (!volume.dicom) throw Error(ErrorCode::kInternal, "images from a PACS have no DICOM identity");
   DicomIdentity identity = *volume.dicom;
-  return {keep(owner, std::move(volume), scratch).first, std::move(identity)};
+  return {keep(owner, std::move(volume), scratch, {}).first, std::move(identity)};
 }
 
 Volume VolumeLibrary::import_file(const std::filesystem::path& upload,
                                   const process::ImportOptions& options, const std::string& party,
-                                  const store::ScratchFolder& scratch) {
+                                  const store::ScratchFolder& scratch,
+                                  const std::stop_token& cancelled) {
   return runner_.run({.source = upload,
                       .scratch = scratch.path(),
                       .target = canonical_in(scratch),
                       .options = options,
                       .limits = limits_},
-                     party);
+                     party, cancelled);
 }
 
 std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume volume,
-                                            const store::ScratchFolder& scratch) {
+                                            const store::ScratchFolder& scratch,
+                                            const ImportControl& control) {
   const store::Blob blob = store::digest_of(canonical_in(scratch));
+  if (control.cancelled.stop_requested()) throw_cancelled();
   const std::shared_lock lock(mutex_);
   // Also required if another owner has the same samples; otherwise the outcome on a full disk would
   // reveal that.
@@ -62,6 +66,7 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   volume.id = blob.key;
   volume.created = timestamp();
   auto [stored, is_new] = volumes_.add(owner, volume);
+  if (control.stored) control.stored(stored.id);
   blobs_.mark_named(blob.key);
   // These describe this upload, which may differ from the one that created the record.
   stored.notes = std::move(volume.notes);
@@ -74,9 +79,10 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
                                                    const std::filesystem::path& upload,
                                                    const process::ImportOptions& options,
                                                    const std::string& name,
-                                                   const std::string& party) {
+                                                   const std::string& party,
+                                                   const ImportControl& control) {
   const auto add_one = [&](const process::ImportOptions& how) {
-    auto [volume, is_new] = add(owner, upload, how, name, party);
+    auto [volume, is_new] = add(owner, upload, how, name, party, control);
     return UploadedVolume{.member = how.member, .status = is_new ? 201 : 200, .volume = volume};
   };
   std::vector<Choice> members;
@@ -93,7 +99,7 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
     try {
       volumes.push_back(add_one(how));
     } catch (const Error& error) {
-      if (describe(error.code()).status >= 500) throw;
+      if (error.code() == ErrorCode::kCancelled || describe(error.code()).status >= 500) throw;
       const Problem problem = to_problem(error, "");
       volumes.push_back({.member = member.value, .status = problem.status, .problem = problem});
     }

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <shared_mutex>
+#include <stop_token>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,6 +19,14 @@
 #include "server/store/volume_store.h"
 
 namespace isomesh::jobs {
+
+// Lets another thread cancel imports.
+struct ImportControl {
+  std::stop_token cancelled = {};
+  // Called with the id of each stored volume, also of one that the owner already had. Volumes that
+  // are stored before the cancellation stay.
+  std::function<void(const std::string& id)> stored = {};
+};
 
 // Adds and erases volumes so that records, blobs and the jobs that need them stay consistent.
 // Thread safe; its dependencies must outlive it.
@@ -35,10 +46,11 @@ class VolumeLibrary {
   // used if the file contains no name; `party` takes turns with others (ImportPlaces). Second:
   // false if the owner already had the same samples and geometry. Then the record stays unchanged,
   // but the returned volume has the notes, ignored files and labels of this upload. Throws what
-  // ImportRunner::run throws, and kOutOfSpace.
+  // ImportRunner::run throws, and kOutOfSpace. It stores nothing if it throws kCancelled.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
-                              const std::string& name = {}, const std::string& party = {});
+                              const std::string& name = {}, const std::string& party = {},
+                              const ImportControl& control = {});
 
   // Imports a series from a PACS response. Second: the patient, study and series according to the
   // images themselves; the record may be of an earlier upload of the same samples. The returned
@@ -50,10 +62,11 @@ class VolumeLibrary {
   // Imports all volumes of an upload, each in a process of its own, one after the other. Each
   // element has a volume or its error, unless that is an internal one, which is thrown. If the
   // options choose a member or the upload has only one volume, there is one element with the chosen
-  // member, and its error is thrown.
+  // member, and its error is thrown. A cancellation is thrown, too.
   std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
                                       const process::ImportOptions& options,
-                                      const std::string& name, const std::string& party);
+                                      const std::string& name, const std::string& party,
+                                      const ImportControl& control = {});
 
   // Renames the owner's volume; an empty name removes it. Throws Error kNotFound, kGone.
   Volume rename(const std::string& owner, const std::string& id,
@@ -74,10 +87,11 @@ class VolumeLibrary {
  private:
   // Writes the canonical file of the upload into the scratch folder.
   Volume import_file(const std::filesystem::path& upload, const process::ImportOptions& options,
-                     const std::string& party, const store::ScratchFolder& scratch);
+                     const std::string& party, const store::ScratchFolder& scratch,
+                     const std::stop_token& cancelled);
   // Makes that file a blob, and adds the volume to the owner's records.
   std::pair<Volume, bool> keep(const std::string& owner, Volume volume,
-                               const store::ScratchFolder& scratch);
+                               const store::ScratchFolder& scratch, const ImportControl& control);
 
   const store::DataFolder& folder_;
   store::BlobStore& blobs_;

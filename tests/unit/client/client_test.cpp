@@ -302,6 +302,58 @@ TEST(Timeouts, ASilentServerIsGivenUp) {
   EXPECT_THAT(error.what(), HasSubstr("did not respond in time"));
 }
 
+class CancelledUpload : public testing::Test {
+ protected:
+  CancelledUpload() {
+    server_.http.Post("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
+      response.status = 201;
+      response.set_header("Location", "/v1/uploads/7");
+    });
+    // The response comes only after the client has cancelled the upload.
+    server_.http.Patch("/v1/uploads/7", [this](const httplib::Request&, httplib::Response&) {
+      stop_.request_stop();
+      cancelled_.get_future().wait();
+    });
+  }
+
+  void answer_to_delete(int status, const std::string& body) {
+    server_.http.Delete("/v1/uploads/7",
+                        [=, this](const httplib::Request&, httplib::Response& response) {
+                          response.status = status;
+                          if (!body.empty()) response.set_content(body, kJson);
+                          cancelled_.set_value();
+                        });
+  }
+
+  Error error() {
+    TemporaryFolder folder;
+    test::write_file(folder / "small", "abc");
+    Client client({.server = server_.start(), .stop = stop_.get_token()});
+    UploadOptions options;
+    options.resumable_bytes = 1;
+    return error_of([&] { client.upload(folder / "small", options); });
+  }
+
+  std::stop_source stop_;
+  std::promise<void> cancelled_;
+  FakeServer server_;
+};
+
+TEST_F(CancelledUpload, IsToldToTheServerAfterAStopRequestToo) {
+  answer_to_delete(204, {});
+  const Error told = error();
+  EXPECT_EQ(told.code(), ErrorCode::kCancelled);
+  EXPECT_STREQ(told.what(), "interrupted");
+}
+
+TEST_F(CancelledUpload, NamesTheVolumeThatWasStoredBefore) {
+  const Volume volume = some_volume();
+  answer_to_delete(200, to_json(std::vector<Volume>{volume}));
+  const Error told = error();
+  EXPECT_EQ(told.code(), ErrorCode::kCancelled);
+  EXPECT_EQ(told.what(), "interrupted; it was too late to cancel the volume " + volume.id);
+}
+
 // In the middle of an answer.
 TEST(Timeouts, AServerThatFallsSilentIsGivenUp) {
   test::SocketServer server([](int socket) {

@@ -32,6 +32,21 @@ TEST(PartFile, LeavesNothingWithoutPublishing) {
   EXPECT_THAT(test::files_below(folder.path()), IsEmpty());
 }
 
+TEST(PartFile, KeepsTheModeOfAFileThatItReplaces) {
+  using std::filesystem::perms;
+  TemporaryFolder folder;
+  for (const perms mode : {perms(0600), perms(0666), perms(0400)}) {
+    test::write_file(folder / "mesh.drc", "old");
+    std::filesystem::permissions(folder / "mesh.drc", mode);
+    PartFile file(folder / "mesh.drc");
+    file.write("new");
+    file.publish();
+    EXPECT_EQ(std::filesystem::status(folder / "mesh.drc").permissions(), mode);
+    EXPECT_EQ(test::read_file(folder / "mesh.drc"), "new");
+    std::filesystem::remove(folder / "mesh.drc");
+  }
+}
+
 TEST(PartFile, FollowsALink) {
   TemporaryFolder folder;
   test::write_file(folder / "real.drc", "old");

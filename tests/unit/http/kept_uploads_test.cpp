@@ -1,8 +1,11 @@
 #include "server/http/requests/kept_uploads.h"
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -178,6 +181,38 @@ TEST_F(KeptParts, OfWhoHasMostBytesTheLongestIdleGivesWay) {
   EXPECT_THROW(kept.find_partial("b", modest), Error);
   EXPECT_NO_THROW(kept.find_partial("a", second));
   EXPECT_NO_THROW(kept.find_partial("c", sent->name()));
+}
+
+TEST_F(KeptParts, CancellingWaitsForWhatReadsThemAndTellsWhatThatStored) {
+  KeptUploads kept({}, folder_.path());
+  const KeptUploads::Partial upload = begun(kept, "a", 10);
+  std::vector<std::string> told;
+  std::jthread canceller;
+  {
+    const PartialUpload::Reading reading(upload);
+    const PartialUpload::Reading other(upload);
+    canceller = std::jthread([&] { told = kept.cancel("a", upload->name()); });
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait(lock, reading.cancelled(), [] { return false; });
+    EXPECT_TRUE(other.cancelled().stop_requested());
+    EXPECT_THROW(kept.find_partial("a", upload->name()), Error);
+    EXPECT_THROW(PartialUpload::Reading{upload}, Error);
+    // Both were too far to be cancelled.
+    reading.stored("one");
+    other.stored("two");
+    other.stored("one");
+  }
+  canceller.join();
+  EXPECT_EQ(told, (std::vector<std::string>{"one", "two"}));
+}
+
+TEST_F(KeptParts, ThatHaveToGoAreNotCancelled) {
+  KeptUploads kept({}, folder_.path());
+  const KeptUploads::Partial upload = begun(kept, "a", 10);
+  const PartialUpload::Reading reading(upload);
+  kept.let_go("a", upload->name());
+  EXPECT_FALSE(reading.cancelled().stop_requested());
 }
 
 TEST_F(KeptParts, AreReadToTheEndWhenTheyHaveToGo) {

@@ -31,14 +31,14 @@ class Faulty {
                  .at_once = at_once,
                  .program = FAULTY_IMPORT}) {}
 
-  Error run(const std::string& what) {
+  Error run(const std::string& what, const std::stop_token& cancelled = {}) {
     const TemporaryFolder folder;
     const TemporaryFolder scratch;
     test::write_file(folder / "upload", what);
     const ImportTask task = {
         .source = folder / "upload", .scratch = scratch.path(), .target = scratch / "canonical"};
     try {
-      runner_.run(task);
+      runner_.run(task, {}, cancelled);
     } catch (const Error& error) {
       return error;
     }
@@ -155,6 +155,26 @@ TEST(ImportRunner, StoppingEndsThoseThatRunAndThoseThatWait) {
   faulty.runner().stop();
   threads.clear();
   EXPECT_EQ(faulty.run("crash").code(), ErrorCode::kUnavailable);
+}
+
+TEST(ImportRunner, CancellingEndsOneThatRunsOrWaitsAndNoOther) {
+  Faulty faulty(seconds(600), 1);
+  std::stop_source cancel_running;
+  std::stop_source cancel_waiting;
+  std::jthread running([&] {
+    EXPECT_EQ(faulty.run("hang", cancel_running.get_token()).code(), ErrorCode::kCancelled);
+  });
+  ASSERT_TRUE(test::eventually([] { return test::children_of(::getpid()).size() == 3; }));
+  std::jthread waiting([&] {
+    EXPECT_EQ(faulty.run("hang", cancel_waiting.get_token()).code(), ErrorCode::kCancelled);
+  });
+  cancel_waiting.request_stop();
+  waiting.join();
+  std::jthread next([&] { EXPECT_EQ(faulty.run("lie").code(), ErrorCode::kInternal); });
+  cancel_running.request_stop();
+  running.join();
+  next.join();
+  EXPECT_EQ(faulty.run("hang", cancel_running.get_token()).code(), ErrorCode::kCancelled);
 }
 
 // A client alone uses all places. When another one comes, it gets the next place that becomes free,

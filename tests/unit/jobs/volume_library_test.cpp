@@ -60,6 +60,22 @@ TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
   EXPECT_EQ(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).size(), 3U);
 }
 
+TEST_F(VolumeLibraryTest, ACancelledUploadLeavesNothing) {
+  std::stop_source cancel;
+  std::vector<std::string> stored;
+  const ImportControl control = {.cancelled = cancel.get_token(),
+                                 .stored = [&](const std::string& id) { stored.push_back(id); }};
+  test::write_file(folder_ / "upload", bytes_);
+  const auto add = [&] { return library_.add_all("", folder_ / "upload", raw(), {}, {}, control); };
+  const std::string id = add().front().volume->id;
+  EXPECT_EQ(stored, (std::vector<std::string>{id}));
+  test::write_file(folder_ / "upload", std::string(bytes_.rbegin(), bytes_.rend()));
+  cancel.request_stop();
+  EXPECT_EQ(code_thrown_by(add), ErrorCode::kCancelled);
+  EXPECT_EQ(stored.size(), 1U);
+  EXPECT_EQ(blob_count(), 1U);
+}
+
 TEST_F(VolumeLibraryTest, LeavesTheUploadToItsOwner) {
   add_bytes(bytes_);
   EXPECT_EQ(test::read_file(folder_ / "upload"), bytes_);

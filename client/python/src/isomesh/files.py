@@ -49,6 +49,16 @@ def file_of(
     )
 
 
+def _mode_of(target: Path) -> int:
+    """The mode of the file that is replaced, or that of any new file; mkstemp's are for their owner alone."""
+    try:
+        return target.stat().st_mode & 0o777
+    except OSError:
+        mask = os.umask(0)
+        os.umask(mask)
+        return 0o666 & ~mask
+
+
 @contextlib.contextmanager
 def written(target: Path) -> Iterator[IO[bytes]]:
     """A file to write to, which takes the place of `target` at the end, and is removed on errors."""
@@ -58,10 +68,7 @@ def written(target: Path) -> Iterator[IO[bytes]]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        # mkstemp's files are for their owner alone; this one gets the mode of any new file.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(part, 0o666 & ~mask)
+        os.chmod(part, _mode_of(target))
         os.replace(part, target)
     except BaseException:
         os.unlink(part)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import functools
 import inspect
+import operator
 from typing import Any, Callable, Dict, Mapping, TypeVar, cast
 
 from . import api
@@ -28,7 +29,15 @@ def given(keywords: Mapping[str, Any]) -> Dict[str, Any]:
     for name in ("formats", "lods"):
         if isinstance(found.get(name), str):
             raise TypeError(f"{name} must be a list: {name}=[{found[name]!r}]")
+    for name in ("label_names", "label_colors", "label_values"):
+        if isinstance(found.get(name), Mapping):
+            found[name] = {_label(key): value for key, value in found[name].items()}
     return {name.rstrip("_"): value for name, value in found.items()}
+
+
+def _label(key: Any) -> Any:
+    """A key as JSON takes it. Labels that come from an array are numpy's numbers."""
+    return key if isinstance(key, str) else operator.index(key)
 
 
 def by_keywords(method: Call) -> Call:

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import json
 import time
 from typing import Dict, Iterator, Optional
 
-from .errors import IsomeshError, Refused, Unreachable, WrongAnswer
+from .errors import IsomeshError, Refused, Unreachable, WrongAnswer, warn
 from .transport import Answer, Request, Transport
 from .uploads import Body
 
@@ -32,11 +33,24 @@ def send(transport: Transport, target: str, headers: Dict[str, str], body: Body)
         if isinstance(error, Refused) and error.status == 410:
             # The upload has expired, or another daemon than the one that holds it responds.
             return transport.send(Request("POST", target, headers, body))
-        try:
-            transport.send(Request("DELETE", place)).text()
-        except IsomeshError:
-            pass  # the server deletes the upload when it expires
+        _give_up(transport, place)
         raise
+
+
+def _give_up(transport: Transport, place: str) -> None:
+    try:
+        answer = transport.send(Request("DELETE", place))
+        told = answer.text()
+    except IsomeshError:
+        return  # the server deletes the upload when it expires
+    if answer.status == 200:
+        ids = ", ".join(volume["id"] for volume in json.loads(told)["volumes"])
+        warn(f"the upload was cancelled too late: the server has stored the volume {ids}")
+
+
+def _is_cancelled(error: Refused) -> bool:
+    """True if somebody else has cancelled the upload."""
+    return str(error.problem.get("type", "")).endswith(":cancelled")
 
 
 def _begin(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> str:
@@ -75,7 +89,7 @@ def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer
                 return transport.send(Request("POST", target_again, {}, Body(0, lambda: iter(()))))
             return transport.send(Request("PATCH", place, _part(offset), _after(body, offset)))
         except (Refused, Unreachable) as error:
-            if isinstance(error, Refused) and error.status not in _PASSING:
+            if isinstance(error, Refused) and (error.status not in _PASSING or _is_cancelled(error)):
                 raise
             cut = time.monotonic() if cut is None else cut
             if time.monotonic() - cut >= _LONGEST_CUT:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import re
@@ -9,6 +10,8 @@ import tarfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+
+from .errors import warn
 
 if TYPE_CHECKING:
     from .api import SampleType
@@ -251,7 +254,8 @@ def of_source(
     else:
         is_array = True
         if hasattr(source, "dataobj") and hasattr(source, "affine"):
-            affine = source.affine if affine is None and spacing is None else affine
+            if affine is None and spacing is None:
+                affine = _affine_of_image(source)
             source = source.dataobj
         elif not hasattr(source, "__array__"):
             raise TypeError(f"cannot upload a {type(source).__name__}: give a path, bytes, an array or an image")
@@ -265,6 +269,55 @@ def of_source(
     if not is_array and spacing is not None:
         body.query = {**body.query, "spacing": _joined(steps_of(spacing))}
     return body
+
+
+# The spatial units of NIfTI, by nibabel's names. The server reads an unknown unit as millimetres, too.
+_MILLIMETRES = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
+
+
+def _affine_of_image(image: Any) -> Any:
+    """The image's affine in millimetres: nibabel leaves it in the unit of the header."""
+    header: Any = getattr(image, "header", None)
+    if not hasattr(header, "get_xyzt_units"):
+        return image.affine
+    try:
+        scale = _MILLIMETRES[header.get_xyzt_units()[0]]
+    except KeyError as error:
+        raise ValueError(f"the spatial unit {error} of the image's header is unknown; give an affine") from error
+    affine = _scaled(image.affine, scale)
+    _warn_of_other_form(header, affine, scale, image.dataobj.shape[:3])
+    return affine
+
+
+def _scaled(affine: Any, scale: float) -> List[List[float]]:
+    return [[float(number) * scale for number in row] for row in list(affine)[:3]]
+
+
+def _warn_of_other_form(header: Any, affine: List[List[float]], scale: float, dims: Sequence[int]) -> None:
+    """The server's note forms-differ for a NIfTI image whose affine is its sform."""
+    try:
+        forms = [getattr(header, get)(coded=True)[0] for get in ("get_sform", "get_qform")]
+    except (AttributeError, ValueError):
+        return  # another kind of header, or a qform that is not a rotation
+    if any(form is None for form in forms):
+        return
+    sform, qform = (_scaled(form, scale) for form in forms)
+    step = min(math.hypot(*(row[axis] for row in affine)) for axis in range(3))
+    apart = _distance(affine, qform, dims)
+    if apart > step / 100 and _distance(affine, sform, dims) <= step / 100:
+        warn(
+            f"The sform and qform of the NIfTI header place samples up to {apart:.1f} mm apart. The sform was used. "
+            "affine=image.get_qform() selects the qform, if the header's unit is millimetres. (forms-differ)"
+        )
+
+
+def _distance(one: List[List[float]], other: List[List[float]], dims: Sequence[int]) -> float:
+    """The largest distance between the two positions of a sample, which is at a corner."""
+    corners = itertools.product(*((0, size - 1) for size in dims))
+    rows = [[a - b for a, b in zip(*pair)] for pair in zip(one, other)]
+    return max(
+        math.hypot(*(row[3] + sum(n * index for n, index in zip(row, corner)) for row in rows)) for corner in corners
+    )
 
 
 def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]]) -> Body:
