@@ -204,7 +204,8 @@ scmp_arg_cmp argument_is_without(unsigned index, std::uint64_t bits) {
 void allow_memory(Filter& filter) {
   const scmp_arg_cmp not_executable = argument_is_without(2, PROT_EXEC);
   filter.allow(SCMP_SYS(mprotect), {not_executable});
-  filter.allow(SCMP_SYS(mmap), {not_executable, argument_is_without(3, MAP_SHARED | MAP_GROWSDOWN)});
+  filter.allow(SCMP_SYS(mmap),
+               {not_executable, argument_is_without(3, MAP_SHARED | MAP_GROWSDOWN)});
   filter.allow(SCMP_SYS(mmap),
                {not_executable, argument_is_without(3, MAP_ANONYMOUS | MAP_GROWSDOWN)});
 }

@@ -123,7 +123,8 @@ Statistics measure_samples(std::span<const Sample> samples) {
   if constexpr (sizeof(Sample) <= 2) {
     // One count per possible value fits into memory, so the range is not needed first.
     constexpr std::size_t kValues = std::size_t{1} << (8 * sizeof(Sample));
-    if (samples.size() < kValues) return measure_wide(samples);  // a second walk takes less time than zeroing
+    if (samples.size() < kValues)
+      return measure_wide(samples);  // a second walk takes less time than zeroing
     constexpr std::int64_t kLowest = std::is_signed_v<Sample> ? -std::int64_t{kValues / 2} : 0;
     return from_value_counts(count_values(samples, kLowest, kValues), kLowest);
   } else {

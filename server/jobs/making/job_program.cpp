@@ -283,8 +283,7 @@ int main() {
   const JobSetup setup = setup_from(lines.next());
   const std::uint64_t headroom =
       kHeadroomBytes + kThreadBytes * static_cast<std::uint64_t>(setup.threads);
-  const process::MemoryLimit memory(setup.memory_bytes + kept_bytes(setup.memory_bytes) +
-                                    headroom);
+  const process::MemoryLimit memory(setup.memory_bytes + kept_bytes(setup.memory_bytes) + headroom);
   process::confine_job();
   mesh::set_thread_count(setup.threads);
   Desk desk;
