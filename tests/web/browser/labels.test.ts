@@ -47,7 +47,8 @@ describe('the labels of a volume', () => {
   it('have their colours in slices and in a preview, and their names under the pointer', async () => {
     const { page } = at;
     await page.setViewportSize({ width: 1180, height: 760 });
-    const rows = await openForm(page);
+    // A slab and a plane between samples are for values: with labels they are off.
+    const rows = await openForm(page, '?slab=maximum-10&oblique=30,0');
     const axial = page.locator('[data-plane=axial]');
     // Half of the ball is each label, so that two colours are there; what is between has none.
     const colours = (): Promise<string[]> =>
@@ -64,6 +65,8 @@ describe('the labels of a volume', () => {
         return [...counts].filter(([, count]) => count > 400).map(([hue]) => hue);
       });
     await expect.poll(async () => (await colours()).length).toBe(2);
+    for (const name of ['Show', 'Thickness', 'Oblique plane']) expect(await page.getByLabel(name, { exact: true }).isDisabled()).toBe(true);
+    expect(await page.locator('.oblique').isVisible()).toBe(false);
     await expect.poll(() => page.locator('.live-picture[data-still]').count()).toBe(1);
     const preview = async (): Promise<number> => {
       const { red, green, blue } = await hues(page, page.locator('.live-picture'));

@@ -230,6 +230,13 @@ describe('a surface', () => {
     for (const cell of await page.locator('.cell .viewport').all()) {
       expect((await silhouette(page, cell)).part).toBeGreaterThan(0.05);
     }
+    // Their style is in the address as well.
+    const flat = page.getByRole('toolbar', { name: 'View of all surfaces' }).getByRole('button', { name: 'Flat' });
+    await flat.click();
+    await expect.poll(() => query().get('style')).toBe('flat');
+    await page.reload();
+    await expect.poll(() => page.locator('.cell [data-tool=flat][aria-pressed=true]').count()).toBe(3);
+    expect(await flat.getAttribute('aria-pressed')).toBe('true');
   });
 });
 

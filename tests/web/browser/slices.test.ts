@@ -183,6 +183,26 @@ describe('slices before there is a mesh', () => {
     await page.getByLabel('Show', { exact: true }).selectOption('maximum');
     await page.getByLabel('Thickness', { exact: true }).selectOption('40');
     await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(1.25 * few);
+    // All of that is in the address, with what is measured.
+    await page.getByLabel('Colours', { exact: true }).selectOption('Hot iron');
+    await page.getByLabel('Coordinates').selectOption('RAS');
+    await page.getByLabel('Layout', { exact: true }).selectOption('First large');
+    await page.getByLabel('Oblique plane', { exact: true }).check();
+    await page.getByLabel('Tilt of the oblique plane').fill('20');
+    await page.locator('.oblique-picture[data-angles="30,20"]').waitFor();
+    await page.getByRole('radio', { name: 'Length' }).check({ force: true });
+    const axial = page.locator('[data-plane=axial] canvas');
+    for (const x of [200, 300]) await axial.click({ position: { x, y: 300 } });
+    await expect.poll(() => axial.getAttribute('aria-label')).toMatch(/mm$/);
+    const said = await axial.getAttribute('aria-label');
+    await expect.poll(() => noted(page, 'measured')).toMatch(/^length,axial,8,/);
+    await page.reload();
+    await expect.poll(() => axial.getAttribute('aria-label')).toBe(said);
+    await page.locator('.oblique-picture[data-angles="30,20"]').waitFor();
+    expect(await page.getByLabel('Oblique plane', { exact: true }).isChecked()).toBe(true);
+    const controls = ['Show', 'Thickness', 'Colours', 'Coordinates', 'Layout'];
+    expect(await Promise.all(controls.map((name) => page.getByLabel(name, { exact: true }).inputValue()))).toEqual(['maximum', '40', 'hot', 'RAS', 'large']);
+    await expect.poll(() => page.locator('[data-plane=axial] .slice-where').innerText()).toContain('RAS');
   });
 
   it('show bright structures in a slab over any window', async () => {

@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { defaultStyle } from '@/scene/style';
 import { History } from '@/ui/history';
+import { anglesOfText, anglesToText, measuresOfText, measuresToText, slabOfText, slabToText, type Measure } from '@/views/slices/slice_texts';
 import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from '@/views/surface/look_text';
 
 describe('a look in the address', () => {
@@ -24,6 +25,27 @@ describe('a look in the address', () => {
       { from: [0, 0, 0], to: [0, 0, 1] },
     ]);
     expect(rulersOfText(';1,2,3;1,2,3,4,5,x')).toEqual([]);
+  });
+
+  it('has a slab and the angles of a plane', () => {
+    expect([slabToText(null), slabOfText('')]).toEqual(['', null]);
+    expect(slabOfText(slabToText({ projection: 'mean', thickness: 20 }))).toEqual({ projection: 'mean', thickness: 20 });
+    for (const wrong of ['mean', 'mean-7', 'least-10']) expect(slabOfText(wrong)).toBe(null);
+    const text = anglesToText({ turn: Math.PI / 6, tilt: -0.1 });
+    expect(text).toBe('30,-5.7');
+    expect(anglesToText(anglesOfText(text) ?? { turn: 0, tilt: 0 })).toBe(text);
+    for (const wrong of ['', '30', '30,91', '30,x', '1,2,3']) expect(anglesOfText(wrong)).toBe(null);
+  });
+
+  it('has the measurements of slices that are whole', () => {
+    const length: Measure = { kind: 'length', plane: 'axial', index: 24, points: [[10.5, 24], [30.25, 24]], isWhole: true };
+    const area: Measure = { kind: 'area', plane: 'sagittal', index: 3, points: [[0, 0], [4, 0], [4, 3], [0, 3]], isWhole: true };
+    const text = measuresToText([length, area, { ...length, points: [[1, 1]], isWhole: false }]);
+    expect(text).toBe('length,axial,24,10.5,24,30.25,24;area,sagittal,3,0,0,4,0,4,3,0,3');
+    expect(measuresOfText(text)).toEqual([length, area]);
+    for (const wrong of ['', 'length,axial,24,1,2', 'length,oblique,24,1,2,3,4', 'area,axial,1,0,0,4,0', 'angle,axial,0.5,1,2,3,4,5,6', 'length,axial,1,1,2,3,x']) {
+      expect(measuresOfText(wrong)).toEqual([]);
+    }
   });
 
   it('has labels', () => {

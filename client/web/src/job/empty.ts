@@ -1,6 +1,7 @@
 // The reason why a job's surface is empty, and what to do about it.
 import type { Job, Volume } from '../api/types';
 import { formatCount, formatValue } from '../ui/format';
+import { spanOf } from '../volume/names';
 import { isByLabels } from './table';
 
 export function emptyReason({ parameters, mesh }: Job, volume: Pick<Volume, 'range'> | null): string {
@@ -11,7 +12,7 @@ export function emptyReason({ parameters, mesh }: Job, volume: Pick<Volume, 'ran
     return `The surface is empty: ${components} dropped. Keep more components.`;
   }
   const iso = mesh?.iso ?? parameters.iso;
-  const span = volume ? volume.range[1] - volume.range[0] : undefined;
+  const span = volume ? spanOf(volume) : undefined;
   const at = typeof iso === 'number' ? `at the iso-value ${formatValue(iso, span)}` : 'at this iso-value';
   const where = parameters.crop ? ' within the box' : '';
   if (!volume) return `There is no surface ${at}${where}.`;

@@ -36,6 +36,10 @@ export function isInteger({ type, range }: Pick<Volume, 'type' | 'range'>): bool
   return !type.startsWith('float') && range.every(Number.isInteger);
 }
 
+export function spanOf({ range: [low, high] }: Pick<Volume, 'range'>): number {
+  return high - low;
+}
+
 // The button that makes surfaces of labels. Only volumes of whole values have it.
 export const eachLabel = 'Each label';
 

@@ -13,6 +13,7 @@ import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { KnownVolumes } from '../../volume/known';
 import { distributionChart } from '../jobs/charts';
+import { styleOfText, styleToText } from '../surface/look_text';
 import { SurfacePane } from '../surface/surface_pane';
 
 const most = 4;
@@ -51,7 +52,7 @@ export async function compareView(scope: Scope, route: Route): Promise<HTMLEleme
   const jobs = await Promise.all(ids.map((id) => client.getJob(id)));
   const volumes = new KnownVolumes();
   await volumes.find(jobs.map((job) => job.volume));
-  return new Comparison(scope, jobs, volumes, placeOfText(route.query.get('cam') ?? '')).element;
+  return new Comparison(scope, jobs, volumes, placeOfText(route.query.get('cam') ?? ''), route.query.get('style') ?? '').element;
 }
 
 // One of the surfaces with its title and numbers.
@@ -92,13 +93,17 @@ class Comparison {
   readonly element: HTMLElement;
   private readonly panes: SurfacePane[] = [];
   private noting = 0;
+  // Those of all surfaces, also of those that are still to come.
+  private readonly look: URLSearchParams;
 
   constructor(
     private readonly scope: Scope,
     jobs: readonly Job[],
     private readonly volumes: KnownVolumes,
     private readonly camera: CameraPlace | null,
+    style: string,
   ) {
+    this.look = new URLSearchParams({ style });
     const titles = titlesOf(jobs, (volume) => volumes.nameOf(volume));
     const [only, ...others] = new Set(jobs.map(({ volume }) => volume));
     const title = only !== undefined && others.length === 0 ? `Compare, ${volumes.nameOf(only)}` : 'Compare';
@@ -113,6 +118,7 @@ class Comparison {
   }
 
   private head(title: string, jobs: readonly string[]): HTMLElement {
+    const style = styleOfText(this.look.get('style') ?? '');
     const views = viewNames.map((name) =>
       button(name, () => this.panes[0]?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] }),
     );
@@ -125,8 +131,8 @@ class Comparison {
         { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all surfaces' },
         ...views,
         button('Fit', () => this.panes[0]?.fit()),
-        this.styleButton('Flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
-        this.styleButton('Edges', (isOn) => ({ wireframe: isOn })),
+        this.styleButton('Flat', style.shading === 'flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
+        this.styleButton('Edges', style.wireframe, (isOn) => ({ wireframe: isOn })),
       ),
       h('span', { class: 'hint grow' }, 'All views turn together.'),
       h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'Show in one scene'),
@@ -134,16 +140,19 @@ class Comparison {
   }
 
   // Switches a style of all surfaces.
-  private styleButton(text: string, styleFor: (isOn: boolean) => Partial<SurfaceStyle>): HTMLButtonElement {
-    let isOn = false;
+  private styleButton(text: string, isOnAtFirst: boolean, styleFor: (isOn: boolean) => Partial<SurfaceStyle>): HTMLButtonElement {
+    let isOn = isOnAtFirst;
     const toggle = button(
       text,
       () => {
         isOn = !isOn;
         toggle.setAttribute('aria-pressed', String(isOn));
+        const style = styleToText({ ...styleOfText(this.look.get('style') ?? ''), ...styleFor(isOn) });
+        this.look.set('style', style);
         for (const pane of this.panes) pane.setStyle(styleFor(isOn));
+        noteInAddress({ style });
       },
-      { 'aria-pressed': 'false' },
+      { 'aria-pressed': String(isOn) },
     );
     return toggle;
   }
@@ -182,7 +191,7 @@ class Comparison {
     const pane = new SurfacePane(this.scope, job, {
       hasKeys: false,
       onSlices: null,
-      look: new URLSearchParams(),
+      look: this.look,
       camera,
       volume: this.volumes.get(job.volume),
       labels: new LabelState(labels),

@@ -6,7 +6,7 @@ import { formatDims, volumeFormatTitle, formatSpacing, formatValue } from '../..
 import { askText, tellError } from '../../ui/notices';
 import { go } from '../../ui/route';
 import { skippedText } from '../../volume/skipped';
-import { noteTexts, otherForm, volumeName } from '../../volume/names';
+import { noteTexts, otherForm, spanOf, volumeName } from '../../volume/names';
 import { uploads } from '../volumes/upload_panel';
 
 // Lists the skipped files of an upload, because a user may miss them.
@@ -68,7 +68,7 @@ function factsOf(volume: Volume): string {
     volume.modality,
     `${formatDims(volume.dims)}, ${volume.type}`,
     formatSpacing(volume.spacing),
-    `values ${volume.range.map((value) => formatValue(value, volume.range[1] - volume.range[0])).join(' to ')}`,
+    `values ${volume.range.map((value) => formatValue(value, spanOf(volume))).join(' to ')}`,
   ]
     .filter(Boolean)
     .join(' \u00b7 ');

@@ -19,7 +19,7 @@ import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
 import { isCt } from '../../volume/looks';
 import type { LabelLook } from '../../volume/label_map';
-import { eachLabel, isInteger, volumeName } from '../../volume/names';
+import { eachLabel, isInteger, spanOf, volumeName } from '../../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { CropControl } from './crop_control';
 import { estimateTexts, simplifiedInWords } from './estimate_texts';
@@ -30,7 +30,7 @@ import { LabelChoice, type Choice } from '../labels/label_choice';
 import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
 import { paneArea } from '../slices/pane_area';
-import { sliceControls, WindowChoice } from '../slices/slice_looks';
+import { looksInAddress, restoreLooks, sliceControls, watchLooks, WindowChoice } from '../slices/slice_looks';
 import { SliceLayers } from '../slices/slice_layers';
 import { ObliqueView } from '../slices/oblique_view';
 import { SliceMeasures } from '../slices/slice_measure';
@@ -47,10 +47,6 @@ export async function prepareView(scope: Scope, route: Route): Promise<HTMLEleme
   return new Prepare(scope, route, volume, histogram).element;
 }
 
-function spanOf({ range: [low, high] }: Volume): number {
-  return high - low;
-}
-
 function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
   const parameters = parametersOfQuery(query, defaults);
   // An iso-value makes one surface of all labels above it, which users rarely want.
@@ -65,7 +61,7 @@ class Prepare {
   private window: Window;
   private cursor: Vec3;
   private readonly slices: SliceView[];
-  private readonly measures = new SliceMeasures();
+  private readonly measures: SliceMeasures;
   private readonly layers: SliceLayers;
   private readonly oblique: ObliqueView;
   private readonly histogram: HistogramView;
@@ -110,11 +106,35 @@ class Prepare {
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
     this.oblique = new ObliqueView({ volume, setCursor: (cursor) => this.setCursor(cursor), cursor: () => this.cursor, window: () => this.window }, scope);
-    this.layers = new SliceLayers({ volume, commonWindow: common, window: () => this.window, oblique: this.oblique }, scope);
-    const host: SliceHost = {
+    restoreLooks(route.query);
+    this.measures = new SliceMeasures(route.query.get('measured') ?? '');
+    const areLabels = (): boolean => isByLabels(this.parameters);
+    this.layers = new SliceLayers({ volume, commonWindow: common, window: () => this.window, oblique: this.oblique, areLabels, query: route.query }, scope);
+    const host = this.sliceHost(common);
+    this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
+    this.slices = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));
+    this.live = this.liveView(route, host);
+    this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box), (isGood) => this.mark('crop', isGood));
+    this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
+    this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
+    this.element = this.layout(common);
+    this.kind.append(this.kindChoice() ?? '');
+    this.showKind();
+    scope.onEnd(() => {
+      clearTimeout(this.estimateTimer);
+      this.estimating?.abort();
+    });
+    this.listenToPage();
+    this.update();
+    this.askForEstimate();
+  }
+
+  private sliceHost(commonWindow: Window): SliceHost {
+    const { volume, scope } = this;
+    return {
       volume,
       source: new SliceSource(volume, scope.signal),
-      commonWindow: common,
+      commonWindow,
       state: () => ({
         iso: isByLabels(this.parameters) ? null : this.iso,
         labels: this.labelLook,
@@ -134,22 +154,6 @@ class Prepare {
       layers: this.layers,
       oblique: this.oblique,
     };
-    this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
-    this.slices = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));
-    this.live = this.liveView(route, host);
-    this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box), (isGood) => this.mark('crop', isGood));
-    this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
-    this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
-    this.element = this.layout(common);
-    this.kind.append(this.kindChoice() ?? '');
-    this.showKind();
-    scope.onEnd(() => {
-      clearTimeout(this.estimateTimer);
-      this.estimating?.abort();
-    });
-    this.listenToPage();
-    this.update();
-    this.askForEstimate();
   }
 
   private liveView({ query }: Route, { volume, setCursor }: SliceHost): LiveView {
@@ -160,6 +164,9 @@ class Prepare {
   private listenToPage(): void {
     const { scope } = this;
     scope.onEnd(theme.subscribe(() => this.update()));
+    const note = (): void => noteInAddress(this.slicesInAddress);
+    watchLooks(scope, note);
+    for (const { changes } of [this.measures, this.layers, this.oblique]) scope.onEnd(changes.subscribe(note));
     // Before what is pressed changes anything.
     scope.listen(window, 'pointerdown', () => this.history.hold(), { capture: true });
     for (const end of ['pointerup', 'pointercancel'] as const) scope.listen(window, end, () => this.history.release());
@@ -380,7 +387,12 @@ class Prepare {
       ...queryOfParameters(this.parameters, this.defaults),
       window: textOfWindow(this.window),
       at: this.cursor.join(','),
+      ...this.slicesInAddress,
     });
+  }
+
+  private get slicesInAddress(): Record<string, string> {
+    return { ...looksInAddress(), ...this.layers.texts, measured: this.measures.text };
   }
 
   private sliceFailed(error: unknown): void {
@@ -415,9 +427,7 @@ class Prepare {
     const [fault] = error.faults;
     const text = fault ? `${fault.field}: ${fault.message}` : error.detail;
     this.estimate.classList.remove('stale');
-    this.estimate.replaceChildren(
-      error.status === 404 ? '' : h('p', { class: 'warning' }, text),
-    );
+    this.estimate.replaceChildren(error.status === 404 ? '' : h('p', { class: 'warning' }, text));
   }
 
   private async start(): Promise<void> {

@@ -9,6 +9,7 @@ import { sampledSquare } from '../../volume/reslice';
 import { greyTable, type Window } from '../../volume/slices';
 import type { SliceGrip, Spot } from './slice_grip';
 import { pixelsOf, sliceColours } from './slice_looks';
+import { anglesOfText, anglesToText } from './slice_texts';
 
 const colour = '#c792ea';
 const pixels = 320;
@@ -52,6 +53,18 @@ export class ObliqueView {
     this.listen();
     scope.onEnd(sliceColours.subscribe(() => this.draw()));
     this.showAngles();
+  }
+
+  // For the address.
+  get text(): string {
+    return anglesToText(this.angles);
+  }
+
+  // False where the text says no angles.
+  restore(text: string): boolean {
+    const angles = anglesOfText(text);
+    if (angles) this.set(angles);
+    return angles !== null;
   }
 
   // Null takes it away.

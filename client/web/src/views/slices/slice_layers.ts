@@ -9,13 +9,13 @@ import { volumeName } from '../../volume/names';
 import type { Preview } from '../../volume/preview';
 import { fetchPreview, largestPreview } from '../../volume/preview_file';
 import { PreviewLoader } from '../../volume/preview_loader';
-import { resliced, type Projection, type Slab } from '../../volume/reslice';
+import { resliced, type Slab } from '../../volume/reslice';
 import { windowToFetch, type Slice, type Window } from '../../volume/slices';
 import type { ObliqueView } from './oblique_view';
 import { pixelsOf } from './slice_looks';
+import { slabOfText, slabToText, thicknesses } from './slice_texts';
 
 const bins = 256;
-const thicknesses = [5, 10, 20, 40]; // mm
 // The lowest of 255 values fade out, so that air around a body does not darken the other volume.
 const fading = 48;
 // Up to yellow: what is white could be either volume.
@@ -45,7 +45,13 @@ export interface LayersHost {
   // As it is shown now.
   window: () => Window;
   oblique: ObliqueView;
+  // Numbers of labels are no values: they have no maximum, no mean, and nothing between them.
+  areLabels: () => boolean;
+  // What the address says.
+  query: URLSearchParams;
 }
+
+const notForLabels = 'Only for one surface: numbers of labels have no maximum or mean, and none between samples';
 
 export class SliceLayers {
   readonly element: HTMLElement;
@@ -53,9 +59,11 @@ export class SliceLayers {
   readonly changes = new Signal(0);
   private other: Layer | null = null;
   private readonly own: PreviewLoader;
-  private projection: Projection | null = null;
-  private thickness = 10;
-  private showsOblique = false;
+  private slab: Slab | null;
+  private showsOblique: boolean;
+  private wereLabels = false;
+  // Are for values.
+  private readonly valueControls: HTMLElement[];
   private readonly choice = h('select', {}, h('option', { value: '' }, 'None'));
   private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the overlay' });
   private readonly overlays = new Kept<HTMLCanvasElement>();
@@ -79,32 +87,42 @@ export class SliceLayers {
         if (isConnected) this.own.retry();
       }),
     );
+    this.slab = slabOfText(host.query.get('slab') ?? '');
+    this.showsOblique = host.oblique.restore(host.query.get('oblique') ?? '');
     this.opacity.hidden = true;
     this.opacity.addEventListener('input', () => this.changed());
     this.choice.addEventListener('change', () => void this.show(this.choice.value).catch(tellError));
     const over = field('Overlay', this.choice);
     over.append(this.opacity);
     over.hidden = true;
-    this.element = h('div', { class: 'stack' }, h('div', { class: 'row slice-layers' }, over, ...this.slabControls()), this.obliqueControl());
+    const slabControls = this.slabControls();
+    const obliqueControl = this.obliqueControl();
+    this.valueControls = [...slabControls, obliqueControl];
+    this.element = h('div', { class: 'stack' }, h('div', { class: 'row slice-layers' }, over, ...slabControls), obliqueControl);
     // Without the list nothing can be laid over, and everything else works.
     void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
   }
 
   // A preview does not tell apart the values beyond its window, so another window may need another preview.
   update(): void {
-    if (!this.projection && !this.showsOblique) return;
+    this.showKind();
+    if (this.host.areLabels() || (!this.slab && !this.showsOblique)) return;
     const [low, high] = this.host.window();
     this.own.want(windowToFetch([low, high], (low + high) / 2, this.host.commonWindow));
   }
 
+  // For the address.
+  get texts(): { slab: string; oblique: string } {
+    return { slab: slabToText(this.slab), oblique: this.showsOblique ? this.host.oblique.text : '' };
+  }
+
   // A projection instead of that slice; null where none is wanted or there.
   projected(axis: Axis, index: number): Slice | null {
-    const { projection } = this;
+    const { slab } = this;
     const { volume } = this.host;
     const own = this.own.preview;
-    if (!own || !projection) return null;
-    const slab: Slab = { thickness: this.thickness, projection };
-    return this.projections.get(axis, [index, slab.thickness, projection, ...own.window].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
+    if (!own || !slab || this.host.areLabels()) return null;
+    return this.projections.get(axis, [index, slabToText(slab), ...own.window].join(), () => ({ axis, index, ...resliced(own, volume, axis, index, slab), window: own.window }));
   }
 
   // Draws the other volume over that slice, in whose samples the context counts.
@@ -133,25 +151,23 @@ export class SliceLayers {
 
   private slabControls(): HTMLElement[] {
     const kinds = [['', 'Slice'], ['maximum', 'Maximum of a slab'], ['mean', 'Mean of a slab']] as const;
-    const kind = h('select', {}, ...kinds.map(([value, text]) => h('option', { value }, text)));
-    const thick = h('select', {}, ...thicknesses.map((value) => h('option', { value, selected: value === this.thickness }, `${value} mm`)));
+    const { slab } = this;
+    const kind = h('select', {}, ...kinds.map(([value, text]) => h('option', { value, selected: value === slab?.projection }, text)));
+    const thick = h('select', {}, ...thicknesses.map((value) => h('option', { value, selected: value === (slab?.thickness ?? 10) }, `${value} mm`)));
     const thickness = field('Thickness', thick);
-    thickness.hidden = true;
-    kind.addEventListener('change', () => {
-      this.projection = kind.value === '' ? null : (kind.value as Projection);
-      thickness.hidden = this.projection === null;
+    thickness.hidden = slab === null;
+    const take = (): void => {
+      this.slab = slabOfText(`${kind.value}-${thick.value}`);
+      thickness.hidden = this.slab === null;
       this.askForOwn();
       this.changed();
-    });
-    thick.addEventListener('change', () => {
-      this.thickness = Number(thick.value);
-      this.changed();
-    });
+    };
+    for (const select of [kind, thick]) select.addEventListener('change', take);
     return [field('Show', kind), thickness];
   }
 
   private obliqueControl(): HTMLElement {
-    return checkbox('Oblique plane', false, (isOn) => {
+    return checkbox('Oblique plane', this.showsOblique, (isOn) => {
       this.showsOblique = isOn;
       this.askForOwn();
       this.showOwn();
@@ -165,13 +181,25 @@ export class SliceLayers {
     return others.length > 0;
   }
 
+  // With labels the controls are off, and keep what was chosen.
+  private showKind(): void {
+    const areLabels = this.host.areLabels();
+    if (areLabels === this.wereLabels) return;
+    this.wereLabels = areLabels;
+    for (const control of this.valueControls) {
+      control.title = areLabels ? notForLabels : '';
+      for (const one of control.querySelectorAll<HTMLInputElement | HTMLSelectElement>('input, select')) one.disabled = areLabels;
+    }
+    this.showOwn();
+  }
+
   private askForOwn(): void {
     this.own.retry();
     this.update();
   }
 
   private showOwn(): void {
-    this.host.oblique.show(this.showsOblique ? this.own.preview : null);
+    this.host.oblique.show(this.showsOblique && !this.host.areLabels() ? this.own.preview : null);
     this.changed();
   }
 

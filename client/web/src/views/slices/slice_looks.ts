@@ -3,7 +3,7 @@ import type { Vec3 } from '../../api/types';
 import { colourTable } from '../../scene/colour_map';
 import { field, h, segmented } from '../../ui/dom';
 import { formatNumber } from '../../ui/format';
-import { Signal } from '../../ui/signal';
+import { Signal, type Scope } from '../../ui/signal';
 import type { MeasureKind } from '../../volume/measure';
 import { textOfWindow, type Window } from '../../volume/slices';
 import { layoutNames, paneLayout, type Layout } from './pane_area';
@@ -16,6 +16,31 @@ const colourNames: Record<ColourName, string> = { grey: 'Grey', inverted: 'Inver
 
 export const sliceColours = new Signal<ColourName>('grey');
 export const sliceSpace = new Signal<Space>('LPS');
+
+// Null for a name that is none of those.
+function one<T extends string>(text: string | null, known: Record<T, unknown>): T | null {
+  return text !== null && Object.keys(known).includes(text) ? (text as T) : null;
+}
+
+const spaces: Record<Space, string> = { LPS: 'LPS', RAS: 'RAS' };
+
+// As an address says; where it does not, as they were in the view before.
+export function restoreLooks(query: URLSearchParams): void {
+  sliceColours.value = one(query.get('colours'), colourNames) ?? sliceColours.value;
+  sliceSpace.value = one(query.get('space'), spaces) ?? sliceSpace.value;
+  paneLayout.value = one(query.get('layout'), layoutNames) ?? paneLayout.value;
+}
+
+// Calls it when one of them changes.
+export function watchLooks(scope: Scope, onChange: () => void): void {
+  for (const look of [sliceColours, sliceSpace, paneLayout]) scope.onEnd((look as Signal<unknown>).subscribe(onChange));
+}
+
+// For the address, where only what is not as usual is said.
+export function looksInAddress(): Record<'colours' | 'space' | 'layout', string> {
+  const [colours, space, layout] = [sliceColours.value, sliceSpace.value, paneLayout.value];
+  return { colours: colours === 'grey' ? '' : colours, space: space === 'LPS' ? '' : space, layout: layout === 'grid' ? '' : layout };
+}
 
 // In Hounsfield units, as radiologists set them.
 const ctWindows: readonly [string, Window][] = [
@@ -110,7 +135,7 @@ export function sliceControls(windows: WindowChoice | null, measures: SliceMeasu
       windows?.element,
       select('Colours', Object.entries(colourNames) as [ColourName, string][], sliceColours.value, (name) => (sliceColours.value = name)),
       layoutChoice(),
-      select('Coordinates', [['LPS', 'LPS'], ['RAS', 'RAS']], sliceSpace.value, (space) => (sliceSpace.value = space)),
+      select('Coordinates', Object.entries(spaces) as [Space, string][], sliceSpace.value, (space) => (sliceSpace.value = space)),
     ),
     segmented<MeasureKind | 'none'>('Measure in slices', kinds, 'none', (kind) => (measures.kind.value = kind === 'none' ? null : kind)),
   );

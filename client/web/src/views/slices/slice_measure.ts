@@ -3,18 +3,7 @@ import type { Vec3, Volume } from '../../api/types';
 import { Signal } from '../../ui/signal';
 import { pictureAxes, axisIndex, toPatient, type Plane, type SlicePlane } from '../../volume/geometry';
 import { measureText, pointsOf, type MeasureKind } from '../../volume/measure';
-
-// Columns and rows of a slice's picture, from the middle of its first sample.
-type Point = readonly [number, number];
-
-interface Measure {
-  kind: MeasureKind;
-  plane: Plane;
-  // The slice that it lies in.
-  index: number;
-  points: Point[];
-  isWhole: boolean;
-}
+import { measuresOfText, measuresToText, type Measure, type Point } from './slice_texts';
 
 const colour = '#ffd166';
 const fontSize = 12;
@@ -24,7 +13,17 @@ export class SliceMeasures {
   readonly kind = new Signal<MeasureKind | null>(null);
   // They are to be drawn anew.
   readonly changes = new Signal<number>(0);
-  private measures: Measure[] = [];
+  private measures: Measure[];
+
+  // As an address says.
+  constructor(text = '') {
+    this.measures = measuresOfText(text);
+  }
+
+  // For the address.
+  get text(): string {
+    return measuresToText(this.measures);
+  }
 
   // Takes a click; false if it is none of a measurement's.
   take(plane: Plane, index: number, point: Point): boolean {
