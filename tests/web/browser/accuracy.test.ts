@@ -44,6 +44,10 @@ describe('the largest error', () => {
     await expect.poll(() => panel.innerText()).toMatch(/0\.0\d+ mm is the largest distance[^]*Allowed: 0\.1 mm/);
     const text = await panel.innerText();
     expect(text).toMatch(/simplified from \d/);
+    // The volume is that after smoothing and simplification.
+    expect(text).toMatch(/Volume[^\n]*\n?[^\n]*mm³ as extracted/);
+    expect(text).toContain('Filled: in the mesh. Line: as extracted.');
+    expect(text).not.toContain('before smoothing');
     expect(text).toMatch(/The allowed 0\.1 mm are divided into: smoothing 0\.0\d+, fewer triangles 0\.0\d+, rounding/);
     expect(text).toMatch(/Self-intersections\s+none/);
     expect(text).toMatch(/simplify\s/);

@@ -69,6 +69,16 @@ describe('jobs that are waited for', () => {
     // Nobody listens any more.
     await page.goto(`${daemon.url}/#/volumes/${first}`);
     await page.locator('.prepare').waitFor();
+    // All of the many volumes can be laid over this one, once somebody is about to choose.
+    const overlay = page.getByLabel('Overlay', { exact: true });
+    await overlay.waitFor();
+    await overlay.focus();
+    const { volumes } = await daemon.json<{ volumes: { id: string }[] }>('/v1/volumes?limit=1000');
+    expect(volumes.length).toBeGreaterThan(many);
+    const values = (): Promise<string[]> => overlay.locator('option').evaluateAll((options) => options.map((option) => (option as HTMLOptionElement).value).sort());
+    const others = volumes.map(({ id }) => id).filter((id) => id !== first);
+    await expect.poll(async () => (await values()).length).toBe(1 + others.length);
+    expect(await values()).toEqual(['', ...others].sort());
   });
 });
 

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Job } from '@/api/types';
+import { changeOf } from '@/job/changes';
 import { emptyReason } from '@/job/empty';
 import { millimetres } from '@/ui/format';
 import { histogramPath } from '@/views/jobs/certificate';
@@ -80,6 +81,15 @@ describe('the stages of a job', () => {
     // Cancelled before it was extracted.
     expect(names({ extract: 0, smooth: 0, encode: 0 })).toEqual(['queue', 'load']);
     expect(names({ simplify: 2, certify: 3 })).toEqual(['queue', 'load', 'extract', 'simplify', 'encode', 'certify']);
+  });
+});
+
+describe('a change of the surface', () => {
+  it('is by smoothing only where nothing else changed it, and not told where nothing did', () => {
+    const simplified = { triangles_before: 9, bound_by: 'error' } as const;
+    const titles = [changeOf({ passes: 5 }, {}), changeOf({ passes: 5 }, { simplified }), changeOf({ passes: 0 }, { simplified })].map((change) => change?.title);
+    expect(titles).toEqual(['Change by smoothing', 'Change since extraction', 'Change since extraction']);
+    expect(changeOf({ passes: 0 }, {})).toBeNull();
   });
 });
 

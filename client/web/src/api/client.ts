@@ -80,11 +80,9 @@ export class Client {
     return upload(this.connection, whole, options);
   }
 
-  /** Lists the newest first, in pages. */
-  listVolumes(cursor = '', signal?: GlobalAbortSignal): Promise<VolumeList> {
-    const query = new URLSearchParams({ order: 'newest', limit: String(volumesPerPage) });
-    if (cursor !== '') query.set('cursor', cursor);
-    return this.connection.json(`/v1/volumes?${query.toString()}`, { signal });
+  /** Lists the newest first, in pages of at most 1000. */
+  listVolumes(cursor = '', signal?: GlobalAbortSignal, limit = volumesPerPage): Promise<VolumeList> {
+    return this.connection.json(`/v1/volumes${queryOf({ order: 'newest', limit, cursor })}`, { signal });
   }
 
   getVolume(id: string): Promise<Volume> {

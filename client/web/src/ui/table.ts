@@ -10,7 +10,7 @@ export function row(attributes: Record<string, Attribute>, ...cells: HTMLElement
 }
 
 // The names of columns in `unseen` are for those who hear the table.
-export function table(columns: readonly string[], unseen: readonly string[], rows: readonly HTMLElement[]): HTMLElement {
+export function table(columns: readonly string[], unseen: readonly string[], rows: readonly HTMLElement[]): HTMLTableElement {
   const heads = columns.map((name) =>
     h('th', { scope: 'col', role: 'columnheader' }, h('span', { class: unseen.includes(name) ? 'sr-only' : '' }, name)),
   );

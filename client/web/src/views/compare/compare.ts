@@ -2,6 +2,7 @@
 import { client } from '../../client';
 import { ApiError, asApiError, errorOfProblem } from '../../api/problem';
 import { isFinal, type Job, type LabelSummary } from '../../api/types';
+import { changeOf } from '../../job/changes';
 import { titlesOf } from '../../job/differences';
 import { LabelState, labelsOfMesh } from '../../job/labels';
 import type { SurfaceStyle } from '../../scene/style';
@@ -25,10 +26,9 @@ function numbersOf(job: Job): HTMLElement {
   const { extracted, smoothed } = mesh.volume_mm3;
   const percent = extracted === 0 ? 0 : (100 * (smoothed - extracted)) / Math.abs(extracted);
   const work = job.timing.total - job.timing.queue;
-  const volume: [string, string][] = [
-    ['Volume', `${formatValue(smoothed)} mm\u00b3`],
-    ['Change by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
-  ];
+  const change = changeOf(job.parameters, mesh);
+  const volume: [string, string][] = [['Volume', `${formatValue(smoothed)} mm\u00b3`]];
+  if (change) volume.push([change.title, `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`]);
   const rows: [string, string][] = [
     ['Triangles', formatCount(mesh.triangles)],
     ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: the surface is open'] as [string, string]]),
@@ -81,7 +81,7 @@ class Cell {
 
   showNumbers(job: Job): void {
     this.numbers.replaceChildren(numbersOf(job));
-    if (job.mesh) this.angles.replaceChildren(distributionChart('Smallest angle', job.mesh.quality.smallest_angle_deg, 60, '\u00b0'));
+    if (job.mesh) this.angles.replaceChildren(distributionChart('Smallest angle', job.mesh.quality.smallest_angle_deg, 60, '\u00b0', changeOf(job.parameters, job.mesh)));
   }
 
   show(content: HTMLElement): void {

@@ -1,6 +1,7 @@
 // Small charts of a job's numbers.
 import { stages as order } from '../../../generated/parameters';
 import type { Distribution, QualityStages } from '../../api/types';
+import type { Change } from '../../job/changes';
 import { h, svg } from '../../ui/dom';
 import { formatMilliseconds, formatNumber } from '../../ui/format';
 
@@ -67,12 +68,13 @@ export function waterfall(steps: readonly Step[], total: number): HTMLElement {
 const width = 150;
 const height = 44;
 
-// Both distributions in one picture: before smoothing as an outline, after it filled.
+// Both distributions in one picture: before the change as an outline, after it filled.
 export function distributionChart(
   title: string,
   stages: QualityStages,
   most: number,
   unit: string,
+  change: Change | null,
 ): HTMLElement {
   const { extracted, smoothed } = stages;
   const top = Math.max(1, ...extracted.histogram, ...smoothed.histogram);
@@ -97,17 +99,17 @@ export function distributionChart(
       {
         viewBox: `0 0 ${width} ${height}`,
         role: 'img',
-        'aria-label': `${title}: mean ${said(extracted.mean)} before and ${said(smoothed.mean)} after smoothing`,
+        'aria-label': `${title}: mean ${change ? `${said(extracted.mean)} ${change.before} and ${said(smoothed.mean)} ${change.after}` : said(smoothed.mean)}`,
       },
       svg('path', { class: 'after', d: outline(smoothed) }),
-      svg('path', { class: 'before', d: outline(extracted) }),
+      ...(change ? [svg('path', { class: 'before', d: outline(extracted) })] : []),
     ),
     h('div', { class: 'distribution-axis', 'aria-hidden': 'true' }, h('span', {}, `0${unit}`), h('span', {}, `${most}${unit}`)),
     h(
       'figcaption',
       {},
       h('b', {}, title),
-      ` mean ${said(extracted.mean)} \u2192 ${said(smoothed.mean)}, minimum ${said(smoothed.min)}`,
+      ` mean ${change ? `${said(extracted.mean)} \u2192 ` : ''}${said(smoothed.mean)}, minimum ${said(smoothed.min)}`,
     ),
   );
 }

@@ -195,7 +195,7 @@ function showSurface(
     accuracy(job) ?? '',
     times,
     downloads(job, volume),
-    ...(mesh.empty ? [] : [quality(mesh)]),
+    ...(mesh.empty ? [] : [quality(job, mesh)]),
     compareSection(job),
     againSection(job),
   );

@@ -1,6 +1,7 @@
 // The panel beside a surface: its numbers, timings, files, and links to make others.
 import { token } from '../../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
+import { changeOf, type Change } from '../../job/changes';
 import { isSameJob, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
@@ -48,13 +49,9 @@ function trianglesText({ triangles, simplified }: MeshSummary): Child {
   );
 }
 
-function volumeText({ volume_mm3: { extracted, smoothed } }: MeshSummary): Child {
-  return h(
-    'span',
-    {},
-    sized(smoothed, 'mm\u00b3'),
-    h('span', { class: 'faint' }, `${change(extracted, smoothed)}, ${sized(extracted, 'mm\u00b3')} before smoothing`),
-  );
+function changedText(before: number, after: number, unit: string, stage: Change | null): Child {
+  const since = stage && h('span', { class: 'faint' }, `${change(before, after)}, ${sized(before, unit)} ${stage.before}`);
+  return h('span', {}, sized(after, unit), since);
 }
 
 // People often want only the largest connected component.
@@ -68,24 +65,18 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
   const [low, high] = mesh.bounds;
   const extent = low.map((value, axis) => formatSize((high[axis as 0] ?? 0) - value)).join(' \u00d7 ');
   const { mean, max } = mesh.displacement_mm;
+  const stage = changeOf(job.parameters, mesh);
   const rows: [string, Child][] = [
     ['Iso-value', mesh.iso === undefined ? '' : `${formatValue(mesh.iso)}${job.parameters.iso === 'otsu' ? ', by Otsu' : ''}`],
     ['Triangles', trianglesText(mesh)],
     ['Vertices', formatCount(mesh.vertices)],
-    ['Volume', mesh.quality.encloses_volume ? volumeText(mesh) : openText(job, makeVariant(job))],
     [
-      'Area',
-      h(
-        'span',
-        {},
-        sized(mesh.area_mm2, 'mm\u00b2'),
-        h(
-          'span',
-          { class: 'faint' },
-          `${change(mesh.area_extracted_mm2, mesh.area_mm2)}, ${sized(mesh.area_extracted_mm2, 'mm\u00b2')} before smoothing`,
-        ),
-      ),
+      'Volume',
+      mesh.quality.encloses_volume
+        ? changedText(mesh.volume_mm3.extracted, mesh.volume_mm3.smoothed, 'mm\u00b3', stage)
+        : openText(job, makeVariant(job)),
     ],
+    ['Area', changedText(mesh.area_extracted_mm2, mesh.area_mm2, 'mm\u00b2', stage)],
     [
       'Closed',
       mesh.quality.closed
@@ -96,7 +87,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
     ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
     ['Self-intersections', intersectionsText(mesh)],
-    ['Moved by smoothing', `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm`],
+    ['Moved by smoothing', job.parameters.passes > 0 ? `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm` : ''],
   ];
   if (mesh.dropped.components > 0) {
     rows.push([
@@ -107,17 +98,18 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
   return definitions(rows.filter(([, value]) => value !== ''));
 }
 
-export function quality(mesh: MeshSummary): HTMLElement {
+export function quality({ parameters }: Job, mesh: MeshSummary): HTMLElement {
+  const stage = changeOf(parameters, mesh);
   const { aspect_ratio: aspect, smallest_angle_deg: angle } = mesh.quality;
   return section(
     'Triangle quality',
     h(
       'div',
       { class: 'distributions' },
-      distributionChart('Radius ratio', aspect, 1, ''),
-      distributionChart('Smallest angle', angle, 60, '\u00b0'),
+      distributionChart('Radius ratio', aspect, 1, '', stage),
+      distributionChart('Smallest angle', angle, 60, '\u00b0', stage),
     ),
-    h('p', { class: 'hint' }, 'Filled: after smoothing. Line: before smoothing.'),
+    stage && h('p', { class: 'hint' }, `Filled: ${stage.after}. Line: ${stage.before}.`),
   );
 }
 

@@ -59,6 +59,12 @@ export async function queueView(scope: Scope, { query }: Route): Promise<HTMLEle
   return queue.element;
 }
 
+interface Row {
+  // All that it shows.
+  text: string;
+  element: HTMLElement;
+}
+
 class Queue {
   readonly element: HTMLElement;
   private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Jobs' });
@@ -71,7 +77,10 @@ class Queue {
     { class: 'hint', hidden: true },
     `More than ${mostOfState} jobs wait. The list has the newest ${mostOfState} of them, without their places.`,
   );
+  private readonly table = table(columns, unseen, []);
+  private readonly empty = h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.');
   private readonly list = new JobList(client);
+  private rows = new Map<string, Row>();
   private readonly volumes = new KnownVolumes();
 
   constructor() {
@@ -130,14 +139,25 @@ class Queue {
     const rows = this.ordered().map((job) => this.row(job, places.get(job.id)));
     this.more.hidden = this.list.next === null;
     this.note.hidden = this.list.hasWholeQueue;
-    this.keepFocus(() =>
-      this.body.replaceChildren(
-        rows.length === 0 ? h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.') : table(columns, unseen, rows),
-      ),
-    );
+    this.rows = new Map(rows.map((row) => [row.element.dataset.job ?? '', row]));
+    const shown: Element = rows.length === 0 ? this.empty : this.table;
+    if (this.body.firstElementChild !== shown) this.body.replaceChildren(shown);
+    this.keepFocus(() => this.arrange(rows.map(({ element }) => element)));
   }
 
-  // The rows are made anew; whoever is on one of them with the keyboard stays there.
+  // Leaves rows alone that stay: laying out a thousand of them takes long.
+  private arrange(rows: readonly HTMLElement[]): void {
+    const tbody = this.table.tBodies[0];
+    if (!tbody) return;
+    const wanted = new Set<Element>(rows);
+    for (const old of [...tbody.children]) if (!wanted.has(old)) old.remove();
+    rows.forEach((row, at) => {
+      const there = tbody.children[at] ?? null;
+      if (there !== row) tbody.insertBefore(row, there);
+    });
+  }
+
+  // Rows that have changed are made anew; whoever is on one of them with the keyboard stays there.
   private keepFocus(replace: () => void): void {
     const { activeElement } = document;
     const job = activeElement?.closest('tr')?.dataset.job;
@@ -147,14 +167,22 @@ class Queue {
     this.body.querySelector<HTMLElement>(`tr[data-job="${job}"] [aria-label="${label}"]`)?.focus();
   }
 
-  private row(job: Job, place: number | undefined): HTMLElement {
+  // The one of before if it would look the same.
+  private row(job: Job, place: number | undefined): Row {
+    const volume = this.volumes.nameOf(job.volume);
+    const text = JSON.stringify([job, place, volume, this.chosen.has(job.id)]);
+    const known = this.rows.get(job.id);
+    return known?.text === text ? known : { text, element: this.makeRow(job, place, volume) };
+  }
+
+  private makeRow(job: Job, place: number | undefined, volume: string): HTMLElement {
     const time = isFinal(job.state) && job.timing.total ? formatMilliseconds(job.timing.total) : '';
     return row(
       { 'data-job': job.id },
       cell(this.pickBox(job)),
       stateCell(job, place),
       cell(h('span', { class: `priority ${job.priority}` }, job.priority)),
-      surfaceCell(job, this.volumes.nameOf(job.volume)),
+      surfaceCell(job, volume),
       cell(progressOf(job)),
       cell(time),
       cell(h('span', { class: 'faint' }, formatTime(job.created))),

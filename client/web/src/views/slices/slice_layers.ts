@@ -2,6 +2,7 @@
 import { client, connected } from '../../client';
 import type { Axis, Volume } from '../../api/types';
 import { checkbox, field, h } from '../../ui/dom';
+import { formatCount } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { Signal, type Scope } from '../../ui/signal';
 import { defaultWindow } from '../../volume/histogram';
@@ -16,6 +17,9 @@ import { pixelsOf } from './slice_looks';
 import { slabOfText, slabToText, thicknesses } from './slice_texts';
 
 const bins = 256;
+// Volumes that can be laid over. The first page comes at once, the others when somebody is about to choose.
+const mostListed = 5000;
+const perPage = 1000;
 // The lowest of 255 values fade out, so that air around a body does not darken the other volume.
 const fading = 48;
 // Up to yellow: what is white could be either volume.
@@ -65,6 +69,8 @@ export class SliceLayers {
   // Are for values.
   private readonly valueControls: HTMLElement[];
   private readonly choice = h('select', {}, h('option', { value: '' }, 'None'));
+  private next: string | null = null;
+  private isListing = false;
   private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the overlay' });
   private readonly overlays = new Kept<HTMLCanvasElement>();
   private readonly projections = new Kept<Slice>();
@@ -95,6 +101,7 @@ export class SliceLayers {
     const over = field('Overlay', this.choice);
     over.append(this.opacity);
     over.hidden = true;
+    for (const name of ['pointerenter', 'focus']) this.choice.addEventListener(name, () => void this.listOlder().catch(tellError));
     const slabControls = this.slabControls();
     const obliqueControl = this.obliqueControl();
     this.valueControls = [...slabControls, obliqueControl];
@@ -175,10 +182,32 @@ export class SliceLayers {
   }
 
   private async list(): Promise<boolean> {
-    const { volumes } = await client.listVolumes('', this.scope.signal);
+    const { volumes, next } = await client.listVolumes('', this.scope.signal);
+    this.next = next;
+    this.offer(volumes);
+    return this.choice.length > 1;
+  }
+
+  private async listOlder(): Promise<void> {
+    if (this.isListing) return;
+    this.isListing = true;
+    try {
+      while (this.next !== null && this.choice.length <= mostListed) {
+        const page = await client.listVolumes(this.next, this.scope.signal, perPage);
+        this.next = page.next;
+        this.offer(page.volumes);
+      }
+      if (this.next === null) return;
+      this.next = null;
+      this.choice.append(h('option', { disabled: true }, `Only the newest ${formatCount(this.choice.length - 1)} volumes are listed.`));
+    } finally {
+      this.isListing = false;
+    }
+  }
+
+  private offer(volumes: readonly Volume[]): void {
     const others = volumes.filter(({ id }) => id !== this.host.volume.id);
     this.choice.append(...others.map((one) => h('option', { value: one.id }, volumeName(one))));
-    return others.length > 0;
   }
 
   // With labels the controls are off, and keep what was chosen.
