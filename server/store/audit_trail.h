@@ -30,7 +30,8 @@ struct AuditEntry {
   std::string study = {};
   std::uint64_t instances = 0;
   std::string patient_id = {};
-  std::string peer = {};  // the address of a rejected peer, and the titles that it sent
+  // The address of a peer that began an association, and the titles that it sent.
+  std::string peer = {};
   std::string called = {};
   std::string calling = {};
   std::uint64_t unlisted = 0;  // rejected since the entry before, without entries of their own

@@ -112,9 +112,10 @@ class Receiving(Loop):
         # What was received is not kept.
         peers.until(lambda: not self.received(daemon))
         transfers = [each for each in daemon.audit() if each["event"] == "110104"]
-        self.assertEqual([(each["direction"], each["instances"], each["patient_id"])
-                          for each in transfers],
-                         [("in", 12, "PAT-4711"), ("out", 1, "PAT-4711")])
+        self.assertEqual([(each["direction"], each["instances"], each.get("patient_id"),
+                           each.get("peer"), each.get("calling")) for each in transfers],
+                         [("in", 12, None, "127.0.0.1", "CT1"),
+                          ("in", 12, "PAT-4711", None, None), ("out", 1, "PAT-4711", None, None)])
         for secret in (series.study, series.uid, series.instances[0], "PAT-4711"):
             self.assertNotIn(secret, daemon.logged())
 

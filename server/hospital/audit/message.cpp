@@ -111,6 +111,13 @@ Content content_of(const Json& entry, const std::string& code, const AuditSource
   }
   if (code == "110104") {
     const bool is_in = text_of(entry, "direction") == "in";
+    // By C-STORE, a peer sends without being asked.
+    const std::string sender = text_of(entry, "calling");
+    if (!sender.empty()) {
+      return {
+          participant(sender, true, &kSource) + participant(source.station, false, &kDestination),
+          study_object(entry)};
+    }
     return {participant(is_in ? peer : source.station, !is_in && owner.empty(), &kSource) +
                 participant(is_in ? source.station : peer, is_in && owner.empty(), &kDestination) +
                 asked,

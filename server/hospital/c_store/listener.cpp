@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/log.h"
+#include "server/hospital/orders/received.h"
 #include "server/process/child.h"
 
 namespace isomesh::c_store {
@@ -188,6 +189,17 @@ void DimseListener::serve(const std::stop_token& stop) {
 }
 
 void DimseListener::serve_association(Association& association) {
+  Transfers transfers;
+  try {
+    receive(association, transfers);
+  } catch (...) {
+    note_transfers(transfers, association.party);
+    throw;
+  }
+  note_transfers(transfers, association.party);
+}
+
+void DimseListener::receive(Association& association, Transfers& transfers) {
   const std::stop_token stop = association.end.get_token();
   const store::ScratchFolder scratch(services_.folder.scratch());
   process::Child child = services_.processes.take(Clock::now() + settings_.idle);
@@ -209,7 +221,11 @@ void DimseListener::serve_association(Association& association) {
     const auto* object = std::get_if<DimseObject>(&report);
     if (object == nullptr) break;
     association.is_storing = true;
-    const char verdict = static_cast<char>(keep(*object, scratch.path()));
+    const DimseVerdict kept = keep(*object, scratch.path());
+    if (kept == DimseVerdict::kStored) {
+      ++transfers[{object->called, object->calling, object->study}];
+    }
+    const char verdict = static_cast<char>(kept);
     child.send(std::string_view(&verdict, 1));
     association.told = Clock::now();
     association.has_sent = true;
@@ -241,6 +257,20 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
   } catch (const Error& error) {
     log_error("a received object could not be stored, and its sender is told so: {}", error.what());
     return DimseVerdict::kNoRoom;
+  }
+}
+
+void DimseListener::note_transfers(const Transfers& transfers, const std::string& party) {
+  for (const auto& [what, count] : transfers) {
+    const auto& [called, calling, study] = what;
+    services_.audit.add({.event = store::AuditEvent::kTransferred,
+                         .pacs = orders::received_by(called),
+                         .direction = "in",
+                         .study = study,
+                         .instances = count,
+                         .peer = party,
+                         .called = called,
+                         .calling = calling});
   }
 }
 

@@ -1,11 +1,13 @@
 // Receives series that peers send by C-STORE.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -70,16 +72,22 @@ class DimseListener {
     std::atomic<std::chrono::steady_clock::time_point> told = {};
   };
 
+  // The number of stored objects by called title, calling title and study.
+  using Transfers = std::map<std::array<std::string, 3>, std::uint64_t>;
+
   bool begin(AssociationRequest& request);
   void make_room(const std::string& party);
   static bool is_idle(const Association& association, std::chrono::milliseconds& idle);
   void serve(const std::stop_token& stop);
   std::shared_ptr<Association> next_association(const std::stop_token& stop);
   void serve_association(Association& association);
+  void receive(Association& association, Transfers& transfers);
   process::DimseVerdict keep(const process::DimseObject& object,
                              const std::filesystem::path& folder);
   bool has_room(std::uint64_t more_bytes) const;
   void note_end(const process::DimseEnded& ended, const std::string& party);
+  // Adds what an association has stored to the audit trail.
+  void note_transfers(const Transfers& transfers, const std::string& party);
 
   const ListenerServices services_;
   const orders::DimseSettings settings_;

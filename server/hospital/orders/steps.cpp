@@ -1,6 +1,7 @@
 #include "server/hospital/orders/steps.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 
 #include "base/clock.h"
@@ -75,6 +76,12 @@ void check_identity(const DicomIdentity& identity) {
                     " of the images has bytes that mean nothing in their Specific Character Set: "
                     "correct the images, and submit the order again");
   }
+}
+
+bool has_bytes(const std::filesystem::path& file) {
+  std::error_code missing;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, missing);
+  return !missing && bytes > 0;
 }
 
 // Resets the list of instances, the images, and all results from them.
@@ -215,6 +222,14 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   const OrderSource& source = record.order.source;
   const store::ScratchFolder scratch(services_.folder.scratch());
   const std::filesystem::path file = scratch.path() / "series";
+  store::AuditEntry entry = {.event = store::AuditEvent::kTransferred,
+                             .success = false,
+                             .order = record.order.id,
+                             .owner = record.owner,
+                             .pacs = source.pacs,
+                             .direction = "in",
+                             .study = source.study,
+                             .instances = record.work.listed.size()};
   try {
     const std::string type =
         this->source(source.pacs).fetch_series(source.study, source.series, file, stop);
@@ -223,19 +238,16 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
                                                            .study = source.study,
                                                            .series = source.series,
                                                            .instances = record.work.listed});
-    services_.audit.add({.event = store::AuditEvent::kTransferred,
-                         .order = record.order.id,
-                         .owner = record.owner,
-                         .pacs = source.pacs,
-                         .direction = "in",
-                         .study = source.study,
-                         .instances = record.work.listed.size(),
-                         .patient_id = identity.patient_id});
+    entry.success = true;
+    entry.patient_id = identity.patient_id;
+    services_.audit.add(entry);
     if (!record.order.send.empty()) check_identity(identity);
     record.order.volume = volume.id;
     record.work.identity = std::move(identity);
     if (record.order.parameters.labels) record.work.labels = std::move(volume.labels);
   } catch (const Error& error) {
+    // Images that make no volume have crossed the network, too.
+    if (!entry.success && has_bytes(file)) services_.audit.add(entry);
     if (error.code() != ErrorCode::kSeriesIncomplete) throw;
     // An incomplete series is listed again, so that no mesh is made from a part of it.
     forget_images(record);

@@ -58,6 +58,19 @@ TEST(AuditMessage, ComingInIsTheOtherWayRound) {
       HasSubstr("UserID=\"main\" UserIsRequestor=\"false\"><RoleIDCode csd-code=\"110153\""));
 }
 
+TEST(AuditMessage, ByCStoreTheSenderIsItsTitle) {
+  const std::string xml = audit_message(
+      R"({"id":7,"at":"2026-11-20T10:00:00.123Z","event":"110104","outcome":"success",)"
+      R"("pacs":"dimse:BONE","direction":"in","study":"1.2.3","peer":"10.0.0.7","called":"BONE",)"
+      R"("calling":"CT1","instances":12})",
+      kSource);
+  EXPECT_TRUE(is_xml(xml)) << xml;
+  EXPECT_THAT(xml, HasSubstr("UserID=\"CT1\" UserIsRequestor=\"true\"><RoleIDCode "
+                             "csd-code=\"110153\""));
+  EXPECT_THAT(xml, HasSubstr("UserID=\"isomesh-1\" UserIsRequestor=\"false\"><RoleIDCode "
+                             "csd-code=\"110152\""));
+}
+
 TEST(AuditMessage, EveryEventHasOne) {
   for (const auto& [code, id, type] :
        {std::tuple{"110120", "110100", "110120"}, std::tuple{"110121", "110100", "110121"},

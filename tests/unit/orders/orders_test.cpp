@@ -140,6 +140,20 @@ TEST_F(UnusableOrdersTest, OfAPatientIdThatCannotBeReadFailAtOnce) {
   EXPECT_EQ(main_->stores, 0);
 }
 
+// The images have crossed the network all the same.
+TEST_F(UnusableOrdersTest, HaveTheirTransferInTheAuditTrail) {
+  ASSERT_NE(error_of({"nothing"}).detail, "");
+  std::vector<std::string> transfers;
+  audit_.read(0, [&](std::string_view line) {
+    const auto entry = nlohmann::json::parse(line);
+    if (entry.at("event") != "110104") return;
+    EXPECT_EQ(entry.at("study"), kStudy);
+    EXPECT_EQ(entry.at("instances"), 1);
+    transfers.push_back(entry.at("outcome"));
+  });
+  EXPECT_THAT(transfers, ElementsAre("failure"));
+}
+
 TEST_F(UnusableOrdersTest, DoNotOfferParametersThatOrdersLack) {
   std::vector<std::string> files;
   for (int phase = 0; phase < 2; ++phase) {
