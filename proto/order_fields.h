@@ -73,6 +73,7 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("triangles", self.triangles);
   field("queried", self.queried);
   field("failed_in", self.failed_in);
+  field("contents", self.contents);
 }
 
 void visit(Is<PacsStatus> auto& self, auto&& field) {

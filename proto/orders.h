@@ -90,10 +90,12 @@ struct Order {
 struct OrderWork {
   std::vector<std::string> listed;          // SOP Instance UIDs of the series, ascending
   std::optional<std::string> listed_since;  // when this list was first seen
-  std::uint32_t failures = 0;               // in a row; determines the back-off
-  std::uint32_t looks = 0;                  // in a row, for a series that is missing
-  std::string begun;                        // when the order was accepted or restarted
-  std::optional<DicomIdentity> identity;    // of the images that were fetched
+  // Of images that were sent to us, as of the last fetch: SOP Instance UID, a blank, and a digest.
+  std::vector<std::string> contents = {};
+  std::uint32_t failures = 0;             // in a row; determines the back-off
+  std::uint32_t looks = 0;                // in a row, for a series that is missing
+  std::string begun;                      // when the order was accepted or restarted
+  std::optional<DicomIdentity> identity;  // of the images that were fetched
   // The labels that those images declare, if the job is by labels. Another upload of the same
   // samples may have named the labels of the volume's record.
   std::optional<std::vector<LabelEntry>> labels = {};

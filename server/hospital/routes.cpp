@@ -22,7 +22,9 @@ constexpr const char* kOrderCursor = "orders";
 // Throws Error kNotFound if no PACS is configured.
 Orders& configured(Orders* orders) {
   if (orders != nullptr) return *orders;
-  throw Error(ErrorCode::kNotFound, "this service has no PACS: it was started without --hospital");
+  throw Error(ErrorCode::kNotFound,
+              "this daemon has no PACS: it was started without --hospital. If several share "
+              "one database, send orders to the one that has it");
 }
 
 orders::Orderer orderer_of(const Request& request) {

@@ -1,5 +1,9 @@
 #include "server/store/order_rules.h"
 
+#include <algorithm>
+#include <map>
+#include <string_view>
+
 #include "base/clock.h"
 #include "base/log.h"
 #include "proto/error.h"
@@ -30,12 +34,30 @@ bool is_done(const LastOrder& last, const WatchedSeries& series) {
   return last.order && last.order->source.instances == series.instances;
 }
 
+namespace {
+
+// True if one of the series' instances is one of the order, but with another content.
+bool is_changed(const std::vector<std::string>& of_order, const std::vector<std::string>& now) {
+  const auto instance_of = [](const std::string& content) {
+    return std::string_view(content).substr(0, content.find(' '));
+  };
+  std::map<std::string_view, std::string_view> known;
+  for (const std::string& content : of_order) known[instance_of(content)] = content;
+  return std::ranges::any_of(now, [&](const std::string& content) {
+    const auto before = known.find(instance_of(content));
+    return before != known.end() && before->second != content;
+  });
+}
+
+}  // namespace
+
 ReceivedFate fate_of(const LastOrder& last, const WatchedSeries& series, Time newest) {
   const bool is_all = last.instances == series.instances;
   if (!last.state) return is_all ? ReceivedFate::kDone : ReceivedFate::kNew;
   if (!is_final(*last.state)) return ReceivedFate::kOpen;
   if (!is_all) return ReceivedFate::kNew;
   if (!last.order) return ReceivedFate::kNew;  // its images may not have become a mesh
+  if (is_changed(last.contents, series.contents)) return ReceivedFate::kNew;
   const Order& order = *last.order;
   const bool is_over = order.state == OrderState::kSucceeded ||
                        (order.finished && newest <= time_of(*order.finished));

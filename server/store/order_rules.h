@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/store/order_store.h"
 
@@ -18,9 +19,10 @@ std::optional<Order> readable_order(const std::string& record, const std::string
 
 // The last order made for a watched series.
 struct LastOrder {
-  std::uint32_t instances = 0;           // of the series at that time
-  std::optional<OrderState> state = {};  // empty: the order is forgotten
-  std::optional<Order> order = {};       // if it has ended; empty if its record is damaged
+  std::uint32_t instances = 0;             // of the series at that time
+  std::optional<OrderState> state = {};    // empty: the order is forgotten
+  std::optional<Order> order = {};         // if it has ended; empty if its record is damaged
+  std::vector<std::string> contents = {};  // if it has ended; of the instances, as far as known
 };
 
 // True if no new order is needed: the last one is still open, or had that many instances.

@@ -50,12 +50,14 @@ struct WatchedSeries {
   std::string study;
   std::string series;
   std::uint32_t instances = 0;
+  // Of a received series: the contents of the instances that are held, as in OrderWork.
+  std::vector<std::string> contents = {};
 };
 
 enum class ReceivedFate {
   kNew,   // an order was stored
   kOpen,  // an order is still open, or too many orders are open
-  kDone,  // an order covered all instances
+  kDone,  // an order covered all instances, with their contents
 };
 
 struct OrderFilter {
@@ -84,7 +86,8 @@ class OrderStore {
 
   // Stores an order for a received series whose latest instance came at `last`, unless one is open
   // or one for the same number of instances has succeeded. After an order that ended otherwise,
-  // instances that arrive later give a new one.
+  // instances that arrive later give a new one. So do instances with other contents than those of
+  // the order, for example of a corrected patient.
   virtual ReceivedFate submit_received(const OrderSpec& spec, const WatchedSeries& series,
                                        Time last, std::size_t most_open) = 0;
 

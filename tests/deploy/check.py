@@ -28,12 +28,32 @@ def health_of_image(compose):
     return json.loads(command[1])
 
 
+def check_nginx(folder, service):
+    """Each group of servers that nginx.conf passes requests to is one of upstream.conf's."""
+    read = {}
+    for mount in service["volumes"]:
+        source, target = mount.split(":")[:2]
+        if target.startswith("/etc/nginx/") and target.endswith(".conf"):
+            with open(os.path.join(folder, source), encoding="utf-8") as text:
+                read[target] = text.read()
+    main = read["/etc/nginx/nginx.conf"]
+    servers = dict(re.findall(r"^upstream (\w+) \{(.*?)^\}", read["/etc/nginx/upstream.conf"],
+                              re.MULTILINE | re.DOTALL))
+    check(set(re.findall(r"proxy_pass http://(\w+);", main)) == set(servers),
+          "nginx passes requests to other servers than there are")
+    check(re.search(r"location ~ \^/v1/\(orders\|pacs\)\(/\|\$\) \{\s*proxy_pass http://iso_orders;", main),
+          "nginx does not tell orders apart")
+    check(len(re.findall(r"^\s*server ", servers["iso_orders"], re.MULTILINE)) == 1,
+          "several daemons get orders")
+
+
 def check_compose(file):
     with open(file, encoding="utf-8") as text:
         compose = yaml.safe_load(text)
     services = compose["services"]
     daemons = {name: service for name, service in services.items() if service["image"] == "isomesh"}
     check(daemons, "no daemon")
+    check_nginx(os.path.dirname(file), services["nginx"])
     for name, service in daemons.items():
         check(service["read_only"], f"{name} may write to its root")
         check(service["cap_drop"] == ["ALL"], f"{name} has capabilities")

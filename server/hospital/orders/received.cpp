@@ -52,6 +52,20 @@ std::string received_by(const std::string& title) { return std::string(kPrefix) 
 
 bool is_received(std::string_view pacs) { return pacs.starts_with(kPrefix); }
 
+std::optional<std::string> title_of(std::string_view pacs) {
+  if (!is_received(pacs)) return std::nullopt;
+  return std::string(pacs.substr(kPrefix.size()));
+}
+
+std::vector<std::string> contents_of(const std::vector<store::ReceivedInstance>& instances) {
+  constexpr std::size_t kEnough = 16;  // letters of a digest
+  std::vector<std::string> contents;
+  for (const store::ReceivedInstance& each : instances) {
+    if (!each.blob.empty()) contents.push_back(each.instance + ' ' + each.blob.substr(0, kEnough));
+  }
+  return contents;
+}
+
 std::optional<FoundSeries> Received::find_series(const std::string& study,
                                                  const std::string& series,
                                                  const std::stop_token&) {
@@ -111,14 +125,17 @@ store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
       .study = study, .series = series, .modality = "", .description = "", .instances = held.known};
   store::OrderRecord record = make_order(rule, received_by(title), found);
   // The series has settled already, so the order gets its list and does not wait.
-  for (const auto& each : services_.received.instances(held.series)) {
-    record.work.listed.push_back(each.instance);
-  }
+  const auto instances = services_.received.instances(held.series);
+  for (const auto& each : instances) record.work.listed.push_back(each.instance);
   record.work.listed_since = timestamp_of(held.last);
   const store::ReceivedFate fate = services_.orders.submit_received(
       {.record = record, .idempotency_key = "", .request_digest = ""},
-      {.rule = rule.name, .study = study, .series = series, .instances = held.known}, held.last,
-      settings_.most_open);
+      {.rule = rule.name,
+       .study = study,
+       .series = series,
+       .instances = held.known,
+       .contents = contents_of(instances)},
+      held.last, settings_.most_open);
   if (fate == store::ReceivedFate::kNew) {
     log(record, "");
     changed();

@@ -1,8 +1,10 @@
 // Received series, as a source of images for orders.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/hospital/orders/pacs.h"
 #include "server/store/received_store.h"
@@ -12,6 +14,11 @@ namespace isomesh::orders {
 // Name of the source of orders for series sent to that AE title. No configured PACS can have it.
 std::string received_by(const std::string& title);
 bool is_received(std::string_view pacs);
+// The AE title of received_by(); empty for a PACS.
+std::optional<std::string> title_of(std::string_view pacs);
+
+// The contents of those that are held, as in OrderWork.
+std::vector<std::string> contents_of(const std::vector<store::ReceivedInstance>& instances);
 
 // The series sent to one AE title. Thread safe; the stores must outlive it.
 class Received : public SeriesSource {

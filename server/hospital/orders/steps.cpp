@@ -230,6 +230,11 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
                              .direction = "in",
                              .study = source.study,
                              .instances = record.work.listed.size()};
+  if (const auto title = title_of(source.pacs)) {
+    // Before they are read: what replaces one of them meanwhile counts as new.
+    record.work.contents =
+        contents_of(services_.received.instances({*title, source.study, source.series}));
+  }
   try {
     const std::string type =
         this->source(source.pacs).fetch_series(source.study, source.series, file, stop);
@@ -372,8 +377,8 @@ bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderRe
   throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
 }
 
-void OrderSteps::check_before_sending(store::OrderRecord& record, std::size_t index,
-                                      const std::stop_token& stop) const {
+void OrderSteps::check_patient(store::OrderRecord& record, std::size_t index,
+                               const std::stop_token& stop) const {
   if (!is_same_patient(record, record.order.results[index], stop)) {
     forget_images(record);
     // Failures are kept until the order succeeds, because each attempt may store other objects of
@@ -382,6 +387,10 @@ void OrderSteps::check_before_sending(store::OrderRecord& record, std::size_t in
     throw PacsFailure(PacsFault::kChanged,
                       "the study has another Patient ID than the images; they are fetched again");
   }
+}
+
+void OrderSteps::check_object(store::OrderRecord& record, std::size_t index,
+                              const std::stop_token& stop) const {
   if (!store::is_there_and_intact(services_.blobs, record.work.blobs[index], stop)) {
     record.order.state = OrderState::kMeshing;
     record.work.failed_in = OrderState::kSucceeded;
@@ -441,8 +450,10 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     const InstancePlace place = {.study = record.work.identity->study_uid,
                                  .series = result.series_uid,
                                  .instance = result.sop_instance_uid};
+    // First: an object with the same UIDs may be that of another patient.
+    check_patient(record, index, stop);
     if (has_instance(result.pacs, place, stop) != true) {
-      check_before_sending(record, index, stop);
+      check_object(record, index, stop);
       send_one(record, index, stop);
     }
     result.stored = true;

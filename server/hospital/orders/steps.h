@@ -71,10 +71,13 @@ class OrderSteps {
   // False if the study belongs to another patient now.
   bool is_same_patient(const store::OrderRecord& record, const OrderResult& result,
                        const std::stop_token& stop) const;
-  // Throws PacsFailure kChanged if the study belongs to another patient now, and Error kUnavailable
-  // if the object is damaged or missing. The record is then at the step that repairs this.
-  void check_before_sending(store::OrderRecord& record, std::size_t index,
-                            const std::stop_token& stop) const;
+  // Throws PacsFailure kChanged if the study belongs to another patient now. The record is then at
+  // the step that repairs this.
+  void check_patient(store::OrderRecord& record, std::size_t index,
+                     const std::stop_token& stop) const;
+  // As above, but throws Error kUnavailable if the object is damaged or missing.
+  void check_object(store::OrderRecord& record, std::size_t index,
+                    const std::stop_token& stop) const;
   void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
   // Saves the order after `step` has succeeded, and resets failures of that and earlier steps.
   // Returns `next`. Throws OrderIsOver.

@@ -108,14 +108,17 @@ std::optional<OrderSubmission> made_before(SqlConnection& connection, const Orde
 
 std::optional<LastOrder> last_of(SqlConnection& connection, const WatchedSeries& series) {
   Rows row = connection.query(
-      "SELECT w.instances, o.state, o.record, o.id FROM watched w LEFT JOIN orders o ON o.id = "
+      "SELECT w.instances, o.state, o.record, o.id, o.work FROM watched w LEFT JOIN orders o ON "
+      "o.id = "
       "w.\"order\" WHERE w.rule = ?1 AND w.study = ?2 AND w.series = ?3",
       series.rule, series.study, series.series);
   if (!row.next()) return std::nullopt;
   LastOrder last = {.instances = static_cast<std::uint32_t>(row.integer(0))};
   if (row.is_null(1)) return last;
   last.state = static_cast<OrderState>(row.integer(1));
-  if (is_final(*last.state)) last.order = readable_order(row.text(2), row.text(3));
+  if (!is_final(*last.state)) return last;
+  last.order = readable_order(row.text(2), row.text(3));
+  if (auto work = readable_work(row.text(4))) last.contents = std::move(work->contents);
   return last;
 }
 

@@ -231,9 +231,10 @@ class ReceivedOrdersTest : public OrdersTest {
     peers_[received_by("BONE")].source = std::make_shared<Received>("BONE", received_, blobs_);
     begin();
   }
-  void receive(int from, int to, const std::string& title = "BONE") {
+  void receive(int from, int to, const std::string& title = "BONE",
+               const std::string& patient = "PAT-1") {
     for (int slice = from; slice < to; ++slice) {
-      const std::string file = slice_file(slice);
+      const std::string file = slice_file(slice, patient);
       const auto writer = blobs_.begin("");
       writer->write(std::as_bytes(std::span(file)));
       const store::Blob blob = writer->commit();
@@ -269,6 +270,24 @@ TEST_F(ReceivedOrdersTest, AreMadeWhenNothingMoreComesAndLeaveNothing) {
   pass(minutes(2));
   EXPECT_TRUE(until([&] { return !is_held(); }));
   EXPECT_EQ(all().size(), 1U);
+}
+
+// The mesh of the first has the same UIDs, but the patient of before.
+TEST_F(ReceivedOrdersTest, OfACorrectedPatientAreMadeAnewAndDoNotTrustTheFormerMesh) {
+  receive(0, kSlices);
+  pass(minutes(2));
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return !all().empty() && is_final(all().front().state); }));
+  pass(minutes(1));
+  ASSERT_TRUE(until([&] { return !is_held(); }));
+  receive(0, kSlices, "BONE", "PAT-2");
+  pass(minutes(2));
+  ASSERT_TRUE(until([&] { return all().size() == 2; }));
+  const std::string id = all().front().id;
+  // The samples are the same, and so is the mesh: no job runs.
+  ASSERT_TRUE(until([&] { return get(id).error.has_value(); }));
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("another Patient ID"));
+  EXPECT_EQ(main_->stores, 1);
 }
 
 // Whoever was sending could not while nothing listened.

@@ -39,6 +39,7 @@ OrderWork some_work() {
   OrderWork work;
   work.listed = {"1.4", "1.5"};
   work.listed_since = "2026-11-21T06:00:00.000Z";
+  work.contents = {"1.4 ab", "1.5 cd"};
   work.failures = 3;
   work.looks = 1;
   work.begun = "2026-11-21T06:00:00.000Z";

@@ -127,6 +127,25 @@ TEST_P(ReceivedConformance, ASeriesGetsOneOrderThatSucceeds) {
   EXPECT_EQ(submit(record(), 12), ReceivedFate::kNew);
 }
 
+TEST_P(ReceivedConformance, OtherContentsGetAnotherOrder) {
+  const auto submit_with = [&](const OrderRecord& record, std::vector<std::string> contents) {
+    return orders().submit_received({.record = record, .idempotency_key = "", .request_digest = ""},
+                                    {.rule = "bone",
+                                     .study = "1.2",
+                                     .series = "1.3",
+                                     .instances = 2,
+                                     .contents = std::move(contents)},
+                                    now() - hours(1), 100);
+  };
+  OrderRecord first = record();
+  ASSERT_EQ(submit_with(first, {"1.3.1 a", "1.3.2 b"}), ReceivedFate::kNew);
+  first.work.contents = {"1.3.1 a", "1.3.2 b"};
+  ASSERT_TRUE(end(first, OrderState::kSucceeded));
+  EXPECT_EQ(submit_with(record(), {"1.3.1 a", "1.3.2 b"}), ReceivedFate::kDone);
+  EXPECT_EQ(submit_with(record(), {"1.3.2 b"}), ReceivedFate::kDone) << "a part sent again";
+  EXPECT_EQ(submit_with(record(), {"1.3.2 c"}), ReceivedFate::kNew);
+}
+
 TEST_P(ReceivedConformance, AfterAFailureWhatComesLaterGetsAnother) {
   for (const OrderState state : {OrderState::kFailed, OrderState::kCancelled}) {
     OrderRecord order = record();

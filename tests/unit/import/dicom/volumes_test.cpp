@@ -106,7 +106,7 @@ TEST(DicomVolumes, HaveTitlesThatCanBeRead) {
         object.text(kEchoNumbers, "IS", std::string(volume + 1, '\xE4'));
       }));
   ASSERT_EQ(outcome.remedy.choices.size(), 3);
-  EXPECT_EQ(outcome.remedy.choices[1].title, "EchoNumbers \xEF\xBF\xBD\xEF\xBF\xBD, 6 slices");
+  EXPECT_EQ(outcome.remedy.choices[1].title, "EchoNumbers ää, 6 slices");
 }
 
 TEST(DicomVolumes, AreToldApartByTwoAttributes) {
