@@ -261,11 +261,16 @@ bool has_landlock() { return landlock_version() >= 1; }
 
 namespace {
 
-// Root could raise its limits again.
+// Root could raise its limits again. Others have none, and may be denied the call.
 void drop_capabilities() {
   __user_cap_header_struct header = {.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
-  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> none = {};
-  require(::syscall(SYS_capset, &header, none.data()) == 0, "capset");
+  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> capabilities = {};
+  require(::syscall(SYS_capget, &header, capabilities.data()) == 0, "capget");
+  const bool has_any = std::ranges::any_of(
+      capabilities, [](const auto& each) { return each.permitted != 0 || each.inheritable != 0; });
+  if (!has_any) return;
+  capabilities = {};
+  require(::syscall(SYS_capset, &header, capabilities.data()) == 0, "capset");
 }
 
 void confine_process(Doing doing) {
