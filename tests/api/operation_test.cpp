@@ -38,7 +38,14 @@ TEST(Start, WithoutStandardDescriptors) {
   const std::string url = "unix:" + (folder / "socket").string();
   Process daemon({"/bin/sh", "-c", R"(exec "$@" <&- >&- 2>&-)", "sh", ISOMESHD, "--listen", url,
                   "--data", folder / "data"});
-  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(folder / "socket"); }));
+  // It says nothing, and its socket is there before it listens.
+  ASSERT_TRUE(eventually([&] {
+    try {
+      return answer_to(url, request("GET", "/livez", "")).status == 200;
+    } catch (const std::exception&) {
+      return false;
+    }
+  }));
   const RawUpload raw = sphere_upload();
   const std::string body = request("POST", "/v1/volumes?" + raw.query, raw.bytes);
   EXPECT_EQ(answer_to(url, body).status, 201);
