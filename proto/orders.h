@@ -90,7 +90,7 @@ struct Order {
 struct OrderWork {
   std::vector<std::string> listed;          // SOP Instance UIDs of the series, ascending
   std::optional<std::string> listed_since;  // when this list was first seen
-  // Of images that were sent to us, as of the last fetch: SOP Instance UID, a blank, and a digest.
+  // For images that were sent to us, as of the last fetch: SOP Instance UID, a blank, and a digest.
   std::vector<std::string> contents = {};
   std::uint32_t failures = 0;             // in a row; determines the back-off
   std::uint32_t looks = 0;                // in a row, for a series that is missing

@@ -50,7 +50,7 @@ struct WatchedSeries {
   std::string study;
   std::string series;
   std::uint32_t instances = 0;
-  // Of a received series: the contents of the instances that are held, as in OrderWork.
+  // For a received series: the contents of the instances that are held, as in OrderWork.
   std::vector<std::string> contents = {};
 };
 

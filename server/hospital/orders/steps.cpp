@@ -84,6 +84,18 @@ bool has_bytes(const std::filesystem::path& file) {
   return !missing && bytes > 0;
 }
 
+// An entry of the audit trail that has not succeeded yet.
+store::AuditEntry transfer(const store::OrderRecord& record, const std::string& pacs,
+                           const std::string& direction, const std::string& study) {
+  return {.event = store::AuditEvent::kTransferred,
+          .success = false,
+          .order = record.order.id,
+          .owner = record.owner,
+          .pacs = pacs,
+          .direction = direction,
+          .study = study};
+}
+
 // Resets the list of instances, the images, and all results from them.
 void forget_images(store::OrderRecord& record) {
   record.order.state = OrderState::kWaiting;
@@ -222,14 +234,8 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   const OrderSource& source = record.order.source;
   const store::ScratchFolder scratch(services_.folder.scratch());
   const std::filesystem::path file = scratch.path() / "series";
-  store::AuditEntry entry = {.event = store::AuditEvent::kTransferred,
-                             .success = false,
-                             .order = record.order.id,
-                             .owner = record.owner,
-                             .pacs = source.pacs,
-                             .direction = "in",
-                             .study = source.study,
-                             .instances = record.work.listed.size()};
+  store::AuditEntry entry = transfer(record, source.pacs, "in", source.study);
+  entry.instances = record.work.listed.size();
   if (const auto title = title_of(source.pacs)) {
     // Before they are read: what replaces one of them meanwhile counts as new.
     record.work.contents =
@@ -411,15 +417,9 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
   const InstancePlace place = {.study = identity.study_uid,
                                .series = result.series_uid,
                                .instance = result.sop_instance_uid};
-  store::AuditEntry entry = {.event = store::AuditEvent::kTransferred,
-                             .success = false,
-                             .order = record.order.id,
-                             .owner = record.owner,
-                             .pacs = result.pacs,
-                             .direction = "out",
-                             .study = identity.study_uid,
-                             .instances = 1,
-                             .patient_id = identity.patient_id};
+  store::AuditEntry entry = transfer(record, result.pacs, "out", identity.study_uid);
+  entry.instances = 1;
+  entry.patient_id = identity.patient_id;
   try {
     receiver->store(
         {.place = place,

@@ -1,4 +1,4 @@
-// What changed a surface after it was extracted, in words.
+// The cause of a surface's changes since its extraction, in words.
 import type { JobParameters, MeshSummary } from '../api/types';
 
 export interface Change {

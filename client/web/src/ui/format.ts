@@ -17,7 +17,7 @@ export function formatNumber(value: number, digits = 2): string {
     .replace('-', '\u2212');
 }
 
-// Of the first digit of a number: 2 for hundreds.
+// The power of ten of a number's first digit: 2 for hundreds.
 function magnitudeOf(value: number): number {
   return Math.floor(Math.log10(Math.abs(value)));
 }

@@ -51,7 +51,7 @@ export interface LayersHost {
   oblique: ObliqueView;
   // Numbers of labels are no values: they have no maximum, no mean, and nothing between them.
   areLabels: () => boolean;
-  // What the address says.
+  // The query of the address.
   query: URLSearchParams;
 }
 

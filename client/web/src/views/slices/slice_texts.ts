@@ -1,4 +1,4 @@
-// What is shown in slices, as texts for the address.
+// Texts for the address about slices: slab, plane and measurements.
 import type { Plane } from '../../volume/geometry';
 import { pointsOf, type MeasureKind } from '../../volume/measure';
 import type { Angles } from '../../volume/oblique';
