@@ -232,22 +232,24 @@ void Orders::changed() {
   changed_.notify_all();
 }
 
-std::optional<std::string> Orders::take(std::stop_token& cancelled) {
+std::optional<std::string> Orders::take(const std::stop_token& stop, std::stop_token& cancelled) {
   if (is_paused()) return std::nullopt;
   // More orders than were fetched may wait for a PACS that hangs.
   for (std::size_t limit = kFirstDue;; limit *= 4) {
     const std::vector<store::OrderRecord> due = services_.orders.due(options_.now(), limit);
-    if (auto id = take_one_of(due, cancelled)) return id;
+    if (auto id = take_one_of(due, stop, cancelled)) return id;
     if (due.size() < limit) return std::nullopt;
   }
 }
 
 std::optional<std::string> Orders::take_one_of(const std::vector<store::OrderRecord>& due,
+                                               const std::stop_token& stop,
                                                std::stop_token& cancelled) {
   for (const store::OrderRecord& record : due) {
     const std::string pacs = OrderSteps::pacs_of(record);
     const Lock lock(mutex_);
-    if (!paused_.empty()) return std::nullopt;
+    // stop() aborts only steps that have begun before.
+    if (!paused_.empty() || stop.stop_requested()) return std::nullopt;
     const auto busy = std::ranges::count_if(running_, [&](const auto& running) {
       return !pacs.empty() && running.second.pacs == pacs;
     });
@@ -274,7 +276,7 @@ void Orders::work(const std::stop_token& stop) {
     bool is_in_trouble = false;
     try {
       std::stop_token cancelled;
-      if (const auto id = take(cancelled)) {
+      if (const auto id = take(stop, cancelled)) {
         const struct GiveBack {
           Orders& orders;
           const std::string& id;

@@ -106,10 +106,10 @@ class Orders {
   void receive(const std::stop_token& stop);
   store::ReceivedFate look_at_received(const store::HeldSeries& series);
   void look_at_rule(const Rule& rule, const std::stop_token& stop);
-  // Takes the next due order for this thread; empty if there is none.
-  std::optional<std::string> take(std::stop_token& cancelled);
+  // Takes the next due order for this thread; empty if there is none, or after `stop`.
+  std::optional<std::string> take(const std::stop_token& stop, std::stop_token& cancelled);
   std::optional<std::string> take_one_of(const std::vector<store::OrderRecord>& due,
-                                         std::stop_token& cancelled);
+                                         const std::stop_token& stop, std::stop_token& cancelled);
   void give_back(const std::string& id);
   void advance(store::OrderRecord record, const std::stop_token& stop);
   void make_step(store::OrderRecord& record, const std::stop_token& stop);

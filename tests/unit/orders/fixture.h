@@ -197,9 +197,21 @@ class WatchedOrders : public store::SqlOrderStore {
 
   std::vector<store::OrderRecord> due(store::Time now, std::size_t limit) const override {
     std::vector<store::OrderRecord> found = SqlOrderStore::due(now, limit);
-    if (found.empty()) idle_at_ = std::max(idle_at_.load(), now);
+    if (found.empty()) {
+      idle_at_ = std::max(idle_at_.load(), now);
+    } else if (is_held_) {
+      ++waiting_;
+      is_held_.wait(true);
+    }
     return found;
   }
+  // From now on nobody learns of due orders until they are released.
+  void hold() { is_held_ = true; }
+  void release() {
+    is_held_ = false;
+    is_held_.notify_all();
+  }
+  int waiting() const { return waiting_; }
   store::Time idle_at() const { return idle_at_; }
 
   // A thread asks this before it sleeps because it has nothing to do.
@@ -210,6 +222,8 @@ class WatchedOrders : public store::SqlOrderStore {
   store::Time looked_at() const { return looked_at_; }
 
  private:
+  mutable std::atomic<int> waiting_ = 0;
+  std::atomic<bool> is_held_ = false;
   mutable std::atomic<store::Time> idle_at_ = store::Time();
   mutable std::atomic<store::Time> looked_at_ = store::Time();
 };
@@ -272,6 +286,7 @@ class OrdersTest : public test::JobsFixture {
                                        settings_,
                                        OrderOptions{.now = [this] { return now(); },
                                                     .keep_orders = [this] { return keep(); },
+                                                    .cut_off = [this] { store_.release(); },
                                                     .threads = 3});
     orders_->on_end([](const std::string&) {});
   }

@@ -419,6 +419,18 @@ TEST_F(OrdersTest, GoOnInAnotherProcessWhereverTheyWere) {
   EXPECT_EQ(main_->stores, 1);
 }
 
+// Such a step would never be aborted, so a PACS that hangs would delay the stop.
+TEST_F(OrdersTest, BeginNoStepAfterTheStop) {
+  store_.hold();
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return store_.waiting() > 0; }));
+  stop();  // releases what it holds after it has aborted the steps
+  EXPECT_EQ(main_->calls, 0);
+  begin();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+}
+
 // Slices that were not there when it was listed are not meshed as if they did not exist.
 TEST_F(OrdersTest, OfASeriesThatIsNotThereFailAfterSomeLooks) {
   const std::string id = submit("main", "1.2.99");
