@@ -72,6 +72,27 @@ describe('orders', () => {
     expect(faults).toEqual([]);
   });
 
+  it('stay up to date on older pages too', async () => {
+    status = 503;
+    const { id: older } = await order('1.2.3.6');
+    await order('1.2.3.7');
+    const { page, faults } = await openPage(at.browser, hospital.url);
+    await page.route(/\/v1\/orders(\?|$)/, (route) => {
+      const url = new URL(route.request().url());
+      url.searchParams.set('limit', '1');
+      return route.continue({ url: url.href });
+    });
+    await page.goto(`${hospital.url}/#/orders`);
+    await expect.poll(() => page.locator('tr[data-order]').count()).toBe(1);
+    await page.getByRole('button', { name: 'Older orders' }).click();
+    const row = page.locator(`tr[data-order="${older}"]`);
+    await expect.poll(() => row.locator('td').first().innerText()).toBe('waiting');
+    await hospital.json(`/v1/orders/${older}`, { method: 'DELETE' });
+    await expect.poll(() => row.locator('td').first().innerText()).toBe('cancelled');
+    await page.close();
+    expect(faults).toEqual([]);
+  });
+
   it('are not spoken of where there is no hospital', async () => {
     const { page, daemon } = at;
     const missing: string[] = [];

@@ -1,6 +1,6 @@
 // A hospital's orders: what waits and why, what failed, and how the PACS are. #/orders
 import { client } from '../../client';
-import type { Order, OrderState, PacsList } from '../../api/types';
+import type { Order, OrderList, OrderState, PacsList } from '../../api/types';
 import { surfaceInWords } from '../../job/parameters';
 import { button, field, h } from '../../ui/dom';
 import { formatTime, shortId } from '../../ui/format';
@@ -42,8 +42,9 @@ class Orders {
   readonly element: HTMLElement;
   private readonly pacs = h('ul', { class: 'pacs', 'aria-label': 'PACS' });
   private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Orders' });
-  private readonly more = button('Older orders', () => void this.showMore().catch(tellError), { hidden: true });
+  private readonly more = button('Older orders', () => this.showMore(), { hidden: true });
   private orders: Order[] = [];
+  private pages = 1; // that are shown
   private next: string | null = null;
 
   constructor(
@@ -58,7 +59,7 @@ class Orders {
     );
     choice.addEventListener('change', () => {
       this.state = choice.value as OrderState | '';
-      this.orders = [];
+      this.pages = 1;
       noteInAddress({ state: this.state });
       this.refresh().catch(tellError);
     });
@@ -80,26 +81,31 @@ class Orders {
     this.scope.onEnd(() => clearInterval(timer));
   }
 
-  // Takes the newest over; older ones that were asked for stay as they are.
   async refresh(): Promise<void> {
-    const { state } = this;
-    const [page, { pacs }] = await Promise.all([client.listOrders(state, '', this.scope.signal), client.listPacs(this.scope.signal)]);
-    // Another state was chosen meanwhile.
-    if (state !== this.state) return;
-    const newest = new Set(page.orders.map(({ id }) => id));
-    const older = this.orders.filter(({ id }) => !newest.has(id) && id < (page.orders.at(-1)?.id ?? ''));
-    if (older.length === 0) this.next = page.next;
-    this.orders = [...page.orders, ...older];
+    const { state, pages } = this;
+    const [shown, { pacs }] = await Promise.all([this.load(state, pages), client.listPacs(this.scope.signal)]);
+    // Another state or an older page was chosen meanwhile.
+    if (state !== this.state || pages !== this.pages) return;
+    this.orders = shown.orders;
+    this.next = shown.next;
     this.pacs.replaceChildren(...pacs.map(pacsItem));
     this.show();
   }
 
-  private async showMore(): Promise<void> {
-    if (this.next === null) return;
-    const page = await client.listOrders(this.state, this.next, this.scope.signal);
-    this.orders = [...this.orders, ...page.orders];
-    this.next = page.next;
-    this.show();
+  private async load(state: OrderState | '', pages: number): Promise<{ orders: Order[]; next: string | null }> {
+    const orders: Order[] = [];
+    let next: string | null = '';
+    for (let page = 0; page < pages && next !== null; ++page) {
+      const part: OrderList = await client.listOrders(state, next, this.scope.signal);
+      orders.push(...part.orders);
+      next = part.next;
+    }
+    return { orders, next };
+  }
+
+  private showMore(): void {
+    this.pages += 1;
+    this.refresh().catch(tellError);
   }
 
   private show(): void {
