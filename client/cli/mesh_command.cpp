@@ -103,10 +103,11 @@ class Leftovers {
 // thread.
 class Run {
  public:
-  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many,
+  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many, TakenNames& names,
       Leftovers& leftovers)
       : options_(options),
         stop_(stop),
+        names_(names),
         leftovers_(leftovers),
         is_one_of_many_(is_one_of_many),
         client_(client_of(options, stop)),
@@ -133,19 +134,30 @@ class Run {
       return mesh(*volumes.front().volume, input.name, input.name);
     }
     if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
+    return members(input.name, volumes);
+  }
+
+ private:
+  int members(const std::string& input, const std::vector<UploadedVolume>& volumes) {
+    std::vector<std::string> members;
+    members.reserve(volumes.size());
+    for (const UploadedVolume& each : volumes) members.push_back(each.member);
+    const std::vector<std::string> names = names_of_members(input, members);
+    if (const auto twice = names_.take(names)) {
+      throw Error(ErrorCode::kInvalidParameter,
+                  "two meshes would be called " + *twice + ": --member takes one of the volumes")
+          .with_remedy(several_volumes(volumes).remedy());
+    }
     int status = kDone;
-    for (const UploadedVolume& each : volumes) {
-      const std::string subject = input.name + ": " + each.member;
+    for (std::size_t n = 0; n < volumes.size(); ++n) {
+      const UploadedVolume& each = volumes[n];
+      const std::string subject = input + ": " + each.member;
       if (each.problem) complain(to_error(*each.problem), subject);
-      const int of_this =
-          each.problem ? kRefused
-                       : mesh(*each.volume, input.name + '-' + name_of_input(each.member), subject);
-      status = std::max(status, of_this);
+      status = std::max(status, each.problem ? kRefused : mesh(*each.volume, names[n], subject));
     }
     return status;
   }
 
- private:
   int stored(const std::string& id, const std::string& name) {
     const Volume found = client_.volume(volume_id(client_, id));
     if (!options_.quiet) tell_notes(found, is_one_of_many_ ? name : "");
@@ -234,6 +246,7 @@ class Run {
 
   const Options& options_;
   const std::stop_token stop_;
+  TakenNames& names_;
   Leftovers& leftovers_;
   const bool is_one_of_many_;
   Client client_;
@@ -242,13 +255,13 @@ class Run {
 };
 
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
-             Leftovers& leftovers) {
+             TakenNames& names, Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;
   std::atomic<int> worst = kDone;
   std::atomic<std::size_t> failed = 0;
   std::atomic<bool> is_lost = false;
   const auto work = [&] {
-    Run run(options, stop, true, leftovers);
+    Run run(options, stop, true, names, leftovers);
     for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
       int status = kDone;
       try {
@@ -313,9 +326,12 @@ void refuse_to_overwrite(const std::vector<Input>& inputs, const Options& option
 int mesh(const Options& options, const std::stop_token& stop) {
   const std::vector<Input> inputs = inputs_of(options);
   refuse_to_overwrite(inputs, options);
+  // An archive's members are known after its upload; by then other inputs have their names.
+  TakenNames names;
+  for (const Input& input : inputs) names.take({input.name});
   Leftovers leftovers(options);
-  if (inputs.size() > 1) return mesh_all(options, inputs, stop, leftovers);
-  return Run(options, stop, false, leftovers).input(inputs.front());
+  if (inputs.size() > 1) return mesh_all(options, inputs, stop, names, leftovers);
+  return Run(options, stop, false, names, leftovers).input(inputs.front());
 }
 
 }  // namespace isomesh::cli
