@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <atomic>
-#include <cstdio>
+#include <cerrno>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <mutex>
@@ -10,7 +12,13 @@
 #include <thread>
 #include <utility>
 
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "base/descriptor.h"
 #include "base/files.h"
+#include "base/ids.h"
 #include "client/cli/batch.h"
 #include "client/cli/commands.h"
 #include "client/cli/console.h"
@@ -22,6 +30,8 @@
 
 namespace isomesh::cli {
 namespace {
+
+constexpr std::size_t kKeyBytes = 16;
 
 class Stopwatch {
  public:
@@ -44,27 +54,56 @@ Client parting_client(const Options& options) {
                  .silence_timeout = std::chrono::seconds{5}});
 }
 
-void cancel_after_stop(const Options& options, const std::string& id) {
+// Cancels the job with that key, which may not have come to the server yet. `id` is empty if it is
+// not known.
+void cancel_after_stop(const Options& options, const JobParameters& parameters,
+                       const std::string& key, std::string id) {
   Client client = parting_client(options);
   try {
+    if (id.empty()) id = client.submit(parameters, key).id;
     client.cancel(id);
     complain("interrupted; the job " + id + " was cancelled");
   } catch (const Error& error) {
-    complain("interrupted; the job " + id + " could not be cancelled: " + error.what());
+    complain("interrupted; the job " + (id.empty() ? "" : id + ' ') +
+             "could not be cancelled: " + error.what());
   }
 }
 
+// Waits until standard input has bytes, or has ended. Throws Error kCancelled on a stop request.
+class InputWait {
+ public:
+  explicit InputWait(const std::stop_token& stop)
+      : stop_(stop), wake_(stop, [this] { ::eventfd_write(event_.number(), 1); }) {}
+
+  void operator()() const {
+    std::array<pollfd, 2> files = {{{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0},
+                                    {.fd = event_.number(), .events = POLLIN, .revents = 0}}};
+    while (::poll(files.data(), files.size(), -1) < 0 && errno == EINTR) {
+    }
+    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
+  }
+
+ private:
+  const std::stop_token stop_;
+  const Descriptor event_{::eventfd(0, EFD_CLOEXEC)};
+  const std::stop_callback<std::function<void()>> wake_;
+};
+
 // Copies standard input to a file, because an upload states its size first.
-std::unique_ptr<ScratchFile> stdin_as_file() {
+std::unique_ptr<ScratchFile> stdin_as_file(const std::stop_token& stop) {
   auto file = std::make_unique<ScratchFile>(temporary_folder(), ".volume");
-  std::vector<char> block(std::size_t{1} << 20);
-  while (const std::size_t count = std::fread(block.data(), 1, block.size(), stdin)) {
-    file->write(std::as_bytes(std::span(block).first(count)));
+  const InputWait wait(stop);
+  std::vector<std::byte> block(std::size_t{1} << 20);
+  while (true) {
+    wait();
+    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
+    if (count == 0) return file;
+    if (count > 0) {
+      file->write(std::span(block).first(static_cast<std::size_t>(count)));
+    } else if (errno != EINTR && errno != EAGAIN) {
+      throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
+    }
   }
-  if (std::ferror(stdin) != 0) {
-    throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
-  }
-  return file;
 }
 
 // The volumes that a dry run has stored. They are deleted when all inputs have ended, because
@@ -120,7 +159,7 @@ class Run {
     std::vector<std::filesystem::path> files = input.files;
     for (std::filesystem::path& file : files) {
       if (file != "-") continue;
-      copy = stdin_as_file();
+      copy = stdin_as_file(stop_);
       file = copy->path();
       if (how.name.empty()) how.name = "stdin";
     }
@@ -190,14 +229,16 @@ class Run {
 
   // Returns the job when it has ended; empty after an interrupt.
   std::optional<Job> made(const JobParameters& parameters) {
-    Job job = client_.submit(parameters);
+    const std::string key = random_hex(kKeyBytes);
+    std::optional<Job> job;
     try {
-      resumable(job.id, [&] { job = wait(client_, job.id, bar_); });
+      job = client_.submit(parameters, key);
+      resumable(job->id, [&] { job = wait(client_, job->id, bar_); });
       return job;
     } catch (const Error&) {
       bar_.clear();
       if (!stop_.stop_requested()) throw;
-      cancel_after_stop(options_, job.id);
+      cancel_after_stop(options_, parameters, key, job ? job->id : "");
       return std::nullopt;
     }
   }

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <functional>
 #include <iostream>
+#include <set>
+#include <stop_token>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -78,6 +80,30 @@ TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
   EXPECT_THAT(outcome.err, HasSubstr(options_.server));
   EXPECT_THAT(outcome.err, HasSubstr(" wait 7\n"));
   EXPECT_THAT(outcome.err, HasSubstr(" fetch 7 -o OUT"));
+}
+
+// The server has the job, but its response did not come.
+TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
+  std::stop_source stop;
+  std::vector<std::string> keys;
+  int cancelled = 0;
+  server_.http.set_pre_routing_handler([&](const auto& request, auto&) {
+    if (request.path == "/v1/jobs") {
+      keys.push_back(request.get_header_value("Idempotency-Key"));
+      stop.request_stop();
+    }
+    return httplib::Server::HandlerResponse::Unhandled;
+  });
+  server_.http.Delete("/v1/jobs/7", [&](const auto&, auto& response) {
+    ++cancelled;
+    response.status = 204;
+  });
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options_, stop.get_token()), kRefused);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "isomesh: interrupted; the job 7 was cancelled\n");
+  EXPECT_EQ(cancelled, 1);
+  EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
 }
 
 TEST_F(Commands, QuietSaysNothing) {
