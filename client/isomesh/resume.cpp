@@ -77,9 +77,7 @@ struct Progress {
 
 Progress progress_of(const HttpResponse& response, std::uint64_t bytes) {
   const auto offset = parse_uint64(response.header("upload-offset"));
-  if (!offset || *offset > bytes) {
-    throw Error(ErrorCode::kInternal, "the server's response does not match the API");
-  }
+  if (!offset || *offset > bytes) throw other_api();
   return {*offset, response.header("upload-complete") == "?1"};
 }
 
@@ -141,10 +139,12 @@ HttpResponse Client::Impl::finish_upload(const HttpRequest& request,
   while (true) {
     if (known && patience.is_over()) std::rethrow_exception(failure);
     try {
-      const HttpResponse response =
+      HttpResponse response =
           transport_.send(!known            ? HttpRequest{.method = "HEAD", .target = place}
                           : known->is_whole ? reading_of(request, place)
                                             : rest_of(request, place, known->offset));
+      // The reason of a conflict is in the body of a GET.
+      if (!known && response.status == 409) response = transport_.send({.target = place});
       if (is_success(response)) {
         if (known) return response;
         known = progress_of(response, request.source_bytes);
