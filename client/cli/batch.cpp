@@ -53,10 +53,11 @@ fs::path without_suffixes(const fs::path& path) {
   return path.parent_path() / (is_packed ? path.stem() : path).stem();
 }
 
-// `name` in a file's name, which stays in its folder.
-std::string plain(std::string name) {
-  std::ranges::replace(name, '/', '_');
-  return name;
+// `name` in a file's name, which stays in its folder. An archive may name its members anyhow.
+std::string plain(std::string_view name) {
+  std::string text = printable(name);
+  std::ranges::replace(text, '/', '_');
+  return text;
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ std::vector<Input> inputs_of(const Options& options);
 // True if outputs are named after inputs: one of them has "{name}" in it.
 bool is_by_name(const std::vector<Output>& outputs);
 
-// Replaces "{name}" by `name`; slashes become underscores.
+// Replaces "{name}" by `name`; slashes become underscores, and control characters U+FFFD.
 std::vector<Output> filled(const std::vector<Output>& outputs, const std::string& name);
 
 // The formats of the outputs, each once, in the order of the outputs.

@@ -109,6 +109,8 @@ TEST_F(Batch, NamesFillOutputsAndStayInTheirFolder) {
                                        {"-", MeshFormat::kStl}};
   EXPECT_EQ(filled(outputs, "a").front().path, "out/a-a.stl");
   EXPECT_EQ(filled(outputs, "../a").front().path, "out/.._a-.._a.stl");
+  EXPECT_EQ(filled(outputs, "a\x1b[31m\a").front().path,
+            "out/a\uFFFD[31m\uFFFD-a\uFFFD[31m\uFFFD.stl");
   EXPECT_EQ(filled(outputs, "{name}").front().path, "out/{name}-{name}.stl");
   EXPECT_TRUE(filled(outputs, "a").back().is_stdout());
 }

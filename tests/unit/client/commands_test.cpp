@@ -96,7 +96,7 @@ TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
   });
   server_.http.Delete("/v1/jobs/7", [&](const auto&, auto& response) {
     ++cancelled;
-    response.status = 204;
+    response.set_content(to_json(job_), "application/json");
   });
   testing::internal::CaptureStderr();
   EXPECT_EQ(run(options_, stop.get_token()), kRefused);
@@ -104,6 +104,19 @@ TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
             "isomesh: interrupted; the job 7 was cancelled\n");
   EXPECT_EQ(cancelled, 1);
   EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
+}
+
+TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
+  server_.http.set_pre_routing_handler([](const auto&, auto& response) {
+    Remedy remedy{.overridable = "c\x1b", .choices = {{"member", "a\x1b[31m.nrrd", "x\ny\a"}}};
+    test::answer_with(
+        response,
+        Error(ErrorCode::kUnusableVolume, "line\n\x1b[2J").with_remedy(std::move(remedy)));
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  EXPECT_EQ(outcome_of(options_).err,
+            "isomesh: line\n\uFFFD[2J\n"
+            "    --member a\uFFFD[31m.nrrd  x\uFFFDy\uFFFD\n  --accept c\uFFFD\n");
 }
 
 TEST_F(Commands, QuietSaysNothing) {
