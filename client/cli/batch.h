@@ -2,6 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,6 +23,22 @@ struct Input {
 // "head" for "scans/head.nii.gz", "stdin" for "-"; for a folder its own name.
 std::string name_of_input(const std::filesystem::path& path);
 
+// The names of the outputs of an input's members, for example "study-ct" for "a/ct.nrrd". Members
+// whose files share that name have their folders in it, and, if that is not enough, their suffixes.
+std::vector<std::string> names_of_members(const std::string& input,
+                                          const std::vector<std::string>& members);
+
+// The names of the outputs of one run. Thread safe.
+class TakenNames {
+ public:
+  // Takes all of them, or none: then returns the first that another output has.
+  std::optional<std::string> take(const std::vector<std::string>& names);
+
+ private:
+  std::mutex mutex_;
+  std::set<std::string> names_;
+};
+
 // If outputs are named after inputs, each file is one input, without those that belong to another
 // file, such as the data of a header. Otherwise all files are one input. Throws EarlyExit if two
 // inputs would write the same output.
@@ -28,7 +47,7 @@ std::vector<Input> inputs_of(const Options& options);
 // True if outputs are named after inputs: one of them has "{name}" in it.
 bool is_by_name(const std::vector<Output>& outputs);
 
-// Replaces "{name}" by `name`; slashes become underscores.
+// Replaces "{name}" by `name`; slashes become underscores, and control characters U+FFFD.
 std::vector<Output> filled(const std::vector<Output>& outputs, const std::string& name);
 
 // The formats of the outputs, each once, in the order of the outputs.

@@ -112,14 +112,14 @@ std::filesystem::path temporary_folder() {
 
 void complain(const std::string& message) {
   const std::scoped_lock lock(console_mutex());
-  std::cerr << "isomesh: " << message << '\n';
+  std::cerr << "isomesh: " << printable_lines(message) << '\n';
 }
 
 void complain(const Error& error, const std::string& subject) {
   const std::string remedy = remedy_report(error.remedy());
+  const std::string text = subject + (subject.empty() ? "" : ": ") + in_options(error);
   const std::scoped_lock lock(console_mutex());
-  std::cerr << "isomesh: " << subject << (subject.empty() ? "" : ": ") << in_options(error) << '\n'
-            << remedy;
+  std::cerr << "isomesh: " << printable_lines(text) << '\n' << remedy;
 }
 
 void suggest_local() {

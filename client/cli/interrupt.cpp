@@ -12,6 +12,10 @@ sigset_t stop_signals() {
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  struct sigaction hangup = {};
+  const bool is_known = ::sigaction(SIGHUP, nullptr, &hangup) == 0;
+  // nohup: the command goes on without its terminal.
+  if (is_known && hangup.sa_handler != SIG_IGN) sigaddset(&signals, SIGHUP);
   return signals;
 }
 
@@ -29,6 +33,8 @@ void wait_for_signals(const std::stop_token& over, std::stop_source& source,
   const sigset_t signals = stop_signals();
   int signal = 0;
   while (::sigwait(&signals, &signal) == 0 && !over.stop_requested()) {
+    // A terminal that is closed sends SIGHUP, and then its shell does, too.
+    if (first != 0 && signal == SIGHUP) continue;
     if (first != 0) die_by(signal);
     first = signal;
     source.request_stop();

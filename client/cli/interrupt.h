@@ -7,9 +7,10 @@
 
 namespace isomesh::cli {
 
-// Construct it first in main, while only one thread runs: it blocks SIGINT and SIGTERM for all
-// threads and waits for them on a thread of its own. The first signal requests a stop; a second one
-// ends the process immediately, by that signal.
+// Construct it first in main, while only one thread runs: it blocks SIGINT, SIGTERM and SIGHUP,
+// unless that is ignored, for all threads and waits for them on a thread of its own. The first
+// signal requests a stop; a second one, except SIGHUP, ends the process immediately, by that
+// signal.
 class Interrupt {
  public:
   Interrupt();

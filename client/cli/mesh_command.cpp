@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <atomic>
-#include <cstdio>
+#include <cerrno>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <mutex>
@@ -10,7 +12,13 @@
 #include <thread>
 #include <utility>
 
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "base/descriptor.h"
 #include "base/files.h"
+#include "base/ids.h"
 #include "client/cli/batch.h"
 #include "client/cli/commands.h"
 #include "client/cli/console.h"
@@ -22,6 +30,8 @@
 
 namespace isomesh::cli {
 namespace {
+
+constexpr std::size_t kKeyBytes = 16;
 
 class Stopwatch {
  public:
@@ -44,27 +54,56 @@ Client parting_client(const Options& options) {
                  .silence_timeout = std::chrono::seconds{5}});
 }
 
-void cancel_after_stop(const Options& options, const std::string& id) {
+// Cancels the job with that key, which may not have come to the server yet. `id` is empty if it is
+// not known.
+void cancel_after_stop(const Options& options, const JobParameters& parameters,
+                       const std::string& key, std::string id) {
   Client client = parting_client(options);
   try {
+    if (id.empty()) id = client.submit(parameters, key).id;
     client.cancel(id);
     complain("interrupted; the job " + id + " was cancelled");
   } catch (const Error& error) {
-    complain("interrupted; the job " + id + " could not be cancelled: " + error.what());
+    complain("interrupted; the job " + (id.empty() ? "" : id + ' ') +
+             "could not be cancelled: " + error.what());
   }
 }
 
+// Waits until standard input has bytes, or has ended. Throws Error kCancelled on a stop request.
+class InputWait {
+ public:
+  explicit InputWait(const std::stop_token& stop)
+      : stop_(stop), wake_(stop, [this] { ::eventfd_write(event_.number(), 1); }) {}
+
+  void operator()() const {
+    std::array<pollfd, 2> files = {{{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0},
+                                    {.fd = event_.number(), .events = POLLIN, .revents = 0}}};
+    while (::poll(files.data(), files.size(), -1) < 0 && errno == EINTR) {
+    }
+    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
+  }
+
+ private:
+  const std::stop_token stop_;
+  const Descriptor event_{::eventfd(0, EFD_CLOEXEC)};
+  const std::stop_callback<std::function<void()>> wake_;
+};
+
 // Copies standard input to a file, because an upload states its size first.
-std::unique_ptr<ScratchFile> stdin_as_file() {
+std::unique_ptr<ScratchFile> stdin_as_file(const std::stop_token& stop) {
   auto file = std::make_unique<ScratchFile>(temporary_folder(), ".volume");
-  std::vector<char> block(std::size_t{1} << 20);
-  while (const std::size_t count = std::fread(block.data(), 1, block.size(), stdin)) {
-    file->write(std::as_bytes(std::span(block).first(count)));
+  const InputWait wait(stop);
+  std::vector<std::byte> block(std::size_t{1} << 20);
+  while (true) {
+    wait();
+    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
+    if (count == 0) return file;
+    if (count > 0) {
+      file->write(std::span(block).first(static_cast<std::size_t>(count)));
+    } else if (errno != EINTR && errno != EAGAIN) {
+      throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
+    }
   }
-  if (std::ferror(stdin) != 0) {
-    throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
-  }
-  return file;
 }
 
 // The volumes that a dry run has stored. They are deleted when all inputs have ended, because
@@ -103,10 +142,11 @@ class Leftovers {
 // thread.
 class Run {
  public:
-  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many,
+  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many, TakenNames& names,
       Leftovers& leftovers)
       : options_(options),
         stop_(stop),
+        names_(names),
         leftovers_(leftovers),
         is_one_of_many_(is_one_of_many),
         client_(client_of(options, stop)),
@@ -119,7 +159,7 @@ class Run {
     std::vector<std::filesystem::path> files = input.files;
     for (std::filesystem::path& file : files) {
       if (file != "-") continue;
-      copy = stdin_as_file();
+      copy = stdin_as_file(stop_);
       file = copy->path();
       if (how.name.empty()) how.name = "stdin";
     }
@@ -133,19 +173,30 @@ class Run {
       return mesh(*volumes.front().volume, input.name, input.name);
     }
     if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
+    return members(input.name, volumes);
+  }
+
+ private:
+  int members(const std::string& input, const std::vector<UploadedVolume>& volumes) {
+    std::vector<std::string> members;
+    members.reserve(volumes.size());
+    for (const UploadedVolume& each : volumes) members.push_back(each.member);
+    const std::vector<std::string> names = names_of_members(input, members);
+    if (const auto twice = names_.take(names)) {
+      throw Error(ErrorCode::kInvalidParameter,
+                  "two meshes would be called " + *twice + ": --member takes one of the volumes")
+          .with_remedy(several_volumes(volumes).remedy());
+    }
     int status = kDone;
-    for (const UploadedVolume& each : volumes) {
-      const std::string subject = input.name + ": " + each.member;
+    for (std::size_t n = 0; n < volumes.size(); ++n) {
+      const UploadedVolume& each = volumes[n];
+      const std::string subject = input + ": " + each.member;
       if (each.problem) complain(to_error(*each.problem), subject);
-      const int of_this =
-          each.problem ? kRefused
-                       : mesh(*each.volume, input.name + '-' + name_of_input(each.member), subject);
-      status = std::max(status, of_this);
+      status = std::max(status, each.problem ? kRefused : mesh(*each.volume, names[n], subject));
     }
     return status;
   }
 
- private:
   int stored(const std::string& id, const std::string& name) {
     const Volume found = client_.volume(volume_id(client_, id));
     if (!options_.quiet) tell_notes(found, is_one_of_many_ ? name : "");
@@ -178,14 +229,16 @@ class Run {
 
   // Returns the job when it has ended; empty after an interrupt.
   std::optional<Job> made(const JobParameters& parameters) {
-    Job job = client_.submit(parameters);
+    const std::string key = random_hex(kKeyBytes);
+    std::optional<Job> job;
     try {
-      resumable(job.id, [&] { job = wait(client_, job.id, bar_); });
+      job = client_.submit(parameters, key);
+      resumable(job->id, [&] { job = wait(client_, job->id, bar_); });
       return job;
     } catch (const Error&) {
       bar_.clear();
       if (!stop_.stop_requested()) throw;
-      cancel_after_stop(options_, job.id);
+      cancel_after_stop(options_, parameters, key, job ? job->id : "");
       return std::nullopt;
     }
   }
@@ -234,6 +287,7 @@ class Run {
 
   const Options& options_;
   const std::stop_token stop_;
+  TakenNames& names_;
   Leftovers& leftovers_;
   const bool is_one_of_many_;
   Client client_;
@@ -242,13 +296,13 @@ class Run {
 };
 
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
-             Leftovers& leftovers) {
+             TakenNames& names, Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;
   std::atomic<int> worst = kDone;
   std::atomic<std::size_t> failed = 0;
   std::atomic<bool> is_lost = false;
   const auto work = [&] {
-    Run run(options, stop, true, leftovers);
+    Run run(options, stop, true, names, leftovers);
     for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
       int status = kDone;
       try {
@@ -313,9 +367,12 @@ void refuse_to_overwrite(const std::vector<Input>& inputs, const Options& option
 int mesh(const Options& options, const std::stop_token& stop) {
   const std::vector<Input> inputs = inputs_of(options);
   refuse_to_overwrite(inputs, options);
+  // An archive's members are known after its upload; by then other inputs have their names.
+  TakenNames names;
+  for (const Input& input : inputs) names.take({input.name});
   Leftovers leftovers(options);
-  if (inputs.size() > 1) return mesh_all(options, inputs, stop, leftovers);
-  return Run(options, stop, false, leftovers).input(inputs.front());
+  if (inputs.size() > 1) return mesh_all(options, inputs, stop, names, leftovers);
+  return Run(options, stop, false, names, leftovers).input(inputs.front());
 }
 
 }  // namespace isomesh::cli

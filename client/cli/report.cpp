@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/text.h"
 #include "client/cli/text.h"
 #include "proto/json.h"
 #include "proto/json_tree.h"
@@ -249,7 +250,7 @@ std::string remedy_report(const Remedy& remedy) {
     rows.push_back({"  and " + std::to_string(remedy.choices.size() - kMost) + " more"});
   }
   std::string text = rows.empty() ? "" : in_columns({Align::kLeft, Align::kLeft}, rows);
-  if (!remedy.overridable.empty()) text += "  --accept " + remedy.overridable + '\n';
+  if (!remedy.overridable.empty()) text += "  --accept " + printable(remedy.overridable) + '\n';
   return text;
 }
 

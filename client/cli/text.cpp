@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "base/text.h"
+
 namespace isomesh::cli {
 namespace {
 
@@ -58,7 +60,8 @@ std::string human_duration(double milliseconds) {
 std::string human_number(double value) { return printed("%.*g", 6, value); }
 
 std::string in_columns(const std::vector<Align>& columns,
-                       const std::vector<std::vector<std::string>>& rows) {
+                       std::vector<std::vector<std::string>> rows) {
+  for (auto& row : rows) std::ranges::transform(row, row.begin(), printable);
   std::vector<std::size_t> widths(columns.size());
   for (const auto& row : rows) {
     for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], width_of(row[c]));
@@ -74,6 +77,16 @@ std::string in_columns(const std::vector<Align>& columns,
     text += line + '\n';
   }
   return text;
+}
+
+std::string printable_lines(std::string_view text) {
+  std::string lines;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines += (begin == 0 ? "" : "\n") + printable(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return lines;
 }
 
 std::string with_options(std::string text) {

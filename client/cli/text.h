@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace isomesh::cli {
@@ -16,9 +17,13 @@ std::string human_number(double value);           // six significant digits
 enum class Align { kLeft, kRight };
 
 // Lines of cells under each other, two spaces between columns, indented by two, nothing at the end
-// of a line. Rows may be shorter than `columns`; cells may hold UTF-8.
+// of a line. Rows may be shorter than `columns`; cells may hold UTF-8. Control characters, which
+// files and servers may send to the terminal, are replaced.
 std::string in_columns(const std::vector<Align>& columns,
-                       const std::vector<std::vector<std::string>>& rows);
+                       std::vector<std::vector<std::string>> rows);
+
+// The text without control characters, except line breaks.
+std::string printable_lines(std::string_view text);
 
 // A text of the server, in which the command's options replace the API's parameters: "--member
 // NAME" for "member=NAME".

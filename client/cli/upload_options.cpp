@@ -22,7 +22,7 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
              std::error_code error;
              const bool is_there = path == "-" || std::filesystem::exists(path, error);
              if (!is_there && !(takes_ids && may_be_volume_id(path))) {
-               refuse("FILE", path + " does not exist");
+               refuse("FILE", path + (error ? ": " + error.message() : " does not exist"));
              }
              if (path == "-" && std::ranges::count(paths, "-") > 1) {
                refuse("FILE", "standard input (-) can only be given once");

@@ -158,7 +158,9 @@ Volume Client::rename_volume(const std::string& id, const std::optional<std::str
 }
 
 void Client::erase_volume(const std::string& id) {
-  impl_->send({.method = "DELETE", .target = volume_path(id)});
+  constexpr int kNoContent = 204;
+  const HttpResponse response = impl_->exchange({.method = "DELETE", .target = volume_path(id)});
+  if (response.status != kNoContent) throw other_api();
 }
 
 Histogram Client::histogram(const std::string& id, std::uint32_t bins) {
@@ -188,9 +190,17 @@ void Client::slice(const std::string& id, const SliceOptions& options,
   if (options.index) query.emplace_back("index", std::to_string(*options.index));
   if (options.window) query.emplace_back("window", joined(*options.window));
   PartFile file(target);
+  std::uint64_t bytes = 0;
   HttpRequest request{.target = volume_path(id) + "/slice.png" + query_string(query)};
-  request.sink = [&](std::string_view piece) { file.write(piece); };
-  impl_->repeat(request, [&] { file.restart(); });
+  request.sink = [&](std::string_view piece) {
+    file.write(piece);
+    bytes += piece.size();
+  };
+  const HttpResponse response = impl_->repeated(request, [&] {
+    file.restart();
+    bytes = 0;
+  });
+  if (bytes == 0 || !response.content_type.starts_with("image/png")) throw other_api();
   file.publish();
 }
 
@@ -226,7 +236,7 @@ JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
 }
 
 void Client::cancel(const std::string& id) {
-  impl_->send({.method = "DELETE", .target = job_path(id)});
+  job_from_json(impl_->send({.method = "DELETE", .target = job_path(id)}));
 }
 
 Job Client::wait(const std::string& id, const JobProgress& progress) {

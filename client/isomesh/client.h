@@ -41,8 +41,8 @@ struct ClientOptions {
   // For uploads: the longest time without progress before the connection counts as broken.
   std::chrono::milliseconds stall_timeout{60'000};
 
-  // A stop request ends the present request immediately with Error kCancelled. Jobs on the server
-  // continue.
+  // A stop request ends the present request immediately with Error kCancelled. A large upload is
+  // cancelled on the server first, which takes a few seconds at most. Jobs on the server continue.
   std::stop_token stop = {};
 };
 

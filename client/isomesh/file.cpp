@@ -32,7 +32,8 @@ std::filesystem::path resolve(const std::filesystem::path& target) {
 }
 
 std::filesystem::path part_beside(const std::filesystem::path& target) {
-  return target.parent_path() / ("." + target.filename().string() + "." + random_hex(8) + ".part");
+  // Without the target's name, which may be as long as a name can be.
+  return target.parent_path() / (".isomesh-" + random_hex(8) + ".part");
 }
 
 // A file that is replaced keeps its mode. A new one has 0666, reduced by the process's umask, like

@@ -16,7 +16,7 @@ using std::chrono::milliseconds;
 constexpr int kTries = 4;
 constexpr milliseconds kFirstPause{100};
 // For the server to end the import of a cancelled upload, or to finish storing its volume.
-constexpr milliseconds kPartingSilence{30'000};
+constexpr milliseconds kPartingSilence{5'000};
 
 TransportOptions transport_options(ClientOptions&& options) {
   const bool sendable =

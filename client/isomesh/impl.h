@@ -24,6 +24,10 @@ inline bool is_success(const HttpResponse& response) {
 
 Error refusal(const HttpResponse& response);
 
+inline Error other_api() {
+  return {ErrorCode::kInternal, "the server's response does not match the API"};
+}
+
 // Thread safe.
 class Client::Impl {
  public:

@@ -21,12 +21,24 @@ constexpr std::size_t kBlock = 512;
 
 // --- Which files ---------------------------------------------------------------------------------
 
+// Throws Error kInvalidParameter for a path that cannot be looked at.
+bool is_folder(const fs::path& path) {
+  if (path.empty()) throw Error(ErrorCode::kInvalidParameter, "the name of a file is empty");
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::none) {
+    throw Error(ErrorCode::kInvalidParameter, path.string() + ": " + error.message());
+  }
+  return fs::is_directory(status);
+}
+
 std::vector<PackedFile> files_below(const fs::path& folder) {
   std::vector<PackedFile> files;
   std::error_code error;
   fs::recursive_directory_iterator at(folder, error);
   for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
-    if (at->is_symlink() || !at->is_regular_file()) continue;
+    std::error_code unknown;
+    if (!fs::is_regular_file(at->symlink_status(unknown))) continue;
     files.push_back({at->path().lexically_relative(folder).generic_string(), at->path()});
     if (files.size() > kMostFiles) {
       throw Error(ErrorCode::kInvalidParameter, folder.string() + ": contains more than " +
@@ -223,7 +235,7 @@ std::string lead_of(const Member& member) {
 }  // namespace
 
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
-  if (fs::is_directory(path)) return files_below(path);
+  if (is_folder(path)) return files_below(path);
   const std::string suffix = lower(path.extension().string());
   if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
   if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");
@@ -251,7 +263,7 @@ std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>
 UploadBody::UploadBody(const std::vector<std::filesystem::path>& paths) {
   if (paths.empty()) throw Error(ErrorCode::kInvalidParameter, "there are no files to upload");
   const std::vector<PackedFile> files = files_of_upload(paths);
-  if (files.size() == 1 && !fs::is_directory(paths.front())) {
+  if (files.size() == 1 && !is_folder(paths.front())) {
     add_file(files.front().path, InputFile::chosen(files.front().path).size());
     return;
   }

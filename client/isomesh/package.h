@@ -24,7 +24,7 @@ struct PackedFile {
 // .nhdr): it and the files beside it that it names, or that may match its pattern. Of a NIfTI or
 // Analyze header (.hdr) or its image (.img), also gzipped, and of AFNI's .HEAD and .BRIK or
 // Philips' .PAR and .REC: both. Of any other file: itself. Throws Error kInvalidParameter for a
-// folder without files or with more than 20000.
+// folder without files or with more than 20000, and for a path that cannot be looked at.
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path);
 // The same for several paths that are sent together, as if in one folder. Throws also for two files
 // with the same name.

@@ -2,7 +2,7 @@
 // docs/uploads.md has the server's subset.
 #include <algorithm>
 #include <array>
-#include <chrono>
+#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,19 +10,12 @@
 
 #include "base/text.h"
 #include "client/isomesh/impl.h"
+#include "client/isomesh/patience.h"
 #include "client/isomesh/transport.h"
 #include "proto/json.h"
 
 namespace isomesh {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-
-// The longest outage before an upload is given up. A restart of the daemon takes a few seconds.
-constexpr milliseconds kLongestCut{60'000};
-constexpr milliseconds kFirstPause{100};
-constexpr milliseconds kLongestPause{3'000};
 
 constexpr const char* kPlaces = "/v1/uploads/";
 
@@ -84,31 +77,9 @@ struct Progress {
 
 Progress progress_of(const HttpResponse& response, std::uint64_t bytes) {
   const auto offset = parse_uint64(response.header("upload-offset"));
-  if (!offset || *offset > bytes) {
-    throw Error(ErrorCode::kInternal, "the server's response does not match the API");
-  }
+  if (!offset || *offset > bytes) throw other_api();
   return {*offset, response.header("upload-complete") == "?1"};
 }
-
-class Patience {
- public:
-  // Call after progress.
-  void renew() {
-    is_cut_ = false;
-    pause_ = kFirstPause;
-  }
-  // Call after each failure.
-  bool is_over() {
-    if (!std::exchange(is_cut_, true)) since_ = Clock::now();
-    return Clock::now() - since_ >= kLongestCut;
-  }
-  milliseconds next_pause() { return std::exchange(pause_, std::min(2 * pause_, kLongestPause)); }
-
- private:
-  bool is_cut_ = false;
-  Clock::time_point since_;
-  milliseconds pause_ = kFirstPause;
-};
 
 }  // namespace
 
@@ -156,30 +127,36 @@ std::string Client::Impl::give_up(const std::string& place) const {
 HttpResponse Client::Impl::finish_upload(const HttpRequest& request,
                                          const std::string& place) const {
   std::optional<Progress> known = Progress();
-  std::uint64_t reached = 0;
   Patience patience;
-  while (true) {
-    try {
-      HttpResponse response;
-      if (!known) response = transport_.send({.method = "HEAD", .target = place});
-      if (!known && is_success(response)) {
-        known = progress_of(response, request.source_bytes);
-        if (known->offset > reached) patience.renew();
-        reached = known->offset;
-      }
-      if (known) {
-        response = transport_.send(known->is_whole ? reading_of(request, place)
-                                                   : rest_of(request, place, known->offset));
-        if (is_success(response)) return response;
-      }
-      if (!may_pass(response.status) || is_cancelled(response) || patience.is_over()) {
-        throw refusal(response);
-      }
-    } catch (const NoResponse&) {
-      if (patience.is_over()) throw;
-    }
+  std::exception_ptr failure;
+  const auto fail = [&](const std::exception_ptr& why) {
+    failure = why;
+    patience.fail();
+    if (!known && patience.is_over()) std::rethrow_exception(why);
     known.reset();
     pause(patience.next_pause());
+  };
+  while (true) {
+    if (known && patience.is_over()) std::rethrow_exception(failure);
+    try {
+      HttpResponse response =
+          transport_.send(!known            ? HttpRequest{.method = "HEAD", .target = place}
+                          : known->is_whole ? reading_of(request, place)
+                                            : rest_of(request, place, known->offset));
+      // The reason of a conflict is in the body of a GET.
+      if (!known && response.status == 409) response = transport_.send({.target = place});
+      if (is_success(response)) {
+        if (known) return response;
+        known = progress_of(response, request.source_bytes);
+        patience.hear(known->offset);
+      } else if (!may_pass(response.status) || is_cancelled(response)) {
+        throw refusal(response);
+      } else {
+        fail(std::make_exception_ptr(refusal(response)));
+      }
+    } catch (const NoResponse&) {
+      fail(std::current_exception());
+    }
   }
 }
 

@@ -191,7 +191,8 @@ class Transfer {
       moved_ = moved;
       moved_at_ = now;
     }
-    milliseconds allowed = options_.silence_timeout + request_.patience;
+    milliseconds allowed =
+        std::min(options_.silence_timeout, milliseconds::max() / 2) + request_.patience;
     if (is_sending()) allowed = std::min(allowed, options_.stall_timeout);
     return allowed - std::chrono::duration_cast<milliseconds>(now - moved_at_);
   }

@@ -1,12 +1,18 @@
 // How the command names what is on the server, and how it ends.
 #include <csignal>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include "base/descriptor.h"
 #include "tests/api/daemon.h"
 
 namespace isomesh {
@@ -156,6 +162,61 @@ TEST(CommandInterrupted, EndsTheShellsLoop) {
   EXPECT_EQ(shell.output(), "");
   EXPECT_THAT(shell.errors(), HasSubstr("was cancelled"));
   EXPECT_EQ(daemon.client().jobs().jobs.size(), 1U);
+}
+
+// Standard input is a pipe that the test holds open.
+class CommandReadsTest : public testing::Test {
+ protected:
+  CommandReadsTest() {
+    std::filesystem::create_directory(folder_ / "tmp");
+    const std::string pipe = folder_ / "pipe";
+    EXPECT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    pipe_ = Descriptor(::open(pipe.c_str(), O_RDWR | O_CLOEXEC));
+  }
+
+  // `environment` is an option of env(1). Returns when the first half of the sphere was copied.
+  void begin(const std::string& environment) {
+    std::string words = "exec " ISOMESH " --server " + daemon_.url() + " mesh - --iso 100 -o " +
+                        (folder_ / "out.stl").string();
+    for (const std::string& option : sphere_.options) words += ' ' + option;
+    words += " < " + (folder_ / "pipe").string();
+    command_.emplace(std::vector<std::string>{"env", environment, "bash", "-c", words},
+                     std::vector<std::string>{"TMPDIR=" + (folder_ / "tmp").string()});
+    send(std::string_view(sphere_.bytes).substr(0, half_));
+    ASSERT_TRUE(eventually([&] {
+      const std::vector<std::string> files = files_below(folder_ / "tmp");
+      return files.size() == 1 && read_file(folder_ / "tmp" / files.front()).size() == half_;
+    }));
+  }
+
+  void send(std::string_view bytes) const { write_all(pipe_, std::as_bytes(std::span(bytes))); }
+
+  const Daemon daemon_;
+  const TemporaryFolder folder_;
+  const RawUpload sphere_ = sphere_upload();
+  const std::size_t half_ = sphere_.bytes.size() / 2;
+  Descriptor pipe_;
+  std::optional<Process> command_;
+};
+
+TEST_F(CommandReadsTest, StandardInputUntilItIsStoppedAndLeavesNoCopy) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    begin("--default-signal=INT,TERM,HUP");
+    command_->send_signal(signal);
+    EXPECT_EQ(command_->wait(), 128 + signal);
+    EXPECT_EQ(command_->errors(), "isomesh: interrupted\n");
+    EXPECT_THAT(files_below(folder_ / "tmp"), testing::IsEmpty());
+  }
+}
+
+// As nohup does it.
+TEST_F(CommandReadsTest, StandardInputToItsEndIfItIsToOutliveItsTerminal) {
+  begin("--ignore-signal=HUP");
+  command_->send_signal(SIGHUP);
+  send(std::string_view(sphere_.bytes).substr(half_));
+  pipe_ = Descriptor();
+  EXPECT_EQ(command_->wait(), 0) << command_->errors();
+  EXPECT_GT(std::filesystem::file_size(folder_ / "out.stl"), 1000U);
 }
 
 }  // namespace

@@ -45,6 +45,20 @@ class CommandTest : public testing::Test {
     return words;
   }
 
+  // A header and its samples, which differ from those in other places.
+  void write_pair(const std::filesystem::path& path) {
+    const std::string name = path.filename().string();
+    std::filesystem::create_directories(path.parent_path());
+    write_file(path.string() + ".mhd",
+               "ObjectType = Image\nNDims = 3\nDimSize = 21 20 19\nElementType = MET_UCHAR\n"
+               "ElementDataFile = " +
+                   name + ".raw\n");
+    std::string bytes = sphere_.bytes;
+    bytes.front() = name.back();
+    bytes.back() = path.parent_path().string().back();
+    write_file(path.string() + ".raw", bytes);
+  }
+
   std::string upload() {
     const Finished result = daemon_.command(raw({"upload", folder_ / "sphere.raw"}));
     EXPECT_EQ(result.status, 0) << result.errors;
@@ -246,22 +260,35 @@ TEST_F(CommandTest, ABatchGoesOnWhenOneFails) {
 }
 
 TEST_F(CommandTest, AnArchiveOfSeveralMakesAMeshOfEachUnderItsName) {
-  const std::filesystem::path folder = folder_ / "study";
-  std::filesystem::create_directory(folder);
-  const std::string header =
-      "ObjectType = Image\nNDims = 3\nDimSize = 21 20 19\nElementType = MET_UCHAR\nElementDataFile "
-      "= ";
-  for (const std::string name : {"x", "y"}) {
-    write_file(folder / (name + ".mhd"), header + name + ".raw\n");
-    std::string bytes = sphere_.bytes.substr(0, 21 * 20 * 19);
-    bytes.front() = name.front();
-    write_file(folder / (name + ".raw"), bytes);
-  }
+  write_pair(folder_ / "study/x");
+  write_pair(folder_ / "study/y");
   const Finished result =
-      daemon_.command({"mesh", folder, "--iso", "100", "-o", folder_ / "{name}.stl"});
+      daemon_.command({"mesh", folder_ / "study", "--iso", "100", "-o", folder_ / "{name}.stl"});
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "study-x.stl"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "study-y.stl"));
+}
+
+TEST_F(CommandTest, NoMeshOfARunOverwritesAnother) {
+  std::filesystem::create_directory(folder_ / "out");
+  write_pair(folder_ / "study/a/ct");
+  write_pair(folder_ / "study/b/ct");
+  const std::string out = folder_ / "out/";
+  const Finished result =
+      daemon_.command({"mesh", folder_ / "study", "--iso", "100", "-o", out, "--format", "stl"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_THAT(files_below(out), testing::ElementsAre("study-a_ct.stl", "study-b_ct.stl"));
+
+  write_pair(folder_ / "s/x");
+  write_pair(folder_ / "s/y");
+  write_pair(folder_ / "s-x");
+  const Finished twice = daemon_.command(
+      {"mesh", folder_ / "s", folder_ / "s-x.mhd", "--iso", "100", "-o", out, "--format", "obj"});
+  EXPECT_EQ(twice.status, 1);
+  EXPECT_THAT(twice.errors, HasSubstr("isomesh: s: two meshes would be called s-x"));
+  EXPECT_THAT(twice.errors, HasSubstr("--member x.mhd"));
+  EXPECT_THAT(files_below(out),
+              testing::ElementsAre("s-x.obj", "study-a_ct.stl", "study-b_ct.stl"));
 }
 
 TEST_F(CommandTest, ADryRunLeavesNothingBehind) {

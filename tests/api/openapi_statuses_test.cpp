@@ -139,6 +139,7 @@ void probe_uploads(Statuses& statuses, const Daemon& daemon) {
   statuses.probe(patch, open, "begin", part(false, {{"Upload-Length", "99999999999999"}}));
   statuses.probe(patch, open + "?x=1", "begin", part(false));
   statuses.probe("DELETE /v1/uploads/{id}", place);
+  statuses.probe("GET /v1/uploads/{id}", place);
   statuses.see(patch, "PATCH " + open + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
   for (const std::string method : {"GET", "DELETE"}) {
     statuses.probe(method + " /v1/uploads/{id}", open + "?x=1");

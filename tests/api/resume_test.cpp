@@ -271,9 +271,37 @@ TEST_F(ResumeTest, OneThatIsGivenUpLeavesNothing) {
   daemon_->send("PATCH", place, raw_.bytes.substr(0, 1000), part(0, false));
   EXPECT_EQ(files_of_uploads(daemon_->data()).size(), 2U);
   EXPECT_EQ(daemon_->send("DELETE", place).status, 204);
-  EXPECT_EQ(daemon_->send("HEAD", place).status, 410);
+  EXPECT_EQ(daemon_->send("HEAD", place).status, 409);
+  EXPECT_TRUE(is_problem(daemon_->get(place), ErrorCode::kCancelled));
+  EXPECT_TRUE(
+      is_problem(daemon_->send("PATCH", place, "a", part(1000, false)), ErrorCode::kCancelled));
   EXPECT_EQ(daemon_->send("DELETE", place).status, 410);
   EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
+}
+
+// Somebody else with the same token cancels it.
+TEST_F(ResumeTest, AClientDoesNotSendAgainWhatWasCancelled) {
+  raw_ = long_upload();
+  write_file(folder_ / "body", raw_.bytes);
+  Client client = daemon_->client();
+  bool is_cancelled = false;
+  UploadOptions options{.resumable_bytes = 1};
+  options.progress = [&](std::uint64_t done, std::uint64_t total) {
+    const std::vector<std::string> files = files_of_uploads(daemon_->data());
+    if (is_cancelled || done < total / 2 || files.empty()) return;
+    is_cancelled = true;
+    const std::string file = files.front();
+    const std::string place = "/v1/" + file.substr(0, file.find('.'));
+    EXPECT_EQ(daemon_->send("DELETE", place).status, 204);
+  };
+  try {
+    client.upload(folder_ / "body", options);
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+    EXPECT_STREQ(error.what(), "the upload was cancelled");
+  }
+  EXPECT_TRUE(daemon_->client().volumes().empty());
 }
 
 TEST_F(ResumeTest, CancellingAVolumeThatIsStoredTellsItsId) {
@@ -284,7 +312,7 @@ TEST_F(ResumeTest, CancellingAVolumeThatIsStoredTellsItsId) {
   EXPECT_EQ(told.status, 200);
   ASSERT_EQ(volumes_from_json(told.body).size(), 1U);
   EXPECT_EQ(volumes_from_json(told.body).front().id, volume_from_json(last.body).id);
-  EXPECT_EQ(daemon_->send("HEAD", place).status, 410);
+  EXPECT_EQ(daemon_->send("HEAD", place).status, 409);
   EXPECT_EQ(daemon_->client().volumes().size(), 1U);
   EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
 }

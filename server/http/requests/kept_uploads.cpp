@@ -15,6 +15,7 @@ namespace isomesh::http {
 namespace {
 
 constexpr std::size_t kNameBytes = 16;
+constexpr std::size_t kMostCancelled = 1000;
 
 Error gone() { return {ErrorCode::kGone, "this upload is no longer kept: send it again"}; }
 
@@ -133,6 +134,9 @@ KeptUploads::Entries::iterator KeptUploads::look_up(const std::string& owner,
 KeptUploads::Entries::iterator KeptUploads::found(const std::string& owner,
                                                   const std::string& name) {
   const auto entry = look_up(owner, name);
+  if (std::ranges::count(cancelled_, std::pair(owner, name)) > 0) {
+    throw Error(ErrorCode::kCancelled, "the upload was cancelled");
+  }
   if (entry == kept_.end()) throw gone();
   entry->until = end_of(*entry);
   kept_.splice(kept_.end(), kept_, entry);
@@ -156,10 +160,12 @@ void KeptUploads::let_go(const std::string& owner, const std::string& name) {
 
 std::vector<std::string> KeptUploads::cancel(const std::string& owner, const std::string& name) {
   Lock lock(mutex_);
-  const auto entry = found(owner, name);
-  const Partial partial = entry->partial;
+  const auto entry = look_up(owner, name);
+  const Partial partial = entry == kept_.end() ? nullptr : entry->partial;
   if (!partial) throw gone();
   erase(entry);
+  cancelled_.emplace_back(owner, name);
+  if (cancelled_.size() > kMostCancelled) cancelled_.pop_front();
   lock.unlock();
   std::vector<std::string> stored = partial->cancel();
   const std::string volume = partial->note().volume;

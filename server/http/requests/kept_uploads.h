@@ -5,12 +5,14 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <list>
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/mutex.h"
@@ -58,7 +60,8 @@ class KeptUploads {
   // Begins a resumable upload. It is not deleted for lack of room while the caller holds it.
   Partial begin(PartialNote note) ISOMESH_EXCLUDES(mutex_);
 
-  // Throws Error kGone as find does, and for uploads in one request.
+  // Throws Error kGone as find does, and for uploads in one request; kCancelled for one that was
+  // cancelled lately, so that its client does not send it again.
   Partial find_partial(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
   // The same, but null for uploads in one request.
@@ -76,7 +79,7 @@ class KeptUploads {
   void let_go(const std::string& owner, const std::string& name) ISOMESH_EXCLUDES(mutex_);
 
   // Lets a resumable upload go, and cancels what reads it. Returns the ids of the volumes that were
-  // stored before; none are stored later. Throws Error kGone as find_partial does.
+  // stored before; none are stored later. Throws Error kGone for all that is no resumable upload.
   std::vector<std::string> cancel(const std::string& owner, const std::string& name)
       ISOMESH_EXCLUDES(mutex_);
 
@@ -118,7 +121,9 @@ class KeptUploads {
   Condition changed_;
   bool is_woken_ ISOMESH_GUARDED_BY(mutex_) = false;
   Entries kept_ ISOMESH_GUARDED_BY(mutex_);  // the next to be deleted first
-  std::jthread thread_;                      // last, because it uses the other members
+  // Owners and names, the oldest first.
+  std::deque<std::pair<std::string, std::string>> cancelled_ ISOMESH_GUARDED_BY(mutex_);
+  std::jthread thread_;  // last, because it uses the other members
 };
 
 }  // namespace isomesh::http

@@ -29,6 +29,8 @@ const std::string& this_boot() {
   return boot;
 }
 
+Error was_cancelled() { return {ErrorCode::kCancelled, "the upload was cancelled"}; }
+
 // As the file of a note holds it.
 struct StoredNote {
   std::string boot;
@@ -217,9 +219,7 @@ PartialUpload::Reading::Reading(std::shared_ptr<PartialUpload> upload)
     : upload_(std::move(upload)) {
   if (!upload_) return;
   const Lock lock(upload_->mutex_);
-  if (upload_->cancelled_.stop_requested()) {
-    throw Error(ErrorCode::kCancelled, "the upload was cancelled");
-  }
+  if (upload_->cancelled_.stop_requested()) throw was_cancelled();
   ++upload_->readings_;
 }
 
@@ -259,6 +259,7 @@ void PartialUpload::cut(std::uint64_t bytes) {
 }
 
 void PartialUpload::check(const Lease& lease) const {
+  if (cancelled_.stop_requested()) throw was_cancelled();
   if (lease.number != lease_) {
     throw Error(ErrorCode::kUnavailable, "another request continues this upload");
   }

@@ -78,11 +78,39 @@ TEST_F(Batch, TwoOfOneNameAreRefused) {
   }
 }
 
+TEST_F(Batch, AHeaderThatCannotBeReadIsAnInput) {
+  std::filesystem::create_symlink("loop.mhd", folder_ / "loop.mhd");
+  std::filesystem::create_symlink("absent", folder_ / "absent.nhdr");
+  EXPECT_THAT(names_of({file("a.nii"), folder_ / "loop.mhd", folder_ / "absent.nhdr"}),
+              ElementsAre("a", "loop", "absent"));
+}
+
+TEST_F(Batch, MembersAreCalledAsTheirFilesAndWithTheirFoldersOnlyIfNeeded) {
+  EXPECT_THAT(names_of_members("s", {"a/ct.nrrd", "b/mr.nii.gz", "*.dcm"}),
+              ElementsAre("s-ct", "s-mr", "s-*"));
+  EXPECT_THAT(names_of_members("s", {"a/ct.nrrd", "b/ct.nii.gz", "b/mr.nii"}),
+              ElementsAre("s-a_ct", "s-b_ct", "s-mr"));
+  EXPECT_THAT(names_of_members("s", {"ct.nrrd", "ct.nii.gz"}),
+              ElementsAre("s-ct.nrrd", "s-ct.nii.gz"));
+}
+
+TEST_F(Batch, EachNameIsTakenOnce) {
+  TakenNames names;
+  EXPECT_EQ(names.take({"s", "s-x"}), std::nullopt);
+  EXPECT_EQ(names.take({"s-y", "s-x"}), "s-x");
+  EXPECT_EQ(names.take({"s-y", "s-z", "s-z"}), "s-z");
+  EXPECT_EQ(names.take({"s-a_b"}), std::nullopt);
+  EXPECT_EQ(names.take({"s-a/b"}), "s-a/b") << "both are the same file";
+  EXPECT_EQ(names.take({"s-y", "s-z"}), std::nullopt);
+}
+
 TEST_F(Batch, NamesFillOutputsAndStayInTheirFolder) {
   const std::vector<Output> outputs = {{"out/{name}-{name}.stl", MeshFormat::kStl},
                                        {"-", MeshFormat::kStl}};
   EXPECT_EQ(filled(outputs, "a").front().path, "out/a-a.stl");
   EXPECT_EQ(filled(outputs, "../a").front().path, "out/.._a-.._a.stl");
+  EXPECT_EQ(filled(outputs, "a\x1b[31m\a").front().path,
+            "out/a\uFFFD[31m\uFFFD-a\uFFFD[31m\uFFFD.stl");
   EXPECT_EQ(filled(outputs, "{name}").front().path, "out/{name}-{name}.stl");
   EXPECT_TRUE(filled(outputs, "a").back().is_stdout());
 }

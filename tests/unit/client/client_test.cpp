@@ -302,6 +302,15 @@ TEST(Timeouts, ASilentServerIsGivenUp) {
   EXPECT_THAT(error.what(), HasSubstr("did not respond in time"));
 }
 
+TEST(Timeouts, TheLongestDoesNotEndALongPoll) {
+  FakeServer server;
+  server.http.Get("/v1/jobs/7", [](const httplib::Request&, httplib::Response& response) {
+    response.set_content(to_json(test::finished_job("7", "mesh")), kJson);
+  });
+  Client client({.server = server.start(), .silence_timeout = std::chrono::milliseconds::max()});
+  EXPECT_EQ(client.job("7", std::chrono::seconds{30}).state, JobState::kSucceeded);
+}
+
 class CancelledUpload : public testing::Test {
  protected:
   CancelledUpload() {

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <functional>
 #include <iostream>
+#include <set>
+#include <stop_token>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -78,6 +80,43 @@ TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
   EXPECT_THAT(outcome.err, HasSubstr(options_.server));
   EXPECT_THAT(outcome.err, HasSubstr(" wait 7\n"));
   EXPECT_THAT(outcome.err, HasSubstr(" fetch 7 -o OUT"));
+}
+
+// The server has the job, but its response did not come.
+TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
+  std::stop_source stop;
+  std::vector<std::string> keys;
+  int cancelled = 0;
+  server_.http.set_pre_routing_handler([&](const auto& request, auto&) {
+    if (request.path == "/v1/jobs") {
+      keys.push_back(request.get_header_value("Idempotency-Key"));
+      stop.request_stop();
+    }
+    return httplib::Server::HandlerResponse::Unhandled;
+  });
+  server_.http.Delete("/v1/jobs/7", [&](const auto&, auto& response) {
+    ++cancelled;
+    response.set_content(to_json(job_), "application/json");
+  });
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options_, stop.get_token()), kRefused);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "isomesh: interrupted; the job 7 was cancelled\n");
+  EXPECT_EQ(cancelled, 1);
+  EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
+}
+
+TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
+  server_.http.set_pre_routing_handler([](const auto&, auto& response) {
+    Remedy remedy{.overridable = "c\x1b", .choices = {{"member", "a\x1b[31m.nrrd", "x\ny\a"}}};
+    test::answer_with(
+        response,
+        Error(ErrorCode::kUnusableVolume, "line\n\x1b[2J").with_remedy(std::move(remedy)));
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  EXPECT_EQ(outcome_of(options_).err,
+            "isomesh: line\n\uFFFD[2J\n"
+            "    --member a\uFFFD[31m.nrrd  x\uFFFDy\uFFFD\n  --accept c\uFFFD\n");
 }
 
 TEST_F(Commands, QuietSaysNothing) {

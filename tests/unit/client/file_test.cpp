@@ -32,6 +32,14 @@ TEST(PartFile, LeavesNothingWithoutPublishing) {
   EXPECT_THAT(test::files_below(folder.path()), IsEmpty());
 }
 
+TEST(PartFile, TakesTheLongestName) {
+  TemporaryFolder folder;
+  const std::string name(255, 'a');
+  PartFile file(folder / name);
+  file.publish();
+  EXPECT_THAT(test::files_below(folder.path()), ElementsAre(name));
+}
+
 TEST(PartFile, KeepsTheModeOfAFileThatItReplaces) {
   using std::filesystem::perms;
   TemporaryFolder folder;

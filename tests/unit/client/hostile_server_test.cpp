@@ -85,6 +85,28 @@ TEST(HostileServer, SendsAnEndlessBody) {
   EXPECT_EQ(error_of([&] { client.volumes(); }).code(), ErrorCode::kInternal);
 }
 
+// As a portal of a network does.
+TEST(HostileServer, IsOneOfPagesAndNotOfTheApi) {
+  std::string status = "200 OK";
+  std::string head = "Content-Type: text/html\r\nContent-Length: 6\r\n\r\n<html>";
+  SocketServer server([&](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, "HTTP/1.1 " + status + "\r\n" + head);
+  });
+  Client client({.server = server.url()});
+  test::TemporaryFolder folder;
+  test::write_file(folder / "slice.png", "old");
+  const auto slice = [&] { client.slice("7", {}, folder / "slice.png"); };
+  EXPECT_EQ(error_of(slice).code(), ErrorCode::kInternal);
+  EXPECT_EQ(error_of([&] { client.cancel("7"); }).code(), ErrorCode::kInternal);
+  EXPECT_EQ(error_of([&] { client.erase_volume("7"); }).code(), ErrorCode::kInternal);
+  status = "204 No Content";
+  head = "Content-Type: image/png\r\n\r\n";
+  EXPECT_EQ(error_of(slice).code(), ErrorCode::kInternal);
+  EXPECT_NO_THROW(client.erase_volume("7"));
+  EXPECT_EQ(test::read_file(folder / "slice.png"), "old");
+}
+
 TEST(HostileServer, RefusesWithAProblemThatIsNone) {
   for (const std::string body : {"", "{", "[]", "{\"status\": \"x\"}", "{\"errors\": 7}"}) {
     SocketServer server([&](int socket) {

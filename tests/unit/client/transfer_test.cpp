@@ -312,6 +312,19 @@ TEST(Upload, NamesAFileThatIsNotThere) {
   EXPECT_THAT(error.what(), HasSubstr("/nowhere/head.nii"));
 }
 
+TEST(Upload, NamesAFileThatCannotBeLookedAt) {
+  TemporaryFolder folder;
+  std::filesystem::create_symlink("loop.nii", folder / "loop.nii");
+  Client client({.server = test::unused_url()});
+  const std::string too_long(300, 'a');
+  for (const auto& path : {folder / "loop.nii", folder / too_long}) {
+    const Error error = error_of([&] { client.upload(path); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+    EXPECT_THAT(error.what(), HasSubstr(path.string() + ": "));
+  }
+  EXPECT_EQ(error_of([&] { client.upload(""); }).code(), ErrorCode::kInvalidParameter);
+}
+
 class Fetch : public testing::Test {
  protected:
   // A server whose job 7 announces `announced` and whose mesh is `sent`.

@@ -196,7 +196,8 @@ TEST_F(KeptParts, CancellingWaitsForWhatReadsThemAndTellsWhatThatStored) {
     std::unique_lock lock(mutex);
     std::condition_variable_any().wait(lock, reading.cancelled(), [] { return false; });
     EXPECT_TRUE(other.cancelled().stop_requested());
-    EXPECT_THROW(kept.find_partial("a", upload->name()), Error);
+    EXPECT_EQ(code_of(kept, "a", upload->name()), ErrorCode::kCancelled);
+    EXPECT_EQ(code_of(kept, "b", upload->name()), ErrorCode::kGone);
     EXPECT_THROW(PartialUpload::Reading{upload}, Error);
     // Both were too far to be cancelled.
     reading.stored("one");

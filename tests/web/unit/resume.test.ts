@@ -13,6 +13,7 @@ class Daemon {
   cuts = 0;
   isLastUnheard = false;
   refusal: Response | null = null;
+  isCancelled = false;
 
   async answer(address: string, init: RequestInit): Promise<Response> {
     init.signal?.throwIfAborted();
@@ -20,6 +21,12 @@ class Daemon {
     const method = init.method ?? 'GET';
     this.asked.push(`${method} ${url.pathname}${url.searchParams.has('upload') ? '?upload' : ''}`);
     const headers = new Headers(init.headers);
+    if (this.isCancelled && url.pathname === place) {
+      // A request that sends to it breaks, and HEAD has no body.
+      if (method === 'PATCH') throw new TypeError('fetch failed');
+      const problem = JSON.stringify({ title: 'Cancelled', status: 409, detail: 'the upload was cancelled' });
+      return new Response(method === 'HEAD' ? null : problem, { status: 409 });
+    }
     if (method === 'HEAD') return new Response(null, { status: 204, headers: this.state() });
     if (method === 'DELETE') return new Response(null, { status: 204 });
     if (method === 'PATCH') return this.append(headers, new Uint8Array(await (init.body as Blob).arrayBuffer()));
@@ -93,6 +100,14 @@ describe('upload in parts', () => {
     const refused = await client.upload(whole).catch((error: unknown) => error);
     expect(refused).toBeInstanceOf(ApiError);
     expect(refused).toMatchObject({ status: 422, detail: problem.detail, remedy: { kept: '0123' } });
+  });
+
+  it('is not sent again if somebody has cancelled it', async () => {
+    daemon.isCancelled = true;
+    const cancelled = await client.upload(whole).catch((error: unknown) => error);
+    expect(cancelled).toBeInstanceOf(ApiError);
+    expect(cancelled).toMatchObject({ status: 409, detail: 'the upload was cancelled' });
+    expect(daemon.asked).toEqual(['POST /v1/volumes', `PATCH ${place}`, `HEAD ${place}`, `GET ${place}`]);
   });
 
   it('comes in one piece where its parts are not known', async () => {

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from typing import Dict, Iterator, Optional
+from typing import Dict, Iterator, Optional, Union
 
 from .errors import IsomeshError, Refused, Unreachable, WrongAnswer, warn
 from .transport import Answer, Request, Transport
@@ -73,15 +73,19 @@ def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer
     reached = 0
     is_whole = False
     cut: Optional[float] = None  # when it broke, if there was no progress since then
+    failure: Optional[Union[Refused, Unreachable]] = None
     wait = _FIRST_PAUSE
     while True:
+        # A part that failed may have got on, so the upload is given up only after HEAD.
+        if failure and offset is not None and _is_over(cut):
+            raise failure
         try:
             if offset is None:
-                state = transport.send(Request("HEAD", place))
-                state.text()
+                state = _look(transport, place)
                 offset, is_whole = _offset_in(state, body.size), state.header("Upload-Complete") == "?1"
                 if offset > reached:
                     cut, wait, reached = None, _FIRST_PAUSE, offset
+                continue
             if is_whole:
                 # The body has arrived: this asks for the response that was lost.
                 sign = "&" if "?" in target else "?"
@@ -92,11 +96,28 @@ def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer
             if isinstance(error, Refused) and (error.status not in _PASSING or _is_cancelled(error)):
                 raise
             cut = time.monotonic() if cut is None else cut
-            if time.monotonic() - cut >= _LONGEST_CUT:
+            if offset is None and _is_over(cut):
                 raise
+            failure = error
         offset = None
         time.sleep(wait)
         wait = min(2 * wait, _LONGEST_PAUSE)
+
+
+def _is_over(cut: Optional[float]) -> bool:
+    return cut is not None and time.monotonic() - cut >= _LONGEST_CUT
+
+
+def _look(transport: Transport, place: str) -> Answer:
+    try:
+        state = transport.send(Request("HEAD", place))
+    except Refused as error:
+        if error.status != 409:
+            raise
+        # The reason of a conflict is in the body of a GET.
+        state = transport.send(Request("GET", place))
+    state.text()
+    return state
 
 
 def _part(offset: int) -> Dict[str, str]:

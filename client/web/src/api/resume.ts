@@ -67,8 +67,11 @@ class Parts {
     const { signal } = this.options;
     for (;;) {
       try {
+        const isLook = this.reached === null;
         const answer = this.reached === null ? await this.look() : await this.send(this.reached);
-        if (answer && (!passing.includes(answer.status) || this.patience.isOver())) return answer;
+        // Only an upload that was cancelled conflicts with the question how far it is.
+        const isCancelled = isLook && answer?.status === 409;
+        if (answer && (isCancelled || !passing.includes(answer.status) || this.patience.isOver())) return answer;
         if (answer === null) continue;
       } catch (error) {
         if (signal?.aborted || this.patience.isOver()) throw error;
@@ -81,6 +84,8 @@ class Parts {
   // Asks how much the daemon has. Returns null, or an error response.
   private async look(): Promise<Response | null> {
     const answer = await this.connection.ask(this.place, { method: 'HEAD', signal: this.options.signal });
+    // The reason of a conflict is in the body of a GET.
+    if (answer.status === 409) return this.connection.ask(this.place, { signal: this.options.signal });
     if (!answer.ok) return answer;
     const offset = Number(answer.headers.get('Upload-Offset'));
     this.goTo({ offset, isWhole: answer.headers.get('Upload-Complete') === '?1' });

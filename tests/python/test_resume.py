@@ -1,0 +1,67 @@
+"""When a large upload is continued, and when it ends."""
+
+import unittest
+from types import SimpleNamespace
+from unittest import mock
+
+from isomesh import resume
+from isomesh.errors import Refused, Unreachable
+from isomesh.uploads import Body
+
+PLACE = "/v1/uploads/7"
+BODY = Body(1000, lambda: iter([bytes(1000)]))
+
+
+def answer(**headers):
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    return SimpleNamespace(status=204, header=lambda name: named.get(name, ""), text=lambda: b"")
+
+
+class Server:
+    """Its answers, or the errors of its connections, each with the seconds that it takes."""
+
+    def __init__(self, *answers):
+        self.answers = [(0, answer(Location=PLACE)), *answers]
+        self.asked = []
+        self.now = 0
+
+    def send(self, request):
+        self.asked.append(request.method)
+        seconds, result = self.answers.pop(0)
+        self.now += seconds
+        if isinstance(result, Exception):
+            raise result
+        return result
+
+    def upload(self):
+        clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda seconds: None)
+        with mock.patch.object(resume, "time", clock):
+            return resume.send(self, "/v1/volumes", {}, BODY)
+
+
+def progress(offset):
+    return 0, answer(Upload_Offset=str(offset), Upload_Complete="?0")
+
+
+class Resume(unittest.TestCase):
+    def test_a_part_that_got_on_for_minutes_before_it_broke(self):
+        cut = Unreachable("cut")
+        done = answer()
+        server = Server((0, cut), progress(0), (90, cut), progress(500), (0, done))
+        self.assertIs(server.upload(), done)
+
+    def test_a_minute_without_progress(self):
+        server = Server((0, Unreachable("first")), progress(0), (60, Unreachable("last")), progress(0))
+        with self.assertRaisesRegex(Unreachable, "last"):
+            server.upload()
+
+    def test_somebody_else_cancels_it(self):
+        cancelled = Refused(409, {"type": "urn:isomesh:problem:cancelled", "detail": "the upload was cancelled"})
+        server = Server((0, Unreachable("cut")), (0, Refused(409, {})), (0, cancelled), (0, Refused(410, {})))
+        with self.assertRaisesRegex(Refused, "cancelled"):
+            server.upload()
+        self.assertEqual(server.asked, ["POST", "PATCH", "HEAD", "GET", "DELETE"])
+
+
+if __name__ == "__main__":
+    unittest.main()
