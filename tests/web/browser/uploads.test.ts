@@ -63,6 +63,15 @@ describe('an upload', () => {
     await expect.poll(() => page.locator('[data-volume] strong', { hasText: /first|second/ }).count()).toBe(2);
   });
 
+  it('ends where a proxy answers with its login page', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    await page.route('**/v1/volumes?*', (route) => route.fulfill({ status: 200, contentType: 'text/html', body: '<html>Log in</html>' }));
+    await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(16, 5, 31) }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toContain('not one of isomeshd');
+    await page.getByRole('button', { name: 'Try again' }).waitFor();
+  });
+
   it('of what is no volume is not sent without being asked for', async () => {
     const { page, daemon } = at;
     const sent: string[] = [];

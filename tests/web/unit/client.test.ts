@@ -146,6 +146,39 @@ describe('a request', () => {
     expect(error).toMatchObject({ status: 0, isUnreachable: true, cause: { code: 'ECONNREFUSED' } });
   });
 
+  it('says so also if the connection breaks within a response', async () => {
+    const job = await client.getJob(id);
+    for (const status of [200, 404]) {
+      first.proxy = (response) => {
+        response.writeHead(status, { 'Content-Length': 1000 }).write('{"id":', () => response.destroy());
+      };
+      for (const ask of [
+        () => client.getJob(id),
+        () => client.getVolume('a'),
+        () => client.slicePicture('a', 'z', 0, [0, 1]),
+        () => client.previewFile('a', 9, [0, 1]),
+        () => client.meshOf(job, 'glb'),
+        () => client.upload(new Uint8Array(9)),
+      ]) {
+        const error = await rejectionOf(ask());
+        expect(error, String(ask)).toBeInstanceOf(ApiError);
+        expect(error, String(ask)).toMatchObject({ status: 0 });
+        expect(client.connection.connected.value).toBe(false);
+      }
+    }
+  });
+
+  it('tells a page of a proxy from a response of the API', async () => {
+    for (const body of ['<html>Log in</html>', '', 'null', '"ok"']) {
+      first.proxy = (response) => response.end(body);
+      for (const ask of [() => client.getVolume('a'), () => client.upload(new Uint8Array(9))]) {
+        const error = await rejectionOf(ask());
+        expect(error, body).toBeInstanceOf(ApiError);
+        expect(error, body).toMatchObject({ status: 200, detail: expect.stringContaining('not one of isomeshd') as string });
+      }
+    }
+  });
+
   it('has its key in Node 18, too, which has no global crypto', async () => {
     vi.stubGlobal('crypto', undefined);
     const keys = new Set<unknown>();

@@ -12,6 +12,8 @@ export class Daemon {
   query = new URLSearchParams(); // of the last request
   readonly tokens = new Set<string | undefined>();
   uploaded = Buffer.alloc(0);
+  // Responds in its place, as a proxy before it may.
+  proxy: ((response: ServerResponse) => void) | null = null;
   // Keeps requests for the job without a response.
   holds = false;
   readonly streams = new Set<ServerResponse>();
@@ -49,7 +51,9 @@ export class Daemon {
       all.add(response);
       response.on('close', () => all.delete(response));
     };
-    if (path === '/v1/events') {
+    if (this.proxy) {
+      this.proxy(response);
+    } else if (path === '/v1/events') {
       keep(this.streams);
       response.writeHead(200, { 'Content-Type': 'text/event-stream' }).write(': here\n\n');
     } else if (path === `/v1/jobs/${id}` && this.holds) {

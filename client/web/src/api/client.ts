@@ -127,13 +127,13 @@ export class Client {
     signal?: GlobalAbortSignal,
   ): Promise<GlobalBlob> {
     const query = new URLSearchParams({ axis, index: String(index), window: window.join() }).toString();
-    return (await this.connection.send(`${volumePath(id)}/slice.png?${query}`, { signal })).blob();
+    return this.connection.blob(`${volumePath(id)}/slice.png?${query}`, { signal });
   }
 
   /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     const query = new URLSearchParams({ size: String(size), window: window.join() }).toString();
-    return (await this.connection.send(`${volumePath(id)}/preview?${query}`, { signal })).arrayBuffer();
+    return this.connection.bytes(`${volumePath(id)}/preview?${query}`, { signal });
   }
 
   // --- Jobs ---
@@ -202,7 +202,7 @@ export class Client {
   async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     const file = job.mesh?.files[format];
     if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
-    return (await this.connection.send(file.href, { signal })).arrayBuffer();
+    return this.connection.bytes(file.href, { signal });
   }
 
   // --- Orders of a hospital: only a server with a PACS has these routes ---

@@ -1,8 +1,8 @@
 // Uploads that continue after their connection broke, by "Resumable Uploads for HTTP"
 // (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
-import type { Connection } from './connection';
+import type { Answer, Connection } from './connection';
 import { sleep } from './job_events';
-import { errorOf } from './problem';
+import { errorOf, isSuccess } from './problem';
 
 interface Options {
   signal?: AbortSignal;
@@ -63,7 +63,7 @@ class Parts {
   ) {}
 
   // Sends all parts. Returns the response to the last one, or the first error response that a retry cannot help.
-  async answer(): Promise<Response> {
+  async answer(): Promise<Answer> {
     const { signal } = this.options;
     for (;;) {
       try {
@@ -79,16 +79,16 @@ class Parts {
   }
 
   // Asks how much the daemon has. Returns null, or an error response.
-  private async look(): Promise<Response | null> {
+  private async look(): Promise<Answer | null> {
     const answer = await this.connection.ask(this.place, { method: 'HEAD', signal: this.options.signal });
-    if (!answer.ok) return answer;
+    if (!isSuccess(answer.status)) return answer;
     const offset = Number(answer.headers.get('Upload-Offset'));
     this.goTo({ offset, isWhole: answer.headers.get('Upload-Complete') === '?1' });
     return null;
   }
 
   // Sends one part. Returns null, the response to the last part, or an error response.
-  private async send({ offset, isWhole }: Reached): Promise<Response | null> {
+  private async send({ offset, isWhole }: Reached): Promise<Answer | null> {
     const { signal } = this.options;
     // All bytes are there, but the response was lost. This request repeats it.
     if (isWhole) {
@@ -107,7 +107,7 @@ class Parts {
         'Upload-Complete': isLast ? '?1' : '?0',
       },
     });
-    if (isLast || !answer.ok) return answer;
+    if (isLast || !isSuccess(answer.status)) return answer;
     const took = Date.now() - began;
     if (took < shortTime) this.size = Math.min(2 * this.size, mostPart);
     if (took > longTime) this.size = Math.max(this.size / 2, leastPart);
@@ -131,14 +131,14 @@ export async function answerInParts(
   headers: Record<string, string>,
   whole: Blob,
   options: Options,
-): Promise<Response> {
+): Promise<Answer> {
   const begun = await connection.ask(path, {
     method: 'POST',
     signal: options.signal,
     headers: { ...headers, 'Upload-Complete': '?0', 'Upload-Length': String(whole.size) },
   });
   const place = begun.headers.get('Location');
-  if (!begun.ok || place === null) throw errorOf(begun.status, await begun.text());
+  if (!isSuccess(begun.status) || place === null) throw errorOf(begun.status, begun.text);
   try {
     const answer = await new Parts(connection, path, place, whole, options).answer();
     if (answer.status !== 410) return answer;

@@ -1,6 +1,6 @@
 // Uploads with their progress.
-import type { Connection } from './connection';
-import { ApiError, errorOf, unreachable } from './problem';
+import type { Answer, Connection } from './connection';
+import { ApiError, jsonOf, unreachable } from './problem';
 import { answerInParts } from './resume';
 import type { Uploaded, UploadedVolume, UploadOptions, Volume } from './types';
 
@@ -24,8 +24,8 @@ export function dispositionOf(name: string): string {
 }
 
 // The result for each volume of the body. If there is only one, its `member` is empty.
-export function uploadedOf(status: number, body: string): UploadedVolume[] {
-  const answer: unknown = JSON.parse(body);
+export function uploadedOf(status: number, body: string, kept?: string): UploadedVolume[] {
+  const answer = jsonOf(status, body, kept);
   if (status === 207) return (answer as { volumes: UploadedVolume[] }).volumes;
   return [{ member: '', status, volume: answer as Volume, problem: null }];
 }
@@ -50,31 +50,31 @@ export async function upload(connection: Connection, given: unknown, options: Up
   const whole = bytesOf(given);
   options.signal?.throwIfAborted();
   const isSmall = whole.size < resumableBytes || options.kept !== undefined;
-  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
-  return isSmall && typeof XMLHttpRequest !== 'undefined'
-    ? uploadInOne(connection, whole, options)
-    : uploadInParts(connection, whole, options);
-}
-
-async function uploadInParts(connection: Connection, whole: Blob, options: UploadOptions): Promise<Uploaded> {
-  const name: Record<string, string> =
+  const named: Record<string, string> =
     options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
-  const answer = await answerInParts(connection, uploadPath(options), name, whole, options);
-  const kept = answer.headers.get('Isomesh-Upload') ?? undefined;
-  const text = await answer.text();
-  if (!answer.ok) throw errorOf(answer.status, text, kept);
+  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
+  const { status, headers, text } =
+    isSmall && typeof XMLHttpRequest !== 'undefined'
+      ? await answerInOne(connection, named, whole, options)
+      : await answerInParts(connection, uploadPath(options), named, whole, options);
+  const kept = headers.get('Isomesh-Upload') ?? undefined;
+  const volumes = uploadedOf(status, text, kept);
   options.onProgress?.(whole.size, whole.size);
-  return { volumes: uploadedOf(answer.status, text), kept };
+  return { volumes, kept };
 }
 
-function uploadInOne(connection: Connection, whole: Blob, options: UploadOptions): Promise<Uploaded> {
+function answerInOne(
+  connection: Connection,
+  named: Record<string, string>,
+  whole: Blob,
+  options: UploadOptions,
+): Promise<Answer> {
   const body = options.kept === undefined ? whole : new Blob();
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('POST', connection.addressOf(uploadPath(options)));
-    for (const [name, value] of Object.entries(connection.headers())) request.setRequestHeader(name, value);
+    for (const [name, value] of Object.entries(connection.headers(named))) request.setRequestHeader(name, value);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
-    if (options.name !== undefined) request.setRequestHeader('Content-Disposition', dispositionOf(options.name));
     let sent = 0;
     request.upload.onprogress = (event) => {
       sent = event.loaded;
@@ -83,13 +83,9 @@ function uploadInOne(connection: Connection, whole: Blob, options: UploadOptions
     request.upload.onload = () => options.onProgress?.(body.size, body.size);
     request.onload = () => {
       connection.connected.value = true;
-      const kept = request.getResponseHeader('Isomesh-Upload') ?? undefined;
-      if ([200, 201, 207].includes(request.status)) {
-        resolve({ volumes: uploadedOf(request.status, request.responseText), kept });
-        return;
-      }
       if (request.status === 401) connection.unauthorized.value = true;
-      reject(errorOf(request.status, request.responseText, kept));
+      const headers = { get: (name: string) => request.getResponseHeader(name) };
+      resolve({ status: request.status, headers, text: request.responseText });
     };
     request.onerror = () => {
       // This may also be a server that rejects the upload early: it closes the connection while the body is sent.
