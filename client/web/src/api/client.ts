@@ -165,8 +165,8 @@ export class Client {
 
   /**
    * Calls `onChange` with every change of the job, and resolves with the finished job. It waits while the server
-   * cannot be reached. Rejects with an ApiError if the job no longer exists, and with the signal's reason as soon as
-   * the signal is aborted.
+   * cannot be reached or is busy. Rejects with an ApiError if the job no longer exists, and with the signal's reason as
+   * soon as the signal is aborted.
    */
   follow(id: string, signal?: GlobalAbortSignal, onChange: (job: Job) => void = () => undefined): Promise<Job> {
     return follow(this, id, signal, onChange);

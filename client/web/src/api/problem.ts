@@ -118,6 +118,12 @@ export function adviceFor(error: ApiError): string {
   }
 }
 
+// Returns whether a client should repeat the request: the server cannot be reached, is busy or shuts down, or a proxy before
+// it says so.
+export function isPassing(status: number): boolean {
+  return [0, 408, 429, 502, 503, 504].includes(status);
+}
+
 // Returns whether the same request may succeed later.
 export function mayPass({ status }: ApiError): boolean {
   return ![400, 404, 410, 413, 415, 422].includes(status);

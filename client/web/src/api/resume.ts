@@ -2,7 +2,7 @@
 // (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
 import type { Answer, Connection } from './connection';
 import { sleep } from './job_events';
-import { errorOf, isSuccess } from './problem';
+import { errorOf, isPassing, isSuccess } from './problem';
 
 interface Options {
   signal?: AbortSignal;
@@ -24,8 +24,6 @@ const longTime = 2000;
 const longestCut = 60_000;
 const firstPause = 100;
 const longestPause = 3000;
-// The daemon is busy, shuts down, or still holds the broken connection.
-const passing = [408, 409, 429, 502, 503, 504];
 
 // Counts the time without progress, and makes the pauses between retries longer.
 class Patience {
@@ -68,8 +66,10 @@ class Parts {
     for (;;) {
       try {
         const answer = this.reached === null ? await this.look() : await this.send(this.reached);
-        if (answer && (!passing.includes(answer.status) || this.patience.isOver())) return answer;
         if (answer === null) continue;
+        // With 409 the daemon still holds the broken connection.
+        const mayGoOn = answer.status === 409 || isPassing(answer.status);
+        if (!mayGoOn || this.patience.isOver()) return answer;
       } catch (error) {
         if (signal?.aborted || this.patience.isOver()) throw error;
       }
