@@ -216,6 +216,15 @@ describe('upload', () => {
     expect([...first.uploaded]).toEqual([1, 0]);
   });
 
+  it('of what the server keeps sends no bytes', async () => {
+    for (const whole of [bytes, new Uint8Array(9_000_000)]) {
+      const { volumes } = await client.upload(whole, { kept: 'f00d', choices: { volume: '1' }, name: 'head.nii' });
+      expect(volumes[0]?.volume?.id).toBe('f00d');
+      expect(first.query.get('volume')).toBe('1');
+      expect(first.asked.splice(0)).toEqual(['POST /v1/volumes']);
+    }
+  });
+
   it('rejects anything else, and names what it takes', async () => {
     const takes = /^upload takes a Blob, a File, an ArrayBuffer or a Uint8Array, not /;
     for (const [form, name] of [

@@ -72,6 +72,11 @@ export class Daemon {
       response.end(JSON.stringify({ volume: id, background: 0, labels, next: isLast ? null : 'the rest' }));
     } else if (path === '/v1/jobs' && request.method === 'POST') {
       response.writeHead(202).end(JSON.stringify({ id, key: request.headers['idempotency-key'] }));
+    } else if (path === '/v1/volumes' && this.query.has('upload')) {
+      // A body that is kept cannot be one that is still to come.
+      const isWhole = request.headers['upload-complete'] === undefined && request.headers['content-length'] === '0';
+      const kept = { id: this.query.get('upload') };
+      response.writeHead(isWhole ? 201 : 400).end(JSON.stringify(isWhole ? kept : { title: 'Invalid parameter' }));
     } else if (path === '/v1/volumes' && request.method === 'POST') {
       response.writeHead(201, { Location: '/v1/uploads/a' }).end();
     } else if (path === '/v1/uploads/a') {

@@ -49,38 +49,43 @@ const resumableBytes = 8 << 20;
 export async function upload(connection: Connection, given: unknown, options: UploadOptions): Promise<Uploaded> {
   const whole = bytesOf(given);
   options.signal?.throwIfAborted();
-  const isSmall = whole.size < resumableBytes || options.kept !== undefined;
-  const named: Record<string, string> =
-    options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
-  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
-  const { status, headers, text } =
-    isSmall && typeof XMLHttpRequest !== 'undefined'
-      ? await answerInOne(connection, named, whole, options)
-      : await answerInParts(connection, uploadPath(options), named, whole, options);
+  const { status, headers, text } = await answerTo(connection, whole, options);
   const kept = headers.get('Isomesh-Upload') ?? undefined;
   const volumes = uploadedOf(status, text, kept);
   options.onProgress?.(whole.size, whole.size);
   return { volumes, kept };
 }
 
+function answerTo(connection: Connection, whole: Blob, options: UploadOptions): Promise<Answer> {
+  const path = uploadPath(options);
+  const named: Record<string, string> =
+    options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
+  // The server has the bytes.
+  if (options.kept !== undefined) return connection.ask(path, { method: 'POST', headers: named, signal: options.signal });
+  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
+  return whole.size < resumableBytes && typeof XMLHttpRequest !== 'undefined'
+    ? answerInOne(connection, path, named, whole, options)
+    : answerInParts(connection, path, named, whole, options);
+}
+
 function answerInOne(
   connection: Connection,
+  path: string,
   named: Record<string, string>,
   whole: Blob,
   options: UploadOptions,
 ): Promise<Answer> {
-  const body = options.kept === undefined ? whole : new Blob();
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open('POST', connection.addressOf(uploadPath(options)));
+    request.open('POST', connection.addressOf(path));
     for (const [name, value] of Object.entries(connection.headers(named))) request.setRequestHeader(name, value);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
     let sent = 0;
     request.upload.onprogress = (event) => {
       sent = event.loaded;
-      options.onProgress?.(event.loaded, body.size);
+      options.onProgress?.(event.loaded, whole.size);
     };
-    request.upload.onload = () => options.onProgress?.(body.size, body.size);
+    request.upload.onload = () => options.onProgress?.(whole.size, whole.size);
     request.onload = () => {
       connection.connected.value = true;
       if (request.status === 401) connection.unauthorized.value = true;
@@ -89,7 +94,7 @@ function answerInOne(
     };
     request.onerror = () => {
       // This may also be a server that rejects the upload early: it closes the connection while the body is sent.
-      if (sent > 0 && sent < body.size) {
+      if (sent > 0 && sent < whole.size) {
         reject(
           new ApiError(
             0,
@@ -105,6 +110,6 @@ function answerInOne(
     };
     request.onabort = () => reject(options.signal?.reason as Error);
     options.signal?.addEventListener('abort', () => request.abort());
-    request.send(body);
+    request.send(whole);
   });
 }
