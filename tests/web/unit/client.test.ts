@@ -1,5 +1,8 @@
 // Clients and real HTTP servers in one process.
 import { File } from 'node:buffer';
+import * as fs from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { ApiError, Client, type Job } from '@/api/index';
 import { Daemon, id } from './daemon';
@@ -179,6 +182,19 @@ describe('a request', () => {
     }
   });
 
+  it('with a token that no header can carry says so, without that token', async () => {
+    for (const token of ['sec\nret', 'secret\u20ac']) {
+      const guarded = new Client({ server: first.address, token });
+      for (const asking of [guarded.getVolume('a'), guarded.follow(id), guarded.submitJob({ volume: 'a', iso: 60 }), guarded.upload(new Uint8Array(9))]) {
+        const error = await rejectionOf(asking);
+        expect(error).toBeInstanceOf(ApiError);
+        expect(error).toMatchObject({ status: -1, title: 'The token cannot be sent' });
+        expect((error as ApiError).detail).not.toContain('sec');
+      }
+    }
+    expect(first.asked).toEqual([]);
+  });
+
   it('has its key in Node 18, too, which has no global crypto', async () => {
     vi.stubGlobal('crypto', undefined);
     const keys = new Set<unknown>();
@@ -223,6 +239,32 @@ describe('upload', () => {
       expect(first.query.get('volume')).toBe('1');
       expect(first.asked.splice(0)).toEqual(['POST /v1/volumes']);
     }
+  });
+
+  it('of a file that was changed says so at once, and leaves nothing on the server', async () => {
+    // Newer than the types.
+    const { openAsBlob } = fs as unknown as { openAsBlob: (path: string) => Promise<Blob> };
+    const folder = fs.mkdtempSync(join(tmpdir(), 'isomesh-changed-'));
+    try {
+      const path = join(folder, 'head.nii');
+      fs.writeFileSync(path, bytes);
+      const file = await openAsBlob(path);
+      fs.appendFileSync(path, 'more');
+      const error = await rejectionOf(client.upload(file));
+      expect(error).toBeInstanceOf(ApiError);
+      expect(error).toMatchObject({ status: -1, title: 'The file cannot be read', cause: { name: 'NotReadableError' } });
+      await vi.waitFor(() => expect(first.asked.at(-1)).toBe('DELETE /v1/uploads/a'));
+    } finally {
+      fs.rmSync(folder, { recursive: true });
+    }
+  });
+
+  it('rejects with what its callback throws', async () => {
+    const fault = new TypeError('bar is null');
+    const fail = (): never => {
+      throw fault;
+    };
+    expect(await rejectionOf(client.upload(new Uint8Array(9_000_000), { onProgress: fail }))).toBe(fault);
   });
 
   it('rejects anything else, and names what it takes', async () => {

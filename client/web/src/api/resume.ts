@@ -2,7 +2,7 @@
 // (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
 import type { Answer, Connection } from './connection';
 import { sleep } from './job_events';
-import { errorOf, isPassing, isSuccess } from './problem';
+import { ApiError, errorOf, isPassing, isSuccess } from './problem';
 
 interface Options {
   signal?: AbortSignal;
@@ -25,6 +25,17 @@ const longestCut = 60_000;
 const firstPause = 100;
 const longestPause = 3000;
 
+// Throws an ApiError if the bytes cannot be read. The failure of a request tells this only in Node.
+export async function assertReadable(bytes: Blob): Promise<void> {
+  try {
+    await bytes.arrayBuffer();
+  } catch (cause) {
+    const error = new ApiError(-1, 'The file cannot be read', 'The file was changed or removed during the upload, or its disk failed. Open it again.');
+    error.cause = cause;
+    throw error;
+  }
+}
+
 // Counts the time without progress, and makes the pauses between retries longer.
 class Patience {
   private cut: number | null = null;
@@ -44,6 +55,10 @@ class Patience {
     await sleep(this.pause, signal);
     this.pause = Math.min(2 * this.pause, longestPause);
   }
+}
+
+function isUnreachable(error: unknown): boolean {
+  return error instanceof ApiError && error.isUnreachable;
 }
 
 class Parts {
@@ -71,7 +86,8 @@ class Parts {
         const mayGoOn = answer.status === 409 || isPassing(answer.status);
         if (!mayGoOn || this.patience.isOver()) return answer;
       } catch (error) {
-        if (signal?.aborted || this.patience.isOver()) throw error;
+        if (!isUnreachable(error) || this.patience.isOver()) throw error;
+        if (this.reached) await assertReadable(this.part(this.reached.offset));
       }
       this.reached = null;
       await this.patience.wait(signal);
@@ -94,13 +110,14 @@ class Parts {
     if (isWhole) {
       return this.connection.ask(`${this.path}&upload=${this.place.split('/').at(-1)}`, { method: 'POST', signal });
     }
-    const end = Math.min(this.whole.size, offset + this.size);
+    const body = this.part(offset);
+    const end = offset + body.size;
     const isLast = end === this.whole.size;
     const began = Date.now();
     const answer = await this.connection.ask(this.place, {
       method: 'PATCH',
       signal,
-      body: this.whole.slice(offset, end),
+      body,
       headers: {
         'Content-Type': 'application/partial-upload',
         'Upload-Offset': String(offset),
@@ -113,6 +130,10 @@ class Parts {
     if (took > longTime) this.size = Math.max(this.size / 2, leastPart);
     this.goTo({ offset: end, isWhole: false });
     return null;
+  }
+
+  private part(offset: number): Blob {
+    return this.whole.slice(offset, offset + this.size);
   }
 
   private goTo(reached: Reached): void {
@@ -146,7 +167,7 @@ export async function answerInParts(
     return await connection.ask(path, { method: 'POST', signal: options.signal, body: whole, headers });
   } catch (error) {
     // If this request fails, too, the daemon deletes the upload when it expires.
-    if (options.signal?.aborted) void connection.ask(place, { method: 'DELETE' }).catch(() => undefined);
+    if (!isUnreachable(error)) void connection.ask(place, { method: 'DELETE' }).catch(() => undefined);
     throw error;
   }
 }

@@ -1,7 +1,7 @@
 // Uploads with their progress.
 import type { Answer, Connection } from './connection';
 import { ApiError, jsonOf, unreachable } from './problem';
-import { answerInParts } from './resume';
+import { answerInParts, assertReadable } from './resume';
 import type { Uploaded, UploadedVolume, UploadOptions, Volume } from './types';
 
 // `keep`: the daemon keeps a file that leaves a choice open until a person has chosen.
@@ -92,22 +92,20 @@ function answerInOne(
       const headers = { get: (name: string) => request.getResponseHeader(name) };
       resolve({ status: request.status, headers, text: request.responseText });
     };
-    request.onerror = () => {
+    const failure = (): ApiError => {
       // This may also be a server that rejects the upload early: it closes the connection while the body is sent.
       if (sent > 0 && sent < whole.size) {
-        reject(
-          new ApiError(
-            0,
-            'The upload was interrupted',
-            'The connection was lost before the whole volume was sent. Either the network failed, or the ' +
-              'volume is larger than the server allows.',
-          ),
+        return new ApiError(
+          0,
+          'The upload was interrupted',
+          'The connection was lost before the whole volume was sent. Either the network failed, or the ' +
+            'volume is larger than the server allows.',
         );
-      } else {
-        connection.connected.value = false;
-        reject(unreachable());
       }
+      connection.connected.value = false;
+      return unreachable();
     };
+    request.onerror = () => void assertReadable(whole).then(() => reject(failure()), reject);
     request.onabort = () => reject(options.signal?.reason as Error);
     options.signal?.addEventListener('abort', () => request.abort());
     request.send(whole);
