@@ -64,6 +64,18 @@ describe('the labels of a job', () => {
   });
 });
 
+describe('the mesh of a job', () => {
+  it('is the file of its label if it has only one', async () => {
+    const job = await client.getJob(id);
+    const files = { stl: { href: `/v1/jobs/${id}/mesh.glb` } };
+    const ofLabels = (labels: unknown[]): Job => ({ ...job, mesh: { files: {}, labels } }) as Job;
+    expect(Buffer.from(await client.meshOf(ofLabels([{ label: 5, files }]), 'stl')).toString()).toBe('glTF');
+    for (const none of [ofLabels([{ label: 5, files }, { label: 6, files }]), job, { ...job, mesh: null } as Job]) {
+      expect(await rejectionOf(client.meshOf(none, 'stl'))).toBeInstanceOf(RangeError);
+    }
+  });
+});
+
 describe('the labels of a volume', () => {
   it('come from all pages', async () => {
     const list = await client.labelsOf(id, 0);

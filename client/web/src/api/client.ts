@@ -198,9 +198,13 @@ export class Client {
     return this.connection.json(jobPath(id), { method: 'DELETE' });
   }
 
-  /** Downloads a finished job's mesh in one of the formats that the job was asked for. */
+  /**
+   * Downloads a finished job's mesh in one of the formats that the job was asked for. Rejects with a RangeError if the
+   * job has no such file. Of a format that holds one label, a job with several labels has only the `zip`.
+   */
   async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
-    const file = job.mesh?.files[format];
+    const { files = {}, labels = [] } = job.mesh ?? {};
+    const file = files[format] ?? (labels.length === 1 ? labels[0]?.files[format] : undefined);
     if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
     return this.connection.bytes(file.href, { signal });
   }
