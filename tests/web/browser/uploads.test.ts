@@ -1,4 +1,7 @@
 // Uploads that go on, wait, ask before they send, and are dropped wherever.
+import { mkdtempSync, rmSync, utimesSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
 import { ctSlice, seriesNifti } from './files';
@@ -61,6 +64,37 @@ describe('an upload', () => {
     await expect.poll(() => page.locator('.upload-note').isVisible()).toBe(false);
     await page.locator('.brand').click();
     await expect.poll(() => page.locator('[data-volume] strong', { hasText: /first|second/ }).count()).toBe(2);
+  });
+
+  it('ends where a proxy answers with its login page', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    await page.route('**/v1/volumes?*', (route) => route.fulfill({ status: 200, contentType: 'text/html', body: '<html>Log in</html>' }));
+    await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(16, 5, 31) }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toContain('not one of isomeshd');
+    await page.getByRole('button', { name: 'Try again' }).waitFor();
+  });
+
+  it.each([
+    ['in one request', 64, '**/v1/volumes?*', 'POST'],
+    ['in parts', 208, '**/v1/uploads/*', 'PATCH'],
+  ])('%s ends when its file changes', async (_, size, where, method) => {
+    const { page, daemon } = at;
+    const folder = mkdtempSync(join(tmpdir(), 'isomesh-changed-'));
+    try {
+      const path = join(folder, 'ball.nrrd');
+      writeFileSync(path, ballNrrd(size, 20, 41));
+      utimesSync(path, 1e9, 1e9); // Chromium compares times in seconds
+      await page.goto(daemon.url);
+      await page.route(where, async (route) => {
+        if (route.request().method() === method) writeFileSync(path, 'changed');
+        await route.continue();
+      });
+      await page.setInputFiles('[data-pick=files]', path);
+      await expect.poll(() => page.locator('.refusal').innerText(), { timeout: 30_000 }).toContain('The file cannot be read');
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
   });
 
   it('of what is no volume is not sent without being asked for', async () => {

@@ -1,5 +1,8 @@
 // Clients and real HTTP servers in one process.
 import { File } from 'node:buffer';
+import * as fs from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { ApiError, Client, type Job } from '@/api/index';
 import { Daemon, id } from './daemon';
@@ -58,6 +61,18 @@ describe('the labels of a job', () => {
   it('come from all pages', async () => {
     expect((await client.labelsOfJob(id)).map(({ label }) => label)).toEqual([1, 2, 3]);
     expect(first.asked.length).toBe(2);
+  });
+});
+
+describe('the mesh of a job', () => {
+  it('is the file of its label if it has only one', async () => {
+    const job = await client.getJob(id);
+    const files = { stl: { href: `/v1/jobs/${id}/mesh.glb` } };
+    const ofLabels = (labels: unknown[]): Job => ({ ...job, mesh: { files: {}, labels } }) as Job;
+    expect(Buffer.from(await client.meshOf(ofLabels([{ label: 5, files }]), 'stl')).toString()).toBe('glTF');
+    for (const none of [ofLabels([{ label: 5, files }, { label: 6, files }]), job, { ...job, mesh: null } as Job]) {
+      expect(await rejectionOf(client.meshOf(none, 'stl'))).toBeInstanceOf(RangeError);
+    }
   });
 });
 
@@ -146,6 +161,52 @@ describe('a request', () => {
     expect(error).toMatchObject({ status: 0, isUnreachable: true, cause: { code: 'ECONNREFUSED' } });
   });
 
+  it('says so also if the connection breaks within a response', async () => {
+    const job = await client.getJob(id);
+    for (const status of [200, 404]) {
+      first.proxy = (response) => {
+        response.writeHead(status, { 'Content-Length': 1000 }).write('{"id":', () => response.destroy());
+      };
+      for (const ask of [
+        () => client.getJob(id),
+        () => client.getVolume('a'),
+        () => client.slicePicture('a', 'z', 0, [0, 1]),
+        () => client.previewFile('a', 9, [0, 1]),
+        () => client.meshOf(job, 'glb'),
+        () => client.upload(new Uint8Array(9)),
+      ]) {
+        const error = await rejectionOf(ask());
+        expect(error, String(ask)).toBeInstanceOf(ApiError);
+        expect(error, String(ask)).toMatchObject({ status: 0 });
+        expect(client.connection.connected.value).toBe(false);
+      }
+    }
+  });
+
+  it('tells a page of a proxy from a response of the API', async () => {
+    for (const body of ['<html>Log in</html>', '', 'null', '"ok"']) {
+      first.proxy = (response) => response.end(body);
+      for (const ask of [() => client.getVolume('a'), () => client.upload(new Uint8Array(9))]) {
+        const error = await rejectionOf(ask());
+        expect(error, body).toBeInstanceOf(ApiError);
+        expect(error, body).toMatchObject({ status: 200, detail: expect.stringContaining('not one of isomeshd') as string });
+      }
+    }
+  });
+
+  it('with a token that no header can carry says so, without that token', async () => {
+    for (const token of ['sec\nret', 'secret\u20ac']) {
+      const guarded = new Client({ server: first.address, token });
+      for (const asking of [guarded.getVolume('a'), guarded.follow(id), guarded.submitJob({ volume: 'a', iso: 60 }), guarded.upload(new Uint8Array(9))]) {
+        const error = await rejectionOf(asking);
+        expect(error).toBeInstanceOf(ApiError);
+        expect(error).toMatchObject({ status: -1, title: 'The token cannot be sent' });
+        expect((error as ApiError).detail).not.toContain('sec');
+      }
+    }
+    expect(first.asked).toEqual([]);
+  });
+
   it('has its key in Node 18, too, which has no global crypto', async () => {
     vi.stubGlobal('crypto', undefined);
     const keys = new Set<unknown>();
@@ -181,6 +242,41 @@ describe('upload', () => {
     // The part that a view shows, and not the whole buffer.
     await client.upload(bytes.subarray(1, 3));
     expect([...first.uploaded]).toEqual([1, 0]);
+  });
+
+  it('of what the server keeps sends no bytes', async () => {
+    for (const whole of [bytes, new Uint8Array(9_000_000)]) {
+      const { volumes } = await client.upload(whole, { kept: 'f00d', choices: { volume: '1' }, name: 'head.nii' });
+      expect(volumes[0]?.volume?.id).toBe('f00d');
+      expect(first.query.get('volume')).toBe('1');
+      expect(first.asked.splice(0)).toEqual(['POST /v1/volumes']);
+    }
+  });
+
+  it('of a file that was changed says so at once, and leaves nothing on the server', async () => {
+    // Newer than the types.
+    const { openAsBlob } = fs as unknown as { openAsBlob: (path: string) => Promise<Blob> };
+    const folder = fs.mkdtempSync(join(tmpdir(), 'isomesh-changed-'));
+    try {
+      const path = join(folder, 'head.nii');
+      fs.writeFileSync(path, bytes);
+      const file = await openAsBlob(path);
+      fs.appendFileSync(path, 'more');
+      const error = await rejectionOf(client.upload(file));
+      expect(error).toBeInstanceOf(ApiError);
+      expect(error).toMatchObject({ status: -1, title: 'The file cannot be read', cause: { name: 'NotReadableError' } });
+      await vi.waitFor(() => expect(first.asked.at(-1)).toBe('DELETE /v1/uploads/a'));
+    } finally {
+      fs.rmSync(folder, { recursive: true });
+    }
+  });
+
+  it('rejects with what its callback throws', async () => {
+    const fault = new TypeError('bar is null');
+    const fail = (): never => {
+      throw fault;
+    };
+    expect(await rejectionOf(client.upload(new Uint8Array(9_000_000), { onProgress: fail }))).toBe(fault);
   });
 
   it('rejects anything else, and names what it takes', async () => {

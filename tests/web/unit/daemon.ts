@@ -12,6 +12,8 @@ export class Daemon {
   query = new URLSearchParams(); // of the last request
   readonly tokens = new Set<string | undefined>();
   uploaded = Buffer.alloc(0);
+  // Responds in its place, as a proxy before it may.
+  proxy: ((response: ServerResponse) => void) | null = null;
   // Keeps requests for the job without a response.
   holds = false;
   readonly streams = new Set<ServerResponse>();
@@ -49,7 +51,9 @@ export class Daemon {
       all.add(response);
       response.on('close', () => all.delete(response));
     };
-    if (path === '/v1/events') {
+    if (this.proxy) {
+      this.proxy(response);
+    } else if (path === '/v1/events') {
       keep(this.streams);
       response.writeHead(200, { 'Content-Type': 'text/event-stream' }).write(': here\n\n');
     } else if (path === `/v1/jobs/${id}` && this.holds) {
@@ -68,6 +72,11 @@ export class Daemon {
       response.end(JSON.stringify({ volume: id, background: 0, labels, next: isLast ? null : 'the rest' }));
     } else if (path === '/v1/jobs' && request.method === 'POST') {
       response.writeHead(202).end(JSON.stringify({ id, key: request.headers['idempotency-key'] }));
+    } else if (path === '/v1/volumes' && this.query.has('upload')) {
+      // A body that is kept cannot be one that is still to come.
+      const isWhole = request.headers['upload-complete'] === undefined && request.headers['content-length'] === '0';
+      const kept = { id: this.query.get('upload') };
+      response.writeHead(isWhole ? 201 : 400).end(JSON.stringify(isWhole ? kept : { title: 'Invalid parameter' }));
     } else if (path === '/v1/volumes' && request.method === 'POST') {
       response.writeHead(201, { Location: '/v1/uploads/a' }).end();
     } else if (path === '/v1/uploads/a') {

@@ -11,6 +11,8 @@ class Daemon {
   private readonly held: (() => void)[] = [];
   private stream: ReadableStreamDefaultController<Uint8Array> | null = null;
   questions = 0;
+  // Statuses of the next responses.
+  readonly refusals: number[] = [];
   holds = false;
 
   answer(address: string): Promise<Response> {
@@ -19,6 +21,8 @@ class Daemon {
       return Promise.resolve(new Response(body));
     }
     this.questions += 1;
+    const status = this.refusals.shift();
+    if (status !== undefined) return Promise.resolve(new Response('<html></html>', { status }));
     const answer = Response.json({ id, state: this.state });
     if (!this.holds) return Promise.resolve(answer);
     return new Promise((resolve) => this.held.push(() => resolve(answer)));
@@ -46,6 +50,7 @@ beforeEach(() => {
 afterEach(() => {
   over.abort();
   vi.unstubAllGlobals();
+  vi.useRealTimers();
 });
 
 // What has been begun goes on as far as it can.
@@ -86,6 +91,19 @@ describe('a job that is followed', () => {
     new WatchedJobs((job) => told.push(job)).add(id);
     await settled();
     expect(told.map(({ state }) => state)).toEqual(['succeeded']);
+  });
+
+  it('is waited for while the server or a proxy before it says that it is busy or away', async () => {
+    vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout'] });
+    daemon.refusals.push(408, 429, 502, 503, 504);
+    const states: string[] = [];
+    client.follow(id, over.signal, ({ state }) => states.push(state)).catch((error: Error) => states.push(error.message));
+    for (let second = 0; second < 8; second += 1) {
+      await vi.advanceTimersByTimeAsync(1000);
+      await settled();
+    }
+    expect(daemon.refusals).toEqual([]);
+    expect(states).toEqual(['running']);
   });
 
   it('is asked for once where nothing more is told', async () => {

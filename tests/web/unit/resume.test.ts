@@ -11,7 +11,8 @@ class Daemon {
   isWhole = false;
   // Of so many parts the connection breaks after some of their bytes have come.
   cuts = 0;
-  isLastUnheard = false;
+  // The connection breaks before the last response, or within it.
+  lastUnheard: 'whole' | 'body' | null = null;
   refusal: Response | null = null;
   isCancelled = false;
 
@@ -50,7 +51,11 @@ class Daemon {
     bytes.set(came, this.bytes.length);
     this.bytes = bytes;
     this.isWhole = !isCut && headers.get('Upload-Complete') === '?1';
-    if (isCut || (this.isWhole && this.isLastUnheard)) throw new TypeError('fetch failed');
+    if (isCut || (this.isWhole && this.lastUnheard === 'whole')) throw new TypeError('fetch failed');
+    if (this.isWhole && this.lastUnheard === 'body') {
+      const cut = new ReadableStream({ pull: (controller) => controller.error(new TypeError('terminated')) });
+      return new Response(cut, { status: 201 });
+    }
     return this.isWhole ? this.volume(201) : new Response(null, { status: 204, headers: this.state() });
   }
 
@@ -87,8 +92,8 @@ describe('upload in parts', () => {
     expect(told.at(-1)).toBe(whole.size);
   });
 
-  it('asks for the answer that was not heard', async () => {
-    daemon.isLastUnheard = true;
+  it.each(['whole', 'body'] as const)('asks for the answer that was not heard: %s', async (unheard) => {
+    daemon.lastUnheard = unheard;
     const { volumes } = await client.upload(whole);
     expect(volumes[0]?.volume).toEqual({ id: 'abc' });
     expect(daemon.asked.at(-1)).toBe('POST /v1/volumes?upload');

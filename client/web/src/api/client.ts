@@ -127,13 +127,13 @@ export class Client {
     signal?: GlobalAbortSignal,
   ): Promise<GlobalBlob> {
     const query = new URLSearchParams({ axis, index: String(index), window: window.join() }).toString();
-    return (await this.connection.send(`${volumePath(id)}/slice.png?${query}`, { signal })).blob();
+    return this.connection.blob(`${volumePath(id)}/slice.png?${query}`, { signal });
   }
 
   /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     const query = new URLSearchParams({ size: String(size), window: window.join() }).toString();
-    return (await this.connection.send(`${volumePath(id)}/preview?${query}`, { signal })).arrayBuffer();
+    return this.connection.bytes(`${volumePath(id)}/preview?${query}`, { signal });
   }
 
   // --- Jobs ---
@@ -165,8 +165,8 @@ export class Client {
 
   /**
    * Calls `onChange` with every change of the job, and resolves with the finished job. It waits while the server
-   * cannot be reached. Rejects with an ApiError if the job no longer exists, and with the signal's reason as soon as
-   * the signal is aborted.
+   * cannot be reached or is busy. Rejects with an ApiError if the job no longer exists, and with the signal's reason as
+   * soon as the signal is aborted.
    */
   follow(id: string, signal?: GlobalAbortSignal, onChange: (job: Job) => void = () => undefined): Promise<Job> {
     return follow(this, id, signal, onChange);
@@ -198,11 +198,15 @@ export class Client {
     return this.connection.json(jobPath(id), { method: 'DELETE' });
   }
 
-  /** Downloads a finished job's mesh in one of the formats that the job was asked for. */
+  /**
+   * Downloads a finished job's mesh in one of the formats that the job was asked for. Rejects with a RangeError if the
+   * job has no such file. Of a format that holds one label, a job with several labels has only the `zip`.
+   */
   async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
-    const file = job.mesh?.files[format];
+    const { files = {}, labels = [] } = job.mesh ?? {};
+    const file = files[format] ?? (labels.length === 1 ? labels[0]?.files[format] : undefined);
     if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
-    return (await this.connection.send(file.href, { signal })).arrayBuffer();
+    return this.connection.bytes(file.href, { signal });
   }
 
   // --- Orders of a hospital: only a server with a PACS has these routes ---

@@ -1,6 +1,6 @@
 // Requests to one server, on a page and in Node. A failure is thrown as an ApiError.
 import { Signal } from '../ui/signal';
-import { asApiError, errorOf } from './problem';
+import { ApiError, asApiError, errorOf, jsonOf } from './problem';
 
 // The address without the slash at its end.
 function baseOf(server: string | undefined): string {
@@ -14,8 +14,15 @@ function baseOf(server: string | undefined): string {
   return (server ?? '').replace(/\/+$/, '');
 }
 
+// A response with its whole body.
+export interface Answer {
+  status: number;
+  headers: Pick<Headers, 'get'>;
+  text: string;
+}
+
 export class Connection {
-  // False after a request that got no response.
+  // False after a request that got no whole response.
   readonly connected = new Signal<boolean>(true);
   // True after the server has rejected the token, or asked for one.
   readonly unauthorized = new Signal<boolean>(false);
@@ -33,35 +40,66 @@ export class Connection {
     return this.base + path;
   }
 
+  // Throws an ApiError if the token cannot be part of a header.
   headers(more: Record<string, string> = {}): Record<string, string> {
-    return this.token.value === '' ? more : { ...more, Authorization: `Bearer ${this.token.value}` };
+    if (this.token.value === '') return more;
+    const headers = { ...more, Authorization: `Bearer ${this.token.value}` };
+    try {
+      new Headers(headers);
+    } catch {
+      // The cause is left out because it may contain the token.
+      this.unauthorized.value = true;
+      throw new ApiError(-1, 'The token cannot be sent', 'The token has a line break or a character that HTTP headers cannot carry.');
+    }
+    return headers;
   }
 
   // Returns every response, also one with an error status.
-  async ask(path: string, init: RequestInit = {}): Promise<Response> {
-    let response: Response;
-    try {
-      response = await fetch(this.addressOf(path), { ...init, headers: this.headers(init.headers as Record<string, string>) });
-    } catch (error) {
-      // The caller ended the request. This says nothing about the server.
-      if (init.signal?.aborted) throw init.signal.reason;
-      this.connected.value = false;
-      throw asApiError(error);
-    }
+  async ask(path: string, init: RequestInit = {}): Promise<Answer> {
+    const response = await this.begin(path, init);
+    const text = await this.received(response.text(), init);
+    return { status: response.status, headers: response.headers, text };
+  }
+
+  // Returns the response before its body has come. Throws an ApiError for one with an error status.
+  async send(path: string, init: RequestInit = {}): Promise<Response> {
+    const response = await this.begin(path, init);
+    if (!response.ok) throw errorOf(response.status, await this.received(response.text(), init));
+    return response;
+  }
+
+  async json<T>(path: string, init?: RequestInit): Promise<T> {
+    const { status, text } = await this.ask(path, init);
+    return jsonOf(status, text) as T;
+  }
+
+  async blob(path: string, init: RequestInit = {}): Promise<Blob> {
+    return this.received((await this.send(path, init)).blob(), init);
+  }
+
+  async bytes(path: string, init: RequestInit = {}): Promise<ArrayBuffer> {
+    return this.received((await this.send(path, init)).arrayBuffer(), init);
+  }
+
+  private async begin(path: string, init: RequestInit): Promise<Response> {
+    const headers = this.headers(init.headers as Record<string, string>);
+    const response = await this.received(fetch(this.addressOf(path), { ...init, headers }), init);
     this.connected.value = true;
     if (response.status === 401) this.unauthorized.value = true;
     return response;
   }
 
-  // Throws an ApiError for a response with an error status.
-  async send(path: string, init: RequestInit = {}): Promise<Response> {
-    const response = await this.ask(path, init);
-    if (!response.ok) throw errorOf(response.status, await response.text());
-    return response;
-  }
-
-  async json<T>(path: string, init?: RequestInit): Promise<T> {
-    return (await (await this.send(path, init)).json()) as T;
+  // A connection may break before a response and in its body.
+  private async received<T>(coming: Promise<T>, { signal }: RequestInit): Promise<T> {
+    try {
+      return await coming;
+    } catch (error) {
+      // The caller ended the request. This says nothing about the server.
+      if (signal?.aborted) throw signal.reason;
+      const failure = asApiError(error);
+      if (failure.isUnreachable) this.connected.value = false;
+      throw failure;
+    }
   }
 
   async isAlive(): Promise<boolean> {

@@ -1,7 +1,7 @@
 // Follows a job to its end: by the stream of all jobs, and by requests while there is no stream.
 import type { Client } from './client';
 import { isHidden } from './job_events';
-import { asApiError } from './problem';
+import { asApiError, isPassing } from './problem';
 import { isFinal, type Job, type JobChange } from './types';
 
 // The time between two requests while there is no stream. A hidden page asks less often.
@@ -105,8 +105,7 @@ class Follower {
 
   private takeError(error: unknown): void {
     const failure = asApiError(error);
-    if (failure.isUnreachable || failure.status === 503 || failure.status === 429) return;
-    this.fail(failure);
+    if (!isPassing(failure.status)) this.fail(failure);
   }
 }
 

@@ -6,7 +6,7 @@ export type Remedy = Pick<Problem, 'overridable' | 'choices'> & {
   kept?: string;
 };
 
-/** A request failed. `status` is the HTTP status, or 0 if there was no response. */
+/** A request failed. `status` is the HTTP status, 0 if no whole response came, or -1 if the request could not be sent. */
 export class ApiError extends Error {
   constructor(
     readonly status: number,
@@ -25,6 +25,10 @@ export class ApiError extends Error {
   get isUnreachable(): boolean {
     return this.status === 0;
   }
+}
+
+export function isSuccess(status: number): boolean {
+  return status >= 200 && status < 300;
 }
 
 function isProblem(value: unknown): value is Problem {
@@ -50,7 +54,22 @@ export function errorOf(status: number, body: string, kept?: string): ApiError {
   } catch {
     // The body is not JSON. Only the status is known.
   }
-  return new ApiError(status, `HTTP status ${status}`, `The server answered with status ${status}.`);
+  const detail = isSuccess(status)
+    ? 'The response is not one of isomeshd. A proxy before it may ask for a login.'
+    : `The server answered with status ${status}.`;
+  return new ApiError(status, `HTTP status ${status}`, detail);
+}
+
+// The JSON of a response. Throws an ApiError for an error status, or if the body is not one of the API's.
+export function jsonOf(status: number, body: string, kept?: string): unknown {
+  if (!isSuccess(status)) throw errorOf(status, body, kept);
+  try {
+    const value: unknown = JSON.parse(body);
+    if (typeof value === 'object' && value !== null) return value;
+  } catch {
+    // The body is not JSON.
+  }
+  throw errorOf(status, body);
 }
 
 export function unreachable(cause?: unknown): ApiError {
@@ -97,6 +116,12 @@ export function adviceFor(error: ApiError): string {
     default:
       return '';
   }
+}
+
+// Returns whether a client should repeat the request: the server cannot be reached, is busy or shuts down, or a proxy before
+// it says so.
+export function isPassing(status: number): boolean {
+  return [0, 408, 429, 502, 503, 504].includes(status);
 }
 
 // Returns whether the same request may succeed later.

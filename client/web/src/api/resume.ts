@@ -1,8 +1,8 @@
 // Uploads that continue after their connection broke, by "Resumable Uploads for HTTP"
 // (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
-import type { Connection } from './connection';
+import type { Answer, Connection } from './connection';
 import { sleep } from './job_events';
-import { errorOf } from './problem';
+import { ApiError, errorOf, isPassing, isSuccess } from './problem';
 
 interface Options {
   signal?: AbortSignal;
@@ -24,8 +24,17 @@ const longTime = 2000;
 const longestCut = 60_000;
 const firstPause = 100;
 const longestPause = 3000;
-// The daemon is busy, shuts down, or still holds the broken connection.
-const passing = [408, 409, 429, 502, 503, 504];
+
+// Throws an ApiError if the bytes cannot be read. The failure of a request tells this only in Node.
+export async function assertReadable(bytes: Blob): Promise<void> {
+  try {
+    await bytes.arrayBuffer();
+  } catch (cause) {
+    const error = new ApiError(-1, 'The file cannot be read', 'The file was changed or removed during the upload, or its disk failed. Open it again.');
+    error.cause = cause;
+    throw error;
+  }
+}
 
 // Counts the time without progress, and makes the pauses between retries longer.
 class Patience {
@@ -48,6 +57,10 @@ class Patience {
   }
 }
 
+function isUnreachable(error: unknown): boolean {
+  return error instanceof ApiError && error.isUnreachable;
+}
+
 class Parts {
   private readonly patience = new Patience();
   private size = leastPart;
@@ -63,18 +76,19 @@ class Parts {
   ) {}
 
   // Sends all parts. Returns the response to the last one, or the first error response that a retry cannot help.
-  async answer(): Promise<Response> {
+  async answer(): Promise<Answer> {
     const { signal } = this.options;
     for (;;) {
       try {
         const isLook = this.reached === null;
         const answer = this.reached === null ? await this.look() : await this.send(this.reached);
-        // Only an upload that was cancelled conflicts with the question how far it is.
-        const isCancelled = isLook && answer?.status === 409;
-        if (answer && (isCancelled || !passing.includes(answer.status) || this.patience.isOver())) return answer;
         if (answer === null) continue;
+        // With 409 the daemon still holds the broken connection; asked how far it is, it says so of cancelled uploads only.
+        const mayGoOn = (answer.status === 409 && !isLook) || isPassing(answer.status);
+        if (!mayGoOn || this.patience.isOver()) return answer;
       } catch (error) {
-        if (signal?.aborted || this.patience.isOver()) throw error;
+        if (!isUnreachable(error) || this.patience.isOver()) throw error;
+        if (this.reached) await assertReadable(this.part(this.reached.offset));
       }
       this.reached = null;
       await this.patience.wait(signal);
@@ -82,42 +96,47 @@ class Parts {
   }
 
   // Asks how much the daemon has. Returns null, or an error response.
-  private async look(): Promise<Response | null> {
+  private async look(): Promise<Answer | null> {
     const answer = await this.connection.ask(this.place, { method: 'HEAD', signal: this.options.signal });
     // The reason of a conflict is in the body of a GET.
     if (answer.status === 409) return this.connection.ask(this.place, { signal: this.options.signal });
-    if (!answer.ok) return answer;
+    if (!isSuccess(answer.status)) return answer;
     const offset = Number(answer.headers.get('Upload-Offset'));
     this.goTo({ offset, isWhole: answer.headers.get('Upload-Complete') === '?1' });
     return null;
   }
 
   // Sends one part. Returns null, the response to the last part, or an error response.
-  private async send({ offset, isWhole }: Reached): Promise<Response | null> {
+  private async send({ offset, isWhole }: Reached): Promise<Answer | null> {
     const { signal } = this.options;
     // All bytes are there, but the response was lost. This request repeats it.
     if (isWhole) {
       return this.connection.ask(`${this.path}&upload=${this.place.split('/').at(-1)}`, { method: 'POST', signal });
     }
-    const end = Math.min(this.whole.size, offset + this.size);
+    const body = this.part(offset);
+    const end = offset + body.size;
     const isLast = end === this.whole.size;
     const began = Date.now();
     const answer = await this.connection.ask(this.place, {
       method: 'PATCH',
       signal,
-      body: this.whole.slice(offset, end),
+      body,
       headers: {
         'Content-Type': 'application/partial-upload',
         'Upload-Offset': String(offset),
         'Upload-Complete': isLast ? '?1' : '?0',
       },
     });
-    if (isLast || !answer.ok) return answer;
+    if (isLast || !isSuccess(answer.status)) return answer;
     const took = Date.now() - began;
     if (took < shortTime) this.size = Math.min(2 * this.size, mostPart);
     if (took > longTime) this.size = Math.max(this.size / 2, leastPart);
     this.goTo({ offset: end, isWhole: false });
     return null;
+  }
+
+  private part(offset: number): Blob {
+    return this.whole.slice(offset, offset + this.size);
   }
 
   private goTo(reached: Reached): void {
@@ -136,14 +155,14 @@ export async function answerInParts(
   headers: Record<string, string>,
   whole: Blob,
   options: Options,
-): Promise<Response> {
+): Promise<Answer> {
   const begun = await connection.ask(path, {
     method: 'POST',
     signal: options.signal,
     headers: { ...headers, 'Upload-Complete': '?0', 'Upload-Length': String(whole.size) },
   });
   const place = begun.headers.get('Location');
-  if (!begun.ok || place === null) throw errorOf(begun.status, await begun.text());
+  if (!isSuccess(begun.status) || place === null) throw errorOf(begun.status, begun.text);
   try {
     const answer = await new Parts(connection, path, place, whole, options).answer();
     if (answer.status !== 410) return answer;
@@ -151,7 +170,7 @@ export async function answerInParts(
     return await connection.ask(path, { method: 'POST', signal: options.signal, body: whole, headers });
   } catch (error) {
     // If this request fails, too, the daemon deletes the upload when it expires.
-    if (options.signal?.aborted) void connection.ask(place, { method: 'DELETE' }).catch(() => undefined);
+    if (!isUnreachable(error)) void connection.ask(place, { method: 'DELETE' }).catch(() => undefined);
     throw error;
   }
 }

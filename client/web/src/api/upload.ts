@@ -1,7 +1,7 @@
 // Uploads with their progress.
-import type { Connection } from './connection';
-import { ApiError, errorOf, unreachable } from './problem';
-import { answerInParts } from './resume';
+import type { Answer, Connection } from './connection';
+import { ApiError, jsonOf, unreachable } from './problem';
+import { answerInParts, assertReadable } from './resume';
 import type { Uploaded, UploadedVolume, UploadOptions, Volume } from './types';
 
 // `keep`: the daemon keeps a file that leaves a choice open until a person has chosen.
@@ -24,8 +24,8 @@ export function dispositionOf(name: string): string {
 }
 
 // The result for each volume of the body. If there is only one, its `member` is empty.
-export function uploadedOf(status: number, body: string): UploadedVolume[] {
-  const answer: unknown = JSON.parse(body);
+export function uploadedOf(status: number, body: string, kept?: string): UploadedVolume[] {
+  const answer = jsonOf(status, body, kept);
   if (status === 207) return (answer as { volumes: UploadedVolume[] }).volumes;
   return [{ member: '', status, volume: answer as Volume, problem: null }];
 }
@@ -49,66 +49,65 @@ const resumableBytes = 8 << 20;
 export async function upload(connection: Connection, given: unknown, options: UploadOptions): Promise<Uploaded> {
   const whole = bytesOf(given);
   options.signal?.throwIfAborted();
-  const isSmall = whole.size < resumableBytes || options.kept !== undefined;
-  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
-  return isSmall && typeof XMLHttpRequest !== 'undefined'
-    ? uploadInOne(connection, whole, options)
-    : uploadInParts(connection, whole, options);
-}
-
-async function uploadInParts(connection: Connection, whole: Blob, options: UploadOptions): Promise<Uploaded> {
-  const name: Record<string, string> =
-    options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
-  const answer = await answerInParts(connection, uploadPath(options), name, whole, options);
-  const kept = answer.headers.get('Isomesh-Upload') ?? undefined;
-  const text = await answer.text();
-  if (!answer.ok) throw errorOf(answer.status, text, kept);
+  const { status, headers, text } = await answerTo(connection, whole, options);
+  const kept = headers.get('Isomesh-Upload') ?? undefined;
+  const volumes = uploadedOf(status, text, kept);
   options.onProgress?.(whole.size, whole.size);
-  return { volumes: uploadedOf(answer.status, text), kept };
+  return { volumes, kept };
 }
 
-function uploadInOne(connection: Connection, whole: Blob, options: UploadOptions): Promise<Uploaded> {
-  const body = options.kept === undefined ? whole : new Blob();
+function answerTo(connection: Connection, whole: Blob, options: UploadOptions): Promise<Answer> {
+  const path = uploadPath(options);
+  const named: Record<string, string> =
+    options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
+  // The server has the bytes.
+  if (options.kept !== undefined) return connection.ask(path, { method: 'POST', headers: named, signal: options.signal });
+  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
+  return whole.size < resumableBytes && typeof XMLHttpRequest !== 'undefined'
+    ? answerInOne(connection, path, named, whole, options)
+    : answerInParts(connection, path, named, whole, options);
+}
+
+function answerInOne(
+  connection: Connection,
+  path: string,
+  named: Record<string, string>,
+  whole: Blob,
+  options: UploadOptions,
+): Promise<Answer> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open('POST', connection.addressOf(uploadPath(options)));
-    for (const [name, value] of Object.entries(connection.headers())) request.setRequestHeader(name, value);
+    request.open('POST', connection.addressOf(path));
+    for (const [name, value] of Object.entries(connection.headers(named))) request.setRequestHeader(name, value);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
-    if (options.name !== undefined) request.setRequestHeader('Content-Disposition', dispositionOf(options.name));
     let sent = 0;
     request.upload.onprogress = (event) => {
       sent = event.loaded;
-      options.onProgress?.(event.loaded, body.size);
+      options.onProgress?.(event.loaded, whole.size);
     };
-    request.upload.onload = () => options.onProgress?.(body.size, body.size);
+    request.upload.onload = () => options.onProgress?.(whole.size, whole.size);
     request.onload = () => {
       connection.connected.value = true;
-      const kept = request.getResponseHeader('Isomesh-Upload') ?? undefined;
-      if ([200, 201, 207].includes(request.status)) {
-        resolve({ volumes: uploadedOf(request.status, request.responseText), kept });
-        return;
-      }
       if (request.status === 401) connection.unauthorized.value = true;
-      reject(errorOf(request.status, request.responseText, kept));
+      const headers = { get: (name: string) => request.getResponseHeader(name) };
+      resolve({ status: request.status, headers, text: request.responseText });
     };
-    request.onerror = () => {
+    const failure = (): ApiError => {
       // This may also be a server that rejects the upload early: it closes the connection while the body is sent.
-      if (sent > 0 && sent < body.size) {
-        reject(
-          new ApiError(
-            0,
-            'The upload was interrupted',
-            'The connection was lost before the whole volume was sent. Either the network failed, or the ' +
-              'volume is larger than the server allows.',
-          ),
+      if (sent > 0 && sent < whole.size) {
+        return new ApiError(
+          0,
+          'The upload was interrupted',
+          'The connection was lost before the whole volume was sent. Either the network failed, or the ' +
+            'volume is larger than the server allows.',
         );
-      } else {
-        connection.connected.value = false;
-        reject(unreachable());
       }
+      connection.connected.value = false;
+      return unreachable();
     };
+    request.onerror = () => void assertReadable(whole).then(() => reject(failure()), reject);
     request.onabort = () => reject(options.signal?.reason as Error);
     options.signal?.addEventListener('abort', () => request.abort());
-    request.send(body);
+    request.send(whole);
   });
 }

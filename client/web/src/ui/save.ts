@@ -16,7 +16,7 @@ const mostInMemory = 250_000_000;
 // link, so that the page fetches the file itself.
 export async function saveFile(href: string, name: string, bytes: number): Promise<void> {
   if (token.value !== '' || bytes <= mostInMemory) {
-    saveBlob(await (await client.connection.send(href)).blob(), name);
+    saveBlob(await client.connection.blob(href), name);
     return;
   }
   const link = document.createElement('a');
