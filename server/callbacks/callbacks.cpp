@@ -191,7 +191,7 @@ class Callbacks::Sender {
     curl_multi_remove_handle(multi_.get(), easy);
     const bool success = result == CURLE_OK && status >= 200 && status < 300;
     if (success) {
-      outbox_.remove(attempt.delivery.job);
+      outbox_.remove(attempt.delivery);
       return observer_(attempt.delivery, CallbackOutcome::kDelivered, "");
     }
     const std::string reason =
@@ -204,13 +204,13 @@ class Callbacks::Sender {
     if ((result == CURLE_OK && status == kGone) || age > options_.give_up_after) {
       return give_up(attempt.delivery, reason);
     }
-    outbox_.postpone(attempt.delivery.job,
+    outbox_.postpone(attempt.delivery,
                      std::chrono::system_clock::now() + delay_after(attempt.delivery.attempts));
     observer_(attempt.delivery, CallbackOutcome::kRetried, reason);
   }
 
   void give_up(const store::Delivery& delivery, const std::string& reason) {
-    outbox_.remove(delivery.job);
+    outbox_.remove(delivery);
     observer_(delivery, CallbackOutcome::kGivenUp, reason);
   }
 

@@ -65,6 +65,8 @@ Server::Server(const Services& services, const ServerOptions& options)
 }
 
 Server::~Server() {
+  // Its threads tell the app of ended orders, also if a start fails after start().
+  if (Wing* const hospital = state_->app.services.hospital) hospital->stop();
   if (state_->watching.joinable()) stop();
 }
 

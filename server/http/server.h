@@ -12,6 +12,7 @@ namespace isomesh::http {
 class Server {
  public:
   Server(const Services& services, const ServerOptions& options);
+  // Ends the orders and serving if that was not done.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct Delivery {
   std::string body;  // its JSON at its end
   int attempts = 0;  // failed ones
   Time created;
+  std::int64_t created_us = 0;  // by the clock of the records: a retried order ends again later
 };
 
 // Survives restarts. The job store adds a delivery in the transaction that ends the job, so that
@@ -33,11 +35,12 @@ class Outbox {
   // The earliest due time after `now`; empty if there is none.
   virtual std::optional<Time> next_after(Time now) const = 0;
 
-  // Removes a delivery that succeeded or was given up.
-  virtual void remove(const std::string& job) = 0;
+  // Removes a delivery that succeeded or was given up. Like postpone(), does nothing if the order
+  // has ended again since due() returned it: that end stays due.
+  virtual void remove(const Delivery& delivery) = 0;
 
   // Counts a failed attempt; the delivery is due again at `next`.
-  virtual void postpone(const std::string& job, Time next) = 0;
+  virtual void postpone(const Delivery& delivery, Time next) = 0;
 
   virtual std::size_t count() const = 0;
 };

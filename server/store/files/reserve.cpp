@@ -49,16 +49,15 @@ void Reserve::check_room() {
   throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
 }
 
-bool Reserve::let_go() {
+void Reserve::let_go() {
   const Lock lock(mutex_);
-  if (bytes_ == 0 || !is_whole_) return false;
+  if (bytes_ == 0 || !is_whole_) return;
   std::error_code error;
   std::filesystem::remove(file_, error);
   is_whole_ = false;
   log_warning(
       "the disk is full: its reserve was released, and nothing new starts until the reserve is "
       "back");
-  return !error;
 }
 
 std::uint64_t Reserve::free_bytes() const { return space_of(file_.parent_path()).available; }

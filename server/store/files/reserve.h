@@ -23,8 +23,8 @@ class Reserve {
   // Throws Error kOutOfSpace unless has_room().
   void check_room();
 
-  // Releases the reserve. Returns false if it was released before.
-  bool let_go();
+  // Releases the reserve, unless it was released before.
+  void let_go();
 
   // Bytes free on the disk now, besides the reserve.
   std::uint64_t free_bytes() const;

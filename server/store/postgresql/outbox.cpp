@@ -31,11 +31,11 @@ std::vector<Delivery> PostgresOutbox::due(Time now, std::size_t per_receiver) co
   return deliveries;
 }
 
-void PostgresOutbox::postpone(const std::string& job, Time next) {
-  database_.run(
-      Change::kRepeatable,
-      "UPDATE callbacks SET attempts = attempts + 1, next = ?1, held_until = 0 WHERE job = ?2",
-      database_.to_us(next), job);
+void PostgresOutbox::postpone(const Delivery& delivery, Time next) {
+  database_.run(Change::kRepeatable,
+                "UPDATE callbacks SET attempts = attempts + 1, next = ?1, held_until = 0 WHERE job "
+                "= ?2 AND created = ?3",
+                database_.to_us(next), delivery.job, delivery.created_us);
 }
 
 }  // namespace isomesh::store::postgresql

@@ -15,7 +15,7 @@ class PostgresOutbox : public SqlOutbox {
   explicit PostgresOutbox(Database& database) : SqlOutbox(database), database_(database) {}
 
   std::vector<Delivery> due(Time now, std::size_t per_receiver) const override;
-  void postpone(const std::string& job, Time next) override;
+  void postpone(const Delivery& delivery, Time next) override;
 
  private:
   Database& database_;

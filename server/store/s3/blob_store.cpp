@@ -109,10 +109,8 @@ void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
 // The caller finishes the bytes.
 void S3BlobStore::store(const Blob& blob, const std::string& owner) {
   const auto in_use = cache_.use(blob.key);
-  cache_.files().mark_named(blob.key);   // records name the blob in the bucket, not this copy
-  if (!cache_.files().size(blob.key)) {  // evicting an older copy may have removed the new one
-    throw Error(ErrorCode::kUnavailable, "there is no space for a copy in the cache: try again");
-  }
+  cache_.files().mark_named(blob.key);  // records name the blob in the bucket, not this copy
+  const File copy = open_copy(blob.key);
   cache_.note(blob.key, blob.bytes);
   cache_.make_room(0);
   room_.take(blob.bytes, owner);
@@ -120,7 +118,7 @@ void S3BlobStore::store(const Blob& blob, const std::string& owner) {
   try {
     client_.put_text(hold, "");
     wait_until_not_going(blob.key);
-    put(blob);
+    put(blob, copy);
   } catch (...) {
     room_.finish(blob.bytes, owner);
     room_.give(blob.bytes);
@@ -131,12 +129,21 @@ void S3BlobStore::store(const Blob& blob, const std::string& owner) {
   unnamed_.note(blob.key, hold);
 }
 
-void S3BlobStore::put(const Blob& blob) {
+// Evicting an older copy may have removed the new one.
+File S3BlobStore::open_copy(const std::string& key) const {
+  try {
+    return File::open(cache_.files().local(key).path);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+  }
+  throw Error(ErrorCode::kUnavailable, "there is no space for a copy in the cache: try again");
+}
+
+void S3BlobStore::put(const Blob& blob, const File& copy) {
   const bool is_damaged = [&] {
     const Lock lock(mutex_);
     return damaged_.contains(blob.key);
   }();
-  const File copy = File::open(cache_.files().local(blob.key).path);
   const bool is_new = client_.put_file(blob_object(blob.key), copy, blob,
                                        is_damaged ? IfThere::kReplace : IfThere::kKeep);
   if (!is_new || is_damaged) room_.give(blob.bytes);

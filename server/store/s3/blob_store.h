@@ -83,7 +83,9 @@ class S3BlobStore : public BlobStore {
 
   // Uploads the local copy as a blob.
   void store(const Blob& blob, const std::string& owner);
-  void put(const Blob& blob);
+  // The copy that was just made. Stays readable if another thread erases the blob.
+  File open_copy(const std::string& key) const;
+  void put(const Blob& blob, const File& copy);
   void wait_until_not_going(const std::string& key);
   bool fetch(const std::string& key, const std::stop_token& stop) const;
   bool fetch_once(const std::string& key, std::uint64_t bytes, const std::stop_token& stop) const;

@@ -27,7 +27,8 @@ Delivery SqlOutbox::delivery_of(const Rows& row) const {
           .url = row.text(1),
           .body = row.text(2),
           .attempts = static_cast<int>(row.integer(3)),
-          .created = database_.from_us(row.integer(4))};
+          .created = database_.from_us(row.integer(4)),
+          .created_us = row.integer(4)};
 }
 
 std::optional<Time> SqlOutbox::next_after(Time now) const {
@@ -38,14 +39,16 @@ std::optional<Time> SqlOutbox::next_after(Time now) const {
   return database_.from_us(row.integer(0));
 }
 
-void SqlOutbox::remove(const std::string& job) {
-  database_.run(Change::kRepeatable, "DELETE FROM callbacks WHERE job = ?1", job);
+void SqlOutbox::remove(const Delivery& delivery) {
+  database_.run(Change::kRepeatable, "DELETE FROM callbacks WHERE job = ?1 AND created = ?2",
+                delivery.job, delivery.created_us);
 }
 
-void SqlOutbox::postpone(const std::string& job, Time next) {
-  database_.run(Change::kRepeatable,
-                "UPDATE callbacks SET attempts = attempts + 1, next = ?1 WHERE job = ?2",
-                database_.to_us(next), job);
+void SqlOutbox::postpone(const Delivery& delivery, Time next) {
+  database_.run(
+      Change::kRepeatable,
+      "UPDATE callbacks SET attempts = attempts + 1, next = ?1 WHERE job = ?2 AND created = ?3",
+      database_.to_us(next), delivery.job, delivery.created_us);
 }
 
 std::size_t SqlOutbox::count() const {

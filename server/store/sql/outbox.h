@@ -15,8 +15,8 @@ class SqlOutbox : public Outbox {
 
   std::vector<Delivery> due(Time now, std::size_t per_receiver) const override;
   std::optional<Time> next_after(Time now) const override;
-  void remove(const std::string& job) override;
-  void postpone(const std::string& job, Time next) override;
+  void remove(const Delivery& delivery) override;
+  void postpone(const Delivery& delivery, Time next) override;
   std::size_t count() const override;
 
  protected:

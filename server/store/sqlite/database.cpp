@@ -252,11 +252,10 @@ Database::Database(const DataFolder& folder)
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }
 
-bool Database::make_way() {
-  const bool is_let_go = folder_.reserve().let_go();
+void Database::make_way() {
+  folder_.reserve().let_go();
   const Lock writing(writer_.mutex());
   writer_.empty_log();
-  return is_let_go;
 }
 
 std::int64_t Database::changes() {

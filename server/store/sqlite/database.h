@@ -42,14 +42,16 @@ class Database : public SqlDatabase {
   std::size_t most_at_once() const override { return std::numeric_limits<std::size_t>::max(); }
 
   // Runs one transaction that frees space or must be stored in any case. If there is no space for
-  // it, releases the reserve first. Throws what `run` throws.
+  // it, releases the reserve and runs it again; another thread may have released the reserve
+  // meanwhile. Throws what `run` throws.
   template <class Run>
   auto freeing(const Run& run) {
     try {
       return run();
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::kOutOfSpace || !make_way()) throw;
+      if (error.code() != ErrorCode::kOutOfSpace) throw;
     }
+    make_way();
     return run();
   }
 
@@ -59,7 +61,7 @@ class Database : public SqlDatabase {
   std::size_t tell(Change kind, std::string_view sql,
                    std::span<const Parameter> parameters) override;
   Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
-  bool make_way();
+  void make_way();
 
   const DataFolder& folder_;
   std::atomic<std::int64_t> newest_us_ = 0;

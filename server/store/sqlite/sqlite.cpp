@@ -212,7 +212,10 @@ int Connection::look_at_log(void* connection, sqlite3* handle, const char* name,
   return SQLITE_OK;
 }
 
-void Connection::empty_log() { script("PRAGMA wal_checkpoint(TRUNCATE)"); }
+void Connection::empty_log() noexcept {
+  if (batch_) end_batch();
+  sqlite3_wal_checkpoint_v2(handle_, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+}
 
 bool Connection::has_open_transaction() const { return sqlite3_get_autocommit(handle_) == 0; }
 

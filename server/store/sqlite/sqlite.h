@@ -69,8 +69,8 @@ class Connection : public SqlConnection {
   // which waits for readers.
   void limit_log(std::uint64_t bytes);
 
-  // Checkpoints and truncates now. Throws Error kOutOfSpace or kInternal.
-  void empty_log();
+  // Ends an open batch, then checkpoints and truncates if possible. For holders of the mutex.
+  void empty_log() noexcept;
 
   // Number of rows changed since the file was opened.
   std::int64_t all_changes() const;

@@ -8,13 +8,7 @@
 
 #include "server/hospital/routes.h"
 #include "server/http/routes/routes.h"
-#include "server/store/files/blob_store.h"
-#include "server/store/retention.h"
-#include "server/store/sql/outbox.h"
-#include "server/store/sql/volume_store.h"
-#include "server/store/sqlite/database.h"
-#include "server/store/sqlite/job_store.h"
-#include "tests/support/files.h"
+#include "tests/unit/http/services.h"
 
 namespace isomesh::http {
 namespace {
@@ -50,36 +44,8 @@ class OpenApi : public testing::Test {
     return methods;
   }
 
-  test::TemporaryFolder folder_;
-  store::DataFolder data_{folder_ / "data"};
-  store::Database database_{data_};
-  store::FileBlobStore blobs_{data_};
-  store::SqlVolumeStore volumes_{database_};
-  store::SqliteJobStore jobs_{database_, blobs_, store::JobStoreOptions{}};
-  store::Retention retention_{jobs_, volumes_, blobs_, data_.scratch(), store::RetentionOptions{}};
-  jobs::VolumeLibrary library_{
-      data_, blobs_, volumes_, retention_, volume::SizeLimits{}, jobs::RunnerOptions{}};
-  jobs::Histograms histograms_{blobs_};
-  jobs::LabelLists labels_{blobs_};
-  jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}, jobs::JobProgram{}};
-  Metrics metrics_;
-  store::SqlOutbox outbox_{database_};
-  const callbacks::CallbackTargets targets_{{}};
-  callbacks::Callbacks callbacks_{outbox_, targets_, {}, {}};
-  App app_{Services{.folder = data_,
-                    .blobs = blobs_,
-                    .volumes = volumes_,
-                    .jobs = jobs_,
-                    .outbox = outbox_,
-                    .library = library_,
-                    .histograms = histograms_,
-                    .labels = labels_,
-                    .estimator = estimator_,
-                    .retention = retention_,
-                    .metrics = metrics_,
-                    .callbacks = callbacks_,
-                    .callback_targets = targets_},
-           ServerOptions{}};
+  OpenServices services_;
+  App app_{services_.all(), ServerOptions{}};
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
 };
 

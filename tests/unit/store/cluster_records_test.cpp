@@ -208,7 +208,7 @@ TEST_F(ClusterTest, OneReceiverIsToldNoMoreAtATimeByAllNodes) {
   const auto mine = one().outbox.due(now, 4);
   EXPECT_THAT(mine, SizeIs(4));
   EXPECT_THAT(two().outbox.due(now, 4), IsEmpty());
-  one().outbox.remove(mine[0].job);
+  one().outbox.remove(mine[0]);
   const auto theirs = two().outbox.due(now, 4);
   ASSERT_THAT(theirs, SizeIs(1));
   for (const Delivery& each : mine) EXPECT_NE(each.job, theirs[0].job);

@@ -216,6 +216,26 @@ TEST_P(OrderConformance, TheirEndIsToldOnce) {
   EXPECT_THAT(told[0].body, testing::Not(HasSubstr("\"1.3\"")));
 }
 
+// Its first end may still be on its way to the receiver.
+TEST_P(OrderConformance, TheEndAfterARetryIsToldToo) {
+  OrderRecord record = submitted();
+  record.work.callback = "https://a.example/x";
+  EXPECT_TRUE(end(record, OrderState::kFailed));
+  const auto due = [&] { return outbox().due(now() + seconds(1), 9); };
+  const Delivery first = due().at(0);
+  orders().retry(std::nullopt, record.order.id);
+  EXPECT_TRUE(end(record, OrderState::kSucceeded));
+  outbox().postpone(first, now() + hours(1));
+  ASSERT_EQ(due().size(), 1U);
+  outbox().remove(first);
+  const auto second = due();
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_THAT(second[0].body, HasSubstr("succeeded"));
+  EXPECT_EQ(second[0].attempts, 0);
+  outbox().remove(second[0]);
+  EXPECT_EQ(outbox().count(), 0U);
+}
+
 TEST_P(OrderConformance, AreListedInPages) {
   const OrderRecord first = submitted();
   const OrderRecord second = submitted();

@@ -17,7 +17,7 @@ namespace {
 class DatabaseTest : public testing::Test {
  protected:
   test::TemporaryFolder folder_;
-  DataFolder data_{folder_ / "data"};
+  DataFolder data_{folder_ / "data", std::uint64_t{1} << 20};
 };
 
 TEST_F(DatabaseTest, IsForItsOwnerOnly) {
@@ -118,6 +118,17 @@ TEST_F(DatabaseTest, TheAuditTrailIsNeitherChangedNorRemoved) {
               ErrorCode::kInternal)
         << sql;
   }
+}
+
+// All members of a group commit fail together, and one of them is first.
+TEST_F(DatabaseTest, WhatFreesSpaceIsTriedAgainAlsoIfAnotherThreadReleasedTheReserve) {
+  Database database(data_);
+  data_.reserve().let_go();
+  int runs = 0;
+  database.freeing([&] {
+    if (++runs == 1) throw Error(ErrorCode::kOutOfSpace, "full");
+  });
+  EXPECT_EQ(runs, 2);
 }
 
 // By who removes the triggers first.

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <filesystem>
 #include <functional>
+#include <latch>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -144,6 +146,23 @@ TEST_F(GroupCommit, WhatAFullDiskTakesBackIsAcknowledgedToNobody) {
   join();
   EXPECT_GE(full, kThreads / 4);
   EXPECT_EQ(numbers(), done);
+}
+
+// A thread for which there was no space empties it, and may come while a commit waits for others.
+TEST_F(GroupCommit, TheLogIsEmptiedBetweenTwoParts) {
+  std::latch has_begun(1);
+  const std::jthread member([&] {
+    Transaction transaction(writer_);
+    transaction->run("INSERT INTO numbers VALUES(1)");
+    has_begun.count_down();
+    EXPECT_TRUE(test::eventually([this] { return writer_.coming() == 1; }));
+    transaction.commit();
+  });
+  has_begun.wait();
+  const Transaction open(writer_);
+  writer_.empty_log();
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "records-wal"), 0U);
+  EXPECT_EQ(numbers(), std::set<int>{1});
 }
 
 TEST_F(GroupCommit, NobodySeesAPartBeforeAllIsCommitted) {

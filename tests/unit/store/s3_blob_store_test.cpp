@@ -2,6 +2,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -298,6 +299,29 @@ TEST_F(S3Blobs, ARequestThatMayBeLateKeepsOthersFromStoringIt) {
   EXPECT_THAT(peer().keys().front(), HasSubstr("going/" + key));
   peer().age(peer().keys().front(), std::chrono::minutes(21));
   EXPECT_EQ(get(put("hello")), "hello");
+}
+
+// Its copy in the cache is erased, too, while the thread that stores it waits.
+TEST_F(S3Blobs, BytesCanBeStoredAgainWhileTheyAreErased) {
+  options_.client.patience = std::chrono::seconds(60);
+  open();
+  const std::string key = put("hello");
+  const int listed = peer().count("GET", "going");
+  peer().fail("status-503", 0, "DELETE", "/quarantine/");
+  std::jthread erasing([&] {
+    const auto nothing = [](const std::string& /*key*/) { return false; };
+    EXPECT_TRUE(blobs_->erase_unnamed(std::span(&key, 1), Steady::clock::now(), nothing).empty());
+  });
+  EXPECT_TRUE(test::eventually([&] { return peer().count("DELETE", "/quarantine/") > 0; }));
+  std::jthread storing([&] {
+    const auto error = thrown_by([&] { put("hello"); });
+    EXPECT_FALSE(error) << error->what();
+  });
+  EXPECT_TRUE(test::eventually([&] { return peer().count("GET", "going") > listed; }));
+  peer().recover();
+  erasing.join();
+  storing.join();
+  EXPECT_EQ(get(key), "hello");
 }
 
 TEST_F(S3Blobs, WhatADaemonThatDiedHeldIsNotHeldForEver) {
