@@ -128,14 +128,15 @@ std::string OrderSteps::pacs_of(const store::OrderRecord& record) {
   }
 }
 
-Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop) const {
+Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop,
+                         std::vector<std::string>& stored) const {
   switch (record.order.state) {
     case OrderState::kWaiting:
       return wait_for_series(record, stop);
     case OrderState::kFetching:
       return fetch(record, stop);
     case OrderState::kMeshing:
-      return mesh(record);
+      return mesh(record, stored);
     case OrderState::kSending:
       return send(record, stop);
     default:
@@ -297,7 +298,7 @@ bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) c
          !store::is_there_and_intact(services_.blobs, *record.order.volume, {});
 }
 
-Time OrderSteps::mesh(store::OrderRecord& record) const {
+Time OrderSteps::mesh(store::OrderRecord& record, std::vector<std::string>& stored) const {
   try {
     if (!record.order.job) return submit_job(record);
     const Job job = services_.jobs.get(std::nullopt, *record.order.job);
@@ -308,7 +309,7 @@ Time OrderSteps::mesh(store::OrderRecord& record) const {
     if (job.state != JobState::kSucceeded) {
       throw Error(ErrorCode::kUnusableVolume, "the order's job was cancelled");
     }
-    return make(record, job);
+    return make(record, job, stored);
   } catch (const Error& error) {
     if (!is_lost(error, record)) throw;
     forget_images(record);
@@ -319,7 +320,8 @@ Time OrderSteps::mesh(store::OrderRecord& record) const {
   }
 }
 
-Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
+Time OrderSteps::make(store::OrderRecord& record, const Job& job,
+                      std::vector<std::string>& stored) const {
   record.order.results.clear();
   record.work.blobs.clear();
   std::vector<MadeObject> objects;
@@ -350,7 +352,8 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       }
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
-    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs);
+    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs,
+                           stored);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {
@@ -366,9 +369,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     }
   }
   record.order.state = OrderState::kSending;
-  const Time next = save_after(OrderState::kMeshing, record, now_());
-  for (const MadeObject& object : objects) services_.blobs.mark_named(object.blob.key);
-  return next;
+  return save_after(OrderState::kMeshing, record, now_());
 }
 
 bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderResult& result,

@@ -122,6 +122,34 @@ TEST_F(OrdersTest, WhoseObjectIsMissingMakeItAgainAfterAPause) {
   EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
 }
 
+// Receives an instance with other contents right after somebody has asked for all.
+class ReplacingReceived : public store::SqlReceivedStore {
+ public:
+  using SqlReceivedStore::SqlReceivedStore;
+
+  std::vector<store::ReceivedInstance> instances(
+      const store::ReceivedSeries& series) const override {
+    auto all = SqlReceivedStore::instances(series);
+    if (const auto act = std::exchange(replace, nullptr)) act();
+    return all;
+  }
+
+  mutable std::function<void()> replace;
+};
+
+TEST_F(OrdersTest, OfReceivedImagesThatAreReplacedWhileTheyAreReadAreIncomplete) {
+  ReplacingReceived received(database_);
+  const store::ReceivedSeries series = {"BONE", kStudy, kSeries};
+  received.add(series, {instance_of(0), "of the first", 1});
+  received.replace = [&] { received.add(series, {instance_of(0), "of the second", 1}); };
+  Received source("BONE", received, blobs_);
+  const auto code_of = [&](const std::string& file) {
+    return test::code_thrown_by([&] { source.fetch_series(kStudy, kSeries, folder_ / file, {}); });
+  };
+  EXPECT_EQ(code_of("first"), ErrorCode::kSeriesIncomplete);
+  EXPECT_EQ(code_of("second"), ErrorCode::kUnusableVolume) << "nothing replaces this one";
+}
+
 // Sixty hours, of which nothing is waited for.
 TEST_F(OrdersTest, OutliveAWeekendsOutage) {
   main_->is_down = true;
