@@ -96,6 +96,20 @@ store::AuditEntry transfer(const store::OrderRecord& record, const std::string& 
           .study = study};
 }
 
+// The same for one of the order's objects.
+store::AuditEntry transfer_out(const store::OrderRecord& record, const OrderResult& result) {
+  const DicomIdentity& identity = *record.work.identity;
+  store::AuditEntry entry = transfer(record, result.pacs, "out", identity.study_uid);
+  entry.instances = 1;
+  entry.patient_id = identity.patient_id;
+  return entry;
+}
+
+// The object, as in OrderWork::sending.
+std::string object_of(const OrderResult& result) {
+  return result.pacs + ' ' + result.sop_instance_uid;
+}
+
 // Resets the list of instances, the images, and all results from them.
 void forget_images(store::OrderRecord& record) {
   record.order.state = OrderState::kWaiting;
@@ -418,9 +432,11 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
   const InstancePlace place = {.study = identity.study_uid,
                                .series = result.series_uid,
                                .instance = result.sop_instance_uid};
-  store::AuditEntry entry = transfer(record, result.pacs, "out", identity.study_uid);
-  entry.instances = 1;
-  entry.patient_id = identity.patient_id;
+  store::AuditEntry entry = transfer_out(record, result);
+  if (record.work.sending != object_of(result)) {
+    record.work.sending = object_of(result);
+    save(record, now_());
+  }
   try {
     receiver->store(
         {.place = place,
@@ -456,8 +472,14 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     if (has_instance(result.pacs, place, stop) != true) {
       check_object(record, index, stop);
       send_one(record, index, stop);
+    } else if (record.work.sending == object_of(result)) {
+      // An earlier attempt stored it, but its confirmation was lost.
+      store::AuditEntry entry = transfer_out(record, result);
+      entry.success = true;
+      services_.audit.add(entry);
     }
     result.stored = true;
+    record.work.sending.reset();
     save_after(OrderState::kSending, record, now_());
   }
   record.order.state = OrderState::kSucceeded;

@@ -82,6 +82,7 @@ class OrderSteps {
   // As above, but throws Error kUnavailable if the object is damaged or missing.
   void check_object(store::OrderRecord& record, std::size_t index,
                     const std::stop_token& stop) const;
+  // Saves beforehand that the order sends the object.
   void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
   // Saves the order after `step` has succeeded, and resets failures of that and earlier steps.
   // Returns `next`. Throws OrderIsOver.

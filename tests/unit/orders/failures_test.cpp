@@ -150,6 +150,40 @@ TEST_F(OrdersTest, OfReceivedImagesThatAreReplacedWhileTheyAreReadAreIncomplete)
   EXPECT_EQ(code_of("second"), ErrorCode::kUnusableVolume) << "nothing replaces this one";
 }
 
+// As if the process died after the PACS had stored the object: nothing is saved from then on.
+TEST_F(OrdersTest, HaveTheTransferInTheAuditTrailThoughItsConfirmationIsLost) {
+  std::atomic<bool> is_dead = false;
+  store_.before_save = [&](const auto&) {
+    if (is_dead) throw Error(ErrorCode::kInternal, "the process is dead");
+  };
+  main_->after_store = [&] {
+    is_dead = true;
+    main_->is_down = true;
+    throw PacsFailure(PacsFault::kUnreachable, "the connection broke");
+  };
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return store_.unsaved() > 0; }));
+  stop();
+  EXPECT_THAT(outcomes_of("110104", id), ElementsAre("success", "failure")) << "in, out";
+  is_dead = false;
+  main_->is_down = false;
+  begin();
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(main_->stores, 1);
+  EXPECT_THAT(outcomes_of("110104", id), ElementsAre("success", "failure", "success"));
+}
+
+TEST_F(OrdersTest, ThatFindTheObjectOfAnotherOneHaveNoTransferOfIt) {
+  for (const bool is_first : {true, false}) {
+    const std::string id = submit();
+    ASSERT_TRUE(!is_first || finish_job());
+    ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+    EXPECT_EQ(outcomes_of("110104", id).size(), is_first ? 2U : 1U);
+  }
+  EXPECT_EQ(main_->stores, 1);
+}
+
 // Sixty hours, of which nothing is waited for.
 TEST_F(OrdersTest, OutliveAWeekendsOutage) {
   main_->is_down = true;

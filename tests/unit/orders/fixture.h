@@ -96,9 +96,10 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::atomic<int> aborted = 0;
   std::atomic<int> stores = 0;
   std::atomic<int> fetches = 0;
-  std::atomic<int> sent_slices = kSlices;  // of those that it lists
-  std::atomic<int> foreign_slice = -1;     // of another patient
-  std::atomic<bool> is_merged = false;     // the study has another Patient ID than its images
+  std::atomic<int> sent_slices = kSlices;     // of those that it lists
+  std::atomic<int> foreign_slice = -1;        // of another patient
+  std::atomic<bool> is_merged = false;        // the study has another Patient ID than its images
+  std::function<void()> after_store = [] {};  // set it before there are orders
 
   std::vector<FoundSeries> find_recent(const std::string&, const std::string&,
                                        const std::stop_token&) override {
@@ -150,6 +151,7 @@ class FakePacs : public Archive, public ObjectReceiver {
     ++stores;
     const Lock lock(mutex_);
     stored_.insert(object.place.instance);
+    after_store();
   }
 
   // From now on the series has these files instead of its slices.
@@ -359,11 +361,11 @@ class OrdersTest : public test::JobsFixture {
     }
   }
 
-  std::vector<std::string> outcomes_of_queries(const std::string& order) const {
+  std::vector<std::string> outcomes_of(const std::string& event, const std::string& order) const {
     std::vector<std::string> outcomes;
     audit_.read(0, [&](std::string_view line) {
       const auto entry = nlohmann::json::parse(line);
-      if (entry.at("event") == "110112" && entry.value("order", "") == order) {
+      if (entry.at("event") == event && entry.value("order", "") == order) {
         outcomes.push_back(entry.at("outcome"));
       }
     });

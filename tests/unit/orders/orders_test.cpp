@@ -31,10 +31,10 @@ TEST_F(OrdersTest, TheirFirstQueryIsInTheAuditTrailWithItsOutcome) {
   pass(minutes(10));
   ASSERT_TRUE(finish_job());
   ASSERT_TRUE(reaches(late, OrderState::kSucceeded));
-  EXPECT_THAT(outcomes_of_queries(late), ElementsAre("failure"));
+  EXPECT_THAT(outcomes_of("110112", late), ElementsAre("failure"));
   const std::string prompt = submit();
-  ASSERT_TRUE(until([&] { return !outcomes_of_queries(prompt).empty(); }));
-  EXPECT_THAT(outcomes_of_queries(prompt), ElementsAre("success"));
+  ASSERT_TRUE(until([&] { return !outcomes_of("110112", prompt).empty(); }));
+  EXPECT_THAT(outcomes_of("110112", prompt), ElementsAre("success"));
 }
 
 // The error names the iso-value and the range of the samples, which explain the empty surface.
