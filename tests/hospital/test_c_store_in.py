@@ -120,7 +120,7 @@ class Receiving(Loop):
             self.assertNotIn(secret, daemon.logged())
 
     def test_replaced(self):
-        """What is sent again with other contents leaves nothing of before, also while it waits."""
+        """An image that is sent again with other contents leaves no former file."""
         _, folder = self.made()
         daemon = self.receiver(settle=3600)
         files = self.in_folder(folder)
