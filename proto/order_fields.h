@@ -72,6 +72,7 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("max_error_mm", self.max_error_mm);
   field("triangles", self.triangles);
   field("queried", self.queried);
+  field("sending", self.sending);
   field("failed_in", self.failed_in);
   field("contents", self.contents);
 }

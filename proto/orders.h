@@ -107,6 +107,9 @@ struct OrderWork {
   std::optional<double> max_error_mm = {};
   std::optional<std::uint32_t> triangles = {};  // the number that fits, if not all do
   std::optional<std::string> queried = {};      // when the query of the audit trail was recorded
+  // The object that is being sent, or whose sending failed: the PACS, a blank, the SOP Instance
+  // UID.
+  std::optional<std::string> sending = {};
   // The failures are forgotten once this step succeeds. Empty: there were none.
   std::optional<OrderState> failed_in = {};
 

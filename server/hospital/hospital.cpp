@@ -96,6 +96,7 @@ class OpenHospital {
     listener_ = std::make_unique<c_store::DimseListener>(
         c_store::ListenerServices{.folder = services.folder,
                                   .blobs = services.blobs,
+                                  .volumes = services.volumes,
                                   .received = services.received,
                                   .audit = services.audit,
                                   .processes = *dimse_},

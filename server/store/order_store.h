@@ -65,6 +65,11 @@ struct OrderFilter {
   std::optional<std::string> rule = {};
 };
 
+struct CancelledOrder {
+  Order order;
+  std::vector<std::string> blobs;  // that it named until its end
+};
+
 struct OrderCounts {
   std::map<std::pair<OrderState, std::string>, std::uint64_t> by_state_and_rule;
   std::optional<Time> oldest_open = {};
@@ -118,7 +123,7 @@ class OrderStore {
   virtual void hurry(const std::string& id) = 0;
 
   // Cancels an open order; an ended one stays as it is. Throws Error kNotFound.
-  virtual Order cancel(const Viewer& viewer, const std::string& id) = 0;
+  virtual CancelledOrder cancel(const Viewer& viewer, const std::string& id) = 0;
 
   // Restarts a failed order from its beginning. Throws Error kNotFound; kNotReady unless it has
   // failed.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -45,8 +46,10 @@ class ReceivedStore {
  public:
   virtual ~ReceivedStore() = default;
 
-  // The instance survives a crash once this returns. Replaces one with the same UID.
-  virtual void add(const ReceivedSeries& series, const ReceivedInstance& instance) = 0;
+  // The instance survives a crash once this returns. Replaces one with the same UID, and returns
+  // the blob of that one if it was another.
+  virtual std::optional<std::string> add(const ReceivedSeries& series,
+                                         const ReceivedInstance& instance) = 0;
 
   // All series with held instances.
   virtual std::vector<HeldSeries> held() const = 0;

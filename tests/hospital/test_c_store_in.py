@@ -119,6 +119,24 @@ class Receiving(Loop):
         for secret in (series.study, series.uid, series.instances[0], "PAT-4711"):
             self.assertNotIn(secret, daemon.logged())
 
+    def test_replaced(self):
+        """An image that is sent again with other contents leaves no former file."""
+        _, folder = self.made()
+        daemon = self.receiver(settle=3600)
+        files = self.in_folder(folder)
+        self.send(daemon, files)
+        before = self.received(daemon)
+        for path in files:
+            with open(path, "rb") as file:
+                data = file.read()
+            self.assertIn(b"PAT-4711", data)
+            with open(path, "wb") as file:
+                file.write(data.replace(b"PAT-4711", b"PAT-4712"))
+        self.send(daemon, files)
+        now = self.received(daemon)
+        self.assertEqual((len(before), len(now)), (12, 12))
+        self.assertFalse(set(before) & set(now))
+
     def test_orthanc_sends(self):
         """A PACS that sends a series by itself gets the mesh back."""
         series = self.series()

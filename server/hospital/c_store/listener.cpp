@@ -13,6 +13,7 @@
 
 #include "base/log.h"
 #include "server/hospital/orders/received.h"
+#include "server/hospital/orders/unnamed.h"
 #include "server/process/child.h"
 
 namespace isomesh::c_store {
@@ -245,19 +246,26 @@ bool DimseListener::has_room(std::uint64_t more_bytes) const {
 }
 
 DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesystem::path& folder) {
+  DimseVerdict verdict = DimseVerdict::kNoRoom;
+  std::vector<std::string> stored;
+  std::optional<std::string> replaced;
   try {
     const std::filesystem::path file = folder / object.file;
     const store::Blob blob = store::digest_of(file);
-    if (!has_room(blob.bytes)) return DimseVerdict::kNoRoom;
+    if (!has_room(blob.bytes)) return verdict;
     services_.blobs.adopt(file, blob, "");  // the owner of its order is not known yet
-    services_.received.add({.route = object.called, .study = object.study, .series = object.series},
-                           {.instance = object.instance, .blob = blob.key, .bytes = blob.bytes});
-    services_.blobs.mark_named(blob.key);
-    return DimseVerdict::kStored;
+    stored.push_back(blob.key);
+    replaced = services_.received.add(
+        {.route = object.called, .study = object.study, .series = object.series},
+        {.instance = object.instance, .blob = blob.key, .bytes = blob.bytes});
+    verdict = DimseVerdict::kStored;
   } catch (const Error& error) {
     log_error("a received object could not be stored, and its sender is told so: {}", error.what());
-    return DimseVerdict::kNoRoom;
   }
+  std::vector<std::string> former;
+  if (replaced) former.push_back(*replaced);
+  orders::erase_unnamed(services_.blobs, services_.volumes, former, stored);
+  return verdict;
 }
 
 void DimseListener::note_transfers(const Transfers& transfers, const std::string& party) {

@@ -24,6 +24,7 @@
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/received_store.h"
+#include "server/store/volume_store.h"
 
 namespace isomesh::c_store {
 
@@ -34,6 +35,7 @@ net::Address listen_address(const orders::DimseSettings& settings);
 struct ListenerServices {
   const store::DataFolder& folder;
   store::BlobStore& blobs;
+  const store::VolumeStore& volumes;
   store::ReceivedStore& received;
   store::AuditTrail& audit;
   process::PreparedProcesses& processes;  // running isomesh-dimse

@@ -268,7 +268,7 @@ Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range)
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs) {
+                                     store::BlobStore& blobs, std::vector<std::string>& stored) {
   std::vector<MadeObject> objects;
   std::string materials_uid;
   for (Document& document : documents_of(record, job, blobs)) {
@@ -284,6 +284,7 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
     if (!document.blob.empty()) copy(*blobs.open(document.blob), document, *writer);
     write(envelope.after, *writer);
     object.blob = writer->commit();
+    stored.push_back(object.blob.key);
     objects.push_back(std::move(object));
   }
   return objects;

@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "proto/error.h"
+#include "server/hospital/orders/unnamed.h"
 
 namespace isomesh::orders {
 namespace {
@@ -163,8 +164,7 @@ std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest
 }
 
 Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
-  const std::vector<std::string> named = services_.orders.blobs(id);
-  const Order order = services_.orders.cancel(viewer, id);
+  const auto [order, objects] = services_.orders.cancel(viewer, id);
   {
     const Lock lock(mutex_);
     if (const auto running = running_.find(id); running != running_.end()) {
@@ -178,7 +178,7 @@ Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
       if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
     }
   }
-  erase_unnamed(named);
+  erase_unnamed(services_.blobs, services_.volumes, objects);
   ended(order.id);
   changed();
   return order;
@@ -303,26 +303,24 @@ void Orders::work(const std::stop_token& stop) {
 }
 
 void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
-  const std::vector<std::string> named = services_.orders.blobs(record.order.id);
-  make_step(record, stop);
-  if (is_final(record.order.state) || record.work.blobs != named) erase_unnamed(named);
+  // Also after an exception: nobody else knows objects of a step that could not be saved.
+  struct Objects {
+    const OrderServices& services;
+    std::vector<std::string> named;
+    std::vector<std::string> stored = {};
+
+    ~Objects() { erase_unnamed(services.blobs, services.volumes, std::move(named), stored); }
+  } objects{.services = services_, .named = services_.orders.blobs(record.order.id)};
+  make_step(record, stop, objects.stored);
 }
 
-void Orders::erase_unnamed(const std::vector<std::string>& blobs) {
-  try {
-    services_.blobs.erase_unnamed(
-        blobs, {}, [this](const std::string& key) { return services_.volumes.names(key); });
-  } catch (const std::exception& error) {
-    log_error("objects of an order could not be erased and are removed later: {}", error.what());
-  }
-}
-
-void Orders::make_step(store::OrderRecord& record, const std::stop_token& stop) {
+void Orders::make_step(store::OrderRecord& record, const std::stop_token& stop,
+                       std::vector<std::string>& stored) {
   if (record.is_damaged) return end_damaged(record);
   const std::string pacs = OrderSteps::pacs_of(record);
   const OrderState before = record.order.state;
   try {
-    steps_.advance(record, stop);
+    steps_.advance(record, stop, stored);
     if (!pacs.empty()) note_success(pacs);
     if (record.order.state == OrderState::kMeshing && record.order.job) wait_for_job(record.order);
     if (is_final(record.order.state)) ended(record.order.id);

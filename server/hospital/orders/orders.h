@@ -112,9 +112,8 @@ class Orders {
                                          const std::stop_token& stop, std::stop_token& cancelled);
   void give_back(const std::string& id);
   void advance(store::OrderRecord record, const std::stop_token& stop);
-  void make_step(store::OrderRecord& record, const std::stop_token& stop);
-  // Erases those of the blobs that no record names any more: objects contain names of patients.
-  void erase_unnamed(const std::vector<std::string>& blobs);
+  void make_step(store::OrderRecord& record, const std::stop_token& stop,
+                 std::vector<std::string>& stored);
   // `record` may already be at an earlier step than the failed one.
   void fail_step(store::OrderRecord& record, OrderState failed, const Error& error, bool may_pass,
                  std::chrono::seconds retry_after);

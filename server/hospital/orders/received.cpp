@@ -14,6 +14,7 @@
 #include "base/log.h"
 #include "base/sha256.h"
 #include "server/hospital/orders/orders.h"
+#include "server/hospital/orders/unnamed.h"
 
 namespace isomesh::orders {
 namespace {
@@ -95,7 +96,8 @@ std::string Received::fetch_series(const std::string& study, const std::string& 
   const std::string boundary = random_hex(kBoundaryBytes);
   const Descriptor file(::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (file.number() < 0) throw_system_error("open", errno);
-  for (const store::ReceivedInstance& each : received_.instances({title_, study, series})) {
+  const auto instances = received_.instances({title_, study, series});
+  for (const store::ReceivedInstance& each : instances) {
     if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "the order was cancelled");
     if (each.blob.empty()) {
       throw PacsFailure(PacsFault::kIncomplete,
@@ -104,6 +106,9 @@ std::string Received::fetch_series(const std::string& study, const std::string& 
     }
     append(file, "\r\n--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n");
     if (!append(file, blobs_, each.blob)) {
+      if (received_.instances({title_, study, series}) != instances) {
+        throw PacsFailure(PacsFault::kIncomplete, "the series changed while it was read");
+      }
       throw Error(ErrorCode::kUnusableVolume,
                   "the received image " + each.instance +
                       " is damaged or missing in the store: send the whole series again");
@@ -140,7 +145,7 @@ store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
     log(record, "");
     changed();
   } else if (fate == store::ReceivedFate::kDone) {
-    erase_unnamed(services_.received.release(held));
+    erase_unnamed(services_.blobs, services_.volumes, services_.received.release(held));
   }
   return fate;
 }

@@ -30,7 +30,8 @@ class Received : public SeriesSource {
                                          const std::stop_token& stop) override;
   std::vector<std::string> list_instances(const std::string& study, const std::string& series,
                                           const std::stop_token& stop) override;
-  // Throws PacsFailure kIncomplete if some instances are known but no longer held.
+  // Throws PacsFailure kIncomplete if some instances are known but no longer held, or were replaced
+  // meanwhile.
   std::string fetch_series(const std::string& study, const std::string& series,
                            const std::filesystem::path& target,
                            const std::stop_token& stop) override;

@@ -96,6 +96,20 @@ store::AuditEntry transfer(const store::OrderRecord& record, const std::string& 
           .study = study};
 }
 
+// The same for one of the order's objects.
+store::AuditEntry transfer_out(const store::OrderRecord& record, const OrderResult& result) {
+  const DicomIdentity& identity = *record.work.identity;
+  store::AuditEntry entry = transfer(record, result.pacs, "out", identity.study_uid);
+  entry.instances = 1;
+  entry.patient_id = identity.patient_id;
+  return entry;
+}
+
+// The object, as in OrderWork::sending.
+std::string object_of(const OrderResult& result) {
+  return result.pacs + ' ' + result.sop_instance_uid;
+}
+
 // Resets the list of instances, the images, and all results from them.
 void forget_images(store::OrderRecord& record) {
   record.order.state = OrderState::kWaiting;
@@ -128,14 +142,15 @@ std::string OrderSteps::pacs_of(const store::OrderRecord& record) {
   }
 }
 
-Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop) const {
+Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop,
+                         std::vector<std::string>& stored) const {
   switch (record.order.state) {
     case OrderState::kWaiting:
       return wait_for_series(record, stop);
     case OrderState::kFetching:
       return fetch(record, stop);
     case OrderState::kMeshing:
-      return mesh(record);
+      return mesh(record, stored);
     case OrderState::kSending:
       return send(record, stop);
     default:
@@ -297,7 +312,7 @@ bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) c
          !store::is_there_and_intact(services_.blobs, *record.order.volume, {});
 }
 
-Time OrderSteps::mesh(store::OrderRecord& record) const {
+Time OrderSteps::mesh(store::OrderRecord& record, std::vector<std::string>& stored) const {
   try {
     if (!record.order.job) return submit_job(record);
     const Job job = services_.jobs.get(std::nullopt, *record.order.job);
@@ -308,7 +323,7 @@ Time OrderSteps::mesh(store::OrderRecord& record) const {
     if (job.state != JobState::kSucceeded) {
       throw Error(ErrorCode::kUnusableVolume, "the order's job was cancelled");
     }
-    return make(record, job);
+    return make(record, job, stored);
   } catch (const Error& error) {
     if (!is_lost(error, record)) throw;
     forget_images(record);
@@ -319,7 +334,8 @@ Time OrderSteps::mesh(store::OrderRecord& record) const {
   }
 }
 
-Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
+Time OrderSteps::make(store::OrderRecord& record, const Job& job,
+                      std::vector<std::string>& stored) const {
   record.order.results.clear();
   record.work.blobs.clear();
   std::vector<MadeObject> objects;
@@ -350,7 +366,8 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       }
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
-    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs);
+    objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs,
+                           stored);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {
@@ -366,9 +383,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     }
   }
   record.order.state = OrderState::kSending;
-  const Time next = save_after(OrderState::kMeshing, record, now_());
-  for (const MadeObject& object : objects) services_.blobs.mark_named(object.blob.key);
-  return next;
+  return save_after(OrderState::kMeshing, record, now_());
 }
 
 bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderResult& result,
@@ -417,9 +432,11 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
   const InstancePlace place = {.study = identity.study_uid,
                                .series = result.series_uid,
                                .instance = result.sop_instance_uid};
-  store::AuditEntry entry = transfer(record, result.pacs, "out", identity.study_uid);
-  entry.instances = 1;
-  entry.patient_id = identity.patient_id;
+  store::AuditEntry entry = transfer_out(record, result);
+  if (record.work.sending != object_of(result)) {
+    record.work.sending = object_of(result);
+    save(record, now_());
+  }
   try {
     receiver->store(
         {.place = place,
@@ -455,8 +472,14 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     if (has_instance(result.pacs, place, stop) != true) {
       check_object(record, index, stop);
       send_one(record, index, stop);
+    } else if (record.work.sending == object_of(result)) {
+      // An earlier attempt stored it, but its confirmation was lost.
+      store::AuditEntry entry = transfer_out(record, result);
+      entry.success = true;
+      services_.audit.add(entry);
     }
     result.stored = true;
+    record.work.sending.reset();
     save_after(OrderState::kSending, record, now_());
   }
   record.order.state = OrderState::kSucceeded;

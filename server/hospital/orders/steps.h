@@ -53,7 +53,10 @@ class OrderSteps {
   // Makes and saves the next step of an open order; returns when the following one is due. Throws
   // PacsFailure and Error if the step failed; `record` then has the state to save. Every return to
   // an earlier step is such a failure, so that none repeats without a pause. Throws OrderIsOver.
-  store::Time advance(store::OrderRecord& record, const std::stop_token& stop) const;
+  // `stored` gets the keys of the objects that the step stores, also if it throws: the caller
+  // passes them to erase_unnamed.
+  store::Time advance(store::OrderRecord& record, const std::stop_token& stop,
+                      std::vector<std::string>& stored) const;
 
   // The PACS of the next step; empty if it uses none.
   static std::string pacs_of(const store::OrderRecord& record);
@@ -63,10 +66,11 @@ class OrderSteps {
   void note_query(store::OrderRecord& record, bool success) const;
   store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
-  store::Time mesh(store::OrderRecord& record) const;
+  store::Time mesh(store::OrderRecord& record, std::vector<std::string>& stored) const;
   bool is_lost(const Error& error, const store::OrderRecord& record) const;
   store::Time submit_job(store::OrderRecord& record) const;
-  store::Time make(store::OrderRecord& record, const Job& job) const;
+  store::Time make(store::OrderRecord& record, const Job& job,
+                   std::vector<std::string>& stored) const;
   store::Time send(store::OrderRecord& record, const std::stop_token& stop) const;
   // False if the study belongs to another patient now.
   bool is_same_patient(const store::OrderRecord& record, const OrderResult& result,
@@ -78,6 +82,7 @@ class OrderSteps {
   // As above, but throws Error kUnavailable if the object is damaged or missing.
   void check_object(store::OrderRecord& record, std::size_t index,
                     const std::stop_token& stop) const;
+  // Saves beforehand that the order sends the object.
   void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
   // Saves the order after `step` has succeeded, and resets failures of that and earlier steps.
   // Returns `next`. Throws OrderIsOver.

@@ -131,6 +131,13 @@ void insert_watched(SqlConnection& connection, const OrderSpec& spec, const Watc
       series.rule, series.study, series.series, spec.record.order.id, series.instances);
 }
 
+std::vector<std::string> named_blobs(SqlConnection& connection, const std::string& id) {
+  Rows rows = connection.query("SELECT blob FROM order_blobs WHERE \"order\" = ?1", id);
+  std::vector<std::string> blobs;
+  while (rows.next()) blobs.push_back(rows.text(0));
+  return blobs;
+}
+
 void name_blobs(SqlConnection& connection, const OrderRecord& record) {
   connection.run("DELETE FROM order_blobs WHERE \"order\" = ?1", record.order.id);
   if (is_final(record.order.state)) return;
@@ -284,10 +291,7 @@ bool SqlOrderStore::save(const OrderRecord& record, Time next) {
 }
 
 std::vector<std::string> SqlOrderStore::blobs(const std::string& id) const {
-  Rows rows = database_.query("SELECT blob FROM order_blobs WHERE \"order\" = ?1", id);
-  std::vector<std::string> blobs;
-  while (rows.next()) blobs.push_back(rows.text(0));
-  return blobs;
+  return database_.read([&](SqlConnection& connection) { return named_blobs(connection, id); });
 }
 
 void SqlOrderStore::hurry(const std::string& id) {
@@ -297,16 +301,20 @@ void SqlOrderStore::hurry(const std::string& id) {
                 id);
 }
 
-Order SqlOrderStore::cancel(const Viewer& viewer, const std::string& id) {
-  return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+CancelledOrder SqlOrderStore::cancel(const Viewer& viewer, const std::string& id) {
+  return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) -> CancelledOrder {
     SqlConnection& connection = transaction.connection();
     OrderRecord record = found(connection, viewer, id, connection.for_update());
-    if (is_final(record.order.state) && !record.is_damaged) return record.order;
+    // The first attempt of this transaction may have cancelled it.
+    if (is_final(record.order.state) && !record.is_damaged) {
+      return {.order = record.order, .blobs = record.work.blobs};
+    }
+    const std::vector<std::string> blobs = named_blobs(connection, id);
     cancel_order(record);
     write(connection, record);
     tell_of_end(connection, record);
     transaction.commit();
-    return record.order;
+    return {.order = record.order, .blobs = blobs};
   });
 }
 

@@ -35,7 +35,7 @@ class SqlOrderStore : public OrderStore {
   bool save(const OrderRecord& record, Time next) override;
   std::vector<std::string> blobs(const std::string& id) const override;
   void hurry(const std::string& id) override;
-  Order cancel(const Viewer& viewer, const std::string& id) override;
+  CancelledOrder cancel(const Viewer& viewer, const std::string& id) override;
   Order retry(const Viewer& viewer, const std::string& id) override;
   OrderCounts counts() const override;
   std::size_t forget(Time before) override;

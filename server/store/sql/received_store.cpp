@@ -2,13 +2,29 @@
 
 namespace isomesh::store {
 
-void SqlReceivedStore::add(const ReceivedSeries& series, const ReceivedInstance& instance) {
-  database_.run(Change::kNew,
-                "INSERT INTO received(route, study, series, instance, blob, bytes, at) VALUES(?1, "
-                "?2, ?3, ?4, ?5, ?6, isomesh_now()) ON CONFLICT(route, study, series, instance) DO "
-                "UPDATE SET blob = excluded.blob, bytes = excluded.bytes, at = excluded.at",
-                series.route, series.study, series.series, instance.instance, instance.blob,
-                instance.bytes);
+// If the connection is lost, a repetition returns no blob; the replaced one is swept.
+std::optional<std::string> SqlReceivedStore::add(const ReceivedSeries& series,
+                                                 const ReceivedInstance& instance) {
+  using Replaced = std::optional<std::string>;
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) -> Replaced {
+    Replaced replaced;
+    {
+      Rows row = transaction->query(
+          std::string("SELECT blob FROM received WHERE route = ?1 AND study = ?2 AND series = ?3 "
+                      "AND instance = ?4 AND blob <> ?5") +
+              transaction->for_update(),
+          series.route, series.study, series.series, instance.instance, instance.blob);
+      if (row.next()) replaced = row.text(0);
+    }
+    transaction->run(
+        "INSERT INTO received(route, study, series, instance, blob, bytes, at) VALUES(?1, ?2, ?3, "
+        "?4, ?5, ?6, isomesh_now()) ON CONFLICT(route, study, series, instance) DO UPDATE SET "
+        "blob = excluded.blob, bytes = excluded.bytes, at = excluded.at",
+        series.route, series.study, series.series, instance.instance, instance.blob,
+        instance.bytes);
+    transaction.commit();
+    return replaced;
+  });
 }
 
 std::vector<HeldSeries> SqlReceivedStore::held() const {

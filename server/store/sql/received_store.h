@@ -10,7 +10,8 @@ class SqlReceivedStore : public ReceivedStore {
  public:
   explicit SqlReceivedStore(SqlDatabase& database) : database_(database) {}
 
-  void add(const ReceivedSeries& series, const ReceivedInstance& instance) override;
+  std::optional<std::string> add(const ReceivedSeries& series,
+                                 const ReceivedInstance& instance) override;
   std::vector<HeldSeries> held() const override;
   std::uint64_t held_bytes() const override;
   std::vector<ReceivedInstance> instances(const ReceivedSeries& series) const override;

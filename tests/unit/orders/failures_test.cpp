@@ -122,6 +122,68 @@ TEST_F(OrdersTest, WhoseObjectIsMissingMakeItAgainAfterAPause) {
   EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
 }
 
+// Receives an instance with other contents right after somebody has asked for all.
+class ReplacingReceived : public store::SqlReceivedStore {
+ public:
+  using SqlReceivedStore::SqlReceivedStore;
+
+  std::vector<store::ReceivedInstance> instances(
+      const store::ReceivedSeries& series) const override {
+    auto all = SqlReceivedStore::instances(series);
+    if (const auto act = std::exchange(replace, nullptr)) act();
+    return all;
+  }
+
+  mutable std::function<void()> replace;
+};
+
+TEST_F(OrdersTest, OfReceivedImagesThatAreReplacedWhileTheyAreReadAreIncomplete) {
+  ReplacingReceived received(database_);
+  const store::ReceivedSeries series = {"BONE", kStudy, kSeries};
+  received.add(series, {instance_of(0), "of the first", 1});
+  received.replace = [&] { received.add(series, {instance_of(0), "of the second", 1}); };
+  Received source("BONE", received, blobs_);
+  const auto code_of = [&](const std::string& file) {
+    return test::code_thrown_by([&] { source.fetch_series(kStudy, kSeries, folder_ / file, {}); });
+  };
+  EXPECT_EQ(code_of("first"), ErrorCode::kSeriesIncomplete);
+  EXPECT_EQ(code_of("second"), ErrorCode::kUnusableVolume) << "nothing replaces this one";
+}
+
+// As if the process died after the PACS had stored the object: nothing is saved from then on.
+TEST_F(OrdersTest, HaveTheTransferInTheAuditTrailThoughItsConfirmationIsLost) {
+  std::atomic<bool> is_dead = false;
+  store_.before_save = [&](const auto&) {
+    if (is_dead) throw Error(ErrorCode::kInternal, "the process is dead");
+  };
+  main_->after_store = [&] {
+    is_dead = true;
+    main_->is_down = true;
+    throw PacsFailure(PacsFault::kUnreachable, "the connection broke");
+  };
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return store_.unsaved() > 0; }));
+  stop();
+  EXPECT_THAT(outcomes_of("110104", id), ElementsAre("success", "failure")) << "in, out";
+  is_dead = false;
+  main_->is_down = false;
+  begin();
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(main_->stores, 1);
+  EXPECT_THAT(outcomes_of("110104", id), ElementsAre("success", "failure", "success"));
+}
+
+TEST_F(OrdersTest, ThatFindTheObjectOfAnotherOneHaveNoTransferOfIt) {
+  for (const bool is_first : {true, false}) {
+    const std::string id = submit();
+    ASSERT_TRUE(!is_first || finish_job());
+    ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+    EXPECT_EQ(outcomes_of("110104", id).size(), is_first ? 2U : 1U);
+  }
+  EXPECT_EQ(main_->stores, 1);
+}
+
 // Sixty hours, of which nothing is waited for.
 TEST_F(OrdersTest, OutliveAWeekendsOutage) {
   main_->is_down = true;

@@ -96,9 +96,10 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::atomic<int> aborted = 0;
   std::atomic<int> stores = 0;
   std::atomic<int> fetches = 0;
-  std::atomic<int> sent_slices = kSlices;  // of those that it lists
-  std::atomic<int> foreign_slice = -1;     // of another patient
-  std::atomic<bool> is_merged = false;     // the study has another Patient ID than its images
+  std::atomic<int> sent_slices = kSlices;     // of those that it lists
+  std::atomic<int> foreign_slice = -1;        // of another patient
+  std::atomic<bool> is_merged = false;        // the study has another Patient ID than its images
+  std::function<void()> after_store = [] {};  // set it before there are orders
 
   std::vector<FoundSeries> find_recent(const std::string&, const std::string&,
                                        const std::stop_token&) override {
@@ -150,6 +151,7 @@ class FakePacs : public Archive, public ObjectReceiver {
     ++stores;
     const Lock lock(mutex_);
     stored_.insert(object.place.instance);
+    after_store();
   }
 
   // From now on the series has these files instead of its slices.
@@ -190,7 +192,7 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::vector<std::string> held_ ISOMESH_GUARDED_BY(mutex_);
 };
 
-// Tells until when nothing was due.
+// Tells until when nothing was due, and lets the test act before a change.
 class WatchedOrders : public store::SqlOrderStore {
  public:
   using SqlOrderStore::SqlOrderStore;
@@ -221,7 +223,27 @@ class WatchedOrders : public store::SqlOrderStore {
   }
   store::Time looked_at() const { return looked_at_; }
 
+  // Set these before an order is there.
+  std::function<void(const store::OrderRecord&)> before_save = [](const auto&) {};
+  std::function<void()> before_cancel = [] {};
+
+  bool save(const store::OrderRecord& record, store::Time next) override {
+    try {
+      before_save(record);
+    } catch (const Error&) {
+      ++unsaved_;
+      throw;
+    }
+    return SqlOrderStore::save(record, next);
+  }
+  int unsaved() const { return unsaved_; }
+  store::CancelledOrder cancel(const store::Viewer& viewer, const std::string& id) override {
+    before_cancel();
+    return SqlOrderStore::cancel(viewer, id);
+  }
+
  private:
+  std::atomic<int> unsaved_ = 0;
   mutable std::atomic<int> waiting_ = 0;
   std::atomic<bool> is_held_ = false;
   mutable std::atomic<store::Time> idle_at_ = store::Time();
@@ -299,6 +321,9 @@ class OrdersTest : public test::JobsFixture {
     request.source = {.pacs = pacs, .study = kStudy, .series = series};
     request.parameters = parameters;
     request.send = {{.pacs = pacs}};
+    return submit(request);
+  }
+  std::string submit(const OrderRequest& request) {
     return orders_->submit({.name = "", .is_administrator = true}, request, "", "").first.id;
   }
 
@@ -336,11 +361,11 @@ class OrdersTest : public test::JobsFixture {
     }
   }
 
-  std::vector<std::string> outcomes_of_queries(const std::string& order) const {
+  std::vector<std::string> outcomes_of(const std::string& event, const std::string& order) const {
     std::vector<std::string> outcomes;
     audit_.read(0, [&](std::string_view line) {
       const auto entry = nlohmann::json::parse(line);
-      if (entry.at("event") == "110112" && entry.value("order", "") == order) {
+      if (entry.at("event") == event && entry.value("order", "") == order) {
         outcomes.push_back(entry.at("outcome"));
       }
     });
@@ -365,6 +390,14 @@ class OrdersTest : public test::JobsFixture {
     if (triangles == 0) outcome.mesh->iso = 1000;
     outcome.mesh->labels_count = labels_of_mesh_;
     outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
+    if (bytes_of_obj_ > 0) {
+      const auto obj_writer = blobs_.begin("");
+      const std::string obj(bytes_of_obj_, '#');
+      obj_writer->write(std::as_bytes(std::span(obj)));
+      const store::Blob obj_blob = obj_writer->commit();
+      outcome.mesh->files[MeshFormat::kObj] = {
+          .bytes = obj_blob.bytes, .sha256 = obj_blob.key, .href = "/y"};
+    }
     const bool is_done = jobs_.finish(*lease, outcome);
     before_told(lease->id);
     orders_->job_ended(lease->id);
@@ -382,6 +415,7 @@ class OrdersTest : public test::JobsFixture {
   store::SqlAuditTrail audit_{database_};
   WatchedReceived received_{database_};
   std::optional<std::uint64_t> labels_of_mesh_;
+  std::size_t bytes_of_obj_ = 0;   // 0: the mesh has no OBJ
   JobParameters last_parameters_;  // of the job that was finished last
   std::unique_ptr<Orders> orders_;
 };

@@ -31,10 +31,10 @@ TEST_F(OrdersTest, TheirFirstQueryIsInTheAuditTrailWithItsOutcome) {
   pass(minutes(10));
   ASSERT_TRUE(finish_job());
   ASSERT_TRUE(reaches(late, OrderState::kSucceeded));
-  EXPECT_THAT(outcomes_of_queries(late), ElementsAre("failure"));
+  EXPECT_THAT(outcomes_of("110112", late), ElementsAre("failure"));
   const std::string prompt = submit();
-  ASSERT_TRUE(until([&] { return !outcomes_of_queries(prompt).empty(); }));
-  EXPECT_THAT(outcomes_of_queries(prompt), ElementsAre("success"));
+  ASSERT_TRUE(until([&] { return !outcomes_of("110112", prompt).empty(); }));
+  EXPECT_THAT(outcomes_of("110112", prompt), ElementsAre("success"));
 }
 
 // The error names the iso-value and the range of the samples, which explain the empty surface.
@@ -439,50 +439,6 @@ TEST_F(OrdersTest, OfASeriesThatIsNotThereFailAfterSomeLooks) {
     return is_final(get(id).state);
   }));
   EXPECT_EQ(get(id).error->type, "urn:isomesh:problem:pacs-refused");
-}
-
-// An order whose object, with the patient's name, is about to be sent.
-class SendingOrdersTest : public OrdersTest {
- protected:
-  void make_object() {
-    id_ = submit();
-    ASSERT_TRUE(until([&] { return get(id_).job.has_value(); }));
-    main_->is_down = true;
-    ASSERT_TRUE(finish_job());
-    ASSERT_TRUE(reaches(id_, OrderState::kSending));
-    const std::vector<std::string> objects = store_.blobs(id_);
-    ASSERT_EQ(objects.size(), 1U);
-    object_ = objects[0];
-    ASSERT_TRUE(blobs_.size(object_));
-  }
-  bool is_erased() {
-    return until([&] { return !blobs_.size(object_); }) &&
-           test::files_below(folder_ / "data/quarantine").empty();
-  }
-
-  std::string id_;
-  std::string object_;
-};
-
-TEST_F(SendingOrdersTest, LeaveNoObjectWhenTheySucceed) {
-  make_object();
-  main_->is_down = false;
-  pass(hours(1));
-  ASSERT_TRUE(reaches(id_, OrderState::kSucceeded));
-  EXPECT_TRUE(is_erased());
-}
-
-TEST_F(SendingOrdersTest, LeaveNoObjectWhenTheyAreCancelled) {
-  make_object();
-  orders_->cancel(std::nullopt, id_);
-  EXPECT_TRUE(is_erased());
-}
-
-TEST_F(SendingOrdersTest, LeaveAnObjectThatSomethingElseNames) {
-  make_object();
-  received_.add({"BONE", kStudy, kSeries}, {"1.2.3", object_, 1});
-  orders_->cancel(std::nullopt, id_);
-  EXPECT_TRUE(blobs_.size(object_));
 }
 
 TEST_F(OrdersTest, NameConfiguredPacsOnly) {

@@ -49,6 +49,7 @@ OrderWork some_work() {
   work.label = "Bone";
   work.series_number = 9001;
   work.callback = "https://ris.example/";
+  work.sending = "main 2.25.7";
   return work;
 }
 

@@ -118,11 +118,11 @@ TEST_P(OrderConformance, StepsAreKeptAndPutOff) {
 // Whoever works on a cancelled order finds that out when it saves.
 TEST_P(OrderConformance, ThatHaveEndedStayAsTheyAre) {
   OrderRecord record = submitted();
-  EXPECT_EQ(orders().cancel("", record.order.id).state, OrderState::kCancelled);
+  EXPECT_EQ(orders().cancel("", record.order.id).order.state, OrderState::kCancelled);
   record.order.state = OrderState::kFetching;
   EXPECT_FALSE(orders().save(record, now()));
   EXPECT_FALSE(end(record, OrderState::kSucceeded));
-  EXPECT_EQ(orders().cancel("", record.order.id).state, OrderState::kCancelled);
+  EXPECT_EQ(orders().cancel("", record.order.id).order.state, OrderState::kCancelled);
   EXPECT_THAT(due(now() + hours(1)), IsEmpty());
   EXPECT_FALSE(orders().next_after(now()));
 }
@@ -174,7 +174,7 @@ TEST_P(OrderConformance, ADamagedRecordIsCancelled) {
     const OrderRecord record = submitted();
     if (has_ended) end(record, OrderState::kFailed);
     damage("orders", record.order.id);
-    EXPECT_EQ(orders().cancel(std::nullopt, record.order.id).state, OrderState::kCancelled);
+    EXPECT_EQ(orders().cancel(std::nullopt, record.order.id).order.state, OrderState::kCancelled);
     EXPECT_EQ(orders().get(std::nullopt, record.order.id).state, OrderState::kCancelled);
   }
 }
@@ -200,6 +200,23 @@ TEST_P(OrderConformance, TellTheBlobsThatTheyName) {
   EXPECT_THAT(orders().blobs(record.order.id), testing::UnorderedElementsAre("a", "b"));
   end(record, OrderState::kSucceeded);
   EXPECT_THAT(orders().blobs(record.order.id), IsEmpty());
+}
+
+// The caller erases them.
+TEST_P(OrderConformance, TellTheBlobsThatTheyNamedUntilTheyWereCancelled) {
+  OrderRecord record = submitted();
+  record.work.blobs = {"b", "a"};
+  orders().save(record, now());
+  for (const char* attempt : {"first", "second"}) {
+    EXPECT_THAT(orders().cancel(std::nullopt, record.order.id).blobs,
+                testing::UnorderedElementsAre("a", "b"))
+        << attempt;
+  }
+  OrderRecord damaged = submitted();
+  damaged.work.blobs = {"c"};
+  orders().save(damaged, now());
+  damage("orders", damaged.order.id);
+  EXPECT_THAT(orders().cancel(std::nullopt, damaged.order.id).blobs, ElementsAre("c"));
 }
 
 TEST_P(OrderConformance, TheirEndIsToldOnce) {

@@ -20,9 +20,9 @@ const ReceivedSeries kSeries = {"BONE", "1.2", "1.3"};
 
 class ReceivedConformance : public test::EngineTest {
  protected:
-  void add(const std::string& instance, const std::string& blob,
-           const ReceivedSeries& series = kSeries) {
-    received().add(series, {.instance = instance, .blob = blob, .bytes = 10});
+  std::optional<std::string> add(const std::string& instance, const std::string& blob,
+                                 const ReceivedSeries& series = kSeries) {
+    return received().add(series, {.instance = instance, .blob = blob, .bytes = 10});
   }
   HeldSeries only_held() {
     const auto held = received().held();
@@ -76,10 +76,13 @@ TEST_P(ReceivedConformance, WhatIsHeldNamesItsBlob) {
 }
 
 TEST_P(ReceivedConformance, TheSameInstanceIsReplaced) {
-  add("1.3.1", "a");
-  add("1.3.1", "b");
+  EXPECT_EQ(add("1.3.1", "a"), std::nullopt);
+  EXPECT_EQ(add("1.3.1", "a"), std::nullopt) << "the same contents";
+  EXPECT_EQ(add("1.3.1", "b"), "a");
   EXPECT_THAT(received().instances(kSeries), ElementsAre(ReceivedInstance{"1.3.1", "b", 10}));
   EXPECT_FALSE(volumes().names("a"));
+  received().release(only_held());
+  EXPECT_EQ(add("1.3.1", "c"), std::nullopt) << "instead of one that is no longer held";
 }
 
 TEST_P(ReceivedConformance, SurvivesARestart) {
