@@ -12,7 +12,8 @@ namespace isomesh::store {
 class HealthCheck {
  public:
   // Returns the result of `check`, or the last one if it is younger than `valid_for` or a check is
-  // running. False if the running check takes longer than `patience`.
+  // running. False if the running check takes longer than `patience`. If `check` throws, so does
+  // this, and the result is false.
   bool passes(std::chrono::milliseconds valid_for, std::chrono::milliseconds patience,
               const std::function<bool()>& check) {
     using Clock = std::chrono::steady_clock;
@@ -24,15 +25,23 @@ class HealthCheck {
       is_checking_ = true;
       changed_ = Clock::now();
     }
-    const bool result = check();
+    try {
+      return end(check());
+    } catch (...) {
+      end(false);
+      throw;
+    }
+  }
+
+ private:
+  bool end(bool result) {
     const Lock lock(mutex_);
     is_checking_ = false;
-    changed_ = Clock::now();
+    changed_ = std::chrono::steady_clock::now();
     last_ = result;
     return result;
   }
 
- private:
   Mutex mutex_;
   bool is_checking_ ISOMESH_GUARDED_BY(mutex_) = false;
   bool last_ ISOMESH_GUARDED_BY(mutex_) = true;  // before the first check

@@ -263,7 +263,8 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
                                                           {.content_type = type,
                                                            .study = source.study,
                                                            .series = source.series,
-                                                           .instances = record.work.listed});
+                                                           .instances = record.work.listed},
+                                                          {.cancelled = stop});
     entry.success = true;
     entry.patient_id = identity.patient_id;
     services_.audit.add(entry);

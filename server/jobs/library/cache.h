@@ -6,6 +6,7 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "base/mutex.h"
@@ -30,6 +31,7 @@ class Cache {
     std::promise<std::shared_ptr<const Value>> promise;
     std::shared_future<std::shared_ptr<const Value>> result;
     bool is_mine = false;
+    std::optional<Leave> leave;
     {
       const Lock lock(mutex_);
       if (const auto known = results_.find(key); known != results_.end()) {
@@ -43,15 +45,16 @@ class Cache {
         throw Error(ErrorCode::kUnavailable, "too many requests of this kind are in progress");
       }
       ++waiting_;
+      leave.emplace(*this);
       if (!result.valid()) {
         is_mine = true;
         result = promise.get_future().share();
-        order_.push_front(key);
-        results_.emplace(key, Entry{result, order_.begin()});
+        std::list<Key> place(1, key);
+        results_.emplace(key, Entry{result, place.begin()});
+        order_.splice(order_.begin(), place);
         forget_oldest();
       }
     }
-    const Leave leave(*this);
     if (is_mine) fulfil(key, find, promise);
     return result.get();
   }

@@ -1,12 +1,14 @@
 #include "server/jobs/library/import_places.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "proto/error.h"
 
 namespace isomesh::jobs {
 
 ImportPlaces::Place ImportPlaces::take(const std::string& party, const std::stop_token& stop) {
+  std::string name = party;  // copied before a place is taken, which would be lost with a failure
   Lock lock(mutex_);
   const auto line = line_of(party);
   const std::uint64_t ticket = tickets_++;
@@ -17,12 +19,13 @@ ImportPlaces::Place ImportPlaces::take(const std::string& party, const std::stop
   std::erase(line->waiting, ticket);
   if (!is_mine || stop.stop_requested()) {
     forget_if_idle(line);
+    changed_.notify_all();  // a free place may have waited for this one
     throw Error(ErrorCode::kUnavailable, "the service is shutting down");
   }
   --free_;
   ++line->running;
   changed_.notify_all();  // there may be a place for the next one, too
-  return Place(*this, party);
+  return Place(*this, std::move(name));
 }
 
 void ImportPlaces::give_back(const std::string& party) {

@@ -6,6 +6,7 @@
 #include <list>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "base/mutex.h"
 
@@ -20,7 +21,7 @@ class ImportPlaces {
  public:
   class Place {
    public:
-    Place(ImportPlaces& places, const std::string& party) : places_(places), party_(party) {}
+    Place(ImportPlaces& places, std::string party) : places_(places), party_(std::move(party)) {}
     ~Place() { places_.give_back(party_); }
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;

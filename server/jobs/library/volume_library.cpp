@@ -31,12 +31,13 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
 
 std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& owner,
                                                           const std::filesystem::path& response,
-                                                          const process::PeersSeries& series) {
+                                                          const process::PeersSeries& series,
+                                                          const ImportControl& control) {
   const store::ScratchFolder scratch(folder_.scratch());
-  Volume volume = import_file(response, {.peers = series}, owner, scratch, {});
+  Volume volume = import_file(response, {.peers = series}, owner, scratch, control.cancelled);
   if (!volume.dicom) throw Error(ErrorCode::kInternal, "images from a PACS have no DICOM identity");
   DicomIdentity identity = *volume.dicom;
-  return {keep(owner, std::move(volume), scratch, {}).first, std::move(identity)};
+  return {keep(owner, std::move(volume), scratch, control).first, std::move(identity)};
 }
 
 Volume VolumeLibrary::import_file(const std::filesystem::path& upload,

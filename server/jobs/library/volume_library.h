@@ -54,10 +54,11 @@ class VolumeLibrary {
 
   // Imports a series from a PACS response. Second: the patient, study and series according to the
   // images themselves; the record may be of an earlier upload of the same samples. The returned
-  // volume has the labels of this series, as with add().
+  // volume has the labels of this series, as with add(). It stores nothing if it throws kCancelled.
   std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
                                              const std::filesystem::path& response,
-                                             const process::PeersSeries& series);
+                                             const process::PeersSeries& series,
+                                             const ImportControl& control = {});
 
   // Imports all volumes of an upload, each in a process of its own, one after the other. Each
   // element has a volume or its error, unless that is an internal one, which is thrown. If the

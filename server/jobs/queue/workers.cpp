@@ -31,7 +31,7 @@ constexpr milliseconds kExhaustedDelay{5000};
 constexpr milliseconds kEndRetry{500};
 
 // Why a run was asked to stop.
-enum class Reason { kNone, kCancelled, kLost, kTooLong, kFullDisk, kExhausted, kEnding };
+enum class Reason { kNone, kCancelled, kLost, kTooLong, kEnding };
 
 std::string worker_name(std::size_t thread) {
   std::array<char, 256> host = {};
@@ -46,6 +46,9 @@ void pause(const std::stop_token& stop, milliseconds time) {
 }
 
 }  // namespace
+
+// The machine's fault, if that ended a run: a full disk, or one that will pass soon.
+enum class Workers::Fault { kNone, kFullDisk, kOther };
 
 // A running job, shared by its worker and the thread that renews leases. Thread safe.
 class Workers::Run {
@@ -162,6 +165,7 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
   const std::stop_callback on_end(running_.get_token(), [&] { run->stop(Reason::kEnding); });
   const std::string path = "/v1/jobs/" + lease.id;
   store::Outcome outcome;
+  Fault fault = Fault::kNone;
   try {
     const Volume volume = volumes_.get(lease.owner, lease.parameters.volume);
     PipelineResult result = run_pipeline(
@@ -178,16 +182,16 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
     outcome.may_retry = true;
     log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, end.what());
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kOutOfSpace) run->stop(Reason::kFullDisk);
-    if (error.code() == ErrorCode::kUnavailable) run->stop(Reason::kExhausted);
+    if (error.code() == ErrorCode::kOutOfSpace) fault = Fault::kFullDisk;
+    if (error.code() == ErrorCode::kUnavailable) fault = Fault::kOther;
     if (error.code() != ErrorCode::kCancelled) {
-      outcome.error = to_problem(error, path);
+      if (fault == Fault::kNone) outcome.error = to_problem(error, path);
       outcome.may_retry = error.code() == ErrorCode::kInternal;
       log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
     }
   } catch (const std::bad_alloc&) {
     // The service is out of memory, not the job.
-    run->stop(Reason::kExhausted);
+    fault = Fault::kOther;
     log_error("job {}, attempt {} failed: the service is out of memory", lease.id, lease.attempt);
   } catch (const std::exception& error) {
     outcome.error = to_problem({ErrorCode::kInternal, error.what()}, path);
@@ -198,15 +202,16 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
   {
     const Lock lock(runs_mutex_);
     std::erase(runs_, run);
-    if (run->reason() != Reason::kFullDisk) full_disk_delays_.erase(lease.id);
+    if (fault != Fault::kFullDisk) full_disk_delays_.erase(lease.id);
   }
-  conclude(*run, outcome);
+  conclude(*run, fault, outcome);
 }
 
 // Records how the run ended. Retries if the database has no space or does not respond.
-void Workers::conclude(const Run& run, store::Outcome outcome) {
+void Workers::conclude(const Run& run, Fault fault, store::Outcome outcome) {
   const store::Lease& lease = run.lease();
-  const bool was_stopped = !outcome.mesh && !outcome.error;
+  // Also with a fault of the machine: a run that was to stop may meet one before it ends.
+  const bool was_stopped = !outcome.mesh && !outcome.error && run.reason() != Reason::kNone;
   if (was_stopped && run.reason() == Reason::kTooLong) {
     const std::string minutes = std::to_string(options_.longest_job.count());
     outcome.error = to_problem(
@@ -219,14 +224,12 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
     if (was_stopped && run.reason() == Reason::kEnding) {
       return jobs_.put_back(lease, milliseconds(0));
     }
-    if (!outcome.mesh && run.reason() == Reason::kFullDisk) {
+    if (!was_stopped && fault == Fault::kFullDisk) {
       const milliseconds delay = full_disk_delay(lease.id);
       log_warning("job {} waits {} s for disk space", lease.id, delay.count() / 1000);
       return jobs_.put_back(lease, delay, WaitingFor::kDisk);
     }
-    if (!outcome.mesh && run.reason() == Reason::kExhausted) {
-      return jobs_.put_back(lease, kExhaustedDelay);
-    }
+    if (!was_stopped && fault == Fault::kOther) return jobs_.put_back(lease, kExhaustedDelay);
     return jobs_.finish(lease, outcome);
   };
   while (true) {

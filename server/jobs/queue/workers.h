@@ -42,10 +42,11 @@ class Workers {
 
  private:
   class Run;
+  enum class Fault;
 
   void work(const std::stop_token& stop, const std::string& name);
   void run(const store::Lease& lease, JobProcess& process);
-  void conclude(const Run& run, store::Outcome outcome);
+  void conclude(const Run& run, Fault fault, store::Outcome outcome);
   std::chrono::milliseconds full_disk_delay(const std::string& job);
   void renew(Run& run);
   void look_after_leases(const std::stop_token& stop);

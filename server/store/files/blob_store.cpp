@@ -346,8 +346,9 @@ bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& sto
   const std::string traits = traits_of(place);
   {
     Lock lock(intact_mutex_);
-    checked_.wait(lock,
-                  [&]() ISOMESH_REQUIRES(intact_mutex_) { return !under_check_.contains(key); });
+    const bool is_free = checked_.wait(
+        lock, stop, [&]() ISOMESH_REQUIRES(intact_mutex_) { return !under_check_.contains(key); });
+    if (!is_free) throw Error(ErrorCode::kCancelled, "cancelled");
     const auto known = intact_.find(key);
     if (known != intact_.end() && known->second.traits == traits &&
         Steady::clock::now() - known->second.when < kBelieved) {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <latch>
+#include <new>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,6 +13,22 @@
 
 namespace isomesh::jobs {
 namespace {
+
+// A key that can be copied only so often, as where memory ends.
+class ScarceKey {
+ public:
+  explicit ScarceKey(int* copies) : copies_(copies) {}
+  ScarceKey(const ScarceKey& other) : copies_(other.copies_) {
+    if (*copies_ == 0) throw std::bad_alloc();
+    --*copies_;
+  }
+  ScarceKey& operator=(const ScarceKey&) = delete;
+  ~ScarceKey() = default;
+  friend bool operator<(const ScarceKey& /*one*/, const ScarceKey& /*equal*/) { return false; }
+
+ private:
+  int* copies_;
+};
 
 TEST(Cache, ComputesAValueOnce) {
   Cache<int, std::string> cache(2, 4);
@@ -41,6 +58,23 @@ TEST(Cache, AFailureIsNotKept) {
             }),
             ErrorCode::kOutOfSpace);
   EXPECT_EQ(*cache.get(1, [] { return 5; }), 5);
+}
+
+TEST(Cache, ACallerThatGetsNoMemoryWaitsNoLonger) {
+  Cache<ScarceKey, int> cache(1, 1);
+  int failed = 0;
+  for (;;) {
+    int copies = failed;
+    try {
+      EXPECT_EQ(*cache.get(ScarceKey(&copies), [] { return 5; }), 5);
+      break;
+    } catch (const std::bad_alloc&) {
+      ++failed;
+    }
+  }
+  EXPECT_GT(failed, 0);
+  int none = 0;
+  EXPECT_EQ(*cache.get(ScarceKey(&none), [] { return 0; }), 5);
 }
 
 TEST(Cache, SeveralWaitForOneFinder) {

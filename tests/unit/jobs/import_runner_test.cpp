@@ -1,10 +1,12 @@
 #include "server/jobs/library/import_runner.h"
 
 #include <csignal>
+#include <latch>
 #include <limits>
 #include <mutex>
 #include <semaphore>
 #include <set>
+#include <stop_token>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -12,6 +14,7 @@
 #include <unistd.h>
 
 #include "server/process/import_message.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
 
@@ -213,6 +216,47 @@ TEST(ImportPlaces, ALaterClientWaitsForOneImport) {
     ASSERT_TRUE(test::eventually([&] { return number_begun() == count + 1; }));
     const std::scoped_lock lock(mutex);
     EXPECT_EQ(begun.back(), "other") << count;
+  }
+}
+
+// Those in front of the next one in line are cancelled, and have not left when the place comes
+// free: the next one finds them still there, and only they can tell it that they are gone.
+TEST(ImportPlaces, APlaceThatComesFreeForCancelledOnesGoesToTheNext) {
+  constexpr std::size_t kCancelled = 20;
+  for (int round = 0; round < 5; ++round) {
+    ImportPlaces places(1);
+    std::latch has_begun(1);
+    std::binary_semaphore may_end(0);
+    std::jthread holder([&] {
+      const ImportPlaces::Place place = places.take("party", {});
+      has_begun.count_down();
+      may_end.acquire();
+    });
+    has_begun.wait();
+    std::stop_source cancel;
+    std::vector<std::jthread> cancelled;
+    for (std::size_t n = 0; n < kCancelled; ++n) {
+      cancelled.emplace_back([&] {
+        EXPECT_EQ(test::code_thrown_by([&] { places.take("party", cancel.get_token()); }),
+                  ErrorCode::kUnavailable);
+      });
+    }
+    EXPECT_TRUE(test::eventually([&] { return places.waiting() == kCancelled; }));
+    std::atomic<bool> has_place = false;
+    std::jthread next([&](const std::stop_token& stop) {
+      test::code_thrown_by([&] {
+        const ImportPlaces::Place place = places.take("party", stop);
+        has_place = true;
+      });
+    });
+    EXPECT_TRUE(test::eventually([&] { return places.waiting() == kCancelled + 1; }));
+    // Runs when the stop is requested and nobody is woken yet, as the last callback runs first.
+    const std::stop_callback give_back(cancel.get_token(), [&] {
+      may_end.release();
+      holder.join();
+    });
+    cancel.request_stop();
+    ASSERT_TRUE(test::eventually([&] { return has_place.load(); }, seconds(60))) << round;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <latch>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,25 @@ namespace {
 using std::chrono::milliseconds;
 using test::eventually;
 using test::kLongest;
+
+// A storage that fails while the daemon ends.
+class FailingBlobs : public store::FileBlobStore {
+ public:
+  FailingBlobs(const store::DataFolder& data, ErrorCode code) : FileBlobStore(data), code_(code) {}
+
+  bool is_intact(const std::string& /*key*/, const std::stop_token& stop) const override {
+    asked_.count_down();
+    Mutex mutex;
+    Lock lock(mutex);
+    Condition().wait(lock, stop, [] { return false; });
+    throw Error(code_, "the storage fails");
+  }
+  void wait_until_asked() const { asked_.wait(); }
+
+ private:
+  const ErrorCode code_;
+  mutable std::latch asked_{1};
+};
 
 class WorkersTest : public test::JobsFixture {
  protected:
@@ -145,6 +165,21 @@ TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
   std::filesystem::rename(folder_ / "elsewhere", folder_ / "shared");
   EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kSucceeded);
   EXPECT_EQ(jobs_.account(id).attempts, 1);
+}
+
+TEST_F(WorkersTest, AJobWhoseStorageFailsWhileTheDaemonEndsIsPutBackUncharged) {
+  const Volume volume = add_sphere();
+  for (const ErrorCode code : {ErrorCode::kUnavailable, ErrorCode::kOutOfSpace}) {
+    const std::string id = submit(parameters_of(volume, 0));
+    {
+      FailingBlobs failing(data_, code);
+      const Workers workers(threads(1), jobs_, volumes_, failing);
+      failing.wait_until_asked();
+    }
+    EXPECT_EQ(jobs_.get("", id).state, JobState::kQueued);
+    EXPECT_EQ(jobs_.account(id).attempts, 0);
+    jobs_.cancel("", id);
+  }
 }
 
 TEST_F(WorkersTest, AJobThatTakesTooLongFails) {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -100,6 +101,7 @@ class FakePacs : public Archive, public ObjectReceiver {
   std::atomic<int> foreign_slice = -1;        // of another patient
   std::atomic<bool> is_merged = false;        // the study has another Patient ID than its images
   std::function<void()> after_store = [] {};  // set it before there are orders
+  std::function<void()> on_fetched;           // called when the images have come
 
   std::vector<FoundSeries> find_recent(const std::string&, const std::string&,
                                        const std::stop_token&) override {
@@ -135,6 +137,7 @@ class FakePacs : public Archive, public ObjectReceiver {
       file << "\r\n--b\r\nContent-Type: application/dicom\r\n\r\n" << all[n];
     }
     file << "\r\n--b--\r\n";
+    if (on_fetched) on_fetched();
     return "multipart/related; boundary=b";
   }
   std::optional<std::string> patient_of(const std::string&, const std::stop_token& stop) override {

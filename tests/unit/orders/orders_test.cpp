@@ -392,6 +392,17 @@ TEST_F(OrdersTest, ThatAreCancelledStopAtOnce) {
   EXPECT_EQ(store_.get(std::nullopt, id).state, OrderState::kCancelled);
 }
 
+TEST_F(OrdersTest, ThatAreCancelledImportNothing) {
+  main_->on_fetched = [this] {
+    const Order fetched = orders_->list(std::nullopt, {}, "", 1).front();
+    orders_->cancel(std::nullopt, fetched.id);
+  };
+  const std::string id = submit();
+  ASSERT_TRUE(reaches(id, OrderState::kCancelled));
+  stop();
+  EXPECT_TRUE(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).empty());
+}
+
 TEST_F(OrdersTest, CancelTheirJob) {
   const std::string id = submit();
   ASSERT_TRUE(until([&] { return get(id).job.has_value(); }));

@@ -1,6 +1,7 @@
 #include <functional>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "server/store/files/files.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/process.h"
 #include "tests/unit/store/power_cut.h"
 
 namespace isomesh::store {
@@ -156,6 +158,34 @@ TEST_F(FileBlobStoreTest, WhatIsChangedRightAfterItsAdoptionIsReadAgain) {
     test::write_file(blobs_.path_of(blob.key), "more");
     EXPECT_FALSE(blobs_.is_intact(blob.key, {}));
   }
+}
+
+// True if this process has the file open.
+bool is_open(const std::filesystem::path& file) {
+  for (const auto& descriptor : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code closed_meanwhile;
+    if (std::filesystem::read_symlink(descriptor, closed_meanwhile) == file) return true;
+  }
+  return false;
+}
+
+// Reading takes longer than anybody waits: the file is a hole of a terabyte.
+TEST_F(FileBlobStoreTest, WaitingForTheCheckOfAnotherCanBeStopped) {
+  const std::string key = put("hello").key;
+  const std::filesystem::path file = blobs_.path_of(key);
+  std::filesystem::resize_file(file, std::uintmax_t{1} << 40);
+  std::jthread another([&](const std::stop_token& stop) {
+    EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(key, stop); }), ErrorCode::kCancelled);
+  });
+  ASSERT_TRUE(test::eventually([&] { return is_open(file); }));
+  std::atomic<bool> has_ended = false;
+  std::jthread waiting([&](const std::stop_token& stop) {
+    EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(key, stop); }), ErrorCode::kCancelled);
+    has_ended = true;
+  });
+  waiting.request_stop();
+  EXPECT_TRUE(test::eventually([&] { return has_ended.load(); }, std::chrono::seconds(60)));
+  another.request_stop();
 }
 
 class Sweeping : public FileBlobStoreTest {

@@ -1,0 +1,26 @@
+#include "server/store/health_check.h"
+
+#include <chrono>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+
+namespace isomesh::store {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::milliseconds;
+
+TEST(HealthCheck, ACheckThatThrowsHasFailedAndEnded) {
+  HealthCheck health;
+  const auto throws = []() -> bool { throw Error(ErrorCode::kInternal, "it cannot be checked"); };
+  EXPECT_EQ(test::code_thrown_by([&] { health.passes(milliseconds(0), hours(1), throws); }),
+            ErrorCode::kInternal);
+  const auto is_well = [] { return true; };
+  EXPECT_FALSE(health.passes(hours(1), hours(1), is_well));
+  EXPECT_TRUE(health.passes(milliseconds(0), hours(1), is_well));
+}
+
+}  // namespace
+}  // namespace isomesh::store
