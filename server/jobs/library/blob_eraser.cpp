@@ -55,11 +55,11 @@ void BlobEraser::erase(const std::string& key) {
   changed_.notify_all();
 }
 
-void BlobEraser::finish() {
+void BlobEraser::finish(const std::stop_token& stop) {
   Lock lock(mutex_);
   ++hurries_;
   changed_.notify_all();
-  changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return waiting_.empty(); });
+  changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return waiting_.empty(); });
   --hurries_;
 }
 
@@ -67,9 +67,10 @@ void BlobEraser::run(const std::stop_token& stop) {
   Lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return !waiting_.empty(); });
-    if (waiting_.empty()) return;
+    if (stop.stop_requested()) return;
     changed_.wait_for(lock, stop, kPause,
                       [this]() ISOMESH_REQUIRES(mutex_) { return hurries_ > 0; });
+    if (stop.stop_requested()) return;
     const std::string key = waiting_.front();
     lock.unlock();
     const bool is_done = erase_now(key);

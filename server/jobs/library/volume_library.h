@@ -77,12 +77,13 @@ class VolumeLibrary {
   // Aborts running and waiting imports, and rejects further ones.
   void stop_imports() { runner_.stop(); }
 
-  // Erases the records visible to the viewer. The samples are erased soon after the last record.
+  // Erases the records visible to the viewer. The samples are erased soon after the last record,
+  // or after the next start if this object is destroyed before.
   // Throws Error kNotFound, kGone, and kNotReady while a job needs the volume.
   void erase(const store::Viewer& viewer, const std::string& id);
 
-  // Returns once the samples of erased volumes are gone.
-  void finish_erasing() { eraser_.finish(); }
+  // Returns once the samples of erased volumes are gone, or `stop` is requested.
+  void finish_erasing(const std::stop_token& stop = {}) { eraser_.finish(stop); }
 
  private:
   // Writes the canonical file of the upload into the scratch folder.

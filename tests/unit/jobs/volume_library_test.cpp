@@ -165,6 +165,37 @@ TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
 }
 
+// Each takes a tenth of a second unless somebody waits for them, and seconds if the database hangs.
+TEST_F(VolumeLibraryTest, TheEndLeavesErasingToTheNextStart) {
+  const Volume volume = add_bytes(bytes_).first;
+  constexpr int kMany = 200;
+  std::shared_mutex coming;
+  {
+    BlobEraser eraser(blobs_, volumes_, coming, data_.erasing());
+    const std::scoped_lock erasing(coming);
+    for (int n = 0; n < kMany; ++n) eraser.erase(std::to_string(n));
+    eraser.erase(volume.id);
+    volumes_.erase("", volume.id);
+  }
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
+  BlobEraser next(blobs_, volumes_, coming, data_.erasing());
+  next.finish();
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
+}
+
+TEST_F(VolumeLibraryTest, WhoeverWaitsForErasingCanBeStopped) {
+  std::shared_mutex coming;
+  BlobEraser eraser(blobs_, volumes_, coming, data_.erasing());
+  std::stop_source stop;
+  stop.request_stop();
+  const std::scoped_lock erasing(coming);
+  eraser.erase(std::string(64, 'a'));
+  eraser.finish(stop.get_token());
+  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / std::string(64, 'a')));
+}
+
 // Whoever erases does not wait for the disk, which takes long for what is large and no time for
 // what another owner has.
 TEST_F(VolumeLibraryTest, AVolumeIsErasedBeforeItsSamplesAre) {
