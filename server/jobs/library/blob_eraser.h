@@ -29,7 +29,7 @@ class BlobEraser {
   ~BlobEraser() = default;
 
   // Queues the blob. It is erased soon, unless a record names it by then. To be called before its
-  // record is erased, with `coming` held exclusively until that has happened.
+  // record is erased, with `coming` held shared until that has happened.
   void erase(const std::string& key);
 
   // Returns once all queued blobs are erased, or `stop` is requested.

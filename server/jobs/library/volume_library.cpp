@@ -108,7 +108,7 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
 }
 
 void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
-  const std::scoped_lock lock(mutex_);
+  const std::shared_lock lock(mutex_);
   // The eraser waits for the lock, and leaves alone what a record still names then.
   if (volumes_.contains(viewer, id)) eraser_.erase(id);
   volumes_.erase(viewer, id);

@@ -100,8 +100,8 @@ class VolumeLibrary {
   store::Retention& retention_;
   const volume::SizeLimits limits_;
   ImportRunner runner_;
-  // Held while a blob and its record are added or erased together. Additions share it, so that they
-  // wait for the disk concurrently.
+  // Held shared while a blob and its record are added, or its record is erased, so that all of
+  // these wait for the disk and the database concurrently; exclusively while a blob is erased.
   std::shared_mutex mutex_;
   BlobEraser eraser_{blobs_, volumes_, mutex_, folder_.erasing()};
 };

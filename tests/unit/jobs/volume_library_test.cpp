@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
+#include "tests/support/process.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -163,6 +164,26 @@ TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   eraser.finish();
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
+}
+
+// In a row they would hold up the end of the service for long if the database hangs.
+TEST_F(VolumeLibraryTest, VolumesAreErasedConcurrently) {
+  class Counting : public store::SqlVolumeStore {
+   public:
+    explicit Counting(store::Database& database) : SqlVolumeStore(database) {}
+    void erase(const store::Viewer& /*viewer*/, const std::string& /*id*/) override {
+      ++begun_;
+      EXPECT_TRUE(test::eventually([this] { return begun_ == 2; }));
+    }
+
+   private:
+    std::atomic<int> begun_ = 0;
+  };
+  Counting volumes(database_);
+  VolumeLibrary library(data_, blobs_, volumes, retention_, {},
+                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  const std::jthread one([&] { library.erase("", "one"); });
+  library.erase("", "two");
 }
 
 // Each takes a tenth of a second unless somebody waits for them, and seconds if the database hangs.
