@@ -221,7 +221,7 @@ void DimseListener::receive(Association& association, Transfers& transfers) {
     const auto* object = std::get_if<DimseObject>(&report);
     if (object == nullptr) break;
     association.is_storing = true;
-    const DimseVerdict kept = keep(*object, scratch.path());
+    const DimseVerdict kept = keep(*object, stop, scratch.path());
     if (kept == DimseVerdict::kStored) {
       ++transfers[{object->called, object->calling, object->study}];
     }
@@ -244,12 +244,13 @@ bool DimseListener::has_room(std::uint64_t more_bytes) const {
          services_.received.held_bytes() + more_bytes <= settings_.max_held_bytes;
 }
 
-DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesystem::path& folder) {
+DimseVerdict DimseListener::keep(const DimseObject& object, const std::stop_token& stop,
+                                 const std::filesystem::path& folder) {
   try {
     const std::filesystem::path file = folder / object.file;
     const store::Blob blob = store::digest_of(file);
     if (!has_room(blob.bytes)) return DimseVerdict::kNoRoom;
-    services_.blobs.adopt(file, blob, "");  // the owner of its order is not known yet
+    services_.blobs.adopt(file, blob, "", stop);  // the owner of its order is not known yet
     services_.received.add({.route = object.called, .study = object.study, .series = object.series},
                            {.instance = object.instance, .blob = blob.key, .bytes = blob.bytes});
     services_.blobs.mark_named(blob.key);

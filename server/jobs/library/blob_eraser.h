@@ -18,10 +18,9 @@ namespace isomesh::jobs {
 // before the process ended, it erases after the next start. Thread safe.
 class BlobEraser {
  public:
-  // `coming` is held shared while a blob and its record are added, and exclusively while a blob is
-  // erased. `marks` is a folder with an empty file for each queued blob. The other arguments must
-  // outlive this object.
-  BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes, std::shared_mutex& coming,
+  // `erasing` is held shared by callers of erase(). `marks` is a folder with an empty file for each
+  // queued blob. The other arguments must outlive this object.
+  BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes, std::shared_mutex& erasing,
              std::filesystem::path marks);
 
   // Waits only for the blob that is being erased: there may be many, and each takes long if the
@@ -29,7 +28,7 @@ class BlobEraser {
   ~BlobEraser() = default;
 
   // Queues the blob. It is erased soon, unless a record names it by then. To be called before its
-  // record is erased, with `coming` held shared until that has happened.
+  // record is erased, with `erasing` held shared until that has happened.
   void erase(const std::string& key);
 
   // Returns once all queued blobs are erased, or `stop` is requested.
@@ -42,7 +41,7 @@ class BlobEraser {
 
   store::BlobStore& blobs_;
   const store::VolumeStore& volumes_;
-  std::shared_mutex& coming_;
+  std::shared_mutex& erasing_;
   const std::filesystem::path marks_;
   Mutex mutex_;
   Condition changed_;

@@ -46,7 +46,8 @@ class VolumeLibrary {
   // used if the file contains no name; `party` takes turns with others (ImportPlaces). Second:
   // false if the owner already had the same samples and geometry. Then the record stays unchanged,
   // but the returned volume has the notes, ignored files and labels of this upload. Throws what
-  // ImportRunner::run throws, and kOutOfSpace. It stores nothing if it throws kCancelled.
+  // ImportRunner::run throws, also while the bytes are stored, and kOutOfSpace. It stores nothing
+  // if it throws kCancelled.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
                               const std::string& name = {}, const std::string& party = {},
@@ -74,7 +75,7 @@ class VolumeLibrary {
     return volumes_.rename(owner, id, name);
   }
 
-  // Aborts running and waiting imports, and rejects further ones.
+  // Aborts running and waiting imports and the storing of their bytes, and rejects further ones.
   void stop_imports() { runner_.stop(); }
 
   // Erases the records visible to the viewer. The samples are erased soon after the last record,
@@ -100,10 +101,9 @@ class VolumeLibrary {
   store::Retention& retention_;
   const volume::SizeLimits limits_;
   ImportRunner runner_;
-  // Held shared while a blob and its record are added, or its record is erased, so that all of
-  // these wait for the disk and the database concurrently; exclusively while a blob is erased.
-  std::shared_mutex mutex_;
-  BlobEraser eraser_{blobs_, volumes_, mutex_, folder_.erasing()};
+  // Held shared while a record is erased.
+  std::shared_mutex erasing_;
+  BlobEraser eraser_{blobs_, volumes_, erasing_, folder_.erasing()};
 };
 
 }  // namespace isomesh::jobs
