@@ -39,8 +39,11 @@ class BlobWriter {
   virtual void write(std::span<const std::byte> bytes) = 0;
 
   // Makes the bytes a blob that survives a crash. Call once. Throws Error kOutOfSpace; kUnavailable
-  // if a remote store does not respond.
-  virtual Blob commit() = 0;
+  // if a remote store does not respond; kCancelled if `stop` is requested while it sends the bytes.
+  Blob commit(const std::stop_token& stop = {}) { return store(stop); }
+
+ private:
+  virtual Blob store(const std::stop_token& stop) = 0;
 };
 
 // An open blob. Stays readable after the blob is erased. Thread safe.
@@ -128,9 +131,9 @@ class BlobStore {
 
   // Turns a finished local file into a blob that survives a crash, and removes the file. `blob` is
   // the recent result of digest_of(file), so that is_intact() need not read it again. `owner`: as
-  // for begin(). Throws Error kOutOfSpace.
-  virtual void adopt(const std::filesystem::path& file, const Blob& blob,
-                     const std::string& owner) = 0;
+  // for begin(). `stop`: as for commit(). Throws Error kOutOfSpace, kCancelled.
+  virtual void adopt(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
+                     const std::stop_token& stop) = 0;
 
   // Opens a local copy: a remote blob is first fetched and verified. Throws Error kNotFound;
   // kInternal if its bytes do not match the key.

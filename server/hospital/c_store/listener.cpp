@@ -222,7 +222,7 @@ void DimseListener::receive(Association& association, Transfers& transfers) {
     const auto* object = std::get_if<DimseObject>(&report);
     if (object == nullptr) break;
     association.is_storing = true;
-    const DimseVerdict kept = keep(*object, scratch.path());
+    const DimseVerdict kept = keep(*object, stop, scratch.path());
     if (kept == DimseVerdict::kStored) {
       ++transfers[{object->called, object->calling, object->study}];
     }
@@ -245,7 +245,8 @@ bool DimseListener::has_room(std::uint64_t more_bytes) const {
          services_.received.held_bytes() + more_bytes <= settings_.max_held_bytes;
 }
 
-DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesystem::path& folder) {
+DimseVerdict DimseListener::keep(const DimseObject& object, const std::stop_token& stop,
+                                 const std::filesystem::path& folder) {
   DimseVerdict verdict = DimseVerdict::kNoRoom;
   std::vector<std::string> stored;
   std::optional<std::string> replaced;
@@ -253,7 +254,7 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
     const std::filesystem::path file = folder / object.file;
     const store::Blob blob = store::digest_of(file);
     if (!has_room(blob.bytes)) return verdict;
-    services_.blobs.adopt(file, blob, "");  // the owner of its order is not known yet
+    services_.blobs.adopt(file, blob, "", stop);  // the owner of its order is not known yet
     stored.push_back(blob.key);
     replaced = services_.received.add(
         {.route = object.called, .study = object.study, .series = object.series},

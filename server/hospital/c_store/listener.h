@@ -84,7 +84,7 @@ class DimseListener {
   std::shared_ptr<Association> next_association(const std::stop_token& stop);
   void serve_association(Association& association);
   void receive(Association& association, Transfers& transfers);
-  process::DimseVerdict keep(const process::DimseObject& object,
+  process::DimseVerdict keep(const process::DimseObject& object, const std::stop_token& stop,
                              const std::filesystem::path& folder);
   bool has_room(std::uint64_t more_bytes) const;
   void note_end(const process::DimseEnded& ended, const std::string& party);

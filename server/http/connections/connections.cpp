@@ -104,6 +104,11 @@ void Connections::refuse_one_of_many(Exchange& exchange) {
          {ErrorCode::kUnavailable, "too many requests are in progress"});
 }
 
+void Connections::refuse_at_end(Exchange& exchange) {
+  refuse(exchange.body.take_stream(), exchange.request.remote_address,
+         {ErrorCode::kUnavailable, "the service is shutting down"});
+}
+
 void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Handle& handle) {
   const bool is_for_probes = is_probe(exchange->request);
   if (!is_for_probes && sender_->held_bytes() > options_.most_response_bytes) {
@@ -112,10 +117,11 @@ void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Handl
         {ErrorCode::kUnavailable, "too many responses are on their way to slow receivers"});
   }
   net::BoundedTaskQueue& queue = is_for_probes ? *probes_ : *tasks_;
-  if (queue.try_enqueue(exchange->party, [this, exchange, handle] { serve(exchange, handle); })) {
-    return;
-  }
-  refuse_one_of_many(*exchange);
+  // The whole backlog would hold up the end of the service for long.
+  const auto begin = [this, exchange, handle] {
+    stopping_ ? refuse_at_end(*exchange) : serve(exchange, handle);
+  };
+  if (!queue.try_enqueue(exchange->party, begin)) refuse_one_of_many(*exchange);
 }
 
 bool Connections::is_probe(const Request& request) const {
@@ -165,10 +171,10 @@ void Connections::park(const std::shared_ptr<Exchange>& exchange,
 void Connections::compute(const std::shared_ptr<Exchange>& exchange,
                           const Continuation& continuation) {
   exchange->party = *continuation.computing_for;
-  const bool is_accepted = computing_->try_enqueue(
-      exchange->party,
-      [this, exchange, resume = continuation.resume] { finish_by(exchange, resume); });
-  if (!is_accepted) refuse_one_of_many(*exchange);
+  const auto begin = [this, exchange, resume = continuation.resume] {
+    stopping_ ? refuse_at_end(*exchange) : finish_by(exchange, resume);
+  };
+  if (!computing_->try_enqueue(exchange->party, begin)) refuse_one_of_many(*exchange);
 }
 
 // Enters the library once more to write the response.
@@ -183,9 +189,7 @@ void Connections::finish_by(const std::shared_ptr<Exchange>& exchange, const Res
 void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
   const bool has_turn = tasks_->enqueue_rest(
       exchange->party, [this, exchange, resume] { finish_by(exchange, resume); });
-  if (has_turn) return;
-  refuse(exchange->body.take_stream(), exchange->request.remote_address,
-         {ErrorCode::kUnavailable, "the service is shutting down"});
+  if (!has_turn) refuse_at_end(*exchange);
 }
 
 }  // namespace isomesh::http

@@ -82,8 +82,9 @@ class Connections {
   std::size_t pending() const { return acceptor_->pending(); }
   std::size_t sending() const { return sender_->sending(); }
 
-  // Stops accepting connections and reading bodies, resumes all waiting requests, and sends
-  // responses within `patience`. Returns when all threads have ended.
+  // Stops accepting connections and reading bodies, resumes all requests that wait for a job,
+  // refuses those whose handler or computation has not begun, and sends responses within
+  // `patience`. Returns when all threads have ended.
   void close(std::chrono::milliseconds patience);
 
  private:
@@ -94,6 +95,7 @@ class Connections {
   void refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
               const Error& error);
   void refuse_one_of_many(Exchange& exchange);
+  void refuse_at_end(Exchange& exchange);
   bool is_probe(const Request& request) const;
   void enqueue(const std::shared_ptr<Exchange>& exchange, const Handle& handle);
   void serve(const std::shared_ptr<Exchange>& exchange, const Handle& handle);

@@ -40,26 +40,28 @@ std::deque<std::string> marked_in(const std::filesystem::path& folder) {
 }  // namespace
 
 BlobEraser::BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes,
-                       std::shared_mutex& coming, std::filesystem::path marks)
+                       std::shared_mutex& erasing, std::filesystem::path marks)
     : blobs_(blobs),
       volumes_(volumes),
-      coming_(coming),
+      erasing_(erasing),
       marks_(std::move(marks)),
       waiting_(marked_in(marks_)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void BlobEraser::erase(const std::string& key) {
-  mark(marks_, key);
-  const Lock lock(mutex_);
-  waiting_.push_back(key);
-  changed_.notify_all();
+  {
+    const Lock lock(mutex_);
+    waiting_.push_back(key);
+    changed_.notify_all();
+  }
+  mark(marks_, key);  // last, so that no earlier erasure of the same blob removes the mark
 }
 
-void BlobEraser::finish() {
+void BlobEraser::finish(const std::stop_token& stop) {
   Lock lock(mutex_);
   ++hurries_;
   changed_.notify_all();
-  changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return waiting_.empty(); });
+  changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return waiting_.empty(); });
   --hurries_;
 }
 
@@ -67,9 +69,10 @@ void BlobEraser::run(const std::stop_token& stop) {
   Lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return !waiting_.empty(); });
-    if (waiting_.empty()) return;
+    if (stop.stop_requested()) return;
     changed_.wait_for(lock, stop, kPause,
                       [this]() ISOMESH_REQUIRES(mutex_) { return hurries_ > 0; });
+    if (stop.stop_requested()) return;
     const std::string key = waiting_.front();
     lock.unlock();
     const bool is_done = erase_now(key);
@@ -85,10 +88,11 @@ void BlobEraser::run(const std::stop_token& stop) {
 
 bool BlobEraser::erase_now(const std::string& key) {
   try {
-    // Freeing the bytes of a large blob takes long. Holding them until the lock is released keeps
-    // others from waiting for it.
+    // Freeing the bytes of a large blob takes long. The store would hold a lock meanwhile.
     const std::shared_ptr<const void> held = blobs_.hold_bytes(key);
-    const std::scoped_lock lock(coming_);
+    // Once every deletion that had begun is over, the record is gone. What is stored meanwhile, the
+    // blob store keeps.
+    { const std::scoped_lock wait(erasing_); }
     const auto names = [this](const std::string& asked) { return volumes_.names(asked); };
     // Another daemon may have stored the same blob at any time and be about to name it, so every
     // blob counts as recent.

@@ -96,22 +96,17 @@ ImportRunner::ImportRunner(const RunnerOptions& options)
 
 void throw_cancelled() { throw Error(ErrorCode::kCancelled, "the upload was cancelled"); }
 
+void throw_ending() { throw Error(ErrorCode::kUnavailable, "the service is shutting down"); }
+
 Volume ImportRunner::run(const process::ImportTask& task, const std::string& party,
                          const std::stop_token& cancelled) {
   // Checked here because a JSON message cannot carry non-finite numbers.
   if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
   const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
-  std::stop_source stop;
-  const auto request_stop = [&stop] { stop.request_stop(); };
-  const std::stop_callback on_end(stop_.get_token(), request_stop);
-  const std::stop_callback on_cancel(cancelled, request_stop);
   const std::string message = process::to_message(process::ImportOrder{task, bounds});
-  try {
-    return volume_of(report_of(message, party, stop.get_token()), task);
-  } catch (const Error&) {
-    if (cancelled.stop_requested()) throw_cancelled();
-    throw;
-  }
+  return until_stopped(cancelled, [&](const std::stop_token& stop) {
+    return volume_of(report_of(message, party, stop), task);
+  });
 }
 
 process::PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
@@ -148,9 +143,7 @@ std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
   child.send_last(message);
   const auto deadline = Clock::now() + options_.bounds.time;
   const process::Output output = child.receive(kMostResponseBytes, deadline, stop);
-  if (output.ending == Ending::kStopped) {
-    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-  }
+  if (output.ending == Ending::kStopped) throw_ending();
   process::ImportReport report = process::report_from(output.text);
   if (output.ending == Ending::kTooLong) {
     refuse_dead("after " + std::to_string(options_.bounds.time.count()) + " seconds", report);

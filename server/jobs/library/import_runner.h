@@ -25,6 +25,7 @@ struct RunnerOptions {
 process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
 
 [[noreturn]] void throw_cancelled();
+[[noreturn]] void throw_ending();
 
 // Thread safe.
 class ImportRunner {
@@ -43,6 +44,23 @@ class ImportRunner {
   // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
   // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
   process::PeersResponse read_response(const std::filesystem::path& file);
+
+  // Calls `run` with a token that stop() and `cancelled` stop, and returns its result. If it throws
+  // an Error after that, throws as run() does.
+  template <class Run>
+  auto until_stopped(const std::stop_token& cancelled, const Run& run) const {
+    std::stop_source stop;
+    const auto request_stop = [&stop] { stop.request_stop(); };
+    const std::stop_callback on_end(stop_.get_token(), request_stop);
+    const std::stop_callback on_cancel(cancelled, request_stop);
+    try {
+      return run(stop.get_token());
+    } catch (const Error&) {
+      if (cancelled.stop_requested()) throw_cancelled();
+      if (stop_.stop_requested()) throw_ending();
+      throw;
+    }
+  }
 
   // Aborts running and waiting imports, and rejects further ones.
   void stop();

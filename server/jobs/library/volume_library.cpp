@@ -57,13 +57,15 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
                                             const ImportControl& control) {
   const store::Blob blob = store::digest_of(canonical_in(scratch));
   if (control.cancelled.stop_requested()) throw_cancelled();
-  const std::shared_lock lock(mutex_);
   // Also required if another owner has the same samples; otherwise the outcome on a full disk would
   // reveal that.
   if (!volumes_.contains(owner, blob.key)) {
     retention_.make_room({.owner = owner, .bytes = blob.bytes});
   }
-  blobs_.adopt(canonical_in(scratch), blob, owner);
+  // The store keeps the blob for mark_named(), so nobody has to wait for it.
+  runner_.until_stopped(control.cancelled, [&](const std::stop_token& stop) {
+    blobs_.adopt(canonical_in(scratch), blob, owner, stop);
+  });
   volume.id = blob.key;
   volume.created = timestamp();
   auto [stored, is_new] = volumes_.add(owner, volume);
@@ -109,8 +111,8 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
 }
 
 void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
-  const std::scoped_lock lock(mutex_);
   // The eraser waits for the lock, and leaves alone what a record still names then.
+  const std::shared_lock lock(erasing_);
   if (volumes_.contains(viewer, id)) eraser_.erase(id);
   volumes_.erase(viewer, id);
 }

@@ -46,7 +46,8 @@ class VolumeLibrary {
   // used if the file contains no name; `party` takes turns with others (ImportPlaces). Second:
   // false if the owner already had the same samples and geometry. Then the record stays unchanged,
   // but the returned volume has the notes, ignored files and labels of this upload. Throws what
-  // ImportRunner::run throws, and kOutOfSpace. It stores nothing if it throws kCancelled.
+  // ImportRunner::run throws, also while the bytes are stored, and kOutOfSpace. It stores nothing
+  // if it throws kCancelled.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
                               const std::string& name = {}, const std::string& party = {},
@@ -75,15 +76,16 @@ class VolumeLibrary {
     return volumes_.rename(owner, id, name);
   }
 
-  // Aborts running and waiting imports, and rejects further ones.
+  // Aborts running and waiting imports and the storing of their bytes, and rejects further ones.
   void stop_imports() { runner_.stop(); }
 
-  // Erases the records visible to the viewer. The samples are erased soon after the last record.
+  // Erases the records visible to the viewer. The samples are erased soon after the last record,
+  // or after the next start if this object is destroyed before.
   // Throws Error kNotFound, kGone, and kNotReady while a job needs the volume.
   void erase(const store::Viewer& viewer, const std::string& id);
 
-  // Returns once the samples of erased volumes are gone.
-  void finish_erasing() { eraser_.finish(); }
+  // Returns once the samples of erased volumes are gone, or `stop` is requested.
+  void finish_erasing(const std::stop_token& stop = {}) { eraser_.finish(stop); }
 
  private:
   // Writes the canonical file of the upload into the scratch folder.
@@ -100,10 +102,9 @@ class VolumeLibrary {
   store::Retention& retention_;
   const volume::SizeLimits limits_;
   ImportRunner runner_;
-  // Held while a blob and its record are added or erased together. Additions share it, so that they
-  // wait for the disk concurrently.
-  std::shared_mutex mutex_;
-  BlobEraser eraser_{blobs_, volumes_, mutex_, folder_.erasing()};
+  // Held shared while a record is erased.
+  std::shared_mutex erasing_;
+  BlobEraser eraser_{blobs_, volumes_, erasing_, folder_.erasing()};
 };
 
 }  // namespace isomesh::jobs

@@ -36,7 +36,8 @@ Housekeeper::Housekeeper(store::Retention& retention, VolumeLibrary& library,
         Mutex mutex;
         Condition never;
         while (!stop.stop_requested()) {
-          library.finish_erasing();
+          library.finish_erasing(stop);
+          if (stop.stop_requested()) return;
           enforce(retention);
           Lock lock(mutex);
           never.wait_for(lock, stop, interval, [] { return false; });

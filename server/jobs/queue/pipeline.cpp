@@ -70,11 +70,11 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   const auto stored = Clock::now();
   PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const store::Blob blob = writers[i]->commit();
+    const store::Blob blob = writers[i]->commit(stop);
     result.mesh.files[files[i]] = {blob.bytes, blob.key, ""};
   }
   if (result.mesh.labels_count) {
-    const store::Blob blob = writers.back()->commit();
+    const store::Blob blob = writers.back()->commit(stop);
     result.mesh.label_list = {blob.bytes, blob.key};
   }
   result.timing.encode += milliseconds_since(stored);

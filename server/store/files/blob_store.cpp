@@ -155,7 +155,7 @@ class FileBlobStore::Writer : public BlobWriter {
     digest_.update(bytes);
   }
 
-  Blob commit() override {
+  Blob store(const std::stop_token& /*stop*/) override {
     const std::string key = to_hex(digest_.finish());
     // Another folder may be in the place of the shared one: nothing must be stored there.
     if (store_.holds_) store_.check_is_there();
@@ -286,9 +286,9 @@ std::unique_ptr<BlobWriter> FileBlobStore::begin(const std::string& owner) {
 }
 
 void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
-                          const std::string& owner) {
+                          const std::string& owner, const std::stop_token& stop) {
   if (holds_) {
-    copy_in(file, blob, owner);
+    copy_in(file, blob, owner, stop);
     return;
   }
   reserve_.check_room();
@@ -307,12 +307,13 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
 
 // A shared folder is on another file system, so the file cannot be moved.
 void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob,
-                            const std::string& owner) {
+                            const std::string& owner, const std::stop_token& stop) {
   const File source = File::open(file);
   const std::unique_ptr<BlobWriter> writer = begin(owner);
   std::vector<std::byte> block(kBlockBytes);
   std::uint64_t offset = 0;
   while (const std::size_t count = source.read_at(offset, block)) {
+    if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
     writer->write(std::span(block).first(count));
     offset += count;
   }

@@ -46,8 +46,8 @@ class FileBlobStore : public BlobStore {
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
-  void adopt(const std::filesystem::path& file, const Blob& blob,
-             const std::string& owner) override;
+  void adopt(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
+             const std::stop_token& stop) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
   // A verified file is trusted for an hour, unless its device, inode, size or times change.
@@ -103,7 +103,8 @@ class FileBlobStore : public BlobStore {
   void make_folder_for(const std::filesystem::path& place);
   // As path_of, for reading: brings the blob back from quarantine.
   std::filesystem::path found(const std::string& key) const;
-  void copy_in(const std::filesystem::path& file, const Blob& blob, const std::string& owner);
+  void copy_in(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
+               const std::stop_token& stop);
   // Size of the disk that has the blobs.
   std::uint64_t disk_capacity() const;
   // For a shared folder: erases the blob unless it is held or named. Returns false if it still

@@ -26,9 +26,9 @@ class S3BlobStore::Writer : public BlobWriter {
     copy_->write(bytes);
   }
 
-  Blob commit() override {
+  Blob store(const std::stop_token& stop) override {
     const Blob blob = copy_->commit();
-    store_.store(blob, owner_);
+    store_.store(blob, store_.open_copy(blob.key), owner_, stop);
     stored_ = blob.bytes;
     return blob;
   }
@@ -100,25 +100,26 @@ std::unique_ptr<BlobWriter> S3BlobStore::begin(const std::string& owner) {
 }
 
 void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
-                        const std::string& owner) {
-  cache_.files().adopt(file, blob, owner);
-  store(blob, owner);
+                        const std::string& owner, const std::stop_token& stop) {
+  const File bytes = File::open(file);
+  cache_.files().adopt(file, blob, owner, stop);
+  store(blob, bytes, owner, stop);
   room_.finish(blob.bytes, owner);
 }
 
 // The caller finishes the bytes.
-void S3BlobStore::store(const Blob& blob, const std::string& owner) {
+void S3BlobStore::store(const Blob& blob, const File& bytes, const std::string& owner,
+                        const std::stop_token& stop) {
   const auto in_use = cache_.use(blob.key);
   cache_.files().mark_named(blob.key);  // records name the blob in the bucket, not this copy
-  const File copy = open_copy(blob.key);
-  cache_.note(blob.key, blob.bytes);
+  cache_.note(blob.key, cache_.files().size(blob.key).value_or(0));
   cache_.make_room(0);
   room_.take(blob.bytes, owner);
   const std::string hold = hold_object(blob.key);
   try {
-    client_.put_text(hold, "");
-    wait_until_not_going(blob.key);
-    put(blob, copy);
+    client_.put_text(hold, "", stop);
+    wait_until_not_going(blob.key, stop);
+    put(blob, bytes, stop);
   } catch (...) {
     room_.finish(blob.bytes, owner);
     room_.give(blob.bytes);
@@ -139,23 +140,23 @@ File S3BlobStore::open_copy(const std::string& key) const {
   throw Error(ErrorCode::kUnavailable, "there is no space for a copy in the cache: try again");
 }
 
-void S3BlobStore::put(const Blob& blob, const File& copy) {
+void S3BlobStore::put(const Blob& blob, const File& bytes, const std::stop_token& stop) {
   const bool is_damaged = [&] {
     const Lock lock(mutex_);
     return damaged_.contains(blob.key);
   }();
-  const bool is_new = client_.put_file(blob_object(blob.key), copy, blob,
-                                       is_damaged ? IfThere::kReplace : IfThere::kKeep);
+  const bool is_new = client_.put_file(blob_object(blob.key), bytes, blob,
+                                       is_damaged ? IfThere::kReplace : IfThere::kKeep, stop);
   if (!is_new || is_damaged) room_.give(blob.bytes);
   const Lock lock(mutex_);
   damaged_.erase(blob.key);
 }
 
-void S3BlobStore::wait_until_not_going(const std::string& key) {
+void S3BlobStore::wait_until_not_going(const std::string& key, const std::stop_token& stop) {
   constexpr std::chrono::milliseconds kPause{250};
   constexpr int kTries = 40;
   for (int n = 0; n < kTries; ++n) {
-    const S3Listing going = client_.list(going_objects(key));
+    const S3Listing going = client_.list(going_objects(key), stop);
     const bool is_going = std::ranges::any_of(going.objects, [&](const S3Object& object) {
       return going.now - object.modified < kLongestGoing;
     });

@@ -59,8 +59,8 @@ class S3BlobStore : public BlobStore {
   bool has_room() const override;
   std::uint64_t bytes() const override { return room_.used(); }
   std::uint64_t capacity() const override;
-  void adopt(const std::filesystem::path& file, const Blob& blob,
-             const std::string& owner) override;
+  void adopt(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
+             const std::stop_token& stop) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
   // Checks the local copy as FileBlobStore does; fetches one if there is none.
@@ -81,12 +81,13 @@ class S3BlobStore : public BlobStore {
   class Writer;
   class Fetching;
 
-  // Uploads the local copy as a blob.
-  void store(const Blob& blob, const std::string& owner);
   // The copy that was just made. Stays readable if another thread erases the blob.
   File open_copy(const std::string& key) const;
-  void put(const Blob& blob, const File& copy);
-  void wait_until_not_going(const std::string& key);
+  // Uploads the bytes of a local copy as a blob. The copy may be erased meanwhile.
+  void store(const Blob& blob, const File& bytes, const std::string& owner,
+             const std::stop_token& stop);
+  void put(const Blob& blob, const File& bytes, const std::stop_token& stop);
+  void wait_until_not_going(const std::string& key, const std::stop_token& stop);
   bool fetch(const std::string& key, const std::stop_token& stop) const;
   bool fetch_once(const std::string& key, std::uint64_t bytes, const std::stop_token& stop) const;
   bool is_held(const std::string& key, std::chrono::nanoseconds oldest) const;

@@ -127,8 +127,9 @@ bool S3Client::responds() const {
   }
 }
 
-std::optional<std::uint64_t> S3Client::size(const std::string& key) const {
-  const S3Response response = ask({.method = "HEAD", .key = key});
+std::optional<std::uint64_t> S3Client::size(const std::string& key,
+                                            const std::stop_token& stop) const {
+  const S3Response response = ask({.method = "HEAD", .key = key}, stop);
   if (response.status == kS3NotFound) return std::nullopt;
   const auto bytes = parse_uint64(response.header("content-length"));
   if (response.status != kS3Ok || !bytes) {
@@ -139,21 +140,21 @@ std::optional<std::uint64_t> S3Client::size(const std::string& key) const {
 }
 
 bool S3Client::put_file(const std::string& key, const File& file, const Blob& blob,
-                        IfThere if_there) {
+                        IfThere if_there, const std::stop_token& stop) {
   constexpr int kTries = 3;
   for (int n = 0; n < kTries; ++n) {
     bool is_stored = true;
     if (blob.bytes > options_.multipart_above) {
-      const auto there = if_there == IfThere::kKeep ? size(key) : std::nullopt;
+      const auto there = if_there == IfThere::kKeep ? size(key, stop) : std::nullopt;
       is_stored = there != blob.bytes;
-      if (is_stored) put_in_parts(key, file, blob);
+      if (is_stored) put_in_parts(key, file, blob, stop);
     } else {
-      const S3Response response = put_at_once(key, file, blob, if_there);
+      const S3Response response = put_at_once(key, file, blob, if_there, stop);
       if (response.status == kS3NotFound) reject(response);  // the bucket is missing
       is_stored = response.status / 100 == 2;
     }
     // A successful PUT does not prove that the object is stored.
-    if (size(key) == blob.bytes) return is_stored;
+    if (size(key, stop) == blob.bytes) return is_stored;
     if_there = IfThere::kReplace;
   }
   throw Error(ErrorCode::kUnavailable,
@@ -161,21 +162,22 @@ bool S3Client::put_file(const std::string& key, const File& file, const Blob& bl
 }
 
 S3Response S3Client::put_at_once(const std::string& key, const File& file, const Blob& blob,
-                                 IfThere if_there) {
+                                 IfThere if_there, const std::stop_token& stop) {
   S3Request request = {
       .method = "PUT", .key = key, .file = &file, .bytes = blob.bytes, .sha256 = blob.key};
   if (if_there == IfThere::kKeep && knows_conditions_) {
     request.condition = "If-None-Match: *";
-    S3Response response = ask(request);
+    S3Response response = ask(request, stop);
     if (response.status != kS3NotImplemented) return response;
     knows_conditions_ = false;
     request.condition.clear();
   }
-  return ask(request);
+  return ask(request, stop);
 }
 
-void S3Client::put_in_parts(const std::string& key, const File& file, const Blob& blob) {
-  const S3Response begun = ask({.method = "POST", .key = key, .query = "uploads="});
+void S3Client::put_in_parts(const std::string& key, const File& file, const Blob& blob,
+                            const std::stop_token& stop) {
+  const S3Response begun = ask({.method = "POST", .key = key, .query = "uploads="}, stop);
   const S3Text text = read_s3_text(begun.text);
   const std::string id(text.find("UploadId"));
   if (begun.status != kS3Ok) reject(begun);
@@ -191,7 +193,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
     for (std::uint64_t begin = 0; begin < blob.bytes; begin += part_bytes) {
       const std::string part = std::to_string(++number);
       const std::string tag = put_part(key, "partNumber=" + part + '&' + upload, file, begin,
-                                       std::min(part_bytes, blob.bytes - begin));
+                                       std::min(part_bytes, blob.bytes - begin), stop);
       parts += "<Part><PartNumber>" + part + "</PartNumber><ETag>" + tag + "</ETag></Part>";
     }
     const std::string whole =
@@ -199,13 +201,14 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
         "</CompleteMultipartUpload>";
     // The status may be sent before the outcome is known, and a repeated request may find that the
     // upload no longer exists. The object's size then decides.
-    const S3Response ended = ask({.method = "POST", .key = key, .query = upload, .text = whole});
+    const S3Response ended =
+        ask({.method = "POST", .key = key, .query = upload, .text = whole}, stop);
     if (ended.status == kS3Ok && read_s3_text(ended.text).root == "CompleteMultipartUploadResult") {
       return;
     }
   } catch (...) {
     try {
-      connections_.attempt({.method = "DELETE", .key = key, .query = upload}, {});
+      connections_.attempt({.method = "DELETE", .key = key, .query = upload, .is_quick = true}, {});
     } catch (const Error&) {
       log_debug("an incomplete multipart upload is left to the storage's own rules");
     }
@@ -214,7 +217,8 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
 }
 
 std::string S3Client::put_part(const std::string& key, const std::string& query, const File& file,
-                               std::uint64_t begin, std::uint64_t bytes) {
+                               std::uint64_t begin, std::uint64_t bytes,
+                               const std::stop_token& stop) {
   Sha256 digest;
   std::vector<std::byte> block(kReadAtOnce);
   for (std::uint64_t done = 0; done < bytes;) {
@@ -231,7 +235,8 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
                                    .file = &file,
                                    .begin = begin,
                                    .bytes = bytes,
-                                   .sha256 = to_hex(digest.finish())});
+                                   .sha256 = to_hex(digest.finish())},
+                                  stop);
   const std::string tag = response.header("etag");
   if (response.status != kS3Ok || tag.empty() || tag.find_first_of("<>&") != tag.npos) {
     throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes has lost an upload");
@@ -239,8 +244,9 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
   return tag;
 }
 
-void S3Client::put_text(const std::string& key, std::string_view text) {
-  const S3Response response = ask({.method = "PUT", .key = key, .text = text});
+void S3Client::put_text(const std::string& key, std::string_view text,
+                        const std::stop_token& stop) {
+  const S3Response response = ask({.method = "PUT", .key = key, .text = text}, stop);
   if (response.status == kS3NotFound) reject(response);  // the bucket is missing
 }
 
@@ -292,11 +298,11 @@ S3Request S3Client::listing(const std::string& beginning, const std::string& las
   return {.query = std::move(query)};
 }
 
-S3Listing S3Client::list(const std::string& beginning) const {
+S3Listing S3Client::list(const std::string& beginning, const std::stop_token& stop) const {
   S3Listing all;
   std::string last;
   for (int page = 0; page < kMostPages; ++page) {
-    const S3Response response = ask(listing(beginning, last, kListedAtOnce));
+    const S3Response response = ask(listing(beginning, last, kListedAtOnce), stop);
     const S3Text text = read_s3_text(response.text);
     if (response.status != kS3Ok || text.root != "ListBucketResult") {
       throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");

@@ -32,8 +32,9 @@ enum class IfThere { kKeep, kReplace };
 // Keys have plain characters only and no prefix. Requests are repeated, with growing pauses, while
 // the peer does not respond, disconnects or is busy. Throws Error kUnavailable if that continues,
 // and for all other rejections and invalid responses: they are never the fault of a job or an
-// upload. Throws kOutOfSpace if the peer is full. The log has the status and the peer's code;
-// messages contain neither credentials nor text of the peer. Thread safe.
+// upload. Throws kOutOfSpace if the peer is full, and kCancelled if `stop` is requested; the
+// operation may have taken place nevertheless. The log has the status and the peer's code; messages
+// contain neither credentials nor text of the peer. Thread safe.
 class S3Client {
  public:
   explicit S3Client(S3ClientOptions options) : options_(std::move(options)) {}
@@ -44,18 +45,19 @@ class S3Client {
   // Stores the first `blob.bytes` bytes of a file; the peer verifies their SHA-256. With kKeep,
   // returns false and replaces nothing if an object of that size exists. Checks afterwards that the
   // object has that size.
-  bool put_file(const std::string& key, const File& file, const Blob& blob, IfThere if_there);
+  bool put_file(const std::string& key, const File& file, const Blob& blob, IfThere if_there,
+                const std::stop_token& stop);
 
-  void put_text(const std::string& key, std::string_view text);
+  void put_text(const std::string& key, std::string_view text, const std::stop_token& stop = {});
   std::optional<std::string> get_text(const std::string& key) const;
 
   // Passes the object's `bytes` bytes to `sink` in order. An interrupted transfer continues where
-  // it stopped. Throws Error kNotFound; kCancelled if `stop` is requested.
+  // it stopped. Throws Error kNotFound.
   void get(const std::string& key, std::uint64_t bytes, const S3Sink& sink,
            const std::stop_token& stop) const;
 
   // Size in bytes; empty if the object is missing.
-  std::optional<std::uint64_t> size(const std::string& key) const;
+  std::optional<std::uint64_t> size(const std::string& key, const std::stop_token& stop = {}) const;
 
   enum class Erased { kAtOnce, kMaybeLater };
   // kMaybeLater: the object is gone, but a repeated request may arrive late and erase a new object
@@ -66,7 +68,7 @@ class S3Client {
   void try_to_erase(const std::string& key);
 
   // Lists all objects, with as many requests as necessary.
-  S3Listing list(const std::string& beginning) const;
+  S3Listing list(const std::string& beginning, const std::stop_token& stop = {}) const;
 
   bool has_any(const std::string& beginning) const;
 
@@ -77,10 +79,11 @@ class S3Client {
   S3Response ask(const S3Request& request, const std::stop_token& stop = {}) const;
   S3Request listing(const std::string& beginning, const std::string& last, int most) const;
   S3Response put_at_once(const std::string& key, const File& file, const Blob& blob,
-                         IfThere if_there);
-  void put_in_parts(const std::string& key, const File& file, const Blob& blob);
+                         IfThere if_there, const std::stop_token& stop);
+  void put_in_parts(const std::string& key, const File& file, const Blob& blob,
+                    const std::stop_token& stop);
   std::string put_part(const std::string& key, const std::string& query, const File& file,
-                       std::uint64_t begin, std::uint64_t bytes);
+                       std::uint64_t begin, std::uint64_t bytes, const std::stop_token& stop);
 
   const S3ClientOptions options_;
   const S3Connections connections_{options_};

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <string>
 #include <string_view>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -203,6 +204,33 @@ TEST_F(ConnectionsTest, TheEndCutsBodiesAndAnswersWaiters) {
   connections_->close(1h);
   EXPECT_EQ(waiting.receive().body, "waited");
   EXPECT_EQ(sending.receive().body, "cut 3");
+}
+
+TEST_F(ConnectionsTest, TheEndRefusesRequestsThatHaveNotBegun) {
+  ConnectionOptions narrow = patient_options();
+  narrow.threads = 3;  // two for one party
+  narrow.computing_threads = 2;
+  open(narrow);
+  const auto hold = [&](const std::string& bytes) {
+    hang_on(1, bytes);
+    return eventually([&] {
+      return connections_->open_connections() == clients_.size() && connections_->pending() == 0;
+    });
+  };
+  ASSERT_TRUE(hold(request("GET", "/compute")) && eventually([&] { return runs_ == 1; }));
+  ASSERT_TRUE(hold(request("GET", "/compute")));
+  ASSERT_TRUE(hold(request("GET", "/block")) && eventually([&] { return busy_.load(); }));
+  ASSERT_TRUE(hold("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc"));
+  ASSERT_TRUE(hold(request("POST", "/do", "x")));
+  std::jthread closing([&] { connections_->close(1h); });
+  EXPECT_EQ(clients_[3].receive().body, "cut 3");
+  EXPECT_EQ(clients_[4].receive().status, 503);
+  go_.set_value();
+  EXPECT_EQ(clients_[2].receive().body, "done");
+  computing_.set_value();
+  EXPECT_EQ(clients_[0].receive().status, 200);
+  EXPECT_EQ(clients_[1].receive().status, 503);
+  EXPECT_EQ(runs_, 1);
 }
 
 }  // namespace

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <memory>
 #include <mutex>
 #include <numbers>
 #include <numeric>
 #include <set>
+#include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -216,6 +219,50 @@ INSTANTIATE_TEST_SUITE_P(Stages, Cancelled,
                          testing::Values(Stage::kLoad, Stage::kExtract, Stage::kSmooth,
                                          Stage::kEncode),
                          [](const auto& stage) { return std::string(to_string(stage.param)); });
+
+// Remote blobs, which are sent when they are committed: the stop comes meanwhile.
+class StoppedBlobs : public store::FileBlobStore {
+ public:
+  StoppedBlobs(const store::DataFolder& data, std::stop_source& stop)
+      : FileBlobStore(data), stop_(stop) {}
+
+  std::unique_ptr<store::BlobWriter> begin(const std::string& owner) override {
+    return std::make_unique<Writer>(FileBlobStore::begin(owner), stop_);
+  }
+
+ private:
+  class Writer : public store::BlobWriter {
+   public:
+    Writer(std::unique_ptr<store::BlobWriter> draft, std::stop_source& stop)
+        : draft_(std::move(draft)), stop_(stop) {}
+
+    void write(std::span<const std::byte> bytes) override { draft_->write(bytes); }
+    store::Blob store(const std::stop_token& stop) override {
+      stop_.request_stop();
+      if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
+      return draft_->commit(stop);
+    }
+
+   private:
+    const std::unique_ptr<store::BlobWriter> draft_;
+    std::stop_source& stop_;
+  };
+
+  std::stop_source& stop_;
+};
+
+TEST_F(PipelineTest, StoringItsFilesCanBeStopped) {
+  const Volume volume = add_sphere();
+  const std::size_t before = blob_count();
+  std::stop_source stop;
+  StoppedBlobs blobs(data_, stop);
+  EXPECT_EQ(test::code_thrown_by([&] {
+              run_pipeline(volume, parameters_of(volume, 0), {}, blobs, process_, stop.get_token(),
+                           kQuiet);
+            }),
+            ErrorCode::kCancelled);
+  EXPECT_EQ(blob_count(), before);
+}
 
 // The first of two formats is stored when the second is begun.
 TEST_F(PipelineTest, CancelledBetweenTwoFormatsItStoresNothing) {

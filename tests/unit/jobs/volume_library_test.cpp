@@ -4,6 +4,7 @@
 #include <atomic>
 #include <functional>
 #include <shared_mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
+#include "tests/support/process.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -34,13 +36,13 @@ class VolumeLibraryTest : public test::JobsFixture {
     return library_.add("", folder_ / "upload", raw(geometry));
   }
 
-  // Has the eraser erase a volume of bytes_ while somebody stores what `meanwhile` does.
-  void erase_while_somebody_stores(const std::function<void(const Volume& volume)>& meanwhile) {
+  // Has the eraser erase a volume of bytes_ after what `meanwhile` does.
+  void erase_after(const std::function<void(const Volume& volume)>& meanwhile) {
     const Volume volume = add_bytes(bytes_).first;
-    std::shared_mutex coming;
-    BlobEraser eraser(blobs_, volumes_, coming, data_.erasing());
+    std::shared_mutex erasing;
+    BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
     {
-      const std::shared_lock somebody_stores(coming);
+      const std::shared_lock somebody_erases(erasing);
       eraser.erase(volume.id);
       volumes_.erase("", volume.id);
       meanwhile(volume);
@@ -141,8 +143,8 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
   }
   volumes_.erase("", erased.id);
   std::filesystem::rename(blobs_.path_of(erased.id), data_.quarantine() / erased.id);
-  std::shared_mutex coming;
-  BlobEraser next(blobs_, volumes_, coming, data_.erasing());
+  std::shared_mutex erasing;
+  BlobEraser next(blobs_, volumes_, erasing, data_.erasing());
   next.finish();
   EXPECT_EQ(blob_count(), 1U);
   EXPECT_TRUE(std::filesystem::exists(blobs_.path_of(kept.id)));
@@ -152,10 +154,10 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
 
 TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   const Volume volume = add_bytes(bytes_).first;
-  std::shared_mutex coming;
-  BlobEraser eraser(blobs_, volumes_, coming, data_.erasing());
+  std::shared_mutex erasing;
+  BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
   {
-    const std::scoped_lock erasing(coming);
+    const std::shared_lock lock(erasing);
     eraser.erase(volume.id);
     EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
     volumes_.erase("", volume.id);
@@ -165,15 +167,133 @@ TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
 }
 
+// Slow uploads to remote storage: adopt() waits until `go` is set or it is stopped.
+class SlowBlobs : public store::FileBlobStore {
+ public:
+  using FileBlobStore::FileBlobStore;
+
+  void adopt(const std::filesystem::path& file, const store::Blob& blob, const std::string& owner,
+             const std::stop_token& stop) override {
+    has_begun = true;
+    EXPECT_TRUE(test::eventually([&] { return go || stop.stop_requested(); }));
+    if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
+    FileBlobStore::adopt(file, blob, owner, stop);
+  }
+
+  std::atomic<bool> has_begun = false;
+  std::atomic<bool> go = false;
+};
+
+TEST_F(VolumeLibraryTest, ErasingDoesNotWaitForBytesThatAreBeingStored) {
+  const Volume volume = add_bytes(bytes_).first;
+  SlowBlobs slow(data_);
+  VolumeLibrary library(data_, slow, volumes_, retention_, {},
+                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  test::write_file(folder_ / "upload", std::string(bytes_.rbegin(), bytes_.rend()));
+  std::jthread adding([&] { library.add("", folder_ / "upload", raw()); });
+  ASSERT_TRUE(test::eventually([&] { return slow.has_begun.load(); }));
+  std::atomic<bool> is_erased = false;
+  const std::jthread erasing([&] {
+    library.erase("", volume.id);
+    library.finish_erasing();
+    is_erased = true;
+  });
+  EXPECT_TRUE(test::eventually([&] { return is_erased.load(); }));
+  EXPECT_EQ(blob_count(), 0U);
+  slow.go = true;
+  adding.join();
+  EXPECT_EQ(blob_count(), 1U);
+}
+
+TEST_F(VolumeLibraryTest, StoringBytesCanBeStopped) {
+  test::write_file(folder_ / "upload", bytes_);
+  for (const bool is_end : {false, true}) {
+    SlowBlobs slow(data_);
+    VolumeLibrary library(data_, slow, volumes_, retention_, {},
+                          {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+    std::stop_source cancel;
+    const std::jthread stopping([&] {
+      EXPECT_TRUE(test::eventually([&] { return slow.has_begun.load(); }));
+      is_end ? library.stop_imports() : static_cast<void>(cancel.request_stop());
+    });
+    const auto add = [&] {
+      library.add("", folder_ / "upload", raw(), {}, {}, {.cancelled = cancel.get_token()});
+    };
+    EXPECT_EQ(code_thrown_by(add), is_end ? ErrorCode::kUnavailable : ErrorCode::kCancelled);
+  }
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_TRUE(volumes_.list("", {}, 1, store::ListOrder::kOldestFirst).empty());
+}
+
+// In a row they would hold up the end of the service for long if the database hangs.
+TEST_F(VolumeLibraryTest, VolumesAreErasedConcurrently) {
+  class Counting : public store::SqlVolumeStore {
+   public:
+    explicit Counting(store::Database& database) : SqlVolumeStore(database) {}
+    void erase(const store::Viewer& /*viewer*/, const std::string& /*id*/) override {
+      ++begun_;
+      EXPECT_TRUE(test::eventually([this] { return begun_ == 2; }));
+    }
+
+   private:
+    std::atomic<int> begun_ = 0;
+  };
+  Counting volumes(database_);
+  VolumeLibrary library(data_, blobs_, volumes, retention_, {},
+                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  const std::jthread one([&] { library.erase("", "one"); });
+  library.erase("", "two");
+}
+
+// Each takes a tenth of a second unless somebody waits for them, and seconds if the database hangs.
+TEST_F(VolumeLibraryTest, TheEndLeavesErasingToTheNextStart) {
+  const Volume volume = add_bytes(bytes_).first;
+  constexpr int kMany = 200;
+  std::shared_mutex erasing;
+  {
+    BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
+    const std::shared_lock lock(erasing);
+    for (int n = 0; n < kMany; ++n) eraser.erase(std::to_string(n));
+    eraser.erase(volume.id);
+    volumes_.erase("", volume.id);
+  }
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
+  BlobEraser next(blobs_, volumes_, erasing, data_.erasing());
+  next.finish();
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
+}
+
+TEST_F(VolumeLibraryTest, WhoeverWaitsForErasingCanBeStopped) {
+  std::shared_mutex erasing;
+  BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
+  std::stop_source stop;
+  stop.request_stop();
+  const std::shared_lock lock(erasing);
+  eraser.erase(std::string(64, 'a'));
+  eraser.finish(stop.get_token());
+  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / std::string(64, 'a')));
+}
+
 // Whoever erases does not wait for the disk, which takes long for what is large and no time for
 // what another owner has.
 TEST_F(VolumeLibraryTest, AVolumeIsErasedBeforeItsSamplesAre) {
-  erase_while_somebody_stores([this](const Volume&) { EXPECT_EQ(blob_count(), 1U); });
+  erase_after([this](const Volume&) { EXPECT_EQ(blob_count(), 1U); });
   EXPECT_EQ(blob_count(), 0U);
 }
 
 TEST_F(VolumeLibraryTest, SamplesThatCameAgainMeanwhileStay) {
-  erase_while_somebody_stores([this](const Volume& volume) { volumes_.add("other", volume); });
+  erase_after([this](const Volume& volume) { volumes_.add("other", volume); });
+  EXPECT_EQ(blob_count(), 1U);
+}
+
+TEST_F(VolumeLibraryTest, SamplesThatAreStoredAgainStayBeforeTheyAreNamed) {
+  erase_after([this](const Volume& volume) {
+    const std::filesystem::path again = data_.scratch() / "again";
+    std::filesystem::copy_file(blobs_.path_of(volume.id), again);
+    blobs_.adopt(again, store::digest_of(again), "", {});
+  });
   EXPECT_EQ(blob_count(), 1U);
 }
 

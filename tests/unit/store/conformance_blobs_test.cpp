@@ -139,7 +139,7 @@ TEST_P(Blobs, AFinishedFileIsTakenOver) {
   const std::string text(3 << 20, 'x');
   const std::filesystem::path file = engine_->write_file(text);
   const Blob blob = digest_of(file);
-  blobs_->adopt(file, blob, "");
+  blobs_->adopt(file, blob, "", {});
   EXPECT_EQ(blob.bytes, text.size());
   EXPECT_EQ(blob.key, put(text).key);
   EXPECT_FALSE(std::filesystem::exists(file));

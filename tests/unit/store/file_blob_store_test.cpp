@@ -105,7 +105,7 @@ TEST_F(FileBlobStoreTest, AdoptsAFinishedFileByMovingIt) {
   const std::string text(3 << 20, 'x');
   test::write_file(data_.scratch() / "made", text);
   const Blob blob = digest_of(data_.scratch() / "made");
-  blobs_.adopt(data_.scratch() / "made", blob, "");
+  blobs_.adopt(data_.scratch() / "made", blob, "", {});
   EXPECT_EQ(blob.bytes, text.size());
   EXPECT_EQ(blob.key, put(text).key);
   EXPECT_FALSE(std::filesystem::exists(data_.scratch() / "made"));
@@ -140,7 +140,7 @@ TEST_F(FileBlobStoreTest, WhatWasHashedToBeAdoptedIsNotReadAgain) {
   std::stop_source stopped;
   stopped.request_stop();
   test::write_file(data_.scratch() / "made", "hello");
-  blobs_.adopt(data_.scratch() / "made", digest_of(data_.scratch() / "made"), "");
+  blobs_.adopt(data_.scratch() / "made", digest_of(data_.scratch() / "made"), "", {});
   EXPECT_TRUE(blobs_.is_intact(kHello, stopped.get_token()));
   test::write_file(blobs_.path_of(kHello), "hallo");
   EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, stopped.get_token()); }),
@@ -154,7 +154,7 @@ TEST_F(FileBlobStoreTest, WhatIsChangedRightAfterItsAdoptionIsReadAgain) {
     const std::string text = std::to_string(1000 + n);
     test::write_file(data_.scratch() / "made", text);
     const Blob blob = digest_of(data_.scratch() / "made");
-    blobs_.adopt(data_.scratch() / "made", blob, "");
+    blobs_.adopt(data_.scratch() / "made", blob, "", {});
     test::write_file(blobs_.path_of(blob.key), "more");
     EXPECT_FALSE(blobs_.is_intact(blob.key, {}));
   }

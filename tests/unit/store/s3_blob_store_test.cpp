@@ -1,6 +1,8 @@
 // Tests specific to blobs in S3: a failing peer, local copies, and state that is kept in objects.
 #include <chrono>
 #include <memory>
+#include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -59,6 +61,18 @@ class S3Blobs : public testing::Test {
     std::string key = writer->commit().key;
     blobs_->mark_named(key);
     return key;
+  }
+
+  // The error of storing the text if that is stopped once the peer has a PUT with `part`.
+  std::optional<ErrorCode> code_thrown_by_stopping(std::string_view text, const std::string& part) {
+    std::stop_source stop;
+    const std::jthread stopping([&] {
+      EXPECT_TRUE(test::eventually([&] { return peer().count("PUT", part) > 0; }));
+      stop.request_stop();
+    });
+    const auto writer = blobs_->begin("");
+    writer->write(as_span(text));
+    return code_thrown_by([&] { writer->commit(stop.get_token()); });
   }
 
   // One of which there is no copy here.
@@ -176,6 +190,13 @@ TEST_F(S3Blobs, APeerThatIsSilentIsGivenUp) {
   EXPECT_EQ(get(key), "hello");
 }
 
+TEST_F(S3Blobs, AnUploadCanBeStopped) {
+  peer().fail("hang", 1, "PUT", "/blobs/");
+  EXPECT_EQ(code_thrown_by_stopping("hello", "/blobs/"), ErrorCode::kCancelled);
+  EXPECT_TRUE(peer().keys().empty());
+  EXPECT_EQ(get(put("hello")), "hello");
+}
+
 TEST_F(S3Blobs, ADownloadThatIsCutOffGoesOnWhereItWas) {
   const std::string text = text_of(1'000'000);
   const std::string key = put_elsewhere(text);
@@ -265,6 +286,13 @@ TEST_F(InParts, APartThatFailsIsSentAgain) {
 TEST_F(InParts, AnUploadThatCannotGoOnIsGivenUp) {
   peer().fail("status-403", 0, "PUT", "partNumber=3");
   EXPECT_EQ(code_thrown_by([&] { put(text_of(1'500)); }), ErrorCode::kUnavailable);
+  EXPECT_EQ(peer().open_uploads(), 0);
+}
+
+TEST_F(InParts, AnUploadCanBeStopped) {
+  peer().fail("hang", 1, "PUT", "partNumber=2");
+  EXPECT_EQ(code_thrown_by_stopping(text_of(1'500), "partNumber=2"), ErrorCode::kCancelled);
+  EXPECT_TRUE(peer().keys().empty());
   EXPECT_EQ(peer().open_uploads(), 0);
 }
 
