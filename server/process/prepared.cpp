@@ -28,14 +28,20 @@ PreparedProcesses::PreparedProcesses(const std::filesystem::path& program, std::
 
 PreparedProcesses::~PreparedProcesses() { stop(); }
 
-Child PreparedProcesses::take(std::chrono::steady_clock::time_point until) {
-  Lock lock(mutex_);
+Child PreparedProcesses::take(std::chrono::steady_clock::time_point until,
+                              const std::stop_token& cancelled) {
+  const std::stop_callback wake(cancelled, [this] {
+    const Lock lock(mutex_);
+    changed_.notify_all();
+  });
+  Lock lock(mutex_);  // after `wake`, whose end may wait for the callback
   ++takers_;
   for (;;) {
     changed_.notify_all();
-    changed_.wait_until(lock, stop_.get_token(), until,
-                        [this]() ISOMESH_REQUIRES(mutex_) { return !ready_.empty(); });
-    if (stop_.stop_requested() || ready_.empty()) break;
+    changed_.wait_until(lock, stop_.get_token(), until, [&]() ISOMESH_REQUIRES(mutex_) {
+      return !ready_.empty() || cancelled.stop_requested();
+    });
+    if (stop_.stop_requested() || cancelled.stop_requested() || ready_.empty()) break;
     Child child = std::move(ready_.front());
     ready_.pop_front();
     if (child.has_ended()) continue;
@@ -44,6 +50,7 @@ Child PreparedProcesses::take(std::chrono::steady_clock::time_point until) {
     return child;
   }
   --takers_;
+  if (cancelled.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
   throw Error(ErrorCode::kUnavailable, stop_.stop_requested()
                                            ? "the service is shutting down"
                                            : "no process could be started in time");

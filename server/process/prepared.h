@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <thread>
 
 #include "base/mutex.h"
@@ -25,8 +26,8 @@ class PreparedProcesses {
 
   // Takes a prepared process, which is then replaced, or waits for one. Skips processes that have
   // died. Retries failed starts, because a busy machine may recover. Throws Error kUnavailable if
-  // there is none by `until`, and after stop().
-  Child take(std::chrono::steady_clock::time_point until);
+  // there is none by `until`, and after stop(), and kCancelled after `cancelled`.
+  Child take(std::chrono::steady_clock::time_point until, const std::stop_token& cancelled = {});
 
   // Call after input has crashed a process. Copies share addresses and stack guards. To prevent
   // guessing them, later copies come from a restarted program.

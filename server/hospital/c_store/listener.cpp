@@ -203,7 +203,7 @@ void DimseListener::serve_association(Association& association) {
 void DimseListener::receive(Association& association, Transfers& transfers) {
   const std::stop_token stop = association.end.get_token();
   const store::ScratchFolder scratch(services_.folder.scratch());
-  process::Child child = services_.processes.take(Clock::now() + settings_.idle);
+  process::Child child = services_.processes.take(Clock::now() + settings_.idle, stop);
   child.send(
       process::to_line(process::DimseReceiving{.called = titles_of(settings_),
                                                .calling = settings_.calling,

@@ -97,7 +97,8 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
       .timeout = settings_.timeout,
       .response_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
   const Descriptor peer = connected(settings_, stop);
-  process::Child child = processes_.take(std::chrono::steady_clock::now() + settings_.timeout);
+  process::Child child =
+      processes_.take(std::chrono::steady_clock::now() + settings_.timeout, stop);
   child.send(process::to_line(order), peer.number());
   const process::Output output =
       child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);

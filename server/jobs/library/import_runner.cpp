@@ -130,7 +130,8 @@ process::ImportReport ImportRunner::report_of(const std::string& message, const 
   // A process that died while idle has not touched the file. Several in a row are a defect.
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
-    if (auto report = run_in(prepared_.take(deadline), message, stop)) return *std::move(report);
+    if (auto report = run_in(prepared_.take(deadline, stop), message, stop))
+      return *std::move(report);
     log_warning("a prepared import process ended before its import began; another one takes over");
   }
   throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");

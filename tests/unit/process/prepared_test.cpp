@@ -8,7 +8,9 @@
 #include <fstream>
 #include <random>
 #include <set>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -156,6 +158,21 @@ TEST(PreparedProcesses, NoneIsGivenOnceStopped) {
     EXPECT_EQ(error.code(), ErrorCode::kUnavailable);
   }
   EXPECT_TRUE(eventually([] { return children_of(::getpid()).empty(); }));
+}
+
+TEST(PreparedProcesses, WaitingForOneCanBeCancelled) {
+  PreparedProcesses prepared("/nonexistent", 1);
+  std::stop_source stop;
+  const std::jthread canceller([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // likely after the wait has begun
+    stop.request_stop();
+  });
+  try {
+    prepared.take(std::chrono::steady_clock::now() + std::chrono::hours(1), stop.get_token());
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+  }
 }
 
 TEST(PreparedProcesses, GoWithTheirOwner) {
