@@ -268,7 +268,8 @@ Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range)
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs, std::vector<std::string>& stored) {
+                                     store::BlobStore& blobs, const std::stop_token& stop,
+                                     std::vector<std::string>& stored) {
   std::vector<MadeObject> objects;
   std::string materials_uid;
   for (Document& document : documents_of(record, job, blobs)) {
@@ -283,7 +284,7 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
     write(document.text, *writer);
     if (!document.blob.empty()) copy(*blobs.open(document.blob), document, *writer);
     write(envelope.after, *writer);
-    object.blob = writer->commit();
+    object.blob = writer->commit(stop);
     stored.push_back(object.blob.key);
     objects.push_back(std::move(object));
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -31,11 +32,13 @@ inline constexpr std::size_t kMostObjects = 500;
 // of all labels, after the object of their materials. UIDs are
 // derived from the content, so the same images with the same mesh always have the same UIDs.
 // `stored` gets the keys of the blobs, which no record names yet, also if it throws. Throws Error
-// kUnusableVolume for an empty surface, kTooLarge if an object exceeds `most_bytes`, kOutOfSpace.
+// kUnusableVolume for an empty surface, kTooLarge if an object exceeds `most_bytes`, and as
+// BlobWriter.
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs, std::vector<std::string>& stored);
+                                     store::BlobStore& blobs, const std::stop_token& stop,
+                                     std::vector<std::string>& stored);
 
 // The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
 Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);

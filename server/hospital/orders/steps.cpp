@@ -150,7 +150,7 @@ Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop
     case OrderState::kFetching:
       return fetch(record, stop);
     case OrderState::kMeshing:
-      return mesh(record, stored);
+      return mesh(record, stop, stored);
     case OrderState::kSending:
       return send(record, stop);
     default:
@@ -313,7 +313,8 @@ bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) c
          !store::is_there_and_intact(services_.blobs, *record.order.volume, {});
 }
 
-Time OrderSteps::mesh(store::OrderRecord& record, std::vector<std::string>& stored) const {
+Time OrderSteps::mesh(store::OrderRecord& record, const std::stop_token& stop,
+                      std::vector<std::string>& stored) const {
   try {
     if (!record.order.job) return submit_job(record);
     const Job job = services_.jobs.get(std::nullopt, *record.order.job);
@@ -324,7 +325,7 @@ Time OrderSteps::mesh(store::OrderRecord& record, std::vector<std::string>& stor
     if (job.state != JobState::kSucceeded) {
       throw Error(ErrorCode::kUnusableVolume, "the order's job was cancelled");
     }
-    return make(record, job, stored);
+    return make(record, job, stop, stored);
   } catch (const Error& error) {
     if (!is_lost(error, record)) throw;
     forget_images(record);
@@ -335,7 +336,7 @@ Time OrderSteps::mesh(store::OrderRecord& record, std::vector<std::string>& stor
   }
 }
 
-Time OrderSteps::make(store::OrderRecord& record, const Job& job,
+Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::stop_token& stop,
                       std::vector<std::string>& stored) const {
   record.order.results.clear();
   record.work.blobs.clear();
@@ -368,7 +369,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job,
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
     objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs,
-                           stored);
+                           stop, stored);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {

@@ -66,10 +66,11 @@ class OrderSteps {
   void note_query(store::OrderRecord& record, bool success) const;
   store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
-  store::Time mesh(store::OrderRecord& record, std::vector<std::string>& stored) const;
+  store::Time mesh(store::OrderRecord& record, const std::stop_token& stop,
+                   std::vector<std::string>& stored) const;
   bool is_lost(const Error& error, const store::OrderRecord& record) const;
   store::Time submit_job(store::OrderRecord& record) const;
-  store::Time make(store::OrderRecord& record, const Job& job,
+  store::Time make(store::OrderRecord& record, const Job& job, const std::stop_token& stop,
                    std::vector<std::string>& stored) const;
   store::Time send(store::OrderRecord& record, const std::stop_token& stop) const;
   // False if the study belongs to another patient now.
