@@ -73,8 +73,8 @@ class PartialUpload {
   std::optional<Lease> begin_lease(std::uint64_t offset) ISOMESH_EXCLUDES(mutex_);
 
   // All throw Error kUnavailable if another lease has begun, kCancelled after cancel(),
-  // kInvalidParameter if the upload is
-  // complete or `length` contradicts an earlier one; write() also throws as write_all does.
+  // kInvalidParameter if the upload is complete or `length` contradicts an earlier one; write()
+  // also throws as write_all does.
   void tell_length(const Lease& lease, std::uint64_t length) ISOMESH_EXCLUDES(mutex_);
   void write(const Lease& lease, std::span<const std::byte> bytes) ISOMESH_EXCLUDES(mutex_);
   // Truncates to the start of the lease.
