@@ -248,24 +248,24 @@ bool DimseListener::has_room(std::uint64_t more_bytes) const {
 DimseVerdict DimseListener::keep(const DimseObject& object, const std::stop_token& stop,
                                  const std::filesystem::path& folder) {
   DimseVerdict verdict = DimseVerdict::kNoRoom;
+  std::vector<std::string> keys;
   std::vector<std::string> stored;
-  std::optional<std::string> replaced;
   try {
     const std::filesystem::path file = folder / object.file;
     const store::Blob blob = store::digest_of(file);
     if (!has_room(blob.bytes)) return verdict;
+    keys.push_back(blob.key);  // a store that is stopped may have the bytes nevertheless
     services_.blobs.adopt(file, blob, "", stop);  // the owner of its order is not known yet
     stored.push_back(blob.key);
-    replaced = services_.received.add(
+    const auto replaced = services_.received.add(
         {.route = object.called, .study = object.study, .series = object.series},
         {.instance = object.instance, .blob = blob.key, .bytes = blob.bytes});
+    if (replaced) keys.push_back(*replaced);
     verdict = DimseVerdict::kStored;
   } catch (const Error& error) {
     log_error("a received object could not be stored, and its sender is told so: {}", error.what());
   }
-  std::vector<std::string> former;
-  if (replaced) former.push_back(*replaced);
-  orders::erase_unnamed(services_.blobs, services_.volumes, former, stored);
+  orders::erase_unnamed(services_.blobs, services_.volumes, std::move(keys), stored);
   return verdict;
 }
 

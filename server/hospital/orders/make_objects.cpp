@@ -268,8 +268,7 @@ Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range)
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs, const std::stop_token& stop,
-                                     std::vector<std::string>& stored) {
+                                     store::BlobStore& blobs, std::vector<std::string>& stored) {
   std::vector<MadeObject> objects;
   std::string materials_uid;
   for (Document& document : documents_of(record, job, blobs)) {
@@ -284,7 +283,7 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
     write(document.text, *writer);
     if (!document.blob.empty()) copy(*blobs.open(document.blob), document, *writer);
     write(envelope.after, *writer);
-    object.blob = writer->commit(stop);
+    object.blob = writer->commit();
     stored.push_back(object.blob.key);
     objects.push_back(std::move(object));
   }
@@ -316,10 +315,10 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
       1, static_cast<std::uint32_t>(share * static_cast<double>(job.mesh->triangles)));
 }
 
-bool can_make_objects(const Job& job, const store::BlobStore& blobs) {
+bool can_make_objects(const Job& job, const store::BlobStore& blobs, const std::stop_token& stop) {
   if (!job.mesh) return true;
   const auto is_intact = [&](const std::string& key) {
-    return store::is_there_and_intact(blobs, key, {});
+    return store::is_there_and_intact(blobs, key, stop);
   };
   const auto& list = job.mesh->label_list;
   return (!list || is_intact(list->sha256)) &&

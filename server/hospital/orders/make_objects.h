@@ -37,8 +37,7 @@ inline constexpr std::size_t kMostObjects = 500;
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
-                                     store::BlobStore& blobs, const std::stop_token& stop,
-                                     std::vector<std::string>& stored);
+                                     store::BlobStore& blobs, std::vector<std::string>& stored);
 
 // The reason why a mesh has no triangles, given the range of the samples: kUnusableVolume.
 Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);
@@ -51,6 +50,6 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
                                                 const store::BlobStore& blobs);
 
 // True if the blobs of the files from which objects are made are intact.
-bool can_make_objects(const Job& job, const store::BlobStore& blobs);
+bool can_make_objects(const Job& job, const store::BlobStore& blobs, const std::stop_token& stop);
 
 }  // namespace isomesh::orders

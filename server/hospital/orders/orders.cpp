@@ -306,11 +306,16 @@ void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
   // Also after an exception: nobody else knows objects of a step that could not be saved.
   struct Objects {
     const OrderServices& services;
+    const store::OrderRecord& record;
     std::vector<std::string> named;
     std::vector<std::string> stored = {};
 
-    ~Objects() { erase_unnamed(services.blobs, services.volumes, std::move(named), stored); }
-  } objects{.services = services_, .named = services_.orders.blobs(record.order.id)};
+    ~Objects() {
+      // All other steps leave them named, and asking takes a query for each.
+      if (!is_final(record.order.state) && record.work.blobs == named) named.clear();
+      erase_unnamed(services.blobs, services.volumes, std::move(named), stored);
+    }
+  } objects{services_, record, services_.orders.blobs(record.order.id)};
   make_step(record, stop, objects.stored);
 }
 

@@ -307,10 +307,11 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
 }
 
 // True if the volume or the job has expired or was removed, or the volume is damaged.
-bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) const {
+bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record,
+                         const std::stop_token& stop) const {
   if (error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kGone) return true;
   return error.code() == ErrorCode::kUnusableVolume &&
-         !store::is_there_and_intact(services_.blobs, *record.order.volume, {});
+         !store::is_there_and_intact(services_.blobs, *record.order.volume, stop);
 }
 
 Time OrderSteps::mesh(store::OrderRecord& record, const std::stop_token& stop,
@@ -327,7 +328,7 @@ Time OrderSteps::mesh(store::OrderRecord& record, const std::stop_token& stop,
     }
     return make(record, job, stop, stored);
   } catch (const Error& error) {
-    if (!is_lost(error, record)) throw;
+    if (!is_lost(error, record, stop)) throw;
     forget_images(record);
     record.work.failed_in = OrderState::kSending;
     throw Error(
@@ -347,7 +348,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::sto
                           services_.volumes.get(record.owner, *record.order.volume).range);
     }
     check_count_of_objects(record.order, job);
-    if (!can_make_objects(job, services_.blobs)) {
+    if (!can_make_objects(job, services_.blobs, stop)) {
       record.order.job = services_.jobs.remake(job.id).id;
       record.work.failed_in = OrderState::kSending;
       throw Error(ErrorCode::kUnavailable,
@@ -369,7 +370,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job, const std::sto
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
     objects = make_objects(record, job, settings_.station_name, most_bytes, made, services_.blobs,
-                           stop, stored);
+                           stored);
   }
   for (const SendTarget& target : record.order.send) {
     for (const MadeObject& object : objects) {

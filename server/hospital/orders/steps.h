@@ -68,7 +68,8 @@ class OrderSteps {
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time mesh(store::OrderRecord& record, const std::stop_token& stop,
                    std::vector<std::string>& stored) const;
-  bool is_lost(const Error& error, const store::OrderRecord& record) const;
+  bool is_lost(const Error& error, const store::OrderRecord& record,
+               const std::stop_token& stop) const;
   store::Time submit_job(store::OrderRecord& record) const;
   store::Time make(store::OrderRecord& record, const Job& job, const std::stop_token& stop,
                    std::vector<std::string>& stored) const;

@@ -40,21 +40,33 @@ std::deque<std::string> marked_in(const std::filesystem::path& folder) {
 }  // namespace
 
 BlobEraser::BlobEraser(store::BlobStore& blobs, const store::VolumeStore& volumes,
-                       std::shared_mutex& erasing, std::filesystem::path marks)
+                       std::filesystem::path marks)
     : blobs_(blobs),
       volumes_(volumes),
-      erasing_(erasing),
       marks_(std::move(marks)),
       waiting_(marked_in(marks_)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-void BlobEraser::erase(const std::string& key) {
+void BlobEraser::erase(const std::string& key, const std::function<void()>& erase_record) {
   {
     const Lock lock(mutex_);
-    waiting_.push_back(key);
-    changed_.notify_all();
+    coming_.insert(key);
   }
-  mark(marks_, key);  // last, so that no earlier erasure of the same blob removes the mark
+  try {
+    mark(marks_, key);
+    erase_record();
+  } catch (...) {
+    queue(key);
+    throw;
+  }
+  queue(key);
+}
+
+void BlobEraser::queue(const std::string& key) {
+  const Lock lock(mutex_);
+  coming_.erase(coming_.find(key));
+  waiting_.push_back(key);
+  changed_.notify_all();
 }
 
 void BlobEraser::finish(const std::stop_token& stop) {
@@ -78,7 +90,7 @@ void BlobEraser::run(const std::stop_token& stop) {
     const bool is_done = erase_now(key);
     lock.lock();
     waiting_.pop_front();
-    if (is_done && std::ranges::count(waiting_, key) == 0) {
+    if (is_done && std::ranges::count(waiting_, key) == 0 && !coming_.contains(key)) {
       std::error_code ignored;  // the next start finds nothing to do
       std::filesystem::remove(marks_ / key, ignored);
     }
@@ -90,9 +102,6 @@ bool BlobEraser::erase_now(const std::string& key) {
   try {
     // Freeing the bytes of a large blob takes long. The store would hold a lock meanwhile.
     const std::shared_ptr<const void> held = blobs_.hold_bytes(key);
-    // Once every deletion that had begun is over, the record is gone. What is stored meanwhile, the
-    // blob store keeps.
-    { const std::scoped_lock wait(erasing_); }
     const auto names = [this](const std::string& asked) { return volumes_.names(asked); };
     // Another daemon may have stored the same blob at any time and be about to name it, so every
     // blob counts as recent.

@@ -112,8 +112,9 @@ Volume ImportRunner::run(const process::ImportTask& task, const std::string& par
 process::PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
   const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
   try {
-    process::ImportReport report = report_of(
-        process::to_message(process::ResponseOrder{{file}, bounds}), "", stop_.get_token());
+    process::ImportReport report = until_stopped({}, [&](const std::stop_token& stop) {
+      return report_of(process::to_message(process::ResponseOrder{{file}, bounds}), "", stop);
+    });
     if (report.error) throw *report.error;
     if (!report.response) throw_lying();
     return *std::move(report.response);

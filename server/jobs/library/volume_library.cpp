@@ -63,9 +63,15 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
     retention_.make_room({.owner = owner, .bytes = blob.bytes});
   }
   // The store keeps the blob for mark_named(), so nobody has to wait for it.
-  runner_.until_stopped(control.cancelled, [&](const std::stop_token& stop) {
-    blobs_.adopt(canonical_in(scratch), blob, owner, stop);
-  });
+  try {
+    runner_.until_stopped(control.cancelled, [&](const std::stop_token& stop) {
+      blobs_.adopt(canonical_in(scratch), blob, owner, stop);
+    });
+  } catch (const Error& error) {
+    // A remote store may have the bytes nevertheless.
+    if (error.code() == ErrorCode::kCancelled) eraser_.erase(blob.key, [] {});
+    throw;
+  }
   volume.id = blob.key;
   volume.created = timestamp();
   auto [stored, is_new] = volumes_.add(owner, volume);
@@ -111,10 +117,9 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
 }
 
 void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
-  // The eraser waits for the lock, and leaves alone what a record still names then.
-  const std::shared_lock lock(erasing_);
-  if (volumes_.contains(viewer, id)) eraser_.erase(id);
-  volumes_.erase(viewer, id);
+  const auto erase_record = [&] { volumes_.erase(viewer, id); };
+  if (!volumes_.contains(viewer, id)) return erase_record();  // throws
+  eraser_.erase(id, erase_record);
 }
 
 }  // namespace isomesh::jobs

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <shared_mutex>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -102,9 +101,7 @@ class VolumeLibrary {
   store::Retention& retention_;
   const volume::SizeLimits limits_;
   ImportRunner runner_;
-  // Held shared while a record is erased.
-  std::shared_mutex erasing_;
-  BlobEraser eraser_{blobs_, volumes_, erasing_, folder_.erasing()};
+  BlobEraser eraser_{blobs_, volumes_, folder_.erasing()};
 };
 
 }  // namespace isomesh::jobs

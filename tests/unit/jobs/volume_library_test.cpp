@@ -3,7 +3,6 @@
 #include <array>
 #include <atomic>
 #include <functional>
-#include <shared_mutex>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -39,14 +38,11 @@ class VolumeLibraryTest : public test::JobsFixture {
   // Has the eraser erase a volume of bytes_ after what `meanwhile` does.
   void erase_after(const std::function<void(const Volume& volume)>& meanwhile) {
     const Volume volume = add_bytes(bytes_).first;
-    std::shared_mutex erasing;
-    BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
-    {
-      const std::shared_lock somebody_erases(erasing);
-      eraser.erase(volume.id);
+    BlobEraser eraser(blobs_, volumes_, data_.erasing());
+    eraser.erase(volume.id, [&] {
       volumes_.erase("", volume.id);
       meanwhile(volume);
-    }
+    });
     eraser.finish();
   }
 
@@ -143,8 +139,7 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
   }
   volumes_.erase("", erased.id);
   std::filesystem::rename(blobs_.path_of(erased.id), data_.quarantine() / erased.id);
-  std::shared_mutex erasing;
-  BlobEraser next(blobs_, volumes_, erasing, data_.erasing());
+  BlobEraser next(blobs_, volumes_, data_.erasing());
   next.finish();
   EXPECT_EQ(blob_count(), 1U);
   EXPECT_TRUE(std::filesystem::exists(blobs_.path_of(kept.id)));
@@ -154,14 +149,15 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
 
 TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   const Volume volume = add_bytes(bytes_).first;
-  std::shared_mutex erasing;
-  BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
-  {
-    const std::shared_lock lock(erasing);
-    eraser.erase(volume.id);
+  BlobEraser eraser(blobs_, volumes_, data_.erasing());
+  eraser.erase(volume.id, [] {});
+  // An earlier erasure of the same samples, which found them named, leaves the mark alone.
+  eraser.erase(volume.id, [&] {
+    eraser.finish();
     EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
+    EXPECT_EQ(blob_count(), 1U);
     volumes_.erase("", volume.id);
-  }
+  });
   eraser.finish();
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
@@ -225,6 +221,28 @@ TEST_F(VolumeLibraryTest, StoringBytesCanBeStopped) {
   EXPECT_TRUE(volumes_.list("", {}, 1, store::ListOrder::kOldestFirst).empty());
 }
 
+// A remote store may complete a request although it was stopped.
+TEST_F(VolumeLibraryTest, BytesThatAStoppedStoreHasNeverthelessAreErased) {
+  class Late : public store::FileBlobStore {
+   public:
+    using FileBlobStore::FileBlobStore;
+    void adopt(const std::filesystem::path& file, const store::Blob& blob, const std::string& owner,
+               const std::stop_token& stop) override {
+      FileBlobStore::adopt(file, blob, owner, stop);
+      mark_named(blob.key);  // as if it had not been stored
+      throw Error(ErrorCode::kCancelled, "cancelled");
+    }
+  };
+  Late late(data_);
+  VolumeLibrary library(data_, late, volumes_, retention_, {},
+                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  test::write_file(folder_ / "upload", bytes_);
+  EXPECT_EQ(code_thrown_by([&] { library.add("", folder_ / "upload", raw()); }),
+            ErrorCode::kCancelled);
+  library.finish_erasing();
+  EXPECT_EQ(blob_count(), 0U);
+}
+
 // In a row they would hold up the end of the service for long if the database hangs.
 TEST_F(VolumeLibraryTest, VolumesAreErasedConcurrently) {
   class Counting : public store::SqlVolumeStore {
@@ -249,31 +267,38 @@ TEST_F(VolumeLibraryTest, VolumesAreErasedConcurrently) {
 TEST_F(VolumeLibraryTest, TheEndLeavesErasingToTheNextStart) {
   const Volume volume = add_bytes(bytes_).first;
   constexpr int kMany = 200;
-  std::shared_mutex erasing;
   {
-    BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
-    const std::shared_lock lock(erasing);
-    for (int n = 0; n < kMany; ++n) eraser.erase(std::to_string(n));
-    eraser.erase(volume.id);
-    volumes_.erase("", volume.id);
+    BlobEraser eraser(blobs_, volumes_, data_.erasing());
+    for (int n = 0; n < kMany; ++n) eraser.erase(std::to_string(n), [] {});
+    eraser.erase(volume.id, [&] { volumes_.erase("", volume.id); });
   }
   EXPECT_EQ(blob_count(), 1U);
   EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
-  BlobEraser next(blobs_, volumes_, erasing, data_.erasing());
+  BlobEraser next(blobs_, volumes_, data_.erasing());
   next.finish();
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
 }
 
 TEST_F(VolumeLibraryTest, WhoeverWaitsForErasingCanBeStopped) {
-  std::shared_mutex erasing;
-  BlobEraser eraser(blobs_, volumes_, erasing, data_.erasing());
+  class Hanging : public store::SqlVolumeStore {
+   public:
+    explicit Hanging(store::Database& database) : SqlVolumeStore(database) {}
+    bool names(const std::string& /*key*/) const override {
+      EXPECT_TRUE(test::eventually([this] { return go.load(); }));
+      return true;
+    }
+    std::atomic<bool> go = false;
+  };
+  Hanging volumes(database_);
+  BlobEraser eraser(blobs_, volumes, data_.erasing());
+  const std::string key(64, 'a');
+  eraser.erase(key, [] {});
   std::stop_source stop;
   stop.request_stop();
-  const std::shared_lock lock(erasing);
-  eraser.erase(std::string(64, 'a'));
   eraser.finish(stop.get_token());
-  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / std::string(64, 'a')));
+  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / key));
+  volumes.go = true;
 }
 
 // Whoever erases does not wait for the disk, which takes long for what is large and no time for
