@@ -119,6 +119,25 @@ TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
             "    --member a\uFFFD[31m.nrrd  x\uFFFDy\uFFFD\n  --accept c\uFFFD\n");
 }
 
+TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {
+  Order order;
+  order.id = "8";
+  order.state = OrderState::kFailed;
+  order.error = to_problem(Error(ErrorCode::kPacsRefused, "no\x1b[2J"), "");
+  server_.http.Get("/v1/orders", [&](const auto&, auto& response) {
+    response.set_content(to_json(std::vector{order}), "application/json");
+  });
+  server_.http.Get("/v1/pacs", [](const auto&, auto& response) {
+    const PacsStatus main{.name = "main", .last_failure = "today", .reason = "no\x1b[2J"};
+    response.set_content(to_json(std::vector{main}), "application/json");
+  });
+  options_.command = Command::kOrders;
+  EXPECT_EQ(outcome_of(options_).out, "8 failed: no\uFFFD[2J\n");
+  options_.command = Command::kPacs;
+  EXPECT_EQ(outcome_of(options_).out,
+            "main  last success never  last failure today (no\uFFFD[2J)\n");
+}
+
 TEST_F(Commands, QuietSaysNothing) {
   options_.quiet = true;
   const Outcome outcome = outcome_of(options_);
