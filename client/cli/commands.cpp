@@ -134,9 +134,7 @@ int erase(const Options& options, const std::stop_token& stop) {
 
 int cancel(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
-  const std::string id = job_id(client, options.id);
-  client.cancel(id);
-  const Job job = client.job(id);
+  const Job job = client.cancel(job_id(client, options.id));
   if (options.json) {
     std::cout << to_json(job) << '\n';
   } else {

@@ -61,8 +61,9 @@ void cancel_after_stop(const Options& options, const JobParameters& parameters,
   Client client = parting_client(options);
   try {
     if (id.empty()) id = client.submit(parameters, key).id;
-    client.cancel(id);
-    complain("interrupted; the job " + id + " was cancelled");
+    const JobState state = client.cancel(id).state;
+    const bool had_ended = state == JobState::kSucceeded || state == JobState::kFailed;
+    complain("interrupted; the job " + id + (had_ended ? " had already ended" : " was cancelled"));
   } catch (const Error& error) {
     complain("interrupted; the job " + (id.empty() ? "" : id + ' ') +
              "could not be cancelled: " + error.what());

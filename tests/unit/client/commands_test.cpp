@@ -84,6 +84,7 @@ TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
 
 // The server has the job, but its response did not come.
 TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
+  job_.state = JobState::kRunning;
   std::stop_source stop;
   std::vector<std::string> keys;
   int cancelled = 0;
@@ -104,6 +105,21 @@ TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
             "isomesh: interrupted; the job 7 was cancelled\n");
   EXPECT_EQ(cancelled, 1);
   EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
+}
+
+TEST_F(Commands, AnInterruptAfterTheEndOfTheJobCancelsNothing) {
+  server_.http.Delete("/v1/jobs/7", [&](const auto&, auto& response) {
+    response.set_content(to_json(job_), "application/json");
+  });
+  std::stop_source stop;
+  server_.http.set_pre_routing_handler([&](const auto& request, auto&) {
+    if (request.path == "/v1/jobs") stop.request_stop();
+    return httplib::Server::HandlerResponse::Unhandled;
+  });
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options_, stop.get_token()), kRefused);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "isomesh: interrupted; the job 7 had already ended\n");
 }
 
 TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
