@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cerrno>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -12,18 +10,13 @@
 #include <thread>
 #include <utility>
 
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
-
-#include "base/descriptor.h"
-#include "base/files.h"
 #include "base/ids.h"
 #include "client/cli/batch.h"
 #include "client/cli/commands.h"
 #include "client/cli/console.h"
 #include "client/cli/ids.h"
 #include "client/cli/report.h"
+#include "client/cli/standard_input.h"
 #include "client/cli/text.h"
 #include "client/isomesh/package.h"
 #include "proto/json.h"
@@ -67,43 +60,6 @@ void cancel_after_stop(const Options& options, const JobParameters& parameters,
   } catch (const Error& error) {
     complain("interrupted; the job " + (id.empty() ? "" : id + ' ') +
              "could not be cancelled: " + error.what());
-  }
-}
-
-// Waits until standard input has bytes, or has ended. Throws Error kCancelled on a stop request.
-class InputWait {
- public:
-  explicit InputWait(const std::stop_token& stop)
-      : stop_(stop), wake_(stop, [this] { ::eventfd_write(event_.number(), 1); }) {}
-
-  void operator()() const {
-    std::array<pollfd, 2> files = {{{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0},
-                                    {.fd = event_.number(), .events = POLLIN, .revents = 0}}};
-    while (::poll(files.data(), files.size(), -1) < 0 && errno == EINTR) {
-    }
-    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-  }
-
- private:
-  const std::stop_token stop_;
-  const Descriptor event_{::eventfd(0, EFD_CLOEXEC)};
-  const std::stop_callback<std::function<void()>> wake_;
-};
-
-// Copies standard input to a file, because an upload states its size first.
-std::unique_ptr<ScratchFile> stdin_as_file(const std::stop_token& stop) {
-  auto file = std::make_unique<ScratchFile>(temporary_folder(), ".volume");
-  const InputWait wait(stop);
-  std::vector<std::byte> block(std::size_t{1} << 20);
-  while (true) {
-    wait();
-    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
-    if (count == 0) return file;
-    if (count > 0) {
-      file->write(std::span(block).first(static_cast<std::size_t>(count)));
-    } else if (errno != EINTR && errno != EAGAIN) {
-      throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
-    }
   }
 }
 
@@ -155,15 +111,9 @@ class Run {
 
   int input(const Input& input) {
     seen_ = {};
-    std::unique_ptr<ScratchFile> copy;
     UploadOptions how = options_.upload;
     std::vector<std::filesystem::path> files = input.files;
-    for (std::filesystem::path& file : files) {
-      if (file != "-") continue;
-      copy = stdin_as_file(stop_);
-      file = copy->path();
-      if (how.name.empty()) how.name = "stdin";
-    }
+    const auto copy = standard_input_as_file(files, how, stop_);
     if (is_stored_volume(files.front())) return stored(files.front().string(), input.name);
     const Stopwatch uploading;
     const std::vector<UploadedVolume> volumes =

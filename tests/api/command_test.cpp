@@ -393,6 +393,13 @@ TEST_F(CommandTest, ReadsAndWritesPipes) {
   EXPECT_EQ(piped.status, 0) << piped.errors;
   EXPECT_EQ(piped.output, read_file(folder_ / "file.stl"));
   EXPECT_EQ(daemon_.client().volumes().back().name, "sphere.raw");
+
+  const Finished uploaded =
+      run({"sh", "-c",
+           "tr '\\000' '\\001' < '" + (folder_ / "sphere.raw").string() + "' | " + ISOMESH +
+               " --server " + daemon_.url() + " upload - --dims 21,20,19 --type uint8"});
+  EXPECT_EQ(uploaded.status, 0) << uploaded.errors;
+  EXPECT_EQ(daemon_.client().volume(line_of(uploaded)).name, "stdin");
 }
 
 TEST(CommandOnItsOwn, MeshesWithoutAServerAndLeavesNothing) {
