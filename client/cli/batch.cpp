@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string_view>
@@ -60,6 +61,31 @@ std::string plain(std::string_view name) {
   return text;
 }
 
+fs::path common_folder(const fs::path& one, const fs::path& other) {
+  fs::path common;
+  const auto end = std::ranges::mismatch(one, other).in1;
+  for (auto part = one.begin(); part != end; ++part) common /= *part;
+  return common;
+}
+
+// The part of `path` below the folder that it is in.
+fs::path without_folder(const fs::path& path, const fs::path& folder) {
+  fs::path rest;
+  for (auto part = std::next(path.begin(), std::distance(folder.begin(), folder.end()));
+       part != path.end(); ++part) {
+    rest /= *part;
+  }
+  return rest;
+}
+
+// The name in a file's name, cut so that a file can have it. `count` makes several of it.
+std::string short_name(std::string_view name, int count) {
+  constexpr std::size_t kLongest = 200;  // bytes: a file's name may have 255
+  const std::string end = count > 1 ? '-' + std::to_string(count) : "";
+  const std::string whole = plain(name);
+  return std::string(beginning(whole, kLongest - end.size())) + end;
+}
+
 }  // namespace
 
 std::string name_of_input(const fs::path& path) {
@@ -67,38 +93,48 @@ std::string name_of_input(const fs::path& path) {
   std::error_code absent;
   const fs::path whole = fs::absolute(path, absent).lexically_normal();
   const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-  if (fs::is_directory(path, absent)) return last.string();
-  return without_suffixes(last).string();
+  return plain((fs::is_directory(path, absent) ? last : without_suffixes(last)).string());
 }
 
 std::vector<std::string> names_of_members(const std::string& input,
                                           const std::vector<std::string>& members) {
-  const auto last = [](const std::string& member) { return fs::path(member).filename(); };
-  const std::array<std::function<std::string(const std::string&)>, 3> forms = {
-      [&](const std::string& member) { return without_suffixes(last(member)).string(); },
-      [](const std::string& member) { return plain(without_suffixes(member).string()); },
-      [](const std::string& member) { return plain(member); }};
+  const auto file_of = [](const fs::path& member) {
+    return without_suffixes(member.filename()).string();
+  };
+  std::map<std::string, fs::path> shared;  // by the names of files
+  for (const fs::path member : members) {
+    const auto [at, is_first] = shared.try_emplace(file_of(member), member.parent_path());
+    if (!is_first) at->second = common_folder(at->second, member.parent_path());
+  }
+  const auto rest_of = [&](const fs::path& member) {
+    return without_folder(member, shared.at(file_of(member)));
+  };
+  const std::array<std::function<std::string(const fs::path&)>, 3> forms = {
+      file_of, [&](const fs::path& member) { return without_suffixes(rest_of(member)).string(); },
+      [&](const fs::path& member) { return rest_of(member).string(); }};
   std::vector<std::string> names(members.size());
+  std::set<std::string> given;
   for (const auto& form : forms) {
-    std::map<std::string, int> counts;
-    for (const std::string& member : members) ++counts[form(member)];
+    const bool is_last = &form == &forms.back();
+    std::map<std::string, std::vector<std::size_t>> alike;
     for (std::size_t n = 0; n < members.size(); ++n) {
-      const std::string name = form(members[n]);
-      const bool is_last = &form == &forms.back();
-      if (names[n].empty() && (is_last || counts[name] == 1)) names[n] = input + '-' + name;
+      if (names[n].empty()) alike[short_name(input + '-' + form(members[n]), 1)].push_back(n);
+    }
+    for (const auto& [name, which] : alike) {
+      if (!is_last && (which.size() > 1 || given.contains(name))) continue;
+      for (const std::size_t n : which) {
+        for (int count = 1; names[n].empty() || !given.insert(names[n]).second; ++count) {
+          names[n] = short_name(input + '-' + form(members[n]), count);
+        }
+      }
     }
   }
   return names;
 }
 
-std::optional<std::string> TakenNames::take(const std::vector<std::string>& names) {
+bool TakenNames::take(const std::string& name) {
   const std::scoped_lock lock(mutex_);
-  std::set<std::string> all = names_;
-  for (const std::string& name : names) {
-    if (!all.insert(plain(name)).second) return name;
-  }
-  names_ = std::move(all);
-  return std::nullopt;
+  return names_.insert(name).second;
 }
 
 std::vector<Input> inputs_of(const Options& options) {

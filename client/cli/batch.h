@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -20,19 +19,20 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-// "head" for "scans/head.nii.gz", "stdin" for "-"; for a folder its own name.
+// "head" for "scans/head.nii.gz", "stdin" for "-"; for a folder its own name. As in filled().
 std::string name_of_input(const std::filesystem::path& path);
 
-// The names of the outputs of an input's members, for example "study-ct" for "a/ct.nrrd". Members
-// whose files share that name have their folders in it, and, if that is not enough, their suffixes.
+// The names of the outputs of an input's members, for example "study-ct" for "a/ct.nrrd"; all are
+// different. Members whose files share that name have the folders in which they differ in it, and,
+// if that is not enough, their suffixes. Long names are cut, and numbered if necessary.
 std::vector<std::string> names_of_members(const std::string& input,
                                           const std::vector<std::string>& members);
 
 // The names of the outputs of one run. Thread safe.
 class TakenNames {
  public:
-  // Takes all of them, or none: then returns the first that another output has.
-  std::optional<std::string> take(const std::vector<std::string>& names);
+  // False if another output has it.
+  bool take(const std::string& name);
 
  private:
   std::mutex mutex_;

@@ -12,6 +12,7 @@
 #include "client/cli/orders.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/report.h"
+#include "client/cli/standard_input.h"
 #include "client/cli/text.h"
 #include "client/isomesh/client.h"
 #include "proto/json.h"
@@ -27,8 +28,10 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 int upload(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);
-  const std::vector<UploadedVolume> volumes =
-      upload_all(client, options, options.files, options.upload, bar);
+  UploadOptions how = options.upload;
+  std::vector<std::filesystem::path> files = options.files;
+  const auto copy = standard_input_as_file(files, how, stop);
+  const std::vector<UploadedVolume> volumes = upload_all(client, options, files, how, bar);
   const bool is_one = volumes.size() == 1 && volumes.front().volume;
   if (options.json) {
     std::cout << (is_one ? to_json(*volumes.front().volume) : to_json(volumes)) << '\n';
@@ -134,9 +137,7 @@ int erase(const Options& options, const std::stop_token& stop) {
 
 int cancel(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
-  const std::string id = job_id(client, options.id);
-  client.cancel(id);
-  const Job job = client.job(id);
+  const Job job = client.cancel(job_id(client, options.id));
   if (options.json) {
     std::cout << to_json(job) << '\n';
   } else {

@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cerrno>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -12,18 +10,13 @@
 #include <thread>
 #include <utility>
 
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
-
-#include "base/descriptor.h"
-#include "base/files.h"
 #include "base/ids.h"
 #include "client/cli/batch.h"
 #include "client/cli/commands.h"
 #include "client/cli/console.h"
 #include "client/cli/ids.h"
 #include "client/cli/report.h"
+#include "client/cli/standard_input.h"
 #include "client/cli/text.h"
 #include "client/isomesh/package.h"
 #include "proto/json.h"
@@ -61,48 +54,12 @@ void cancel_after_stop(const Options& options, const JobParameters& parameters,
   Client client = parting_client(options);
   try {
     if (id.empty()) id = client.submit(parameters, key).id;
-    client.cancel(id);
-    complain("interrupted; the job " + id + " was cancelled");
+    const JobState state = client.cancel(id).state;
+    const bool had_ended = state == JobState::kSucceeded || state == JobState::kFailed;
+    complain("interrupted; the job " + id + (had_ended ? " had already ended" : " was cancelled"));
   } catch (const Error& error) {
     complain("interrupted; the job " + (id.empty() ? "" : id + ' ') +
              "could not be cancelled: " + error.what());
-  }
-}
-
-// Waits until standard input has bytes, or has ended. Throws Error kCancelled on a stop request.
-class InputWait {
- public:
-  explicit InputWait(const std::stop_token& stop)
-      : stop_(stop), wake_(stop, [this] { ::eventfd_write(event_.number(), 1); }) {}
-
-  void operator()() const {
-    std::array<pollfd, 2> files = {{{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0},
-                                    {.fd = event_.number(), .events = POLLIN, .revents = 0}}};
-    while (::poll(files.data(), files.size(), -1) < 0 && errno == EINTR) {
-    }
-    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-  }
-
- private:
-  const std::stop_token stop_;
-  const Descriptor event_{::eventfd(0, EFD_CLOEXEC)};
-  const std::stop_callback<std::function<void()>> wake_;
-};
-
-// Copies standard input to a file, because an upload states its size first.
-std::unique_ptr<ScratchFile> stdin_as_file(const std::stop_token& stop) {
-  auto file = std::make_unique<ScratchFile>(temporary_folder(), ".volume");
-  const InputWait wait(stop);
-  std::vector<std::byte> block(std::size_t{1} << 20);
-  while (true) {
-    wait();
-    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
-    if (count == 0) return file;
-    if (count > 0) {
-      file->write(std::span(block).first(static_cast<std::size_t>(count)));
-    } else if (errno != EINTR && errno != EAGAIN) {
-      throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
-    }
   }
 }
 
@@ -138,6 +95,12 @@ class Leftovers {
   std::set<std::string> ids_;
 };
 
+Error overwriting(const std::string& name, const std::string& member) {
+  return Error(ErrorCode::kInvalidParameter,
+               "two meshes would be called " + name + ": --member takes one of the volumes")
+      .with_remedy({.choices = {{"member", member, ""}}});
+}
+
 // Processes one input at a time: uploads it, meshes it and downloads the mesh. One object per
 // thread.
 class Run {
@@ -154,54 +117,59 @@ class Run {
 
   int input(const Input& input) {
     seen_ = {};
-    std::unique_ptr<ScratchFile> copy;
     UploadOptions how = options_.upload;
     std::vector<std::filesystem::path> files = input.files;
-    for (std::filesystem::path& file : files) {
-      if (file != "-") continue;
-      copy = stdin_as_file(stop_);
-      file = copy->path();
-      if (how.name.empty()) how.name = "stdin";
-    }
-    if (is_stored_volume(files.front())) return stored(files.front().string(), input.name);
+    const auto copy = standard_input_as_file(files, how, stop_);
+    if (is_stored_volume(files.front())) return stored(files.front().string(), input);
     const Stopwatch uploading;
     const std::vector<UploadedVolume> volumes =
-        upload_all(client_, options_, files, how, bar_, is_one_of_many_ ? input.name : "");
+        upload_all(client_, options_, files, how, bar_, subject_of(input));
     seen_.upload = uploading.milliseconds();
     if (options_.dry_run) leftovers_.add(volumes);
     if (volumes.size() == 1 && volumes.front().volume) {
-      return mesh(*volumes.front().volume, input.name, input.name);
+      return mesh(*volumes.front().volume, input.name, subject_of(input));
     }
     if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
     return members(input.name, volumes);
   }
 
  private:
-  int members(const std::string& input, const std::vector<UploadedVolume>& volumes) {
+  // A member that cannot be meshed does not keep the others from it.
+  int members(const std::string& input, std::vector<UploadedVolume> volumes) {
+    int status = kDone;
+    const auto refuse = [&](const Error& error, const UploadedVolume& which) {
+      complain(error, input + ": " + which.member);
+      status = std::max(status, status_of(error));
+    };
+    for (const UploadedVolume& each : volumes) {
+      if (each.problem) refuse(to_error(*each.problem), each);
+    }
+    std::erase_if(volumes, [](const UploadedVolume& each) { return each.problem.has_value(); });
     std::vector<std::string> members;
     members.reserve(volumes.size());
     for (const UploadedVolume& each : volumes) members.push_back(each.member);
     const std::vector<std::string> names = names_of_members(input, members);
-    if (const auto twice = names_.take(names)) {
-      throw Error(ErrorCode::kInvalidParameter,
-                  "two meshes would be called " + *twice + ": --member takes one of the volumes")
-          .with_remedy(several_volumes(volumes).remedy());
-    }
-    int status = kDone;
-    for (std::size_t n = 0; n < volumes.size(); ++n) {
+    for (std::size_t n = 0; n < volumes.size() && !stop_.stop_requested(); ++n) {
       const UploadedVolume& each = volumes[n];
-      const std::string subject = input + ": " + each.member;
-      if (each.problem) complain(to_error(*each.problem), subject);
-      status = std::max(status, each.problem ? kRefused : mesh(*each.volume, names[n], subject));
+      try {
+        if (!names_.take(names[n])) throw overwriting(names[n], each.member);
+        status = std::max(status, mesh(*each.volume, names[n], input + ": " + each.member));
+      } catch (const Error& error) {
+        if (error.code() == ErrorCode::kUnreachable || stop_.stop_requested()) throw;
+        refuse(error, each);
+      }
     }
     return status;
   }
 
-  int stored(const std::string& id, const std::string& name) {
+  int stored(const std::string& id, const Input& input) {
     const Volume found = client_.volume(volume_id(client_, id));
-    if (!options_.quiet) tell_notes(found, is_one_of_many_ ? name : "");
-    return mesh(found, name, name);
+    if (!options_.quiet) tell_notes(found, subject_of(input));
+    return mesh(found, input.name, subject_of(input));
   }
+
+  // What messages are about; empty if there is only one.
+  std::string subject_of(const Input& input) const { return is_one_of_many_ ? input.name : ""; }
 
   int mesh(const Volume& volume, const std::string& name, const std::string& subject) {
     const std::vector<Output> outputs = filled(options_.outputs, name);
@@ -209,14 +177,13 @@ class Run {
     parameters.volume = volume.id;
     if (!outputs.empty()) parameters.formats = formats_of(outputs);
     if (!options_.preset.empty()) parameters.iso = preset_of(volume, options_.preset);
-    if (options_.dry_run) return dry_run(parameters, name);
+    if (options_.dry_run) return dry_run(parameters, subject.empty() ? "" : name + '\n');
 
     const std::optional<Job> job = made(parameters);
     if (!job) return kRefused;
-    const std::string about = is_one_of_many_ ? subject : "";
     if (job->state != JobState::kSucceeded) {
       if (options_.json) print(job_json(*job, {}, seen_) + '\n');
-      return status_of(*job, options_, about);
+      return status_of(*job, options_, subject);
     }
     const Stopwatch downloading;
     resumable(job->id, [&] {
@@ -224,7 +191,7 @@ class Run {
     });
     seen_.download = downloading.milliseconds();
     report(*job, outputs);
-    return status_of(*job, options_, about, volume.range);
+    return status_of(*job, options_, subject, volume.range);
   }
 
   // Returns the job when it has ended; empty after an interrupt.
@@ -258,10 +225,9 @@ class Run {
     }
   }
 
-  int dry_run(const JobParameters& parameters, const std::string& name) {
+  int dry_run(const JobParameters& parameters, const std::string& title) {
     const Estimate estimate = client_.estimate(parameters);
-    print(options_.json ? to_json(estimate) + '\n'
-                        : (is_one_of_many_ ? name + '\n' : "") + estimate_report(estimate));
+    print(options_.json ? to_json(estimate) + '\n' : title + estimate_report(estimate));
     return kDone;
   }
 
@@ -369,7 +335,7 @@ int mesh(const Options& options, const std::stop_token& stop) {
   refuse_to_overwrite(inputs, options);
   // An archive's members are known after its upload; by then other inputs have their names.
   TakenNames names;
-  for (const Input& input : inputs) names.take({input.name});
+  for (const Input& input : inputs) names.take(input.name);
   Leftovers leftovers(options);
   if (inputs.size() > 1) return mesh_all(options, inputs, stop, names, leftovers);
   return Run(options, stop, false, names, leftovers).input(inputs.front());

@@ -10,9 +10,11 @@
 
 #include "base/clock.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "client/cli/commands.h"
 #include "client/cli/ids.h"
 #include "client/cli/option_values.h"
+#include "client/cli/text.h"
 #include "proto/json_tree.h"
 #include "proto/orders.h"
 
@@ -42,7 +44,7 @@ OrderRequest request_of(const Options& options) {
 }
 
 std::string reason_of(const Order& order) {
-  return order.error ? ": " + order.error->detail : std::string();
+  return order.error ? ": " + printable_lines(order.error->detail) : std::string();
 }
 
 // Prints one line for each step when it ends.
@@ -182,8 +184,8 @@ int pacs(Client& client, const Options& options) {
   for (const PacsStatus& each : all) {
     std::cout << each.name << "  last success " << each.last_success.value_or("never");
     if (each.last_failure) {
-      std::cout << "  last failure " << *each.last_failure << " (" << each.reason.value_or("?")
-                << ')';
+      std::cout << "  last failure " << *each.last_failure << " ("
+                << printable(each.reason.value_or("?")) << ')';
     }
     std::cout << '\n';
   }

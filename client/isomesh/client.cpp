@@ -235,8 +235,8 @@ JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
   return {.jobs = jobs_from_json(body), .next = next_from_json(body)};
 }
 
-void Client::cancel(const std::string& id) {
-  job_from_json(impl_->send({.method = "DELETE", .target = job_path(id)}));
+Job Client::cancel(const std::string& id) {
+  return job_from_json(impl_->send({.method = "DELETE", .target = job_path(id)}));
 }
 
 Job Client::wait(const std::string& id, const JobProgress& progress) {

@@ -149,7 +149,8 @@ class Client {
   Job job(const std::string& id, std::chrono::seconds wait);
   // A page of the jobs, in one state if given: the first, or the one of `cursor`.
   JobPage jobs(std::optional<JobState> state = std::nullopt, const std::string& cursor = {});
-  void cancel(const std::string& id);
+  // Returns the job. One that had ended keeps its state, and one that runs takes a moment to stop.
+  Job cancel(const std::string& id);
 
   // Returns the job in its final state. With a callback the job is polled at least once a second,
   // and the callback also gets the final state.

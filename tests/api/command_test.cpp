@@ -267,6 +267,9 @@ TEST_F(CommandTest, AnArchiveOfSeveralMakesAMeshOfEachUnderItsName) {
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "study-x.stl"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "study-y.stl"));
+  const Finished empty =
+      daemon_.command({"mesh", folder_ / "study", "--iso", "300", "-o", folder_ / "{name}.obj"});
+  EXPECT_THAT(empty.errors, HasSubstr("isomesh: study: y.mhd: the surface is empty"));
 }
 
 TEST_F(CommandTest, NoMeshOfARunOverwritesAnother) {
@@ -285,10 +288,30 @@ TEST_F(CommandTest, NoMeshOfARunOverwritesAnother) {
   const Finished twice = daemon_.command(
       {"mesh", folder_ / "s", folder_ / "s-x.mhd", "--iso", "100", "-o", out, "--format", "obj"});
   EXPECT_EQ(twice.status, 1);
-  EXPECT_THAT(twice.errors, HasSubstr("isomesh: s: two meshes would be called s-x"));
+  EXPECT_THAT(twice.errors, HasSubstr("isomesh: s: x.mhd: two meshes would be called s-x"));
   EXPECT_THAT(twice.errors, HasSubstr("--member x.mhd"));
   EXPECT_THAT(files_below(out),
-              testing::ElementsAre("s-x.obj", "study-a_ct.stl", "study-b_ct.stl"));
+              testing::ElementsAre("s-x.obj", "s-y.obj", "study-a_ct.stl", "study-b_ct.stl"));
+}
+
+TEST_F(CommandTest, AMemberThatCannotBeMeshedKeepsNoOtherFromIt) {
+  std::filesystem::create_directory(folder_ / "out");
+  write_pair(folder_ / "s/a/ct");
+  write_pair(folder_ / "s/b/ct");
+  write_file(folder_ / "s/b/ct.raw", "too short");
+  write_pair(folder_ / "s/x");
+  write_file(folder_ / "s/f.raw", std::string(sphere_.bytes.size() * 4, '\0'));
+  write_file(folder_ / "s/f.mhd",
+             "ObjectType = Image\nNDims = 3\nDimSize = 21 20 19\nElementType = MET_FLOAT\n"
+             "ElementDataFile = f.raw\n");
+  write_pair(folder_ / "s-x");
+  const Finished result = daemon_.command({"mesh", folder_ / "s", folder_ / "s-x.mhd", "--labels",
+                                           "all", "-o", folder_ / "out/", "--format", "glb"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("isomesh: s: b/ct.mhd: "));
+  EXPECT_THAT(result.errors, HasSubstr("isomesh: s: f.mhd: "));
+  EXPECT_THAT(result.errors, HasSubstr("isomesh: s: x.mhd: two meshes would be called s-x"));
+  EXPECT_THAT(files_below(folder_ / "out"), testing::ElementsAre("s-ct.glb", "s-x.glb"));
 }
 
 TEST_F(CommandTest, ADryRunLeavesNothingBehind) {
@@ -393,6 +416,13 @@ TEST_F(CommandTest, ReadsAndWritesPipes) {
   EXPECT_EQ(piped.status, 0) << piped.errors;
   EXPECT_EQ(piped.output, read_file(folder_ / "file.stl"));
   EXPECT_EQ(daemon_.client().volumes().back().name, "sphere.raw");
+
+  const Finished uploaded =
+      run({"sh", "-c",
+           "tr '\\000' '\\001' < '" + (folder_ / "sphere.raw").string() + "' | " + ISOMESH +
+               " --server " + daemon_.url() + " upload - --dims 21,20,19 --type uint8"});
+  EXPECT_EQ(uploaded.status, 0) << uploaded.errors;
+  EXPECT_EQ(daemon_.client().volume(line_of(uploaded)).name, "stdin");
 }
 
 TEST(CommandOnItsOwn, MeshesWithoutAServerAndLeavesNothing) {

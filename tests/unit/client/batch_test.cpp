@@ -40,6 +40,7 @@ TEST_F(Batch, AnInputIsCalledAsItsFileWithoutSuffixes) {
   EXPECT_EQ(name_of_input("HEAD.NII.GZ"), "HEAD");
   EXPECT_EQ(name_of_input("head"), "head");
   EXPECT_EQ(name_of_input("-"), "stdin");
+  EXPECT_EQ(name_of_input("a\x1b[31m.nii"), "a\uFFFD[31m") << "it is printed";
   file("series.1/one.dcm");
   EXPECT_EQ(name_of_input(folder_.path() / "series.1"), "series.1");
   EXPECT_EQ(name_of_input((folder_.path() / "series.1").string() + "/"), "series.1");
@@ -76,6 +77,8 @@ TEST_F(Batch, TwoOfOneNameAreRefused) {
     EXPECT_EQ(refused.status(), kWrongUsage);
     EXPECT_THAT(refused.what(), HasSubstr("two inputs are called a"));
   }
+  EXPECT_THROW(names_of({file("tab\x01.nii"), file("tab\x02.nii")}), EarlyExit)
+      << "both outputs would have U+FFFD in their names";
 }
 
 TEST_F(Batch, AHeaderThatCannotBeReadIsAnInput) {
@@ -92,16 +95,38 @@ TEST_F(Batch, MembersAreCalledAsTheirFilesAndWithTheirFoldersOnlyIfNeeded) {
               ElementsAre("s-a_ct", "s-b_ct", "s-mr"));
   EXPECT_THAT(names_of_members("s", {"ct.nrrd", "ct.nii.gz"}),
               ElementsAre("s-ct.nrrd", "s-ct.nii.gz"));
+  EXPECT_THAT(names_of_members("s", {"x/a/ct.nrrd", "x/b/c/ct.nrrd", "x/ct.nrrd", "x/mr.nii"}),
+              ElementsAre("s-a_ct", "s-b_c_ct", "s-ct", "s-mr"))
+      << "without the folders that they share";
+}
+
+TEST_F(Batch, NoTwoMembersHaveOneName) {
+  EXPECT_THAT(names_of_members("s", {"a/ct.nrrd", "b/ct.nrrd", "x/a_ct.nrrd"}),
+              ElementsAre("s-a_ct.nrrd", "s-b_ct", "s-a_ct"));
+  EXPECT_THAT(names_of_members("s", {"c/a/b.nii", "c/a_b.nii", "d/a_b.nii", "d/b.nii"}),
+              ElementsAre("s-c_a_b.nii", "s-c_a_b.nii-2", "s-d_a_b", "s-d_b"));
+  EXPECT_THAT(names_of_members("s", {"a\x01.nii", "a\x02.nii"}),
+              ElementsAre("s-a\uFFFD.nii", "s-a\uFFFD.nii-2"));
+}
+
+TEST_F(Batch, LongNamesOfMembersAreCut) {
+  const std::string folders = std::string(100, 'f') + '/' + std::string(100, 'g') + '/';
+  EXPECT_THAT(names_of_members("s", {folders + "left/ct.nrrd", folders + "right/ct.nrrd"}),
+              ElementsAre("s-left_ct", "s-right_ct"));
+  const std::string cut = "s-" + std::string(198, 'f');
+  EXPECT_THAT(
+      names_of_members("s", {"a/" + folders + "ct.nrrd", "b/" + folders + "ct.nrrd",
+                             std::string(200, 'f') + "1.nii", std::string(200, 'f') + "2.nii"}),
+      ElementsAre("s-a_" + std::string(100, 'f') + '_' + std::string(95, 'g'),
+                  "s-b_" + std::string(100, 'f') + '_' + std::string(95, 'g'), cut,
+                  cut.substr(0, 198) + "-2"));
 }
 
 TEST_F(Batch, EachNameIsTakenOnce) {
   TakenNames names;
-  EXPECT_EQ(names.take({"s", "s-x"}), std::nullopt);
-  EXPECT_EQ(names.take({"s-y", "s-x"}), "s-x");
-  EXPECT_EQ(names.take({"s-y", "s-z", "s-z"}), "s-z");
-  EXPECT_EQ(names.take({"s-a_b"}), std::nullopt);
-  EXPECT_EQ(names.take({"s-a/b"}), "s-a/b") << "both are the same file";
-  EXPECT_EQ(names.take({"s-y", "s-z"}), std::nullopt);
+  EXPECT_TRUE(names.take("s-x"));
+  EXPECT_TRUE(names.take("s-y"));
+  EXPECT_FALSE(names.take("s-x"));
 }
 
 TEST_F(Batch, NamesFillOutputsAndStayInTheirFolder) {

@@ -84,6 +84,7 @@ TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
 
 // The server has the job, but its response did not come.
 TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
+  job_.state = JobState::kRunning;
   std::stop_source stop;
   std::vector<std::string> keys;
   int cancelled = 0;
@@ -106,6 +107,21 @@ TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
   EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
 }
 
+TEST_F(Commands, AnInterruptAfterTheEndOfTheJobCancelsNothing) {
+  server_.http.Delete("/v1/jobs/7", [&](const auto&, auto& response) {
+    response.set_content(to_json(job_), "application/json");
+  });
+  std::stop_source stop;
+  server_.http.set_pre_routing_handler([&](const auto& request, auto&) {
+    if (request.path == "/v1/jobs") stop.request_stop();
+    return httplib::Server::HandlerResponse::Unhandled;
+  });
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options_, stop.get_token()), kRefused);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "isomesh: interrupted; the job 7 had already ended\n");
+}
+
 TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
   server_.http.set_pre_routing_handler([](const auto&, auto& response) {
     Remedy remedy{.overridable = "c\x1b", .choices = {{"member", "a\x1b[31m.nrrd", "x\ny\a"}}};
@@ -117,6 +133,25 @@ TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
   EXPECT_EQ(outcome_of(options_).err,
             "isomesh: line\n\uFFFD[2J\n"
             "    --member a\uFFFD[31m.nrrd  x\uFFFDy\uFFFD\n  --accept c\uFFFD\n");
+}
+
+TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {
+  Order order;
+  order.id = "8";
+  order.state = OrderState::kFailed;
+  order.error = to_problem(Error(ErrorCode::kPacsRefused, "no\x1b[2J"), "");
+  server_.http.Get("/v1/orders", [&](const auto&, auto& response) {
+    response.set_content(to_json(std::vector{order}), "application/json");
+  });
+  server_.http.Get("/v1/pacs", [](const auto&, auto& response) {
+    const PacsStatus main{.name = "main", .last_failure = "today", .reason = "no\x1b[2J"};
+    response.set_content(to_json(std::vector{main}), "application/json");
+  });
+  options_.command = Command::kOrders;
+  EXPECT_EQ(outcome_of(options_).out, "8 failed: no\uFFFD[2J\n");
+  options_.command = Command::kPacs;
+  EXPECT_EQ(outcome_of(options_).out,
+            "main  last success never  last failure today (no\uFFFD[2J)\n");
 }
 
 TEST_F(Commands, QuietSaysNothing) {

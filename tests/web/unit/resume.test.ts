@@ -15,6 +15,8 @@ class Daemon {
   lastUnheard: 'whole' | 'body' | null = null;
   refusal: Response | null = null;
   isCancelled = false;
+  // Is called with the number of the part, from 1.
+  atPart: (part: number) => void = () => undefined;
 
   async answer(address: string, init: RequestInit): Promise<Response> {
     init.signal?.throwIfAborted();
@@ -42,6 +44,7 @@ class Daemon {
 
   private append(headers: Headers, part: Uint8Array): Response {
     if (this.refusal) return this.refusal;
+    this.atPart(this.asked.filter((each) => each === `PATCH ${place}`).length);
     expect(headers.get('Upload-Offset')).toBe(String(this.bytes.length));
     const isCut = this.cuts > 0;
     if (isCut) this.cuts -= 1;
@@ -78,7 +81,12 @@ describe('upload in parts', () => {
   });
   afterEach(() => {
     vi.unstubAllGlobals();
+    vi.useRealTimers();
   });
+
+  function passSeconds(seconds: number): void {
+    vi.setSystemTime(Date.now() + 1000 * seconds);
+  }
 
   it('goes on where it broke, and tells how far it is', async () => {
     daemon.cuts = 2;
@@ -120,6 +128,28 @@ describe('upload in parts', () => {
     const { volumes } = await client.upload(whole);
     expect(volumes[0]?.volume).toEqual({ id: 'abc' });
     expect(daemon.asked).toEqual(['POST /v1/volumes', `PATCH ${place}`, 'POST /v1/volumes']);
+  });
+
+  it('goes on after a part that got on for minutes before it broke', async () => {
+    vi.useFakeTimers({ toFake: ['Date'] });
+    daemon.cuts = 1;
+    daemon.atPart = (part) => {
+      if (part === 1) throw new TypeError('fetch failed');
+      if (part === 2) passSeconds(90);
+    };
+    const { volumes } = await client.upload(whole);
+    expect(volumes[0]?.volume).toEqual({ id: 'abc' });
+  });
+
+  it('is given up after a minute without progress, but not before the daemon was asked', async () => {
+    vi.useFakeTimers({ toFake: ['Date'] });
+    daemon.atPart = (part) => {
+      if (part === 2) passSeconds(60);
+      throw new TypeError('fetch failed');
+    };
+    const lost = await client.upload(whole).catch((error: unknown) => error);
+    expect(lost).toMatchObject({ isUnreachable: true });
+    expect(daemon.asked).toEqual(['POST /v1/volumes', `PATCH ${place}`, `HEAD ${place}`, `PATCH ${place}`, `HEAD ${place}`]);
   });
 
   it('is given up by who does not want it any more', async () => {

@@ -36,7 +36,7 @@ export async function assertReadable(bytes: Blob): Promise<void> {
   }
 }
 
-// Counts the time without progress, and makes the pauses between retries longer.
+// Counts the time since the first failure after progress, and makes the pauses between retries longer.
 class Patience {
   private cut: number | null = null;
   private pause = firstPause;
@@ -46,9 +46,12 @@ class Patience {
     this.pause = firstPause;
   }
 
-  isOver(): boolean {
+  fail(): void {
     this.cut ??= Date.now();
-    return Date.now() - this.cut >= longestCut;
+  }
+
+  isOver(): boolean {
+    return this.cut !== null && Date.now() - this.cut >= longestCut;
   }
 
   async wait(signal?: AbortSignal): Promise<void> {
@@ -57,7 +60,7 @@ class Patience {
   }
 }
 
-function isUnreachable(error: unknown): boolean {
+function isUnreachable(error: unknown): error is ApiError {
   return error instanceof ApiError && error.isUnreachable;
 }
 
@@ -77,21 +80,29 @@ class Parts {
 
   // Sends all parts. Returns the response to the last one, or the first error response that a retry cannot help.
   async answer(): Promise<Answer> {
-    const { signal } = this.options;
+    // A part that failed may have got on, so the upload is given up only after the daemon was asked.
+    let giveUp: (() => Answer) | null = null;
     for (;;) {
+      const { reached } = this;
+      if (reached && giveUp && this.patience.isOver()) return giveUp();
       try {
-        const isLook = this.reached === null;
-        const answer = this.reached === null ? await this.look() : await this.send(this.reached);
+        const answer = reached ? await this.send(reached) : await this.look();
         if (answer === null) continue;
         // With 409 the daemon still holds the broken connection; asked how far it is, it says so of cancelled uploads only.
-        const mayGoOn = (answer.status === 409 && !isLook) || isPassing(answer.status);
-        if (!mayGoOn || this.patience.isOver()) return answer;
+        const mayGoOn = (answer.status === 409 && reached !== null) || isPassing(answer.status);
+        if (!mayGoOn) return answer;
+        giveUp = () => answer;
       } catch (error) {
-        if (!isUnreachable(error) || this.patience.isOver()) throw error;
-        if (this.reached) await assertReadable(this.part(this.reached.offset));
+        if (!isUnreachable(error)) throw error;
+        if (reached) await assertReadable(this.part(reached.offset));
+        giveUp = () => {
+          throw error;
+        };
       }
+      this.patience.fail();
+      if (!reached && this.patience.isOver()) return giveUp();
       this.reached = null;
-      await this.patience.wait(signal);
+      await this.patience.wait(this.options.signal);
     }
   }
 
