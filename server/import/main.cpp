@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "proto/error.h"
+#include "server/import/archives/archive.h"
 #include "server/import/dicom/elements/character_sets.h"
 #include "server/import/import.h"
 #include "server/import/peers/response.h"
@@ -113,5 +114,6 @@ void import_one() {
 
 int main() {
   import::dicom::load_character_sets();
+  import::load_name_encoding();
   serve_copies(import_one);
 }

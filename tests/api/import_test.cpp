@@ -8,6 +8,7 @@
 #include "proto/json.h"
 #include "tests/api/daemon.h"
 #include "tests/support/deflate.h"
+#include "tests/unit/import/archives.h"
 
 namespace isomesh::test {
 namespace {
@@ -41,6 +42,20 @@ TEST(Import, AFolderAndAHeaderArePackedOnTheWay) {
   const Finished meshed =
       daemon.command({"mesh", folder / "volume", "--iso", "105", "-o", folder / "out.stl"});
   EXPECT_EQ(meshed.status, 0) << meshed.errors;
+}
+
+// What reads such names must be there before the process that imports is confined.
+TEST(Import, NamesInAZipMayBeUtf8) {
+  using import::test::Utf8Names;
+  const Daemon daemon;
+  for (const Utf8Names names : {Utf8Names::kFlag, Utf8Names::kField}) {
+    const std::string zip =
+        import::test::zip_in_utf8({{"R\xc3\xbcmpf/head.mhd", std::string(kHeader)},
+                                   {"R\xc3\xbcmpf/head.raw", "abcdefghijklmnopqrstuvwx"}},
+                                  names);
+    const Answer answer = daemon.send("POST", "/v1/volumes", zip);
+    EXPECT_EQ(answer.status / 100, 2) << answer.body;
+  }
 }
 
 TEST(Import, AFolderWithoutFilesIsRefusedByTheCommand) {

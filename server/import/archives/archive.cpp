@@ -10,6 +10,7 @@
 #include <archive.h>
 #include <archive_entry.h>
 #include <fcntl.h>
+#include <locale.h>
 
 #include "base/descriptor.h"
 #include "base/error.h"
@@ -70,9 +71,30 @@ std::string plain_name(std::string_view name) {
   return plain;
 }
 
+// Null if the machine lacks it.
+locale_t utf8_locale() {
+  static const locale_t kLocale = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+  return kLocale;
+}
+
+// The library drops names that a ZIP declares as UTF-8 if the locale cannot represent them. It
+// keeps those of a TAR, and would compose their letters in this locale: then they could differ from
+// the names in a header.
+class NamesInUtf8 {
+ public:
+  explicit NamesInUtf8(bool is_zip) : before_(::uselocale(is_zip ? utf8_locale() : nullptr)) {}
+  ~NamesInUtf8() { ::uselocale(before_); }
+  NamesInUtf8(const NamesInUtf8&) = delete;
+  NamesInUtf8& operator=(const NamesInUtf8&) = delete;
+
+ private:
+  locale_t before_;
+};
+
 class OpenArchive {
  public:
-  explicit OpenArchive(const InputFile& file) : file_(file), archive_(::archive_read_new()) {
+  explicit OpenArchive(const InputFile& file)
+      : file_(file), archive_(::archive_read_new()), is_zip_(is_zip(file.text(0, 4))) {
     if (!archive_) throw Error(ErrorCode::kInternal, "archive_read_new failed.");
     // Read a ZIP by its central directory, which shows whether members are missing.
     ::archive_read_support_format_zip_seekable(archive_.get());
@@ -92,10 +114,11 @@ class OpenArchive {
     }
     before_next_ = static_cast<std::uint64_t>(::archive_filter_bytes(archive_.get(), 0));
     archive_entry* entry = nullptr;
+    const NamesInUtf8 names(is_zip_);
     const int status = ::archive_read_next_header(archive_.get(), &entry);
     in_member_ = false;
     if (status == ARCHIVE_EOF) return nullptr;
-    // The library warns of names that the locale cannot represent, which is harmless.
+    // The library warns of a TAR's names that the locale cannot represent, and keeps them.
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) throw_archive_error(archive_.get());
     in_member_ = true;
     return entry;
@@ -138,6 +161,7 @@ class OpenArchive {
 
   const InputFile& file_;
   std::unique_ptr<archive, Free> archive_;
+  bool is_zip_;
   std::uint64_t before_next_ = 0;
   bool in_member_ = false;
 };
@@ -277,6 +301,8 @@ class Unpacker {
 };
 
 }  // namespace
+
+void load_name_encoding() { utf8_locale(); }
 
 bool is_zip(std::string_view head) {
   return head.starts_with("PK\x03\x04") || head.starts_with("PK\x05\x06");

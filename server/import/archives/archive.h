@@ -13,6 +13,10 @@
 
 namespace isomesh::import {
 
+// Call before the process drops the right to open files: otherwise names in a ZIP that are not
+// ASCII are lost.
+void load_name_encoding();
+
 bool is_zip(std::string_view head);
 bool is_tar(std::string_view head);
 

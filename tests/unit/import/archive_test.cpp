@@ -69,6 +69,22 @@ TEST(Archive, HoldsAHeaderAndItsData) {
               "metaimage");
 }
 
+TEST(Archive, NamesMayBeDeclaredAsUtf8) {
+  const std::vector<Member> members = {{"K\xc3\xb6pfe/R\xc3\xbcmpf.mhd", mhd("R\xc3\xbcmpf.raw")},
+                                       {"K\xc3\xb6pfe/R\xc3\xbcmpf.raw", kSamples}};
+  for (const Utf8Names names : {Utf8Names::kFlag, Utf8Names::kField}) {
+    const Outcome outcome = import_bytes(zip_in_utf8(members, names));
+    EXPECT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.volume.name, "R\xc3\xbcmpf.mhd");
+  }
+}
+
+// Programs of macOS write names in decomposed form, also into headers.
+TEST(Archive, NamesInATarAreTheirBytes) {
+  const std::string data = "Ru\xcc\x88mpf.raw";
+  EXPECT_EQ(import_bytes(tar({{"head.mhd", mhd(data)}, {data, kSamples}})).error, "");
+}
+
 TEST(Archive, DataMayBeEncodedSkippedAndShared) {
   const Lines lines = with(small_metaimage(), "CompressedData", "True");
   expect_read({{"h.mhd", metaimage(with(lines, "ElementDataFile", "h.zraw"), "")},

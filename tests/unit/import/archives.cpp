@@ -6,6 +6,7 @@
 
 #include <archive.h>
 #include <archive_entry.h>
+#include <zlib.h>
 
 namespace isomesh::import::test {
 namespace {
@@ -68,6 +69,23 @@ std::string written(const Writer& writer, const std::vector<Member>& members) {
   return file;
 }
 
+std::string little_endian(std::uint64_t value, int bytes) {
+  std::string text;
+  for (int at = 0; at < bytes; ++at) text += static_cast<char>(value >> (8 * at));
+  return text;
+}
+
+std::string crc_of(std::string_view text) {
+  const auto* bytes = reinterpret_cast<const Bytef*>(text.data());
+  return little_endian(::crc32(0, bytes, static_cast<uInt>(text.size())), 4);
+}
+
+std::string ascii_of(std::string name) {
+  std::ranges::replace_if(
+      name, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }, '_');
+  return name;
+}
+
 }  // namespace
 
 std::string zip(const std::vector<Member>& members, Locked locked) {
@@ -86,6 +104,28 @@ std::string tar(const std::vector<Member>& members) {
   writer.check(::archive_write_set_format_pax_restricted(writer.handle()));
   ::archive_write_set_bytes_in_last_block(writer.handle(), 1);
   return written(writer, members);
+}
+
+std::string zip_in_utf8(const std::vector<Member>& members, Utf8Names names) {
+  std::string file;
+  std::string directory;
+  for (const auto& [name, bytes, kind] : members) {
+    const bool by_flag = names == Utf8Names::kFlag;
+    const std::string told = by_flag ? name : ascii_of(name);
+    const std::string field = "\x01" + crc_of(told) + name;
+    const std::string extra = by_flag ? "" : "up" + little_endian(field.size(), 2) + field;
+    // What both headers of a member have: version, flags, no compression, time, sums and lengths.
+    const std::string common = little_endian(20, 2) + little_endian(by_flag ? 0x800 : 0, 2) +
+                               little_endian(0, 2) + little_endian(0x21'0000, 4) + crc_of(bytes) +
+                               little_endian(bytes.size(), 4) + little_endian(bytes.size(), 4) +
+                               little_endian(told.size(), 2) + little_endian(extra.size(), 2);
+    directory += "PK\x01\x02" + little_endian(20, 2) + common + std::string(10, '\0') +
+                 little_endian(file.size(), 4) + told + extra;
+    file += "PK\x03\x04" + common + told + extra + bytes;
+  }
+  const std::string count = little_endian(members.size(), 2);
+  return file + directory + "PK\x05\x06" + little_endian(0, 4) + count + count +
+         little_endian(directory.size(), 4) + little_endian(file.size(), 4) + little_endian(0, 2);
 }
 
 std::string without_name(std::string tar, std::string_view name) {
