@@ -168,7 +168,7 @@ class Run {
     return mesh(found, input.name, subject_of(input));
   }
 
-  // What messages are about; empty if there is only one.
+  // The subject of messages; empty if there is only one.
   std::string subject_of(const Input& input) const { return is_one_of_many_ ? input.name : ""; }
 
   int mesh(const Volume& volume, const std::string& name, const std::string& subject) {

@@ -44,7 +44,7 @@ TEST(Import, AFolderAndAHeaderArePackedOnTheWay) {
   EXPECT_EQ(meshed.status, 0) << meshed.errors;
 }
 
-// What reads such names must be there before the process that imports is confined.
+// The locale for such names must be loaded before the process that imports is confined.
 TEST(Import, NamesInAZipMayBeUtf8) {
   using import::test::Utf8Names;
   const Daemon daemon;

@@ -161,7 +161,7 @@ class OpenArchive {
 
   const InputFile& file_;
   std::unique_ptr<archive, Free> archive_;
-  bool is_zip_;
+  const bool is_zip_;
   std::uint64_t before_next_ = 0;
   bool in_member_ = false;
 };

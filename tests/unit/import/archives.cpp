@@ -114,7 +114,7 @@ std::string zip_in_utf8(const std::vector<Member>& members, Utf8Names names) {
     const std::string told = by_flag ? name : ascii_of(name);
     const std::string field = "\x01" + crc_of(told) + name;
     const std::string extra = by_flag ? "" : "up" + little_endian(field.size(), 2) + field;
-    // What both headers of a member have: version, flags, no compression, time, sums and lengths.
+    // Both headers of a member have these: version, flags, no compression, time, sums and lengths.
     const std::string common = little_endian(20, 2) + little_endian(by_flag ? 0x800 : 0, 2) +
                                little_endian(0, 2) + little_endian(0x21'0000, 4) + crc_of(bytes) +
                                little_endian(bytes.size(), 4) + little_endian(bytes.size(), 4) +
