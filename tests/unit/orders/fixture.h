@@ -6,6 +6,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <set>
 
 #include <gmock/gmock.h>
@@ -259,8 +260,14 @@ class WatchedReceived : public store::SqlReceivedStore {
   using SqlReceivedStore::SqlReceivedStore;
 
   std::vector<store::HeldSeries> held() const override {
+    const std::lock_guard lock(receiving_);
     ++looks_;
     return SqlReceivedStore::held();
+  }
+  // While it lives, nobody looks at what is held. A database's clock does not go with pass(), so
+  // the orders would take a series as settled before all of it is there.
+  [[nodiscard]] std::unique_lock<std::mutex> begin_receiving() {
+    return std::unique_lock(receiving_);
   }
   int looks() const { return looks_; }
 
@@ -275,6 +282,7 @@ class WatchedReceived : public store::SqlReceivedStore {
   int failures() const { return failures_; }
 
  private:
+  mutable std::mutex receiving_;
   mutable std::atomic<int> looks_ = 0;
   mutable std::atomic<int> failures_ = 0;
 };

@@ -233,6 +233,7 @@ class ReceivedOrdersTest : public OrdersTest {
   }
   void receive(int from, int to, const std::string& title = "BONE",
                const std::string& patient = "PAT-1") {
+    const auto receiving = received_.begin_receiving();
     for (int slice = from; slice < to; ++slice) {
       const std::string file = slice_file(slice, patient);
       const auto writer = blobs_.begin("");
