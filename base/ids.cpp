@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include <openssl/rand.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "base/hex.h"
@@ -20,6 +21,11 @@ std::string random_hex(std::size_t bytes) {
     throw Error(ErrorCode::kInternal, "the system's random source failed");
   }
   return to_hex(raw);
+}
+
+std::string host_name() {
+  std::array<char, 256> name = {};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
 }
 
 std::string time_ordered_id(std::chrono::system_clock::time_point now) {

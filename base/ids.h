@@ -1,4 +1,4 @@
-// Unique names. Thread safe. All functions throw Error kInternal if the system has no random bytes.
+// Names. Thread safe.
 #pragma once
 
 #include <chrono>
@@ -7,12 +7,16 @@
 
 namespace isomesh {
 
-// Lower-case hexadecimal from the system's random source, two digits per byte.
+// Lower-case hexadecimal from the system's random source, two digits per byte. Throws Error
+// kInternal if that fails, as time_ordered_id() does.
 std::string random_hex(std::size_t bytes);
 
 // Returns a UUID of version 7 (RFC 9562). It sorts after all earlier ones of this process. Ids of
 // several processes are ordered as far as their clocks agree.
 std::string time_ordered_id(
     std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
+
+// This machine's name; "-" if it has none.
+std::string host_name();
 
 }  // namespace isomesh

@@ -9,8 +9,10 @@
 //   changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return count_ > 0; });
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <stop_token>
 
 #if defined(__clang__)
 #define ISOMESH_THREAD_ATTRIBUTE(x) __attribute__((x))
@@ -50,5 +52,12 @@ class ISOMESH_THREAD_ATTRIBUTE(scoped_lockable) Lock {
 
 // Waits on a Lock; otherwise std::condition_variable_any, with stop tokens too.
 using Condition = std::condition_variable_any;
+
+// Returns after that time, or as soon as `stop` is requested.
+inline void pause(const std::stop_token& stop, std::chrono::milliseconds time) {
+  Mutex mutex;
+  Lock lock(mutex);
+  Condition().wait_for(lock, stop, time, [] { return false; });
+}
 
 }  // namespace isomesh

@@ -1,6 +1,7 @@
 #include "base/sha256.h"
 
 #include <openssl/evp.h>
+#include <openssl/hmac.h>
 
 #include "base/error.h"
 #include "base/hex.h"
@@ -41,6 +42,16 @@ std::string sha256_of(std::string_view text) {
   Sha256 digest;
   digest.update(text);
   return to_hex(digest.finish());
+}
+
+std::string hmac_sha256(std::string_view key, std::string_view text) {
+  std::array<unsigned char, Sha256::kBytes> mac = {};
+  if (HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
+           reinterpret_cast<const unsigned char*>(text.data()), text.size(), mac.data(),
+           nullptr) == nullptr) {
+    throw Error(ErrorCode::kInternal, "HMAC failed");
+  }
+  return {reinterpret_cast<const char*>(mac.data()), mac.size()};
 }
 
 }  // namespace isomesh

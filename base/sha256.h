@@ -35,4 +35,7 @@ class Sha256 {
 
 std::string sha256_of(std::string_view text);
 
+// The bytes of HMAC-SHA-256 (RFC 2104). Throws Error kInternal if OpenSSL fails.
+std::string hmac_sha256(std::string_view key, std::string_view text);
+
 }  // namespace isomesh

@@ -1,7 +1,5 @@
 #include "base/wakeup.h"
 
-#include <cstdint>
-
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -34,5 +32,12 @@ bool Wakeup::clear() {
 }
 
 int new_epoll() { return checked(::epoll_create1(EPOLL_CLOEXEC)); }
+
+bool watch(int epoll, int descriptor, std::uint32_t events, std::uint64_t who, bool is_watched) {
+  epoll_event event = {};
+  event.events = events;
+  event.data.u64 = who;
+  return ::epoll_ctl(epoll, is_watched ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, descriptor, &event) == 0;
+}
 
 }  // namespace isomesh

@@ -1,5 +1,8 @@
-// For threads that poll descriptors. Both throw Error kUnavailable without free descriptors.
+// For threads that poll descriptors. Making either throws Error kUnavailable without free
+// descriptors.
 #pragma once
+
+#include <cstdint>
 
 namespace isomesh {
 
@@ -22,5 +25,10 @@ class Wakeup {
 };
 
 int new_epoll();
+
+// Adds the descriptor to those that `epoll` waits for, or with `is_watched` changes its events;
+// `who` identifies it in them. Returns false if the system refuses.
+bool watch(int epoll, int descriptor, std::uint32_t events, std::uint64_t who,
+           bool is_watched = false);
 
 }  // namespace isomesh

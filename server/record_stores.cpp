@@ -1,10 +1,7 @@
 #include "server/record_stores.h"
 
-#include <array>
 #include <filesystem>
 #include <string>
-
-#include <unistd.h>
 
 #include "base/ids.h"
 #include "server/jobs/making/stage_times.h"
@@ -79,11 +76,6 @@ class FolderStores : public SqlStores {
   store::SqlOutbox outbox_;
 };
 
-std::string host_of_node() {
-  std::array<char, 256> name = {};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
-}
-
 // Requests wait for each other, because a database server has few connections.
 constexpr std::size_t kRequestConnections = 12;
 
@@ -127,7 +119,7 @@ std::unique_ptr<RecordStores> open_record_stores(const Options& options,
   // A copied folder on another machine is another node.
   auto database = std::make_unique<store::postgresql::Database>(
       store::postgresql::DatabaseOptions{.url = options.store,
-                                         .node = folder.name() + '@' + host_of_node(),
+                                         .node = folder.name() + '@' + host_name(),
                                          .connections = kRequestConnections + options.workers});
   return std::make_unique<SharedStores>(options, std::move(database), blobs, tolerance);
 }

@@ -1,15 +1,12 @@
 #include "server/callbacks/signature.h"
 
-#include <array>
 #include <optional>
 #include <sstream>
-
-#include <openssl/evp.h>
-#include <openssl/hmac.h>
 
 #include "base/base64.h"
 #include "base/clock.h"
 #include "base/files.h"
+#include "base/sha256.h"
 
 namespace isomesh::callbacks {
 namespace {
@@ -49,15 +46,8 @@ std::string callback_signature(const std::vector<std::string>& secrets, std::str
   content.append(".").append(std::to_string(timestamp)).append(".").append(body);
   std::string signatures;
   for (const std::string& secret : secrets) {
-    std::array<unsigned char, EVP_MAX_MD_SIZE> mac = {};
-    unsigned size = 0;
-    if (HMAC(EVP_sha256(), secret.data(), static_cast<int>(secret.size()),
-             reinterpret_cast<const unsigned char*>(content.data()), content.size(), mac.data(),
-             &size) == nullptr) {
-      throw Error(ErrorCode::kInternal, "HMAC failed");
-    }
     if (!signatures.empty()) signatures += ' ';
-    signatures += "v1," + to_base64(std::span(mac.data(), size));
+    signatures += "v1," + to_base64(hmac_sha256(secret, content));
   }
   return signatures;
 }

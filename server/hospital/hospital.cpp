@@ -1,12 +1,12 @@
 #include "server/hospital/hospital.h"
 
 #include <algorithm>
-#include <array>
 #include <string>
 #include <utility>
 
 #include <unistd.h>
 
+#include "base/ids.h"
 #include "base/log.h"
 #include "server/hospital/audit/syslog.h"
 #include "server/hospital/c_store/listener.h"
@@ -42,11 +42,6 @@ std::unique_ptr<process::PreparedProcesses> prepare_dimse(const orders::Hospital
   constexpr std::size_t kPrepared = 2;
   if (!needs_dimse(hospital)) return nullptr;
   return std::make_unique<process::PreparedProcesses>(settings.program("isomesh-dimse"), kPrepared);
-}
-
-std::string host_name() {
-  std::array<char, 256> name = {};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
 }
 
 // Null if no collector is configured.

@@ -15,7 +15,7 @@
 #include "base/error.h"
 #include "proto/error.h"
 #include "server/import/archives/archive.h"
-#include "server/import/dicom/elements/character_sets.h"
+#include "server/import/dicom/elements/text.h"
 #include "server/import/import.h"
 #include "server/import/peers/response.h"
 #include "server/process/fork_server.h"

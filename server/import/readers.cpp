@@ -141,10 +141,7 @@ const Reader* sniff_plain(std::string_view head) {
   return found == std::end(kReaders) ? nullptr : found;
 }
 
-bool is_compressed(const InputFile& file) {
-  const std::string head = file.text(0, kSniffBytes);
-  return is_gzip(std::as_bytes(std::span(head)));
-}
+bool is_compressed(const InputFile& file) { return is_gzip(file.text(0, kSniffBytes)); }
 
 void gunzip(const InputFile& file, std::uint64_t limit, ScratchFile& target) {
   const std::uint64_t bytes =
@@ -171,8 +168,7 @@ class InflatedBeginning {
  public:
   InflatedBeginning(const InputFile& file, const std::filesystem::path& scratch)
       : scratch_(scratch, ".beginning") {
-    const std::string head = file.text(0, kBeginningBytes);
-    const std::string plain = inflate_head(std::as_bytes(std::span(head)), kBeginningBytes);
+    const std::string plain = inflate_head(file.text(0, kBeginningBytes), kBeginningBytes);
     scratch_.write(std::as_bytes(std::span(plain)));
   }
 
@@ -204,15 +200,12 @@ void check_options(const Reader& reader, const ImportOptions& options) {
 
 std::span<const Reader> readers() { return kReaders; }
 
-const Reader* sniff(std::span<const std::byte> head) {
+const Reader* sniff(std::string_view head) {
   if (is_gzip(head)) return sniff_plain(inflate_head(head, kSniffBytes));
-  return sniff_plain({reinterpret_cast<const char*>(head.data()), head.size()});
+  return sniff_plain(head);
 }
 
-const Reader* sniff(const InputFile& file) {
-  const std::string head = file.text(0, kSniffBytes);
-  return sniff(std::as_bytes(std::span(head)));
-}
+const Reader* sniff(const InputFile& file) { return sniff(file.text(0, kSniffBytes)); }
 
 MostBytes most_bytes_of(const Reader& reader, const InputFile& beginning, const ImportTask& task) {
   if (!is_compressed(beginning)) return reader.most_bytes(beginning, task);

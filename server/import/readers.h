@@ -15,7 +15,7 @@ std::span<const Reader> readers();
 
 // Recognises a file's format by its first bytes, also inside gzip; never by its name. Null if
 // unknown. Thread safe.
-const Reader* sniff(std::span<const std::byte> head);
+const Reader* sniff(std::string_view head);
 const Reader* sniff(const InputFile& file);
 
 // The largest possible size of a file with this beginning (kBeginningBytes), plain or compressed as

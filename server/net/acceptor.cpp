@@ -26,28 +26,6 @@ constexpr std::size_t kBlock = 16 * 1024;
 constexpr std::uint64_t kListening = 0;
 constexpr std::uint64_t kWakeup = 1;
 
-std::string address_of(const sockaddr_storage& peer) {
-  std::array<char, INET6_ADDRSTRLEN> text = {};
-  const void* address = nullptr;
-  if (peer.ss_family == AF_INET) {
-    address = &reinterpret_cast<const sockaddr_in&>(peer).sin_addr;
-  } else if (peer.ss_family == AF_INET6) {
-    address = &reinterpret_cast<const sockaddr_in6&>(peer).sin6_addr;
-  }
-  if (address == nullptr ||
-      ::inet_ntop(peer.ss_family, address, text.data(), text.size()) == nullptr) {
-    return {};
-  }
-  return text.data();
-}
-
-void add(int epoll, int descriptor, std::uint64_t who) {
-  epoll_event event = {};
-  event.events = EPOLLIN;
-  event.data.u64 = who;
-  ::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event);
-}
-
 // A stream with its place among the connections, which is released after the descriptor.
 class PlacedStream : public ByteStream {
  public:
@@ -76,8 +54,8 @@ Acceptor::Acceptor(int listening, const AcceptorLimits& limits, FairPlaces& plac
       on_refused_(std::move(on_refused)),
       epoll_(new_epoll()) {
   ::fcntl(listening_, F_SETFL, ::fcntl(listening_, F_GETFL) | O_NONBLOCK);
-  add(epoll_, listening_, kListening);
-  add(epoll_, wakeup_.descriptor(), kWakeup);
+  isomesh::watch(epoll_, listening_, EPOLLIN, kListening);
+  isomesh::watch(epoll_, wakeup_.descriptor(), EPOLLIN, kWakeup);
   last_id_ = kWakeup;
   thread_ = std::jthread([this] { work(); });
 }
@@ -236,12 +214,12 @@ bool Acceptor::is_complete(Pending& pending) {
 }
 
 void Acceptor::watch(PendingList::iterator pending, Transfer::State wanted) {
-  epoll_event event = {};
-  event.events = wanted == Transfer::State::kWantsWrite ? EPOLLOUT : EPOLLIN;
-  event.data.u64 = pending->id;
-  const int operation = std::exchange(pending->is_watched, true) ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
+  const auto events = wanted == Transfer::State::kWantsWrite ? EPOLLOUT : EPOLLIN;
   const int descriptor = pending->connection.stream->descriptor();
-  if (::epoll_ctl(epoll_, operation, descriptor, &event) != 0) close(pending);
+  if (!isomesh::watch(epoll_, descriptor, events, pending->id,
+                      std::exchange(pending->is_watched, true))) {
+    close(pending);
+  }
 }
 
 // All have the same time limit, so the oldest expires first.

@@ -33,6 +33,21 @@ std::string party_of(const std::string& address) {
   return to_hex(bytes.first(kNetworkBytes));
 }
 
+std::string address_of(const sockaddr_storage& peer) {
+  std::array<char, INET6_ADDRSTRLEN> text = {};
+  const void* address = nullptr;
+  if (peer.ss_family == AF_INET) {
+    address = &reinterpret_cast<const sockaddr_in&>(peer).sin_addr;
+  } else if (peer.ss_family == AF_INET6) {
+    address = &reinterpret_cast<const sockaddr_in6&>(peer).sin6_addr;
+  }
+  if (address == nullptr ||
+      ::inet_ntop(peer.ss_family, address, text.data(), text.size()) == nullptr) {
+    return {};
+  }
+  return text.data();
+}
+
 Address parse_address(const std::string& text) {
   constexpr std::string_view kUnix = "unix:";
   if (text.starts_with(kUnix)) {

@@ -1,8 +1,10 @@
-// Addresses to listen on.
+// Addresses to listen on, and of peers.
 #pragma once
 
 #include <filesystem>
 #include <string>
+
+#include <sys/socket.h>
 
 namespace isomesh::net {
 
@@ -21,6 +23,9 @@ struct Address {
 // The party that shares limits (FairPlaces): an IPv4 address, or an IPv6 network of 64 bits, the
 // smallest that providers assign. `address` is numeric; "" for "".
 std::string party_of(const std::string& address);
+
+// The numeric address of an IP socket's peer; "" for others.
+std::string address_of(const sockaddr_storage& peer);
 
 // Throws Error kInvalidParameter with the reason.
 Address parse_address(const std::string& text);

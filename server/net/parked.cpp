@@ -14,13 +14,6 @@ namespace {
 constexpr int kMostEvents = 64;
 constexpr std::uint64_t kWakeup = 0;  // epoll's id; requests have higher ids
 
-bool watch(int epoll, int descriptor, unsigned events, std::uint64_t who) {
-  epoll_event event = {};
-  event.events = events;
-  event.data.u64 = who;
-  return ::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event) == 0;
-}
-
 }  // namespace
 
 Parked::Parked(HasEnded has_ended) : has_ended_(std::move(has_ended)), epoll_(new_epoll()) {

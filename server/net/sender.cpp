@@ -57,10 +57,7 @@ Sender::Sender(const SenderLimits& limits)
       epoll_(new_epoll()),
       computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max(),
                  kComputingNiceness) {
-  epoll_event event = {};
-  event.events = EPOLLIN;
-  event.data.u64 = kWakeup;
-  ::epoll_ctl(epoll_, EPOLL_CTL_ADD, wakeup_.descriptor(), &event);
+  isomesh::watch(epoll_, wakeup_.descriptor(), EPOLLIN, kWakeup);
   thread_ = std::jthread([this] { work(); });
 }
 
@@ -318,12 +315,8 @@ void Sender::close_overdue() {
 }
 
 bool Sender::watch(Sending& sending) {
-  epoll_event event = {};
-  event.events = sending.events;
-  event.data.u64 = sending.id;
-  const int descriptor = sending.response.stream->descriptor();
-  const int operation = std::exchange(sending.is_watched, true) ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
-  return ::epoll_ctl(epoll_, operation, descriptor, &event) == 0;
+  return isomesh::watch(epoll_, sending.response.stream->descriptor(), sending.events, sending.id,
+                        std::exchange(sending.is_watched, true));
 }
 
 // Closing the descriptor removes it from epoll.

@@ -15,7 +15,7 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
-#include "server/volume/size.h"
+#include "server/volume/geometry.h"
 
 namespace isomesh::process {
 

@@ -3,41 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <numbers>
 
 #include "server/import/import.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
+#include "tests/support/files.h"
 
 namespace isomesh::bench {
 namespace {
-
-namespace fs = std::filesystem;
-
-// A folder for the import's files that goes with its owner.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "isomesh-bench-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw Error(ErrorCode::kOutOfSpace, "cannot make a temporary folder");
-    }
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 // sin and cos of `periods` turns over n samples.
 struct Waves {
@@ -69,9 +44,9 @@ struct AxisMap {
 
 }  // namespace
 
-LoadedVolume load_volume(const fs::path& path) {
-  const ScratchFolder scratch;
-  const fs::path canonical = scratch.path() / "canonical";
+LoadedVolume load_volume(const std::filesystem::path& path) {
+  const test::TemporaryFolder scratch;
+  const std::filesystem::path canonical = scratch.path() / "canonical";
   const Volume description =
       import::import_volume({.source = path, .scratch = scratch.path(), .target = canonical});
   const volume::CanonicalVolume file(canonical);

@@ -6,14 +6,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <stdexcept>
-
-#include <unistd.h>
 
 #include "proto/error.h"
 #include "proto/json.h"
-#include "server/import/dicom/elements/ascconv.h"
 #include "server/import/dicom/elements/csa_header.h"
 #include "server/import/import.h"
 #include "server/import/labels/label_table.h"
@@ -23,6 +18,7 @@
 #include "server/volume/canonical.h"
 #include "server/volume/labels.h"
 #include "tests/fuzz/draco_target.h"
+#include "tests/support/files.h"
 #include "tests/unit/import/archives.h"
 
 namespace isomesh::fuzz {
@@ -42,27 +38,8 @@ std::string_view text_of(Bytes bytes) {
 
 // A folder of the process, in memory where there is one, emptied between inputs by the imports.
 const fs::path& folder() {
-  static const fs::path path = [] {
-    const fs::path memory = "/dev/shm";
-    std::string name =
-        ((fs::is_directory(memory) ? memory : fs::temp_directory_path()) / "isomesh-fuzz-XXXXXX");
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
-    static const struct Remove {
-      fs::path path;
-      ~Remove() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-      }
-    } remove{name};
-    return fs::path(name);
-  }();
-  return path;
-}
-
-void write(const fs::path& path, Bytes bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()),
-             static_cast<std::streamsize>(bytes.size()));
+  static const test::TemporaryFolder folder(test::fast_place());
+  return folder.path();
 }
 
 void expect_volume(const Volume& found, const fs::path& canonical) {
@@ -76,7 +53,7 @@ void expect_volume(const Volume& found, const fs::path& canonical) {
 
 void import_bytes(Bytes bytes, const process::ImportOptions& options) {
   const fs::path source = folder() / "upload";
-  write(source, bytes);
+  test::write_file(source, text_of(bytes));
   const fs::path scratch = folder() / "scratch";
   fs::create_directory(scratch);
   const process::ImportTask task = {.source = source,
@@ -93,18 +70,15 @@ void import_bytes(Bytes bytes, const process::ImportOptions& options) {
   if (!fs::is_empty(scratch)) fail("an import left files behind");
 }
 
-void import_only(std::string_view format, Bytes bytes) {
-  const auto head = bytes.first(std::min(bytes.size(), import::kSniffBytes));
-  const import::Reader* reader = import::sniff(head);
-  if (reader == nullptr || reader->name != format) return;
-  import_bytes(bytes, {});
-  import_bytes(bytes, {.volume = 1});
+bool is_of(std::string_view format, Bytes bytes) {
+  const import::Reader* reader = import::sniff(text_of(bytes).substr(0, import::kSniffBytes));
+  return reader != nullptr && reader->name == format;
 }
 
-bool is_of(std::string_view format, Bytes bytes) {
-  const import::Reader* reader =
-      import::sniff(bytes.first(std::min(bytes.size(), import::kSniffBytes)));
-  return reader != nullptr && reader->name == format;
+void import_only(std::string_view format, Bytes bytes) {
+  if (!is_of(format, bytes)) return;
+  import_bytes(bytes, {});
+  import_bytes(bytes, {.volume = 1});
 }
 
 // For files without a spacing.
@@ -161,7 +135,7 @@ void import_raw(Bytes bytes) {
 
 void open_canonical(Bytes bytes) {
   const fs::path path = folder() / "canonical";
-  write(path, bytes);
+  test::write_file(path, text_of(bytes));
   try {
     const volume::CanonicalVolume file(path);
     if (file.samples().size() != file.header().sample_bytes()) fail("samples of another size");

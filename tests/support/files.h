@@ -9,10 +9,14 @@
 
 namespace isomesh::test {
 
+// Where files that only one process needs are fast: in memory, if the machine has such a place.
+std::filesystem::path fast_place();
+
 // A new, empty folder; the destructor removes it with its content.
 class TemporaryFolder {
  public:
-  TemporaryFolder();
+  explicit TemporaryFolder(
+      const std::filesystem::path& parent = std::filesystem::temp_directory_path());
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;

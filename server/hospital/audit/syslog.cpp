@@ -1,13 +1,12 @@
 #include "server/hospital/audit/syslog.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <limits>
-#include <mutex>
 #include <string>
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/mutex.h"
 #include "proto/json_tree.h"
 
 namespace isomesh::audit {
@@ -28,14 +27,6 @@ std::uint64_t number_of(std::string_view entry) {
   return json_values::whole(json_values::existing(JsonTree(entry).root(), "id"), kMost);
 }
 
-// Returns early when `stop` is requested.
-void pause(milliseconds time, const std::stop_token& stop) {
-  std::mutex mutex;
-  std::condition_variable_any never;
-  std::unique_lock lock(mutex);
-  never.wait_for(lock, stop, time, [] { return false; });
-}
-
 }  // namespace
 
 SyslogSender::SyslogSender(store::AuditTrail& trail, TlsServer server, AuditSource source)
@@ -48,7 +39,7 @@ void SyslogSender::stop() {
   if (!thread_.joinable()) return;
   thread_.request_stop();
   std::jthread last_word([this](const std::stop_token& stop) {
-    pause(kLastWord, stop);
+    pause(stop, kLastWord);
     cut_.request_stop();
   });
   thread_.join();
@@ -74,7 +65,7 @@ void SyslogSender::run(const std::stop_token& stop) {
       wait = std::min(2 * wait, kLongestPause);
     }
     if (is_last) break;
-    pause(wait, stop);
+    pause(stop, wait);
   }
   connection_.reset();
 }

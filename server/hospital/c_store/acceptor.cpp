@@ -6,7 +6,6 @@
 #include <span>
 #include <utility>
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/epoll.h>
@@ -36,18 +35,6 @@ constexpr std::uint32_t kLongestRequest = 1U << 20;
 // The association reads the rest.
 constexpr std::uint32_t kEnough = 32 * 1024;
 
-std::string address_of(const sockaddr_storage& peer) {
-  std::array<char, INET6_ADDRSTRLEN> text = {};
-  const void* address = nullptr;
-  if (peer.ss_family == AF_INET) {
-    address = &reinterpret_cast<const sockaddr_in&>(peer).sin_addr;
-  } else {
-    address = &reinterpret_cast<const sockaddr_in6&>(peer).sin6_addr;
-  }
-  return ::inet_ntop(peer.ss_family, address, text.data(), text.size()) == nullptr ? ""
-                                                                                   : text.data();
-}
-
 enum class Arrival { kPartly, kWhole, kNone };  // kNone: will not become a request
 
 // Peeks without consuming received bytes.
@@ -71,13 +58,9 @@ bool has_hung_up(int peer) {
   return ::poll(&waiting, 1, 0) > 0;
 }
 
-void watch(int epoll, int descriptor, std::uint32_t events, std::uint64_t who) {
-  epoll_event event = {};
-  event.events = events;
-  event.data.u64 = who;
-  if (::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event) != 0) {
-    throw Error(ErrorCode::kUnavailable, "a connection cannot be watched");
-  }
+void watch_or_throw(int epoll, int descriptor, std::uint32_t events, std::uint64_t who) {
+  if (watch(epoll, descriptor, events, who)) return;
+  throw Error(ErrorCode::kUnavailable, "a connection cannot be watched");
 }
 
 }  // namespace
@@ -90,8 +73,8 @@ AssociationAcceptor::AssociationAcceptor(int listening, const AcceptorLimits& li
       places_(limits.most_pending, "connections"),
       last_id_(kWakeup) {
   ::fcntl(listening_, F_SETFL, ::fcntl(listening_, F_GETFL) | O_NONBLOCK);
-  watch(epoll_.number(), listening_, EPOLLIN, kListening);
-  watch(epoll_.number(), wakeup_.descriptor(), EPOLLIN, kWakeup);
+  watch_or_throw(epoll_.number(), listening_, EPOLLIN, kListening);
+  watch_or_throw(epoll_.number(), wakeup_.descriptor(), EPOLLIN, kWakeup);
   thread_ = std::jthread([this] { work(); });
 }
 
@@ -128,7 +111,7 @@ void AssociationAcceptor::accept_some() {
     // Blocking, as the association expects.
     Descriptor peer(::accept4(listening_, reinterpret_cast<sockaddr*>(&from), &size, SOCK_CLOEXEC));
     if (peer.number() >= 0) {
-      add(std::move(peer), net::party_of(address_of(from)));
+      add(std::move(peer), net::party_of(net::address_of(from)));
     } else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
       // Closing the oldest pending connection frees a descriptor. If there is none, the descriptors
       // are used elsewhere.
@@ -149,7 +132,7 @@ void AssociationAcceptor::add(Descriptor peer, std::string party) {
                          .is_whole = false,
                          .deadline = Clock::now() + limits_.request_time};
       // Edge-triggered, because received bytes stay in the socket.
-      watch(epoll_.number(), peer.number(), EPOLLIN | EPOLLRDHUP | EPOLLET, pending.id);
+      watch_or_throw(epoll_.number(), peer.number(), EPOLLIN | EPOLLRDHUP | EPOLLET, pending.id);
       pending.request = {.peer = std::move(peer), .party = std::move(party)};
       pending_.push_back(std::move(pending));
       by_id_.emplace(++last_id_, std::prev(pending_.end()));

@@ -115,8 +115,7 @@ void Orders::keep(const std::stop_token& stop) {
     } catch (const std::exception& error) {
       log_error("orders stay paused, and going on is retried: {}", error.what());
     }
-    Lock lock(mutex_);
-    changed_.wait_for(lock, stop, kPause, [] { return false; });
+    isomesh::pause(stop, kPause);
   }
 }
 

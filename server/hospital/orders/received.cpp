@@ -173,8 +173,7 @@ void Orders::receive(const std::stop_token& stop) {
     } catch (const std::exception& error) {
       log_error("received series could not be processed and are retried: {}", error.what());
     }
-    Lock lock(mutex_);
-    changed_.wait_for(lock, stop, kPause, [] { return false; });
+    isomesh::pause(stop, kPause);
   }
 }
 

@@ -88,8 +88,7 @@ void Orders::watch(const std::stop_token& stop) {
     } catch (const std::exception& error) {
       log_error("ended orders could not be removed and are retried: {}", error.what());
     }
-    Lock lock(mutex_);
-    changed_.wait_for(lock, stop, settings_.poll, [] { return false; });
+    isomesh::pause(stop, settings_.poll);
   }
 }
 

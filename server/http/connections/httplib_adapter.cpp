@@ -13,7 +13,7 @@
 #include <httplib.h>
 
 #include "base/clock.h"
-#include "server/http/requests/header_parameter.h"
+#include "server/http/requests/request_values.h"
 
 namespace isomesh::http {
 namespace {

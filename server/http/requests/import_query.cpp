@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "base/text.h"
-#include "server/http/requests/header_parameter.h"
 #include "server/http/requests/request_values.h"
 
 namespace isomesh::http {

@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
-
-#include <strings.h>
 
 #include "base/base64.h"
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "base/text.h"
-#include "server/http/requests/header_parameter.h"
+#include "server/net/request_head.h"
 
 namespace isomesh::http {
 namespace {
@@ -31,10 +30,7 @@ std::optional<std::string> preference_in(std::string_view header, std::string_vi
     const bool has_value = equals != std::string_view::npos;
     const std::string_view name =
         has_value ? trimmed(preference.substr(0, equals)) : split(preference, ';').front();
-    if (name.size() != wanted.size() ||
-        ::strncasecmp(name.data(), wanted.data(), wanted.size()) != 0) {
-      continue;
-    }
+    if (!net::equal_names(name, wanted)) continue;
     return has_value ? unquoted(split(preference.substr(equals + 1), ';').front()) : "";
   }
   return std::nullopt;
@@ -74,6 +70,17 @@ bool names_etag(std::string_view header, std::string_view etag, Comparison compa
     if (tag == "*" || tag == etag) return true;
   }
   return false;
+}
+
+// The end of the value at the beginning of the text: the next semicolon outside of quotes.
+std::size_t end_of_value(std::string_view text) {
+  bool is_quoted = false;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    if (text[at] == ';' && !is_quoted) return at;
+    if (text[at] == '"') is_quoted = !is_quoted;
+    if (text[at] == '\\' && is_quoted) ++at;
+  }
+  return text.size();
 }
 
 }  // namespace
@@ -267,6 +274,31 @@ std::optional<std::uint64_t> last_event_id(const Request& request) {
     throw invalid_parameter("Last-Event-ID", "must be the id of an event of this stream");
   constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();  // the store's limit
   return std::min(*number, kLargest);
+}
+
+std::string header_parameter(std::string_view header, std::string_view name) {
+  header.remove_prefix(end_of_value(header));
+  while (!header.empty()) {
+    header.remove_prefix(1);  // the semicolon
+    const std::string_view parameter = header.substr(0, end_of_value(header));
+    const std::size_t equals = std::min(parameter.find('='), parameter.size());
+    if (equals < parameter.size() && net::equal_names(trimmed(parameter.substr(0, equals)), name)) {
+      return unquoted(parameter.substr(equals + 1));
+    }
+    header.remove_prefix(parameter.size());
+  }
+  return {};
+}
+
+std::string unquoted(std::string_view text) {
+  text = trimmed(text);
+  if (!text.starts_with('"')) return std::string(text);
+  std::string value;
+  for (std::size_t at = 1; at < text.size() && text[at] != '"'; ++at) {
+    if (text[at] == '\\' && at + 1 < text.size()) ++at;
+    value += text[at];
+  }
+  return value;
 }
 
 }  // namespace isomesh::http

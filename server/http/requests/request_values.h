@@ -94,4 +94,11 @@ Error wrong_cursor();
 // The last event that a reconnecting client has seen; empty if missing.
 std::optional<std::uint64_t> last_event_id(const Request& request);
 
+// The value of a parameter such as the name in `attachment; filename="a b.nii"` (RFC 9110, 5.6.6),
+// without quotes; empty if missing. Names of parameters are case-insensitive.
+std::string header_parameter(std::string_view header, std::string_view name);
+
+// A word or a quoted string, without the quotes.
+std::string unquoted(std::string_view text);
+
 }  // namespace isomesh::http

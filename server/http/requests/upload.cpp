@@ -12,7 +12,6 @@
 
 #include "base/hex.h"
 #include "base/sha256.h"
-#include "server/http/requests/header_parameter.h"
 #include "server/http/requests/import_query.h"
 #include "server/http/requests/partial_upload.h"
 #include "server/http/requests/request_values.h"

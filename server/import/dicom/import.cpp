@@ -10,7 +10,7 @@
 #include "proto/presets.h"
 #include "server/import/dicom/choosing/choice.h"
 #include "server/import/dicom/choosing/series.h"
-#include "server/import/dicom/elements/beginning.h"
+#include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/kinds/segmentation.h"
 #include "server/import/dicom/pixels/pixels.h"
@@ -18,7 +18,6 @@
 #include "server/import/dicom/structures.h"
 #include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
-#include "server/volume/presets.h"
 
 namespace isomesh::import {
 namespace dicom {
@@ -132,10 +131,34 @@ Volume describe_volume(const Stack& stack) {
   return volume;
 }
 
+struct PresetRow {
+  std::string_view name;
+  double hounsfield;
+};
+
+// Air is -1000 and water 0. Skin is the border of air. Soft tissue is midway between fat (about
+// -100) and muscle and organs (about 50), so fat is excluded. Bone begins above the usual values of
+// contrast agent and calcified tissue.
+constexpr PresetRow kPresets[] = {
+    {kSkinPreset, -300}, {kSoftTissuePreset, -25}, {kBonePreset, 250}};
+
+// The presets of a CT in Hounsfield units that are within the range of the samples. Empty for other
+// modalities, and for a CT with another rescale type (0028,1054).
+std::vector<Preset> presets_for(std::string_view modality, std::string_view rescale_type,
+                                const std::array<double, 2>& range) {
+  std::vector<Preset> presets;
+  if (modality != "CT" || (!rescale_type.empty() && rescale_type != "HU")) return presets;
+  for (const PresetRow& row : kPresets) {
+    if (row.hounsfield <= range[0] || row.hounsfield > range[1]) continue;
+    presets.push_back({std::string(row.name), row.hounsfield});
+  }
+  return presets;
+}
+
 // Preset iso-values for the volume, which may be better than one derived from its samples.
 void suggest(const Stack& stack, Volume& volume) {
   const Image& image = *stack.slices.front().image;
-  volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
+  volume.presets = presets_for(image.modality, image.rescale_type, volume.range);
   if (!are_labels(stack) || !are_shares(stack)) return;
   volume.suggested_iso = half_of(stack);
   if (half_of(stack) <= volume.range[1])
@@ -181,9 +204,7 @@ std::optional<ContourGrid> grid_beside(const StructureFile& structures,
 }  // namespace
 }  // namespace dicom
 
-bool is_dicom(std::string_view head) {
-  return dicom::find_beginning(std::as_bytes(std::span(head))).has_value();
-}
+bool is_dicom(std::string_view head) { return dicom::find_beginning(head).has_value(); }
 
 Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;

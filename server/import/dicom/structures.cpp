@@ -14,6 +14,7 @@
 #include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
+#include "server/import/dicom/geometry/placement.h"
 #include "server/import/labels/combinations.h"
 #include "server/import/labels/label_table.h"
 #include "server/import/samples/transfer.h"
@@ -23,10 +24,6 @@ namespace isomesh::import::dicom {
 namespace {
 
 constexpr std::uint32_t kMostLabel = 0xFFFF;
-
-std::string count_text(std::size_t count, const std::string& what) {
-  return std::to_string(count) + ' ' + what + (count == 1 ? "" : "s");
-}
 
 // Structures keep their numbers if all are valid labels; otherwise they are numbered from 1.
 void number_labels(std::vector<Structure>& structures) {
@@ -50,10 +47,10 @@ void choose_structure(const ImportOptions& options, StructureSet& set) {
   for (const Structure& structure : set.structures) {
     choices.push_back(
         {"volume", std::to_string(choices.size()),
-         printable(structure.name) + ", " + count_text(structure.contours.size(), "contour")});
+         printable(structure.name) + ", " + count_of(structure.contours.size(), "contour")});
   }
   throw_choice("The DICOM structure set has " +
-                   count_text(set.structures.size(), "structure with contours") +
+                   count_of(set.structures.size(), "structure with contours") +
                    ", but no structure " + std::to_string(*options.volume) + '.',
                std::move(choices));
 }
@@ -162,7 +159,7 @@ void add_notes(const StructureSet& set, const Drawing& drawing, Volume& volume) 
   const std::size_t lost = set.structures.size() - drawing.drawn().size();
   std::string skipped;
   const auto add = [&](std::size_t count, const std::string& what, const std::string& why) {
-    if (count > 0) skipped += (skipped.empty() ? "" : "; ") + count_text(count, what) + ' ' + why;
+    if (count > 0) skipped += (skipped.empty() ? "" : "; ") + count_of(count, what) + ' ' + why;
   };
   add(set.skipped, "contour", "not closed or with fewer than three points");
   add(tilted, "contour", "not parallel to the slices");
@@ -175,7 +172,7 @@ void add_notes(const StructureSet& set, const Drawing& drawing, Volume& volume) 
     volume.notes.push_back(note_of(NoteCode::kContoursInterpolated,
                                    "The shapes of structures in slices without contours were "
                                    "interpolated between neighbouring contours, " +
-                                       count_text(count, "time") + "."));
+                                       count_of(count, "time") + "."));
   }
 }
 

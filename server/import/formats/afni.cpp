@@ -2,17 +2,15 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {
-
-using HeadAttributes = std::map<std::string, std::string, std::less<>>;  // the text of each value
 
 // "name = value" of one line; empty if it is none.
 std::optional<std::string_view> value_in(std::string_view line, std::string_view name) {
@@ -30,8 +28,8 @@ bool is_type(std::string_view line) {
 }
 
 // Each attribute has three lines, then its value up to the next attribute.
-HeadAttributes read_attributes(std::string_view text) {
-  HeadAttributes attributes;
+HeaderTexts read_attributes(std::string_view text) {
+  HeaderTexts attributes;
   std::string* value = nullptr;
   for (const std::string_view line : lines(text)) {
     if (is_type(line)) {
@@ -45,23 +43,18 @@ HeadAttributes read_attributes(std::string_view text) {
   return attributes;
 }
 
-std::string_view text_of(const HeadAttributes& attributes, std::string_view name) {
-  const auto found = attributes.find(name);
-  return found == attributes.end() ? std::string_view{} : std::string_view(found->second);
-}
-
 // The value of a string attribute, which is written as 'text~.
-std::string_view string_of(const HeadAttributes& attributes, std::string_view name) {
-  std::string_view text = text_of(attributes, name);
+std::string_view string_of(const HeaderTexts& attributes, std::string_view name) {
+  std::string_view text = value_of(attributes, name);
   if (text.starts_with('\'')) text.remove_prefix(1);
   while (text.ends_with('~')) text.remove_suffix(1);
   return text;
 }
 
-std::vector<double> numbers_of(const HeadAttributes& attributes, std::string_view name,
+std::vector<double> numbers_of(const HeaderTexts& attributes, std::string_view name,
                                std::size_t least) {
   std::vector<double> numbers;
-  for (const std::string_view word : words(text_of(attributes, name))) {
+  for (const std::string_view word : words(value_of(attributes, name))) {
     const auto number = parse_double(word);
     if (!number || !std::isfinite(*number)) {
       throw_unusable("The AFNI attribute " + in_quotes(name) + " is not a list of numbers.");
@@ -82,7 +75,7 @@ std::uint64_t whole_value(double number, std::string_view name) {
   throw_unusable("The AFNI attribute " + in_quotes(name) + " is not plausible.");
 }
 
-StoredType type_of(const HeadAttributes& attributes, std::uint64_t volumes) {
+StoredType type_of(const HeaderTexts& attributes, std::uint64_t volumes) {
   const auto codes = numbers_of(attributes, "BRICK_TYPES", volumes);
   if (std::ranges::count(codes, codes.front()) != static_cast<std::ptrdiff_t>(codes.size())) {
     throw_unusable("The sub-bricks of the AFNI dataset have different types.");
@@ -96,15 +89,15 @@ StoredType type_of(const HeadAttributes& attributes, std::uint64_t volumes) {
                  " is not supported. A sample must be one real number.");
 }
 
-std::optional<Rescale> rescale_of(const HeadAttributes& attributes, std::uint64_t volume) {
-  if (text_of(attributes, "BRICK_FLOAT_FACS").empty()) return std::nullopt;
+std::optional<Rescale> rescale_of(const HeaderTexts& attributes, std::uint64_t volume) {
+  if (value_of(attributes, "BRICK_FLOAT_FACS").empty()) return std::nullopt;
   const double factor = numbers_of(attributes, "BRICK_FLOAT_FACS", volume + 1)[volume];
   if (factor == 0 || factor == 1) return std::nullopt;  // 0 means none
   return Rescale{factor, 0};
 }
 
 // By axis codes: right to left, left to right, back to front, front to back, up, down.
-Geometry geometry_of_axes(const HeadAttributes& attributes) {
+Geometry geometry_of_axes(const HeaderTexts& attributes) {
   const auto codes = numbers_of(attributes, "ORIENT_SPECIFIC", 3);
   const auto origin = numbers_of(attributes, "ORIGIN", 3);
   const auto delta = numbers_of(attributes, "DELTA", 3);
@@ -119,8 +112,8 @@ Geometry geometry_of_axes(const HeadAttributes& attributes) {
   return geometry_of(first, steps);
 }
 
-Geometry geometry_of_header(const HeadAttributes& attributes) {
-  if (text_of(attributes, "IJK_TO_DICOM_REAL").empty()) return geometry_of_axes(attributes);
+Geometry geometry_of_header(const HeaderTexts& attributes) {
+  if (value_of(attributes, "IJK_TO_DICOM_REAL").empty()) return geometry_of_axes(attributes);
   const auto matrix = numbers_of(attributes, "IJK_TO_DICOM_REAL", 12);
   std::array<Vector3, 3> steps = {};
   Vector3 first = {};
@@ -132,7 +125,7 @@ Geometry geometry_of_header(const HeadAttributes& attributes) {
 }
 
 // Everything except the data file.
-SourceVolume describe(const HeadAttributes& attributes, const ImportOptions& options) {
+SourceVolume describe(const HeaderTexts& attributes, const ImportOptions& options) {
   const auto dims = numbers_of(attributes, "DATASET_DIMENSIONS", 3);
   const auto rank = numbers_of(attributes, "DATASET_RANK", 2);
   std::array<std::uint64_t, 4> sizes = {};
@@ -161,11 +154,9 @@ SourceVolume describe(const HeadAttributes& attributes, const ImportOptions& opt
 }
 
 std::string brick_name(const Companions& companions) {
-  const std::string& own = companions.name();
-  const std::string stem = own.substr(0, own.rfind('.'));
-  for (const char* suffix : {".BRIK", ".BRIK.gz", ".BRIK.bz2", ".brik", ".brik.gz"}) {
-    if (companions.find(stem + suffix) != nullptr) return stem + suffix;
-  }
+  const auto name = companion_with({".BRIK", ".BRIK.gz", ".BRIK.bz2", ".brik", ".brik.gz"},
+                                   companions.name(), companions);
+  if (name) return *name;
   throw_unusable(
       "The samples of the AFNI header (.HEAD) are in a .BRIK file, which is missing. Send both "
       "files in one ZIP or TAR.");
@@ -181,7 +172,7 @@ bool is_afni(std::string_view head) {
 SourceVolume parse_afni(const InputFile& file, const Companions& companions,
                         const ImportOptions& options) {
   const std::string name = brick_name(companions);
-  const HeadAttributes attributes = read_attributes(file.text(0, kBeginningBytes));
+  const HeaderTexts attributes = read_attributes(file.text(0, kBeginningBytes));
   SourceVolume volume = describe(attributes, options);
   if (name.ends_with(".gz")) volume.encoding = Encoding::kDeflate;
   if (name.ends_with(".bz2")) volume.encoding = Encoding::kBzip2;

@@ -18,7 +18,7 @@
 #include "server/import/formats/hdf5_file.h"
 #include "server/import/formats/placing.h"
 #include "server/import/samples/transfer.h"
-#include "server/import/source/units.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {

@@ -229,43 +229,44 @@ Hdf5Array Hdf5File::array(const std::string& path) const {
   return Hdf5Array(Hdf5Handle(H5Dopen2(file_.id(), path.c_str(), access.id()), H5Dclose));
 }
 
-std::vector<double> Hdf5File::numbers(const std::string& path, const std::string& attribute) const {
-  constexpr hssize_t kMost = 1000;
+std::optional<Hdf5Handle> Hdf5File::open_attribute(const std::string& path,
+                                                   const std::string& attribute) const {
   if (!has(path) ||
       H5Aexists_by_name(file_.id(), path.c_str(), attribute.c_str(), H5P_DEFAULT) <= 0) {
-    return {};
+    return std::nullopt;
   }
-  const Hdf5Handle found(
+  return Hdf5Handle(
       H5Aopen_by_name(file_.id(), path.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT),
       H5Aclose);
-  const Hdf5Handle type(H5Aget_type(found.id()), H5Tclose);
-  const Hdf5Handle space(H5Aget_space(found.id()), H5Sclose);
+}
+
+std::vector<double> Hdf5File::numbers(const std::string& path, const std::string& attribute) const {
+  constexpr hssize_t kMost = 1000;
+  const auto found = open_attribute(path, attribute);
+  if (!found) return {};
+  const Hdf5Handle type(H5Aget_type(found->id()), H5Tclose);
+  const Hdf5Handle space(H5Aget_space(found->id()), H5Sclose);
   const hssize_t count = H5Sget_simple_extent_npoints(space.id());
   if (!type_of(type.id()) || count < 1 || count > kMost) return {};
   std::vector<double> numbers(static_cast<std::size_t>(count));
-  check(H5Aread(found.id(), H5T_NATIVE_DOUBLE, numbers.data()) >= 0);
+  check(H5Aread(found->id(), H5T_NATIVE_DOUBLE, numbers.data()) >= 0);
   return numbers;
 }
 
 std::optional<std::string> Hdf5File::text(const std::string& path,
                                           const std::string& attribute) const {
   constexpr std::size_t kLongest = 4096;
-  if (!has(path) ||
-      H5Aexists_by_name(file_.id(), path.c_str(), attribute.c_str(), H5P_DEFAULT) <= 0) {
-    return std::nullopt;
-  }
-  const Hdf5Handle found(
-      H5Aopen_by_name(file_.id(), path.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT),
-      H5Aclose);
-  const Hdf5Handle type(H5Aget_type(found.id()), H5Tclose);
-  const Hdf5Handle space(H5Aget_space(found.id()), H5Sclose);
+  const auto found = open_attribute(path, attribute);
+  if (!found) return std::nullopt;
+  const Hdf5Handle type(H5Aget_type(found->id()), H5Tclose);
+  const Hdf5Handle space(H5Aget_space(found->id()), H5Sclose);
   const std::size_t size = H5Tget_size(type.id());
   if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 ||
       H5Sget_simple_extent_npoints(space.id()) != 1 || size > kLongest) {
     return std::nullopt;
   }
   std::string text(size, '\0');
-  check(H5Aread(found.id(), type.id(), text.data()) >= 0);
+  check(H5Aread(found->id(), type.id(), text.data()) >= 0);
   return text.substr(0, text.find('\0'));
 }
 

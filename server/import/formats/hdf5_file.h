@@ -83,6 +83,9 @@ class Hdf5File {
   std::optional<std::string> text(const std::string& path, const std::string& attribute) const;
 
  private:
+  std::optional<Hdf5Handle> open_attribute(const std::string& path,
+                                           const std::string& attribute) const;
+
   std::lock_guard<std::mutex> lock_;
   Hdf5Handle file_;
 };

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,18 +9,17 @@
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
 #include "server/import/formats/format_readers.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/reader.h"
-#include "server/import/source/units.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {
 
 constexpr std::string_view kLastKey = "ElementDataFile";
 
-using Fields = std::map<std::string, std::string, std::less<>>;
-
 struct MetaHeader {
-  Fields fields;
+  HeaderTexts fields;
   std::uint64_t bytes = 0;  // including its last line
 };
 
@@ -35,7 +33,7 @@ bool is_header_line(std::string_view line) {
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
-void add_field(Fields& fields, std::string_view line) {
+void add_field(HeaderTexts& fields, std::string_view line) {
   const std::size_t equals = line.find('=');
   if (equals == std::string_view::npos) {
     throw_unusable("The MetaImage header has a line that is not a field: " + in_quotes(line) + ".");
@@ -68,30 +66,25 @@ MetaHeader read_meta_header(const std::string& text) {
   throw_unusable("The MetaImage header has no end: the field \"ElementDataFile\" is missing.");
 }
 
-std::string_view optional(const Fields& fields, std::string_view name) {
-  const auto found = fields.find(name);
-  return found == fields.end() ? std::string_view{} : std::string_view(found->second);
-}
-
-std::string_view required(const Fields& fields, std::string_view name) {
-  const std::string_view value = optional(fields, name);
+std::string_view required(const HeaderTexts& fields, std::string_view name) {
+  const std::string_view value = value_of(fields, name);
   if (value.empty()) throw_unusable("The MetaImage header has no field " + in_quotes(name) + ".");
   return value;
 }
 
-bool flag(const Fields& fields, std::string_view name, bool otherwise) {
-  const std::string value = lower(optional(fields, name));
+bool flag(const HeaderTexts& fields, std::string_view name, bool otherwise) {
+  const std::string value = lower(value_of(fields, name));
   if (value.empty()) return otherwise;
   if (value == "true" || value == "1") return true;
   if (value == "false" || value == "0") return false;
   throw_unusable("The MetaImage header's " + in_quotes(name) + " is not True or False.");
 }
 
-bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)) != "local"; }
+bool is_detached(const HeaderTexts& fields) { return lower(value_of(fields, kLastKey)) != "local"; }
 
 // The names of the data files. After "LIST" they follow the header, one per line.
 std::vector<std::string> data_names(const InputFile& file, const MetaHeader& header) {
-  const std::string_view said = optional(header.fields, kLastKey);
+  const std::string_view said = value_of(header.fields, kLastKey);
   if (is_file_pattern(said)) return expand_file_pattern(said);
   if (!said.starts_with("LIST")) return {std::string(said)};
   const std::string text = file.text(header.bytes, kMostTextHeaderBytes);
@@ -99,8 +92,8 @@ std::vector<std::string> data_names(const InputFile& file, const MetaHeader& hea
   return {names.begin(), names.end()};
 }
 
-Skip data_skip(const Fields& fields) {
-  const std::string_view text = optional(fields, "HeaderSize");
+Skip data_skip(const HeaderTexts& fields) {
+  const std::string_view text = value_of(fields, "HeaderSize");
   if (text.empty()) return 0;
   const auto bytes = parse_int64(text);
   if (!bytes || *bytes < -1) {
@@ -111,7 +104,7 @@ Skip data_skip(const Fields& fields) {
   return static_cast<std::uint64_t>(*bytes);
 }
 
-std::vector<std::uint64_t> sizes_of(const Fields& fields) {
+std::vector<std::uint64_t> sizes_of(const HeaderTexts& fields) {
   constexpr std::uint64_t kMostAxes = 10;
   const auto count = parse_uint64(required(fields, "NDims"));
   std::vector<std::uint64_t> sizes;
@@ -128,7 +121,7 @@ std::vector<std::uint64_t> sizes_of(const Fields& fields) {
   return sizes;
 }
 
-StoredType type_of(const Fields& fields) {
+StoredType type_of(const HeaderTexts& fields) {
   struct Row {
     std::string_view name;
     StoredType type;
@@ -150,8 +143,8 @@ StoredType type_of(const Fields& fields) {
                  " is not supported. A sample must be one real number.");
 }
 
-void check_samples_are_plain(const Fields& fields) {
-  const std::string_view channels = optional(fields, "ElementNumberOfChannels");
+void check_samples_are_plain(const HeaderTexts& fields) {
+  const std::string_view channels = value_of(fields, "ElementNumberOfChannels");
   if (!channels.empty() && parse_uint64(channels) != 1) {
     throw_unusable("Each sample has " + in_quotes(channels) +
                    " channels. A sample must be one real number.");
@@ -159,9 +152,9 @@ void check_samples_are_plain(const Fields& fields) {
 }
 
 // The standard's function from elements to intensities; few programs apply it.
-std::optional<Rescale> rescale_of(const Fields& fields) {
+std::optional<Rescale> rescale_of(const HeaderTexts& fields) {
   const auto number = [&](std::string_view name, double otherwise) {
-    const std::string_view text = optional(fields, name);
+    const std::string_view text = value_of(fields, name);
     if (text.empty()) return otherwise;
     const auto value = parse_double(text);
     if (!value || !std::isfinite(*value)) {
@@ -176,10 +169,10 @@ std::optional<Rescale> rescale_of(const Fields& fields) {
   return rescale;
 }
 
-bool is_big_endian(const Fields& fields, StoredType type) {
+bool is_big_endian(const HeaderTexts& fields, StoredType type) {
   const bool of_data = flag(fields, "BinaryDataByteOrderMSB", false);
   const bool of_elements = flag(fields, "ElementByteOrderMSB", of_data);
-  const bool has_both = !optional(fields, "BinaryDataByteOrderMSB").empty();
+  const bool has_both = !value_of(fields, "BinaryDataByteOrderMSB").empty();
   if (of_elements != of_data && has_both && bytes_per_sample(type) > 1) {
     throw_unusable(
         "The MetaImage header contradicts itself: \"ElementByteOrderMSB\" differs from "
@@ -188,7 +181,7 @@ bool is_big_endian(const Fields& fields, StoredType type) {
   return of_elements;
 }
 
-Encoding encoding_of(const Fields& fields) {
+Encoding encoding_of(const HeaderTexts& fields) {
   const bool compressed = flag(fields, "CompressedData", false);
   if (flag(fields, "BinaryData", true)) return compressed ? Encoding::kDeflate : Encoding::kRaw;
   if (compressed)
@@ -199,11 +192,11 @@ Encoding encoding_of(const Fields& fields) {
 CompressedRange payload_of(const InputFile& file, const MetaHeader& header,
                            const SourceVolume& volume) {
   CompressedRange payload{header.bytes, file.size() - header.bytes};
-  const std::string_view skip = optional(header.fields, "HeaderSize");
+  const std::string_view skip = value_of(header.fields, "HeaderSize");
   if (!skip.empty() && parse_int64(skip) != 0) {
     throw_unusable("The MetaImage header has a HeaderSize, but its samples are in the same file.");
   }
-  const std::string_view size = optional(header.fields, "CompressedDataSize");
+  const std::string_view size = value_of(header.fields, "CompressedDataSize");
   if (size.empty() || volume.encoding != Encoding::kDeflate) return payload;
   const auto bytes = parse_uint64(size);
   if (!bytes) throw_unusable("The MetaImage header's \"CompressedDataSize\" is not a number.");
@@ -216,8 +209,8 @@ CompressedRange payload_of(const InputFile& file, const MetaHeader& header,
   return payload;
 }
 
-void check_numbers(const Fields& fields, std::string_view name, std::size_t count) {
-  const std::string_view value = optional(fields, name);
+void check_numbers(const HeaderTexts& fields, std::string_view name, std::size_t count) {
+  const std::string_view value = value_of(fields, name);
   if (value.empty()) return;
   const auto numbers = words(value);
   const auto is_number = [](std::string_view word) {
@@ -229,12 +222,12 @@ void check_numbers(const Fields& fields, std::string_view name, std::size_t coun
 }
 
 // The value of a field with several names. Throws if they contradict each other.
-std::string_view one_of(const Fields& fields, std::initializer_list<std::string_view> names,
+std::string_view one_of(const HeaderTexts& fields, std::initializer_list<std::string_view> names,
                         std::size_t count) {
   std::string_view result;
   for (const std::string_view name : names) {
     check_numbers(fields, name, count);
-    const std::string_view value = optional(fields, name);
+    const std::string_view value = value_of(fields, name);
     if (value.empty()) continue;
     if (!result.empty() && words(result) != words(value)) {
       throw_unusable("The MetaImage header contradicts itself: " + in_quotes(name) +
@@ -255,14 +248,14 @@ std::vector<double> numbers_of(std::string_view value) {
 }
 
 // MetaImage's space is LPS, as in all programs that write it. Axes beyond the third are omitted.
-Geometry geometry_of_fields(const Fields& fields, std::size_t axes) {
+Geometry geometry_of_fields(const HeaderTexts& fields, std::size_t axes) {
   const auto matrix =
       numbers_of(one_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes));
   const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, axes));
   // ElementSize is the extent of a sample. It replaces a missing ElementSpacing.
   check_numbers(fields, "ElementSize", axes);
   const std::string_view distances = one_of(fields, {"ElementSpacing"}, axes);
-  const auto spacing = numbers_of(distances.empty() ? optional(fields, "ElementSize") : distances);
+  const auto spacing = numbers_of(distances.empty() ? value_of(fields, "ElementSize") : distances);
   Geometry geometry;
   const std::size_t used = std::min<std::size_t>(axes, 3);
   std::copy_n(origin.begin(), std::min(used, origin.size()), geometry.origin.begin());
@@ -277,16 +270,16 @@ Geometry geometry_of_fields(const Fields& fields, std::size_t axes) {
 }
 
 // A frame's timestamp, as the trackers of PLUS and Slicer's sequences write it; empty if missing.
-std::string timestamp_of(const Fields& fields, std::uint64_t frame) {
+std::string timestamp_of(const HeaderTexts& fields, std::uint64_t frame) {
   std::string number = std::to_string(frame);
   number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
-  const auto seconds = parse_double(optional(fields, "Seq_Frame" + number + "_Timestamp"));
+  const auto seconds = parse_double(value_of(fields, "Seq_Frame" + number + "_Timestamp"));
   return seconds ? "time " + to_text(*seconds) + " s" : std::string();
 }
 
 // A volume's position along the axes beyond the third, of which the fourth runs fastest. Its index
 // if the header has neither an origin nor a spacing for a single such axis.
-std::string place_of(const Fields& fields, std::span<const std::uint64_t> sizes,
+std::string place_of(const HeaderTexts& fields, std::span<const std::uint64_t> sizes,
                      std::uint64_t index) {
   const auto spacing = numbers_of(one_of(fields, {"ElementSpacing"}, sizes.size()));
   const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, sizes.size()));
@@ -305,7 +298,7 @@ std::string place_of(const Fields& fields, std::span<const std::uint64_t> sizes,
   return place;
 }
 
-Difference difference_of(const Fields& fields, const std::vector<std::uint64_t>& sizes) {
+Difference difference_of(const HeaderTexts& fields, const std::vector<std::uint64_t>& sizes) {
   if (!timestamp_of(fields, 0).empty()) {
     return {.what = "time", .title = [&](std::uint64_t index) {
               const std::string time = timestamp_of(fields, index);
@@ -319,7 +312,7 @@ Difference difference_of(const Fields& fields, const std::vector<std::uint64_t>&
 }
 
 // Sets dims, type and encoding, and selects one of several volumes.
-SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes,
+SourceVolume samples_of(const HeaderTexts& fields, const std::vector<std::uint64_t>& sizes,
                         const ImportOptions& options) {
   SourceVolume volume;
   volume.dims = volume_dims(std::span(sizes).first(std::min<std::size_t>(sizes.size(), 3)));
@@ -353,8 +346,8 @@ std::vector<std::string> metaimage_data_names(const InputFile& file,
 SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
                              const ImportOptions& options) {
   const MetaHeader header = read_meta_header(file.text(0, kMostTextHeaderBytes));
-  const Fields& fields = header.fields;
-  const std::string_view object = optional(fields, "ObjectType");
+  const HeaderTexts& fields = header.fields;
+  const std::string_view object = value_of(fields, "ObjectType");
   if (!object.empty() && object != "Image") {
     throw_unusable("The file holds a MetaIO " + in_quotes(object) + ", not an image.");
   }
@@ -369,15 +362,15 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   }
   volume.geometry = geometry_of_fields(fields, sizes.size());
   volume.assumes_spacing =
-      optional(fields, "ElementSpacing").empty() && optional(fields, "ElementSize").empty();
-  scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"), volume.notes);
+      value_of(fields, "ElementSpacing").empty() && value_of(fields, "ElementSize").empty();
+  scale_to_millimetres(volume.geometry, value_of(fields, "DistanceUnits"), volume.notes);
   return volume;
 }
 
 MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::uint64_t kMostSkipped = std::uint64_t{64} << 20;
   const MetaHeader header = read_meta_header(beginning.text(0, kMostTextHeaderBytes));
-  const Fields& fields = header.fields;
+  const HeaderTexts& fields = header.fields;
   const SourceVolume volume = samples_of(fields, sizes_of(fields), task.options);
   check_limits(volume, task.limits);
   const std::uint64_t samples = volume.most_encoded_bytes() + kHeadroomBytes;

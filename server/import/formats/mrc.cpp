@@ -9,7 +9,7 @@
 
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
-#include "server/import/source/header_bytes.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {

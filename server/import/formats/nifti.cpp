@@ -7,7 +7,6 @@
 
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
-#include "server/import/formats/nifti_extensions.h"
 #include "server/import/formats/nifti_header.h"
 #include "server/import/formats/placing.h"
 #include "server/import/source/gzip.h"
@@ -339,18 +338,14 @@ Placement placement_of(const NiftiHeader& header, const ImportOptions& options,
   return sform;
 }
 
-Vector3 to_lps(const Vector3& ras, double scale) {
-  return {-ras[0] * scale, -ras[1] * scale, ras[2] * scale};
-}
-
 Geometry lps_geometry(const NiftiHeader& header, const ImportOptions& options,
                       SourceVolume& volume) {
-  const Placement placement = placement_of(header, options, volume);
+  auto [origin, steps] = placement_of(header, options, volume);
   const double scale = millimetres_per_unit(header);
-  std::array<Vector3, 3> steps;
-  std::transform(placement.steps.begin(), placement.steps.end(), steps.begin(),
-                 [&](const Vector3& step) { return to_lps(step, scale); });
-  return geometry_of(to_lps(placement.origin, scale), steps);
+  for (Vector3* vector : {&origin, &steps[0], &steps[1], &steps[2]}) {
+    for (double& part : *vector) part *= scale;
+  }
+  return geometry_of_ras(origin, steps);
 }
 
 std::uint64_t payload_offset(const NiftiHeader& header) {
@@ -396,10 +391,7 @@ SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
 std::string image_name(const Companions& companions) {
   std::string_view own = companions.name();
   if (lower(own).ends_with(".gz")) own.remove_suffix(3);
-  const std::string stem(own.substr(0, own.rfind('.')));
-  for (const char* suffix : {".img", ".img.gz", ".IMG"}) {
-    if (companions.find(stem + suffix) != nullptr) return stem + suffix;
-  }
+  if (const auto name = companion_with({".img", ".img.gz", ".IMG"}, own, companions)) return *name;
   throw_unusable(
       "The samples of the NIfTI header (.hdr) are in an .img file, which is missing. Send both "
       "files in one ZIP or "
@@ -423,8 +415,7 @@ SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
     return volume;
   }
   const InputFile samples(companion(image, companions));
-  const std::string head = samples.text(0, kSniffBytes);
-  if (is_gzip(std::as_bytes(std::span(head)))) volume.encoding = Encoding::kDeflate;
+  if (is_gzip(samples.text(0, kSniffBytes))) volume.encoding = Encoding::kDeflate;
   volume.data_files = data_files_of({image}, companions, payload_offset(header), volume);
   return volume;
 }

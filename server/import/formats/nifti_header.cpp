@@ -4,8 +4,13 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
+#include <utility>
 
-#include "server/import/source/header_bytes.h"
+#include "server/import/labels/label_table.h"
+#include "server/import/labels/label_xml.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {
@@ -120,6 +125,17 @@ void forget_what_is_no_analyze(NiftiHeader& header) {
   for (double& size : header.pixdim) size = std::abs(size);
 }
 
+// Room for 65 535 labels with long names; the rest is ignored.
+constexpr std::uint64_t kMostExtensionBytes = std::uint64_t{16} << 20;
+constexpr std::size_t kFlagBytes = 4;  // the first tells whether there are extensions
+constexpr std::size_t kHeadBytes = 8;  // size and code
+
+std::string_view text_of(std::string_view data) { return data.substr(0, data.find('\0')); }
+
+bool may_have_labels(std::string_view text) {
+  return text.find("LabelTable") != text.npos || text.find("VALUE_LABEL_DTABLE") != text.npos;
+}
+
 }  // namespace
 
 bool begins_as_nifti(std::string_view head) { return kind_of(head).has_value(); }
@@ -141,6 +157,30 @@ NiftiHeader read_nifti_header(std::string_view head) {
     forget_what_is_no_analyze(header);
   }
   return header;
+}
+
+std::vector<LabelEntry> nifti_labels(const InputFile& file, const NiftiHeader& header,
+                                     std::uint64_t end, std::uint64_t volume) {
+  const auto begin = static_cast<std::uint64_t>(header.bytes);
+  if (header.is_analyze || end < begin + kFlagBytes + kHeadBytes) return {};
+  const std::string bytes = file.text(begin, std::min(end - begin, kMostExtensionBytes));
+  if (bytes.size() < kFlagBytes || bytes[0] == '\0') return {};
+  std::string_view rest = std::string_view(bytes).substr(kFlagBytes);
+  std::vector<LabelEntry> entries;
+  while (rest.size() >= kHeadBytes) {
+    const std::uint32_t size = HeaderBytes(rest, header.big_endian).at<std::uint32_t>(0);
+    if (size < kHeadBytes || size > rest.size()) break;
+    // Recognised by content, not by code: some programs write Caret's as a comment, or without a
+    // code.
+    const std::string_view text = text_of(rest.substr(kHeadBytes, size - kHeadBytes));
+    if (may_have_labels(text)) {
+      for (LabelEntry& entry : labels_of_xml(text, volume)) entries.push_back(std::move(entry));
+    }
+    // Bounds memory for many extensions with many labels.
+    if (entries.size() > Volume::kMostLabels) break;
+    rest.remove_prefix(size);
+  }
+  return label_table(std::move(entries));
 }
 
 }  // namespace isomesh::import

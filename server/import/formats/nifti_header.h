@@ -1,11 +1,16 @@
-// The header fields of NIfTI-1, NIfTI-2 and Analyze 7.5 that a volume needs. Internal to the
-// reader.
+// The header fields of NIfTI-1, NIfTI-2 and Analyze 7.5 that a volume needs, and the extensions
+// between a header and the samples
+// (https://nifti.nimh.nih.gov/nifti-1/documentation/nifti1fields/nifti1fields_pages/extension.html).
+// Internal to the reader.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <string_view>
+#include <vector>
 
+#include "base/files.h"
+#include "proto/types.h"
 #include "server/import/source/names.h"
 
 namespace isomesh::import {
@@ -43,5 +48,12 @@ bool begins_as_nifti(std::string_view head);
 
 // Throws Error kUnusableVolume.
 NiftiHeader read_nifti_header(std::string_view head);
+
+// The labels of one of the file's volumes, as label_table() returns them: from Caret's LabelTable,
+// which TotalSegmentator and others write too, or from AFNI's VALUE_LABEL_DTABLE. Other and damaged
+// extensions are ignored, because their content is private to programs. `end` bounds the
+// extensions. Throws Error kUnusableVolume if there are too many labels.
+std::vector<LabelEntry> nifti_labels(const InputFile& file, const NiftiHeader& header,
+                                     std::uint64_t end, std::uint64_t volume);
 
 }  // namespace isomesh::import

@@ -228,8 +228,7 @@ std::vector<std::string> data_names(const InputFile& file, const NrrdHeader& hea
 // A NIfTI file used as data begins with its own header, which some headers ignore.
 bool has_own_header(const std::string& name, const Companions& companions) {
   const std::string head = InputFile(companion(name, companions)).text(0, kSniffBytes);
-  const auto bytes = std::as_bytes(std::span(head));
-  return is_nifti(is_gzip(bytes) ? inflate_head(bytes, kSniffBytes) : head);
+  return is_nifti(is_gzip(head) ? inflate_head(head, kSniffBytes) : head);
 }
 
 std::vector<DataFile> data_files(const InputFile& file, const NrrdHeader& header,

@@ -10,7 +10,7 @@
 #include "base/text.h"
 #include "server/import/formats/nrrd_numbers.h"
 #include "server/import/source/names.h"
-#include "server/import/source/units.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {
@@ -314,11 +314,6 @@ std::string unit_of(const NrrdFields& fields) {
 
 }  // namespace
 
-std::string_view value_of(const NrrdFields& fields, std::string_view name) {
-  const auto found = fields.find(name);
-  return found == fields.end() ? std::string_view{} : std::string_view(found->second);
-}
-
 std::string own_key(std::string_view key) { return std::string(key) + ":="; }
 
 NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes) {
@@ -393,10 +388,6 @@ void place_as_slicer(const NrrdFields& fields, const std::vector<std::uint64_t>&
 bool is_unnamed_4d(const NrrdFields& fields, std::size_t dimension) {
   return dimension == 4 && !space_of(fields);
 }
-
-}  // namespace
-
-namespace {
 
 void check_handedness(const NrrdFields& fields, const ImportOptions& options,
                       std::vector<Note>& notes) {

@@ -4,22 +4,19 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "proto/types.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
 
 namespace isomesh::import {
 
 // A header's fields. Names are in lower case without spaces: "data file" and "datafile" are the
 // same field.
-using NrrdFields = std::map<std::string, std::string, std::less<>>;
-
-// Returns an empty text for a missing field.
-std::string_view value_of(const NrrdFields& fields, std::string_view name);
+using NrrdFields = HeaderTexts;
 
 // The name under which a private pair "key:=value" is stored.
 std::string own_key(std::string_view key);

@@ -8,7 +8,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/import/formats/format_readers.h"
-#include "server/import/source/header_bytes.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {

@@ -273,11 +273,8 @@ Described describe(const ParHeader& header, const ImportOptions& options) {
 }
 
 std::string rec_name(const Companions& companions) {
-  const std::string& own = companions.name();
-  const std::string stem = own.substr(0, own.rfind('.'));
-  for (const char* suffix : {".REC", ".rec", ".Rec"}) {
-    if (companions.find(stem + suffix) != nullptr) return stem + suffix;
-  }
+  const auto name = companion_with({".REC", ".rec", ".Rec"}, companions.name(), companions);
+  if (name) return *name;
   throw_unusable(
       "The samples of the PAR header are in a .REC file, which is missing. Send both files in one "
       "ZIP or TAR.");

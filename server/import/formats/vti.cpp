@@ -10,14 +10,15 @@
 #include "proto/error.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/vti_document.h"
+#include "server/import/formats/vtk_arrays.h"
 
 namespace isomesh::import {
 namespace {
 
 template <std::size_t Count>
-std::array<double, Count> numbers_of(const VtiAttributes& attributes, std::string_view name,
+std::array<double, Count> numbers_of(const HeaderTexts& attributes, std::string_view name,
                                      const std::array<double, Count>& otherwise) {
-  const std::string_view text = attribute_of(attributes, name);
+  const std::string_view text = value_of(attributes, name);
   if (text.empty()) return otherwise;
   const auto parts = words(text);
   std::array<double, Count> numbers = {};
@@ -39,8 +40,8 @@ struct Extent {
   bool operator==(const Extent&) const = default;
 };
 
-Extent extent_of(const VtiAttributes& attributes, std::string_view name) {
-  const auto parts = words(attribute_of(attributes, name));
+Extent extent_of(const HeaderTexts& attributes, std::string_view name) {
+  const auto parts = words(value_of(attributes, name));
   constexpr std::int64_t kFarthest = std::numeric_limits<std::int32_t>::max();
   Extent extent;
   std::array<std::uint64_t, 3> sizes = {0, 0, 0};
@@ -59,7 +60,7 @@ Extent extent_of(const VtiAttributes& attributes, std::string_view name) {
   return extent;
 }
 
-Geometry geometry_of_image(const VtiAttributes& image, const Extent& extent,
+Geometry geometry_of_image(const HeaderTexts& image, const Extent& extent,
                            const Vector3& default_spacing) {
   Geometry geometry;
   geometry.spacing = numbers_of<3>(image, "Spacing", default_spacing);
@@ -86,7 +87,7 @@ StoredType type_of(const VtiArray& array) {
       {"Int64", StoredType::kInt64},     {"UInt64", StoredType::kUint64},
       {"Float32", StoredType::kFloat32}, {"Float64", StoredType::kFloat64},
   };
-  const std::string_view name = attribute_of(array.attributes, "type");
+  const std::string_view name = value_of(array.attributes, "type");
   for (const Row& row : kTypes) {
     if (row.name == name) return row.type;
   }
@@ -95,11 +96,11 @@ StoredType type_of(const VtiArray& array) {
 }
 
 // The array that is the scalars of points or cells, or the only one; null if there is none.
-const VtiArray* find_scalars(const VtiAttributes& data, const std::vector<VtiArray>& arrays) {
-  const std::string_view scalars = attribute_of(data, "Scalars");
+const VtiArray* find_scalars(const HeaderTexts& data, const std::vector<VtiArray>& arrays) {
+  const std::string_view scalars = value_of(data, "Scalars");
   const VtiArray* found = nullptr;
   for (const VtiArray& array : arrays) {
-    if (!scalars.empty() && attribute_of(array.attributes, "Name") != scalars) continue;
+    if (!scalars.empty() && value_of(array.attributes, "Name") != scalars) continue;
     if (found != nullptr) {
       throw_unusable(
           "The VTK file has several arrays of data, but does not say which one is its scalars.");
@@ -138,28 +139,28 @@ void move_to_cells(SourceVolume& volume) {
 }
 
 void check_components(const VtiArray& array) {
-  const std::string_view count = attribute_of(array.attributes, "NumberOfComponents");
+  const std::string_view count = value_of(array.attributes, "NumberOfComponents");
   if (count.empty() || parse_uint64(count) == 1) return;
   throw_unusable("Each sample has " + in_quotes(count) +
                  " components. A sample must be one real number.");
 }
 
 bool is_big_endian(const VtiDocument& document) {
-  const std::string_view order = attribute_of(document.file, "byte_order");
+  const std::string_view order = value_of(document.file, "byte_order");
   if (order == "LittleEndian") return false;
   if (order == "BigEndian") return true;
   throw_unusable("The VTK file's byte_order " + in_quotes(order) + " is unknown.");
 }
 
 bool has_wide_header(const VtiDocument& document) {
-  const std::string_view type = attribute_of(document.file, "header_type");
+  const std::string_view type = value_of(document.file, "header_type");
   if (type.empty() || type == "UInt32") return false;
   if (type == "UInt64") return true;
   throw_unusable("The VTK file's header_type " + in_quotes(type) + " is unknown.");
 }
 
 VtkCompression compression_of(const VtiDocument& document) {
-  const std::string_view compressor = attribute_of(document.file, "compressor");
+  const std::string_view compressor = value_of(document.file, "compressor");
   if (compressor.empty()) return VtkCompression::kNone;
   if (compressor == "vtkZLibDataCompressor") return VtkCompression::kZlib;
   if (compressor == "vtkLZ4DataCompressor") return VtkCompression::kLz4;
@@ -191,7 +192,7 @@ void check_end(const InputFile& file) {
 CompressedRange appended_range(const InputFile& file, const VtiDocument& document,
                                const VtiArray& array) {
   constexpr std::size_t kMostSpace = 4096;
-  const auto offset = parse_uint64(attribute_of(array.attributes, "offset"));
+  const auto offset = parse_uint64(value_of(array.attributes, "offset"));
   const std::string start = file.text(document.appended_at, kMostSpace);
   const std::size_t mark = start.find_first_not_of(" \t\r\n");
   if (!offset || document.appended_at == 0 || mark == std::string::npos || start[mark] != '_') {
@@ -207,7 +208,7 @@ CompressedRange appended_range(const InputFile& file, const VtiDocument& documen
 }
 
 bool appended_is_base64(const VtiDocument& document) {
-  const std::string_view encoding = attribute_of(document.appended, "encoding");
+  const std::string_view encoding = value_of(document.appended, "encoding");
   if (encoding == "base64") return true;
   if (encoding == "raw") return false;
   throw_unusable("The encoding of the VTK file's appended data, " + in_quotes(encoding) +
@@ -216,7 +217,7 @@ bool appended_is_base64(const VtiDocument& document) {
 
 void place_samples(const InputFile& file, const VtiDocument& document, const VtiArray& array,
                    SourceVolume& volume) {
-  const std::string_view format = attribute_of(array.attributes, "format");
+  const std::string_view format = value_of(array.attributes, "format");
   volume.payload = array.text;
   if (format == "ascii") {
     volume.encoding = Encoding::kText;
@@ -259,7 +260,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
     throw_unusable("The VTK file has " + std::to_string(document.pieces) +
                    " pieces. Exactly one is supported.");
   }
-  if (!attribute_of(document.image, "TimeValues").empty()) {
+  if (!value_of(document.image, "TimeValues").empty()) {
     throw_unusable("The VTK file holds a time series. Only single volumes are supported.");
   }
   const Extent extent = extent_of(document.image, "WholeExtent");
@@ -270,7 +271,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   check_components(array);
   SourceVolume volume;
   volume.dims = extent.dims;
-  volume.assumes_spacing = attribute_of(document.image, "Spacing").empty();
+  volume.assumes_spacing = value_of(document.image, "Spacing").empty();
   volume.geometry =
       geometry_of_image(document.image, extent, options.spacing.value_or(Vector3{1, 1, 1}));
   if (is_of_cells) move_to_cells(volume);
@@ -281,13 +282,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
 }
 
 MostBytes most_vti_bytes(const InputFile& beginning, const ImportTask& task) {
-  // Per sample, in all arrays together: 32 numbers as text.
-  constexpr std::uint64_t kMostPerSample = 1024;
-  const Extent extent = extent_of(read_vti_image(beginning), "WholeExtent");
-  const auto& dims = extent.dims;
-  const std::uint64_t samples = std::uint64_t{dims[0]} * dims[1] * dims[2];
-  const std::uint64_t most = task.limits.max_sample_bytes;
-  return {.file = std::min(most, std::min(most, samples) * kMostPerSample) + kHeadroomBytes};
+  return most_vtk_bytes(extent_of(read_vti_image(beginning), "WholeExtent").dims, task);
 }
 
 }  // namespace isomesh::import

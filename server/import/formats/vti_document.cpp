@@ -55,7 +55,7 @@ class VtiParser : public XmlHandler {
     constexpr std::size_t kDeepest = 32;
     if (path_.size() >= kDeepest) throw_unusable("The VTK file's elements are nested too deeply.");
     path_.emplace_back(name);
-    VtiAttributes attributes;
+    HeaderTexts attributes;
     pairs.for_each([&](const char* key, const char* value) { attributes.emplace(key, value); });
     const std::string place = joined_path();
     if (place == "VTKFile") {
@@ -89,7 +89,7 @@ class VtiParser : public XmlHandler {
   }
 
   void check_kind() const {
-    const std::string_view type = attribute_of(document_.file, "type");
+    const std::string_view type = value_of(document_.file, "type");
     if (type == "ImageData") return;
     throw_unusable("The VTK file holds " + in_quotes(type) + ", not ImageData.");
   }
@@ -101,7 +101,7 @@ class VtiParser : public XmlHandler {
     return nullptr;
   }
 
-  void add_array(VtiAttributes attributes, std::vector<VtiArray>& arrays) const {
+  void add_array(HeaderTexts attributes, std::vector<VtiArray>& arrays) const {
     constexpr std::size_t kMostArrays = 1000;
     if (arrays.size() == kMostArrays) {
       throw_unusable("The VTK file has more than the 1000 arrays that are supported.");
@@ -124,17 +124,12 @@ class VtiParser : public XmlHandler {
 
 }  // namespace
 
-std::string_view attribute_of(const VtiAttributes& attributes, std::string_view name) {
-  const auto found = attributes.find(name);
-  return found == attributes.end() ? std::string_view{} : std::string_view(found->second);
-}
-
 VtiDocument read_vti_document(const InputFile& file) {
   return VtiParser(file, VtiParser::Until::kSamples).parse();
 }
 
-VtiAttributes read_vti_image(const InputFile& beginning) {
-  VtiAttributes image = VtiParser(beginning, VtiParser::Until::kImage).parse().image;
+HeaderTexts read_vti_image(const InputFile& beginning) {
+  HeaderTexts image = VtiParser(beginning, VtiParser::Until::kImage).parse().image;
   if (image.empty()) throw_unusable("The VTK file does not begin with the extent of an image.");
   return image;
 }

@@ -6,8 +6,7 @@
 #include <utility>
 
 #include "base/text.h"
-#include "server/import/source/names.h"
-#include "server/import/source/source.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
 namespace {
@@ -179,6 +178,14 @@ void Scanner::skip_words(std::uint64_t count) {
 }
 
 }  // namespace
+
+MostBytes most_vtk_bytes(const std::array<std::uint32_t, 3>& dims, const ImportTask& task) {
+  // Per sample, in all arrays together: 32 numbers as text.
+  constexpr std::uint64_t kMostPerSample = 1024;
+  const std::uint64_t samples = std::uint64_t{dims[0]} * dims[1] * dims[2];
+  const std::uint64_t most = task.limits.max_sample_bytes;
+  return {.file = std::min(most, std::min(most, samples) * kMostPerSample) + kHeadroomBytes};
+}
 
 std::optional<StoredType> vtk_type(const std::string& name) {
   static constexpr std::pair<std::string_view, StoredType> kTypes[] = {

@@ -1,13 +1,14 @@
-// The arrays in the data section of a legacy VTK file. Internal to the reader.
+// The arrays in the data section of a legacy VTK file. Internal to the readers of VTK.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "base/files.h"
-#include "server/import/source/stored_samples.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 
@@ -21,6 +22,9 @@ struct VtkArray {
   bool is_colors = false;    // bytes, which text has as fractions of 255
   std::uint64_t offset = 0;  // of its data in the file
 };
+
+// The largest possible size of a VTK file with an image of this size.
+MostBytes most_vtk_bytes(const std::array<std::uint32_t, 3>& dims, const ImportTask& task);
 
 // Empty for names of no real number.
 std::optional<StoredType> vtk_type(const std::string& name);

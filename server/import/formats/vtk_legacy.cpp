@@ -169,13 +169,8 @@ SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*compani
 }
 
 MostBytes most_vtk_legacy_bytes(const InputFile& beginning, const ImportTask& task) {
-  // Per sample, in all arrays together: 32 numbers as text.
-  constexpr std::uint64_t kMostPerSample = 1024;
-  const auto dims =
-      volume_dims(read_legacy_header(beginning.text(0, kMostLegacyHeaderBytes)).points);
-  const std::uint64_t samples = std::uint64_t{dims[0]} * dims[1] * dims[2];
-  const std::uint64_t most = task.limits.max_sample_bytes;
-  return {.file = std::min(most, std::min(most, samples) * kMostPerSample) + kHeadroomBytes};
+  return most_vtk_bytes(
+      volume_dims(read_legacy_header(beginning.text(0, kMostLegacyHeaderBytes)).points), task);
 }
 
 }  // namespace isomesh::import

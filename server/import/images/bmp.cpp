@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/import/images/page.h"
-#include "server/import/source/header_bytes.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
 
 namespace isomesh::import {

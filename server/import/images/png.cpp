@@ -10,7 +10,7 @@
 #include <png.h>
 
 #include "server/import/images/page.h"
-#include "server/import/source/header_bytes.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
 
 namespace isomesh::import {

@@ -7,7 +7,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/import/source/names.h"
-#include "server/import/source/units.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {

@@ -14,7 +14,7 @@ namespace isomesh::import {
 //   1 0.2 0.4 0.9 Left thalamus             FSLeyes' lookup tables
 //   1 Left thalamus
 // or the table has named columns, separated by tabs: BIDS's "index", "name" and maybe "color"; or
-// it is a JSON document (label_json.h). Lines that begin with "#", "%" or "//" are comments.
+// it is a JSON document. Lines that begin with "#", "%" or "//" are comments.
 // Returns none unless every other line is such an entry, and for more than Volume::kMostLabels.
 // Unordered. Never throws because of the text.
 std::vector<LabelEntry> labels_of_text(std::string_view text);

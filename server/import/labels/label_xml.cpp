@@ -1,7 +1,6 @@
 #include "server/import/labels/label_xml.h"
 
 #include <array>
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,22 +8,16 @@
 #include "base/text.h"
 #include "base/xml_reader.h"
 #include "server/import/labels/label_table.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {
 
-using Attributes = std::map<std::string, std::string, std::less<>>;
-
-std::string_view attribute(const Attributes& attributes, std::string_view name) {
-  const auto found = attributes.find(name);
-  return found == attributes.end() ? std::string_view{} : std::string_view(found->second);
-}
-
-std::optional<std::string> color_of(const Attributes& attributes) {
+std::optional<std::string> color_of(const HeaderTexts& attributes) {
   std::array<double, 3> parts = {};
   std::size_t at = 0;
   for (const char* const name : {"Red", "Green", "Blue"}) {
-    const auto part = parse_double(attribute(attributes, name));
+    const auto part = parse_double(value_of(attributes, name));
     if (!part) return std::nullopt;
     parts[at++] = *part;
   }
@@ -69,11 +62,10 @@ class LabelXmlParser : public XmlHandler {
     attributes_.clear();
     pairs.for_each([&](const char* key, const char* value) { attributes_.emplace(key, value); });
     if (name == "VolumeInformation") {
-      is_of_volume_ = parse_uint64(attribute(attributes_, "Index")).value_or(0) == volume_;
+      is_of_volume_ = parse_uint64(value_of(attributes_, "Index")).value_or(0) == volume_;
     }
-    is_in_text_ =
-        (name == "Label" && is_of_volume_) ||
-        (name == "AFNI_atr" && attribute(attributes_, "atr_name") == "VALUE_LABEL_DTABLE");
+    is_in_text_ = (name == "Label" && is_of_volume_) ||
+                  (name == "AFNI_atr" && value_of(attributes_, "atr_name") == "VALUE_LABEL_DTABLE");
     text_.clear();
   }
 
@@ -83,7 +75,7 @@ class LabelXmlParser : public XmlHandler {
 
   void end_element(std::string_view name) override {
     if (is_in_text_ && name == "Label") {
-      if (const auto label = parse_int64(attribute(attributes_, "Key"))) {
+      if (const auto label = parse_int64(value_of(attributes_, "Key"))) {
         entries_.push_back(
             {.label = *label, .name = label_name(text_), .color = color_of(attributes_)});
       }
@@ -96,7 +88,7 @@ class LabelXmlParser : public XmlHandler {
 
   const std::uint64_t volume_;
   std::vector<LabelEntry> entries_;
-  Attributes attributes_;  // of the last start tag
+  HeaderTexts attributes_;  // of the last start tag
   std::string text_;
   bool is_in_text_ = false;   // true while text is collected
   bool is_of_volume_ = true;  // true if no element names a volume

@@ -12,7 +12,7 @@
 #include "base/text.h"
 #include "server/import/samples/reorder.h"
 #include "server/import/samples/vtk_data.h"
-#include "server/import/source/bzip2.h"
+#include "server/import/source/gzip.h"
 
 namespace isomesh::import {
 namespace {

@@ -4,13 +4,52 @@
 #include <array>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "server/import/samples/vtk_blocks.h"
+#include <lz4.h>
+#include <lzma.h>
+
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {
+
+// Compressed blocks are decompressed in memory. VTK writes blocks of about 32 KiB.
+constexpr std::uint64_t kLargestVtkBlock = std::uint64_t{64} << 20;
+
+std::uint64_t expand_lz4(std::span<const std::byte> stored, std::span<std::byte> target) {
+  const int found = ::LZ4_decompress_safe(
+      reinterpret_cast<const char*>(stored.data()), reinterpret_cast<char*>(target.data()),
+      static_cast<int>(stored.size()), static_cast<int>(target.size()));
+  return found < 0 ? 0 : static_cast<std::uint64_t>(found);
+}
+
+std::uint64_t expand_xz(std::span<const std::byte> stored, std::span<std::byte> target) {
+  std::uint64_t memory = std::uint64_t{256} << 20;  // the strongest setting needs 65 MiB
+  std::size_t from = 0;
+  std::size_t to = 0;
+  const lzma_ret result = ::lzma_stream_buffer_decode(
+      &memory, 0, nullptr, reinterpret_cast<const std::uint8_t*>(stored.data()), &from,
+      stored.size(), reinterpret_cast<std::uint8_t*>(target.data()), &to, target.size());
+  return result == LZMA_OK && from == stored.size() ? to : 0;
+}
+
+// A block of vtkLZ4DataCompressor (one LZ4 block) or vtkLZMADataCompressor (one .xz stream).
+std::vector<std::byte> expanded_block(VtkCompression compression, std::span<const std::byte> stored,
+                                      std::uint64_t bytes) {
+  if (bytes > kLargestVtkBlock || stored.size() > 2 * kLargestVtkBlock) {
+    throw_unusable("A compressed block of the VTK array is too large.");
+  }
+  std::vector<std::byte> block(bytes);
+  const std::uint64_t found =
+      compression == VtkCompression::kLz4 ? expand_lz4(stored, block) : expand_xz(stored, block);
+  if (found != bytes) {
+    throw_unusable("A compressed block of the VTK array is damaged or has the wrong size.");
+  }
+  return block;
+}
 
 [[noreturn]] void throw_short() {
   throw_unusable("The file is truncated: the VTK array of the samples ends too early.");
@@ -100,13 +139,10 @@ std::size_t count_bytes(const VtkEncoding& encoding) { return encoding.wide_head
 
 std::uint64_t count_at(std::span<const std::byte> header, std::size_t index,
                        const VtkEncoding& encoding) {
-  const std::size_t size = count_bytes(encoding);
-  std::uint64_t value = 0;
-  for (std::size_t at = 0; at < size; ++at) {
-    const std::size_t byte = encoding.big_endian ? at : size - 1 - at;
-    value = value << 8 | std::to_integer<std::uint64_t>(header[index * size + byte]);
-  }
-  return value;
+  const HeaderBytes counts({reinterpret_cast<const char*>(header.data()), header.size()},
+                           encoding.big_endian);
+  return encoding.wide_header ? counts.at<std::uint64_t>(index * 8)
+                              : counts.at<std::uint32_t>(index * 4);
 }
 
 struct Blocks {

@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
+#include <bzlib.h>
 #include <zlib.h>
 
 #include "proto/error.h"
+#include "server/volume/unusable.h"
 
 namespace isomesh::import {
 namespace {
@@ -46,32 +48,30 @@ void set_output(z_stream& stream, std::span<std::byte> output) {
 }
 
 [[noreturn]] void throw_corrupt() {
-  throw Error(ErrorCode::kUnusableVolume,
-              "The compressed data is corrupt: it cannot be unpacked, or its checksum is wrong.");
+  volume::throw_unusable(
+      "The compressed data is corrupt: it cannot be unpacked, or its checksum is wrong.");
 }
 
 [[noreturn]] void throw_truncated() {
-  throw Error(ErrorCode::kUnusableVolume,
-              "The compressed data is truncated: the file ends too early.");
+  volume::throw_unusable("The compressed data is truncated: the file ends too early.");
 }
 
 [[noreturn]] void throw_followed() {
-  throw Error(ErrorCode::kUnusableVolume,
-              "The compressed data is followed by data that is not part of it.");
+  volume::throw_unusable("The compressed data is followed by data that is not part of it.");
 }
 
+// The compressed bytes of a range, piece by piece.
 class Feed {
  public:
   Feed(const InputFile& file, const CompressedRange& range)
       : file_(file), next_(range.offset), end_(range.offset + range.bytes), piece_(kPieceBytes) {}
 
-  // Returns false at the end of the range or of the file.
-  bool refill(z_stream& stream) {
+  // Empty at the end of the range or of the file.
+  std::span<std::byte> next() {
     const std::uint64_t wanted = std::min<std::uint64_t>(piece_.size(), end_ - next_);
     const std::size_t count = file_.read(next_, std::span(piece_).first(wanted));
     next_ += count;
-    set_input(stream, std::span(piece_).first(count));
-    return count > 0;
+    return std::span(piece_).first(count);
   }
 
  private:
@@ -80,6 +80,13 @@ class Feed {
   std::uint64_t end_;
   std::vector<std::byte> piece_;
 };
+
+// Returns false at the end.
+bool refill(Feed& feed, z_stream& stream) {
+  const std::span<std::byte> piece = feed.next();
+  set_input(stream, piece);
+  return !piece.empty();
+}
 
 struct Trailer {
   std::uint32_t checksum = 0;
@@ -115,7 +122,7 @@ void require_only_padding(Feed& feed, z_stream& stream, const std::optional<Trai
         throw_followed();
       }
     }
-  } while (feed.refill(stream));
+  } while (refill(feed, stream));
   if (rest.empty()) return;
   // A checksum may begin with zeros, which were consumed as padding, and end with zeros.
   std::string expected = trailer ? trailer->text() : std::string();
@@ -127,22 +134,53 @@ void require_only_padding(Feed& feed, z_stream& stream, const std::optional<Trai
 }
 
 bool another_member_follows(Feed& feed, z_stream& stream) {
-  if (stream.avail_in == 0 && !feed.refill(stream)) return false;
+  if (stream.avail_in == 0 && !refill(feed, stream)) return false;
   return stream.next_in[0] == 0x1f;
+}
+
+class Bzip2Stream {
+ public:
+  Bzip2Stream() {
+    if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK) {
+      throw Error(ErrorCode::kInternal, "bzip2 cannot start.");
+    }
+  }
+  ~Bzip2Stream() { BZ2_bzDecompressEnd(&stream_); }
+  Bzip2Stream(const Bzip2Stream&) = delete;
+  Bzip2Stream& operator=(const Bzip2Stream&) = delete;
+
+  // Decodes from `input` to `output`. Returns the number of bytes written; leaves the rest in
+  // `input`, and sets `is_over` at the end of the stream.
+  std::size_t decode(std::span<std::byte>& input, std::span<std::byte> output, bool& is_over) {
+    stream_.next_in = reinterpret_cast<char*>(input.data());
+    stream_.avail_in = static_cast<unsigned>(input.size());
+    stream_.next_out = reinterpret_cast<char*>(output.data());
+    stream_.avail_out = static_cast<unsigned>(output.size());
+    const int status = BZ2_bzDecompress(&stream_);
+    if (status != BZ_OK && status != BZ_STREAM_END) throw_corrupt();
+    is_over = status == BZ_STREAM_END;
+    input = input.last(stream_.avail_in);
+    return output.size() - stream_.avail_out;
+  }
+
+ private:
+  bz_stream stream_ = {};
+};
+
+// Some writers pad the last block with zeros. Nothing else may follow.
+bool is_padding(std::span<const std::byte> bytes) {
+  return std::ranges::all_of(bytes, [](std::byte byte) { return byte == std::byte{0}; });
 }
 
 }  // namespace
 
-bool is_gzip(std::span<const std::byte> head) {
-  return head.size() >= 3 && head[0] == std::byte{0x1f} && head[1] == std::byte{0x8b} &&
-         head[2] == std::byte{Z_DEFLATED};
-}
+bool is_gzip(std::string_view head) { return head.starts_with("\x1f\x8b\x08"); }
 
-std::string inflate_head(std::span<const std::byte> head, std::size_t count) {
+std::string inflate_head(std::string_view head, std::size_t count) {
   if (!is_gzip(head)) return {};
   Inflater inflater;
   std::string result(count, '\0');
-  set_input(inflater.stream(), head);
+  set_input(inflater.stream(), std::as_bytes(std::span(head)));
   set_output(inflater.stream(), std::as_writable_bytes(std::span(result)));
   inflate(&inflater.stream(), Z_SYNC_FLUSH);
   result.resize(count - inflater.stream().avail_out);
@@ -160,7 +198,7 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
   for (;;) {
     // Input is refilled only if the output was not full: otherwise zlib may hold back inflated
     // bytes.
-    if (stream.avail_in == 0 && !feed.refill(stream)) throw_truncated();
+    if (stream.avail_in == 0 && !refill(feed, stream)) throw_truncated();
     int status = Z_OK;
     do {
       set_output(stream, output);
@@ -188,9 +226,39 @@ std::size_t inflate_bytes(std::span<const std::byte> stream, std::span<std::byte
   const int result = inflate(&inflater.stream(), Z_FINISH);
   const std::size_t left = inflater.stream().avail_out;
   if (result != Z_STREAM_END && left > 0) {
-    throw Error(ErrorCode::kUnusableVolume, "its deflated samples are corrupt or truncated");
+    volume::throw_unusable("its deflated samples are corrupt or truncated");
   }
   return target.size() - left;
+}
+
+std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, std::uint64_t limit,
+                           const ByteSink& sink) {
+  Feed feed(file, range);
+  std::vector<std::byte> output(kPieceBytes);
+  std::span<std::byte> input;
+  const auto refill = [&] {
+    if (input.empty()) input = feed.next();
+    return !input.empty();
+  };
+  std::uint64_t produced = 0;
+  do {
+    Bzip2Stream stream;
+    // After a full output the library may hold back decoded bytes.
+    bool is_full = false;
+    for (bool is_over = false; !is_over;) {
+      if (!is_full && !refill()) throw_truncated();
+      const std::size_t count = stream.decode(input, output, is_over);
+      is_full = count == output.size();
+      if (count > limit - produced) return limit + 1;
+      produced += count;
+      if (count > 0) sink(std::span(output).first(count));
+    }
+  } while (refill() && input.front() == std::byte{'B'});
+  do {
+    if (!is_padding(input)) throw_followed();
+    input = {};
+  } while (refill());
+  return produced;
 }
 
 }  // namespace isomesh::import

@@ -1,4 +1,4 @@
-// Inflates gzip, zlib and raw deflate streams with bounded memory and output.
+// Unpacks gzip, zlib, raw deflate and bzip2 streams with bounded memory and output.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +6,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "base/files.h"
 
@@ -14,11 +15,11 @@ namespace isomesh::import {
 // Files are read, inflated and converted in pieces of this size.
 inline constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
 
-bool is_gzip(std::span<const std::byte> head);
+bool is_gzip(std::string_view head);
 
 // Inflates up to `count` bytes of a gzip file's head. Empty if it is not gzip. Never throws because
 // of the input, which may be truncated or damaged.
-std::string inflate_head(std::span<const std::byte> head, std::size_t count);
+std::string inflate_head(std::string_view head, std::size_t count);
 
 // The byte range of a compressed stream.
 struct CompressedRange {
@@ -46,5 +47,9 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
 // bytes. Throws Error kUnusableVolume, with a clause without a subject, if the stream is corrupt or
 // truncated; bytes after the target's size are not read.
 std::size_t inflate_bytes(std::span<const std::byte> stream, std::span<std::byte> target);
+
+// As inflate_range, for one bzip2 stream or several consecutive ones.
+std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, std::uint64_t limit,
+                           const ByteSink& sink);
 
 }  // namespace isomesh::import

@@ -4,7 +4,6 @@
 #include "server/process/import_message.h"
 #include "server/volume/canonical.h"
 #include "server/volume/geometry.h"
-#include "server/volume/size.h"
 #include "server/volume/unusable.h"
 
 namespace isomesh::import {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <vector>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -15,6 +16,33 @@ namespace {
                                    std::uint64_t expected) {
   throw_unusable("The data file " + in_quotes(name) + " has " + std::to_string(found) +
                  " bytes, but the header declares " + std::to_string(expected) + ".");
+}
+
+bool counts_samples(std::string_view unit) {
+  static constexpr std::string_view kNames[] = {"pixel", "pixels", "voxel", "voxels", "px"};
+  return std::ranges::find(kNames, lower(trimmed(unit))) != std::end(kNames);
+}
+
+double millimetres_per(std::string_view unit) {
+  struct Row {
+    double millimetres;
+    std::vector<std::string_view> names;
+  };
+  static const std::vector<Row> units = {
+      {1, {"", "?", "???", "mm", "millimeter", "millimeters", "millimetre", "millimetres"}},
+      {0.000001, {"nm", "nanometer", "nanometers", "nanometre", "nanometres"}},
+      {0.001,
+       {"um", "\xc2\xb5m", "\xce\xbcm", "\xb5m", "micron", "microns", "micrometer", "micrometers",
+        "micrometre", "micrometres"}},
+      {10, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"}},
+      {1000, {"m", "meter", "meters", "metre", "metres"}}};
+  const std::string name = lower(trimmed(unit));
+  for (const Row& row : units) {
+    if (std::find(row.names.begin(), row.names.end(), name) != row.names.end()) {
+      return row.millimetres;
+    }
+  }
+  throw_unusable("The header's unit of length " + in_quotes(unit) + " is unknown.");
 }
 
 }  // namespace
@@ -93,6 +121,16 @@ const std::filesystem::path& companion(const std::string& name, const Companions
   }
   if (const auto* found = companions.find(path)) return *found;
   throw_unusable(reason + ", which is missing. Send both files in one ZIP or TAR.");
+}
+
+std::optional<std::string> companion_with(std::initializer_list<std::string_view> suffixes,
+                                          std::string_view name, const Companions& companions) {
+  const std::string stem(name.substr(0, name.rfind('.')));
+  for (const std::string_view suffix : suffixes) {
+    std::string beside = stem + std::string(suffix);
+    if (companions.find(beside) != nullptr) return beside;
+  }
+  return std::nullopt;
 }
 
 bool may_trail(std::uint64_t bytes, const SourceVolume& volume) {
@@ -194,6 +232,19 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
 std::string begin_remedy(const ImportOptions& options, const std::string& verb) {
   if (!options.peers) return ' ' + verb + ' ';
   return " An order has no parameter for this. Download the series, and upload it with ";
+}
+
+void scale_to_millimetres(Geometry& geometry, std::string_view unit, std::vector<Note>& notes) {
+  if (counts_samples(unit)) {
+    notes.push_back(note_of(NoteCode::kUnitUnknown,
+                            "The file's unit, " + in_quotes(unit) +
+                                ", is not a length. One unit was read as one millimetre."));
+    return;
+  }
+  const double millimetres = millimetres_per(unit);
+  if (millimetres == 1) return;
+  for (double& value : geometry.origin) value *= millimetres;
+  for (double& value : geometry.spacing) value *= millimetres;
 }
 
 }  // namespace isomesh::import

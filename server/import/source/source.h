@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <span>
@@ -84,6 +85,11 @@ class Companions {
 // Returns the companion of that name, with or without "./". Throws Error kUnusableVolume if it is
 // missing, or if the path leaves the header's folder.
 const std::filesystem::path& companion(const std::string& name, const Companions& companions);
+
+// The companion of the header `name` with one of these suffixes in place of the header's; empty if
+// there is none.
+std::optional<std::string> companion_with(std::initializer_list<std::string_view> suffixes,
+                                          std::string_view name, const Companions& companions);
 
 // A file of samples without a header.
 struct DataFile {
@@ -189,5 +195,10 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
 // that resolves it: `verb`, such as "Add". An order has no such parameter, so its series must be
 // uploaded.
 std::string begin_remedy(const ImportOptions& options, const std::string& verb);
+
+// Scales origin and spacing from a header's unit ("mm", "um", "cm", "m", ... or full names) to
+// millimetres. A missing unit is millimetres; so is, with a note, one that counts samples
+// ("pixel"). Throws Error kUnusableVolume for unknown units.
+void scale_to_millimetres(Geometry& geometry, std::string_view unit, std::vector<Note>& notes);
 
 }  // namespace isomesh::import

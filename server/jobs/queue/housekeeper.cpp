@@ -33,14 +33,11 @@ void enforce(store::Retention& retention) {
 Housekeeper::Housekeeper(store::Retention& retention, VolumeLibrary& library,
                          std::chrono::milliseconds interval)
     : thread_([&retention, &library, interval](const std::stop_token& stop) {
-        Mutex mutex;
-        Condition never;
         while (!stop.stop_requested()) {
           library.finish_erasing(stop);
           if (stop.stop_requested()) return;
           enforce(retention);
-          Lock lock(mutex);
-          never.wait_for(lock, stop, interval, [] { return false; });
+          pause(stop, interval);
         }
       }) {}
 

@@ -1,7 +1,6 @@
 #include "server/jobs/queue/workers.h"
 
 #include <algorithm>
-#include <array>
 #include <exception>
 #include <new>
 #include <optional>
@@ -9,6 +8,7 @@
 
 #include <unistd.h>
 
+#include "base/ids.h"
 #include "base/log.h"
 
 namespace isomesh::jobs {
@@ -34,15 +34,7 @@ constexpr milliseconds kEndRetry{500};
 enum class Reason { kNone, kCancelled, kLost, kTooLong, kEnding };
 
 std::string worker_name(std::size_t thread) {
-  std::array<char, 256> host = {};
-  ::gethostname(host.data(), host.size() - 1);
-  return std::string(host.data()) + ':' + std::to_string(::getpid()) + ':' + std::to_string(thread);
-}
-
-void pause(const std::stop_token& stop, milliseconds time) {
-  Mutex mutex;
-  Lock lock(mutex);
-  Condition().wait_for(lock, stop, time, [] { return false; });
+  return host_name() + ':' + std::to_string(::getpid()) + ':' + std::to_string(thread);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "proto/json.h"
 #include "server/store/job_rules.h"
 #include "server/store/microseconds.h"
-#include "server/store/postgresql/exclusive_task.h"
+#include "server/store/postgresql/held_task.h"
 
 namespace isomesh::store::postgresql {
 

@@ -1,18 +1,21 @@
-// Address of the blobs in S3, and its credentials.
+// Address of the blobs in S3, its credentials, and links to objects there.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <string_view>
+
+#include "server/store/blob_store.h"
 
 namespace isomesh::store {
 
 // A bucket of a service that speaks S3, or a part of a bucket.
 struct S3Address {
   // http://HOST[:PORT] or https://HOST[:PORT]; receives the requests.
-  std::string endpoint;  // http://HOST[:PORT] or https:
-  std::string path;      // of the bucket; empty if the endpoint's host contains the bucket
-  std::string prefix;    // of all keys; empty, or ends in a slash
+  std::string endpoint;
+  std::string path;    // of the bucket; empty if the endpoint's host contains the bucket
+  std::string prefix;  // of all keys; empty, or ends in a slash
   std::string region;
 };
 
@@ -34,5 +37,14 @@ struct S3Credentials {
 // Without a file, uses AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN. Throws Error
 // kInvalidParameter for "blob-credentials", never with the file's content.
 S3Credentials read_s3_credentials(const std::filesystem::path& file);
+
+// Escapes all but letters, digits and "-._~" as %XX.
+std::string uri_escaped(std::string_view text);
+
+// A presigned URL at which anybody can fetch the object from now on, for the time in `as` (AWS
+// Signature Version 4 in the query). `key` includes the prefix.
+std::string presigned_url(const S3Address& address, const S3Credentials& credentials,
+                          const std::string& key, const LinkedAs& as,
+                          std::chrono::system_clock::time_point from);
 
 }  // namespace isomesh::store

@@ -1,11 +1,7 @@
 #include "tests/unit/import/files.h"
 
-#include <cstdlib>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
-
-#include <unistd.h>
 
 namespace isomesh::import::test {
 namespace {
@@ -28,34 +24,13 @@ Outcome outcome_of(const Folder& folder, const Import& import) {
 
 }  // namespace
 
-std::string read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-Folder::Folder() {
-  // Every import waits for the disk; where there is a file system in memory thousands take seconds.
-  const std::filesystem::path memory = "/dev/shm";
-  const auto parent =
-      ::access(memory.c_str(), W_OK) == 0 ? memory : std::filesystem::temp_directory_path();
-  std::string name = (parent / "isomesh-import-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
-  path_ = name;
-}
-
-Folder::~Folder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
 std::filesystem::path Folder::write(std::string_view name, std::string_view bytes) const {
-  std::ofstream file(path(name), std::ios::binary);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  isomesh::test::write_file(path(name), bytes);
   return path(name);
 }
 
 std::size_t Folder::entries() const {
-  const std::filesystem::directory_iterator all(path_);
+  const std::filesystem::directory_iterator all(folder_.path());
   return static_cast<std::size_t>(std::distance(begin(all), end(all)));
 }
 

@@ -11,27 +11,24 @@
 #include "proto/error.h"
 #include "server/import/import.h"
 #include "server/volume/canonical.h"
+#include "tests/support/files.h"
 
 namespace isomesh::import::test {
 
-std::string read_file(const std::filesystem::path& path);
+using isomesh::test::read_file;
 
-// Made for one test and removed with everything in it.
+// Made for one test and removed with everything in it. Every import waits for the disk; in memory
+// thousands take seconds.
 class Folder {
  public:
-  Folder();
-  ~Folder();
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::filesystem::path path(std::string_view name) const { return path_ / name; }
+  std::filesystem::path path(std::string_view name) const { return folder_.path() / name; }
   std::filesystem::path write(std::string_view name, std::string_view bytes) const;
 
   // How many files and folders are there.
   std::size_t entries() const;
 
  private:
-  std::filesystem::path path_;
+  isomesh::test::TemporaryFolder folder_{isomesh::test::fast_place()};
 };
 
 using volume::kHeaderBytes;

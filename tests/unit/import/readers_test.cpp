@@ -15,7 +15,7 @@ namespace {
 
 // The name of the format that the bytes are told for; empty for none.
 std::string_view sniffed(std::string_view bytes) {
-  const Reader* reader = sniff(std::as_bytes(std::span(bytes.substr(0, kSniffBytes))));
+  const Reader* reader = sniff(bytes.substr(0, kSniffBytes));
   return reader == nullptr ? std::string_view{} : reader->name;
 }
 

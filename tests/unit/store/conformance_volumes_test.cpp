@@ -7,7 +7,6 @@
 #include <gmock/gmock.h>
 
 #include "tests/support/errors.h"
-#include "tests/support/files.h"
 #include "tests/unit/store/engine.h"
 
 namespace isomesh::store {
@@ -178,38 +177,6 @@ TEST_P(VolumeConformance, OneOfManyThreadsAddsIt) {
   threads.clear();
   EXPECT_EQ(added, 1);
   EXPECT_EQ(volumes().list("").size(), 1U);
-}
-
-// --- Blobs
-
-using BlobConformance = test::EngineTest;
-
-INSTANTIATE_TEST_SUITE_P(Engines, BlobConformance, testing::ValuesIn(test::all_engines()),
-                         test::name_of);
-
-TEST_P(BlobConformance, IsThereWholeAfterItsCommit) {
-  const auto writer = blobs().begin("");
-  writer->write(test::as_span("some "));
-  writer->write(test::as_span("bytes"));
-  const Blob blob = writer->commit();
-  EXPECT_EQ(blob.bytes, 10U);
-  const auto reader = blobs().open(blob.key);
-  EXPECT_EQ(reader->size(), 10U);
-  std::string text(4, '?');
-  EXPECT_EQ(reader->read_at(5, std::as_writable_bytes(std::span(text))), 4U);
-  EXPECT_EQ(text, "byte");
-  EXPECT_EQ(reader->read_at(8, std::as_writable_bytes(std::span(text))), 2U);
-  EXPECT_TRUE(blobs().is_intact(blob.key, {}));
-  EXPECT_EQ(test::read_file(blobs().local(blob.key).path), "some bytes");
-}
-
-TEST_P(BlobConformance, WhatIsNotThereIsNotFound) {
-  const std::string key(64, '0');
-  EXPECT_EQ(code_thrown_by([&] { blobs().open(key); }), ErrorCode::kNotFound);
-  EXPECT_EQ(code_thrown_by([&] { blobs().local(key); }), ErrorCode::kNotFound);
-  EXPECT_EQ(code_thrown_by([&] { blobs().is_intact(key, {}); }), ErrorCode::kNotFound);
-  EXPECT_EQ(blobs().size(key), std::nullopt);
-  blobs().erase(key);
 }
 
 }  // namespace

@@ -21,10 +21,10 @@
 namespace isomesh::test {
 namespace {
 
-class SqliteEngine : public Engine {
+// The stores on one kind of database, with their blobs in a data folder.
+template <class Database, class OutboxOfKind, class JobStoreOfKind>
+class EngineOn : public Engine {
  public:
-  explicit SqliteEngine(const EngineOptions& options) : options_(options) { begin_life(); }
-
   store::JobStore& jobs() override { return *jobs_; }
   store::VolumeStore& volumes() override { return *volumes_; }
   store::BlobStore& blobs() override { return *blobs_; }
@@ -34,9 +34,54 @@ class SqliteEngine : public Engine {
   store::ReceivedStore& received() override { return *received_; }
   store::SqlDatabase& database() override { return *database_; }
 
+ protected:
+  explicit EngineOn(const EngineOptions& options) : options_(options) {}
+
+  void close() {
+    received_.reset();
+    audit_.reset();
+    orders_.reset();
+    outbox_.reset();
+    jobs_.reset();
+    volumes_.reset();
+    database_.reset();
+  }
+
+  void open(const auto& place_of_database) {
+    database_.emplace(place_of_database);
+    volumes_.emplace(*database_);
+    outbox_.emplace(*database_);
+    orders_.emplace(*database_);
+    audit_.emplace(*database_);
+    received_.emplace(*database_);
+    jobs_.emplace(*database_, *blobs_,
+                  store::JobStoreOptions{.max_queued = options_.max_queued,
+                                         .retry_delay = options_.retry_delay,
+                                         .mesher_version = "test",
+                                         .grace = std::chrono::milliseconds(0),
+                                         .expected_ms = options_.expected_ms});
+  }
+
+  const EngineOptions options_;
+  TemporaryFolder folder_;
+  std::optional<store::DataFolder> data_;
+  std::optional<store::FileBlobStore> blobs_;
+  std::optional<Database> database_;
+  std::optional<store::SqlVolumeStore> volumes_;
+  std::optional<OutboxOfKind> outbox_;
+  std::optional<store::SqlOrderStore> orders_;
+  std::optional<store::SqlAuditTrail> audit_;
+  std::optional<store::SqlReceivedStore> received_;
+  std::optional<JobStoreOfKind> jobs_;
+};
+
+class SqliteEngine : public EngineOn<store::Database, store::SqlOutbox, store::SqliteJobStore> {
+ public:
+  explicit SqliteEngine(const EngineOptions& options) : EngineOn(options) { begin_life(); }
+
   void restart() override {
     close();
-    open();
+    open(*data_);
     jobs_->reap();
   }
 
@@ -66,71 +111,27 @@ class SqliteEngine : public Engine {
     }
     data_.emplace(place);
     blobs_.emplace(*data_);
-    open();
+    open(*data_);
   }
 
-  void close() {
-    received_.reset();
-    audit_.reset();
-    orders_.reset();
-    outbox_.reset();
-    jobs_.reset();
-    volumes_.reset();
-    database_.reset();
-  }
-
-  void open() {
-    database_.emplace(*data_);
-    volumes_.emplace(*database_);
-    outbox_.emplace(*database_);
-    orders_.emplace(*database_);
-    audit_.emplace(*database_);
-    received_.emplace(*database_);
-    jobs_.emplace(*database_, *blobs_,
-                  store::JobStoreOptions{.max_queued = options_.max_queued,
-                                         .retry_delay = options_.retry_delay,
-                                         .mesher_version = "test",
-                                         .expected_ms = options_.expected_ms});
-  }
-
-  const EngineOptions options_;
-  TemporaryFolder folder_;
   int lives_ = 0;
   std::optional<PowerCut> power_;
-  std::optional<store::DataFolder> data_;
-  std::optional<store::FileBlobStore> blobs_;
-  std::optional<store::Database> database_;
-  std::optional<store::SqlVolumeStore> volumes_;
-  std::optional<store::SqlOutbox> outbox_;
-  std::optional<store::SqlOrderStore> orders_;
-  std::optional<store::SqlAuditTrail> audit_;
-  std::optional<store::SqlReceivedStore> received_;
-  std::optional<store::SqliteJobStore> jobs_;
 };
 
-// One node of a cluster, whose blobs are in a data folder.
-class PostgresEngine : public Engine {
+// One node of a cluster.
+class PostgresEngine
+    : public EngineOn<store::postgresql::Database, store::postgresql::PostgresOutbox,
+                      store::postgresql::PostgresJobStore> {
  public:
-  explicit PostgresEngine(const EngineOptions& options)
-      : options_(options),
-        url_(Postgres::shared().new_place()),
-        data_(folder_ / "data"),
-        blobs_(data_) {
-    open();
+  explicit PostgresEngine(const EngineOptions& options) : EngineOn(options) {
+    data_.emplace(folder_ / "data");
+    blobs_.emplace(*data_);
+    open(database_options_);
   }
-
-  store::JobStore& jobs() override { return *jobs_; }
-  store::VolumeStore& volumes() override { return *volumes_; }
-  store::BlobStore& blobs() override { return blobs_; }
-  store::Outbox& outbox() override { return *outbox_; }
-  store::OrderStore& orders() override { return *orders_; }
-  store::AuditTrail& audit() override { return *audit_; }
-  store::ReceivedStore& received() override { return *received_; }
-  store::SqlDatabase& database() override { return *database_; }
 
   void restart() override {
     jobs_.reset();
-    open();
+    open(database_options_);
     jobs_->reap();
   }
 
@@ -139,38 +140,13 @@ class PostgresEngine : public Engine {
     jobs_.reset();
     Postgres::shared().stop_at_once();
     Postgres::shared().start();
-    open();
+    open(database_options_);
     jobs_->reap();
   }
 
  private:
-  void open() {
-    database_.emplace(store::postgresql::DatabaseOptions{.url = url_, .node = "one"});
-    volumes_.emplace(*database_);
-    outbox_.emplace(*database_);
-    orders_.emplace(*database_);
-    audit_.emplace(*database_);
-    received_.emplace(*database_);
-    jobs_.emplace(*database_, blobs_,
-                  store::JobStoreOptions{.max_queued = options_.max_queued,
-                                         .retry_delay = options_.retry_delay,
-                                         .mesher_version = "test",
-                                         .grace = std::chrono::milliseconds(0),
-                                         .expected_ms = options_.expected_ms});
-  }
-
-  const EngineOptions options_;
-  const std::string url_;
-  TemporaryFolder folder_;
-  store::DataFolder data_;
-  store::FileBlobStore blobs_;
-  std::optional<store::postgresql::Database> database_;
-  std::optional<store::SqlVolumeStore> volumes_;
-  std::optional<store::postgresql::PostgresOutbox> outbox_;
-  std::optional<store::SqlOrderStore> orders_;
-  std::optional<store::SqlAuditTrail> audit_;
-  std::optional<store::SqlReceivedStore> received_;
-  std::optional<store::postgresql::PostgresJobStore> jobs_;
+  const store::postgresql::DatabaseOptions database_options_{.url = Postgres::shared().new_place(),
+                                                             .node = "one"};
 };
 
 template <class Kind>

@@ -1,6 +1,5 @@
 #include <functional>
 #include <optional>
-#include <set>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -43,7 +42,6 @@ class FileBlobStoreTest : public testing::Test {
   }
 
   std::size_t blob_files() { return test::files_below(data_.blobs()).size(); }
-  std::size_t scratch_files() { return test::files_below(data_.scratch()).size(); }
 
   test::TemporaryFolder folder_;
   DataFolder data_{folder_ / "data"};
@@ -63,53 +61,6 @@ TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
   writer->commit();
   power.leave(folder_ / "left");
   EXPECT_EQ(test::read_file(folder_ / "left/data/blobs/2c" / kHello), "hello");
-}
-
-TEST_F(FileBlobStoreTest, AWriterThatIsGivenUpLeavesNothing) {
-  {
-    const auto writer = blobs_.begin("");
-    writer->write(as_span("hello"));
-    EXPECT_EQ(scratch_files(), 1U);
-  }
-  EXPECT_EQ(scratch_files(), 0U);
-  EXPECT_EQ(blob_files(), 0U);
-}
-
-TEST_F(FileBlobStoreTest, AWriterThatCommitsLeavesTheBlobOnly) {
-  put("hello");
-  EXPECT_EQ(scratch_files(), 0U);
-  EXPECT_EQ(blob_files(), 1U);
-}
-
-TEST_F(FileBlobStoreTest, TheSameBytesAreOneBlob) {
-  EXPECT_EQ(put("hello").key, put("hello").key);
-  EXPECT_EQ(blob_files(), 1U);
-  EXPECT_NE(put("hallo").key, kHello);
-  EXPECT_EQ(blob_files(), 2U);
-}
-
-TEST_F(FileBlobStoreTest, WritersDoNotMeet) {
-  std::vector<std::jthread> threads;
-  for (int thread = 0; thread < 4; ++thread) {
-    threads.emplace_back([this, thread] {
-      for (int n = 0; n < 20; ++n) put("common");
-      for (int n = 0; n < 20; ++n) put(std::to_string(thread * 100 + n));
-    });
-  }
-  threads.clear();
-  EXPECT_EQ(blob_files(), 1U + 4 * 20);
-  EXPECT_EQ(scratch_files(), 0U);
-}
-
-TEST_F(FileBlobStoreTest, AdoptsAFinishedFileByMovingIt) {
-  const std::string text(3 << 20, 'x');
-  test::write_file(data_.scratch() / "made", text);
-  const Blob blob = digest_of(data_.scratch() / "made");
-  blobs_.adopt(data_.scratch() / "made", blob, "", {});
-  EXPECT_EQ(blob.bytes, text.size());
-  EXPECT_EQ(blob.key, put(text).key);
-  EXPECT_FALSE(std::filesystem::exists(data_.scratch() / "made"));
-  EXPECT_TRUE(get(blob.key) == text);
 }
 
 TEST_F(FileBlobStoreTest, AdoptingWhatIsNotThereIsRefused) {
@@ -196,23 +147,6 @@ class Sweeping : public FileBlobStoreTest {
   Swept sweep() { return blobs_.sweep(in(std::chrono::seconds(1)), nothing); }
   std::size_t in_quarantine() { return test::files_below(data_.quarantine()).size(); }
 };
-
-TEST_F(Sweeping, PutsWhatIsNotNamedIntoQuarantine) {
-  const std::string other = put("other").key;
-  put("hello");
-  put("more");
-  std::set<std::string> asked;
-  const Swept swept = blobs_.sweep(in(std::chrono::seconds(1)), [&](const std::string& key) {
-    asked.insert(key);
-    return key == kHello;
-  });
-  EXPECT_EQ(swept.quarantined, 2U);
-  EXPECT_EQ(swept.left, 0U);
-  EXPECT_EQ(asked.size(), 3U);
-  EXPECT_EQ(blob_files(), 1U);
-  EXPECT_EQ(in_quarantine(), 2U);
-  EXPECT_EQ(get(kHello), "hello");
-}
 
 TEST_F(Sweeping, WhatIsAskedForComesBack) {
   const std::string other = put("other").key;

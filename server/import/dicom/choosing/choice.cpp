@@ -1,18 +1,62 @@
 #include "server/import/dicom/choosing/choice.h"
 
 #include <algorithm>
+#include <map>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/text.h"
+#include "proto/notes.h"
 #include "server/import/dicom/choosing/volumes.h"
-#include "server/import/dicom/geometry/frame_of_reference.h"
 #include "server/import/dicom/geometry/placement.h"
+#include "server/import/dicom/geometry/stack.h"
 #include "server/import/dicom/kinds/segmentation.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
 namespace {
+
+std::map<std::string_view, std::size_t> slices_by_uid(std::span<const Slice> slices) {
+  std::map<std::string_view, std::size_t> counts;
+  for (const Slice& slice : slices) ++counts[slice.image->frame_of_reference_uid];
+  return counts;
+}
+
+// Positions refer to a frame of reference, which all slices of a volume share. Some anonymisers
+// give each slice a different one, or none. Then the only evidence is that the slices lie evenly
+// spaced on one line, which the caller has checked. This suffices if every slice has a different
+// frame of reference or none; a note reports it. Groups of slices may come from several coordinate
+// systems and are rejected unless `options` accept them.
+std::optional<Note> note_on_frames_of_reference(std::span<const Slice> slices,
+                                                const ImportOptions& options) {
+  const auto counts = slices_by_uid(slices);
+  if (counts.size() == 1) return std::nullopt;
+  const bool one_each = std::ranges::all_of(
+      counts, [](const auto& entry) { return entry.first.empty() || entry.second == 1; });
+  const std::size_t several = counts.size() - counts.count("");
+  const std::string found = "the " + std::to_string(slices.size()) + " slices have " +
+                            std::to_string(several) + " frames of reference (0020,0052)" +
+                            (counts.contains("") ? ", and some have none." : ".");
+  const std::string even_line =
+      " The slices are evenly spaced on one line, so they were read as one volume.";
+  if (one_each) {
+    return note_of(NoteCode::kFrameOfReference,
+                   "Each slice has its own frame of reference, as some anonymisers write it: " +
+                       found + even_line);
+  }
+  if (options.accepts(NoteCode::kFrameOfReference)) {
+    return note_of(NoteCode::kFrameOfReference,
+                   "The request accepts several frames of reference: " + found + even_line);
+  }
+  throw_overridable(
+      NoteCode::kFrameOfReference,
+      "The series is not a single volume: " + found +
+          " Slices with different frames of reference may not share one coordinate system." +
+          begin_remedy(options, "Add") + "accept=frame-of-reference to read them as one volume.");
+}
 
 // "0 (EchoTime 4.92, 20 slices); 1 (...); ..."
 std::string listed(const std::vector<Choice>& choices) {

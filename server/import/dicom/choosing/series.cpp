@@ -6,12 +6,11 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/dicom/contours/structure_set.h"
-#include "server/import/dicom/elements/beginning.h"
+#include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/kinds/describe.h"
-#include "server/import/dicom/kinds/object_kinds.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/source.h"
 
@@ -57,18 +56,15 @@ Source describe_source(const NamedFile& from, const DicomFile& file) {
   return source;
 }
 
-bool begins_as_dicom(const std::filesystem::path& path) {
-  const std::string head = InputFile(path).text(0, kSniffBytes);
-  return find_beginning(std::as_bytes(std::span(head))).has_value();
-}
-
 class HeaderReader {
  public:
   HeaderReader(std::filesystem::path scratch, std::uint64_t most_sample_bytes)
       : scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
 
   void read(const NamedFile& from) {
-    if (!begins_as_dicom(from.path)) return ignore(upload_, from, "it is not a DICOM file");
+    if (!find_beginning(InputFile(from.path).text(0, kSniffBytes))) {
+      return ignore(upload_, from, "it is not a DICOM file");
+    }
     const DicomFile file(from.path, scratch_, most_sample_bytes_);
     if (is_structure_set(file.data())) return read_structure_set(from, file);
     if (const auto reason = reason_to_ignore(file)) return ignore(upload_, from, *reason);
@@ -150,6 +146,11 @@ std::string joined_titles(const std::vector<Choice>& choices) {
   return text + (choices.size() > kMostNamed ? "; ..." : "");
 }
 
+[[noreturn]] void throw_series_choice(const std::string& reason,
+                                      const std::vector<Choice>& choices) {
+  throw_choice(reason + ". Choose one with series=UID: " + joined_titles(choices) + '.', choices);
+}
+
 std::vector<Choice> list_all(const Upload& upload) {
   std::vector<Choice> choices = list_series(upload.sources);
   for (const StructureFile& each : upload.structure_sets) {
@@ -228,9 +229,7 @@ const StructureFile* chosen_structures(const Upload& upload, const std::string& 
                    " structure sets of the series. Send each one by itself with its images.");
   }
   const std::vector<Choice> choices = list_all(upload);
-  throw_choice("The upload holds " + std::to_string(choices.size()) +
-                   " series. Choose one with series=UID: " + joined_titles(choices) + '.',
-               choices);
+  throw_series_choice("The upload holds " + std::to_string(choices.size()) + " series", choices);
 }
 
 std::vector<Source> images_of(const StructureFile& structures, std::vector<Source> sources) {
@@ -252,15 +251,9 @@ std::vector<Source> choose_series(std::vector<Source> sources, const std::string
   const std::vector<Choice> all = list_series(sources);
   if (!uid.empty()) {
     std::erase_if(sources, [&](const Source& source) { return source.series_uid != uid; });
-    if (sources.empty()) {
-      throw_choice("The upload has no series " + in_quotes(uid) +
-                       ". Choose one with series=UID: " + joined_titles(all) + '.',
-                   all);
-    }
+    if (sources.empty()) throw_series_choice("The upload has no series " + in_quotes(uid), all);
   } else if (all.size() > 1) {
-    throw_choice("The upload holds " + std::to_string(all.size()) +
-                     " series. Choose one with series=UID: " + joined_titles(all) + '.',
-                 all);
+    throw_series_choice("The upload holds " + std::to_string(all.size()) + " series", all);
   }
   for (const Source& source : sources) {
     if (!source.fault) continue;

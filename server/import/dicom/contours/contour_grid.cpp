@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/text.h"
+#include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/vectors.h"
 #include "server/import/source/source.h"
 
@@ -89,17 +90,6 @@ Extents extents_of(const StructureSet& set, const std::array<Vector3, 3>& axes) 
 }
 
 }  // namespace
-
-std::optional<double> usual_gap(const std::vector<double>& ascending) {
-  if (ascending.size() < 2) return std::nullopt;
-  std::vector<double> gaps;
-  for (std::size_t at = 1; at < ascending.size(); ++at) {
-    gaps.push_back(ascending[at] - ascending[at - 1]);
-  }
-  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
-  std::ranges::nth_element(gaps, middle);
-  return *middle;
-}
 
 std::optional<double> usual_distance(const StructureSet& set) {
   const Vector3 normal = normal_of(set);

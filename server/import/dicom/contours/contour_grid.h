@@ -23,7 +23,4 @@ ContourGrid grid_around(const StructureSet& set, const std::array<double, 3>& sp
 // The usual distance of the contours' planes along their normal, in mm; empty for a single plane.
 std::optional<double> usual_distance(const StructureSet& set);
 
-// The usual (median) difference of ascending numbers; empty for fewer than two.
-std::optional<double> usual_gap(const std::vector<double>& ascending);
-
 }  // namespace isomesh::import::dicom

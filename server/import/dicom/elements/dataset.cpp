@@ -1,15 +1,15 @@
 #include "server/import/dicom/elements/dataset.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <string_view>
 
 #include "base/text.h"
-#include "server/import/dicom/elements/beginning.h"
 #include "server/import/dicom/elements/parser.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/source/gzip.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/source.h"
 
@@ -17,8 +17,7 @@ namespace isomesh::import::dicom {
 namespace {
 
 std::size_t beginning_of(const InputFile& file) {
-  const std::string head = file.text(0, kSniffBytes);
-  const auto beginning = find_beginning(std::as_bytes(std::span(head)));
+  const auto beginning = find_beginning(file.text(0, kSniffBytes));
   if (!beginning) throw_unusable("The file is not a DICOM file.");
   return *beginning;
 }
@@ -50,6 +49,52 @@ std::uint64_t most_bytes(const DataSet& data, std::uint64_t most_sample_bytes) {
   if (bytes == 0) return kMostOfOthers;
   const auto most = static_cast<double>(most_sample_bytes);
   return kMostHeaderBytes + static_cast<std::uint64_t>(std::min(bytes * 2, most));
+}
+
+constexpr std::size_t kPreambleBytes = 128;
+constexpr std::string_view kPrefix = "DICM";
+constexpr std::string_view kStandardUids = "1.2.840.10008.";
+
+struct LeadingElement {
+  Tag tag = 0;
+  std::string_view value;
+};
+
+// Removes the first element from `rest`. Two letters in place of an implicit length are always a
+// value representation: as a length they would exceed the head.
+std::optional<LeadingElement> take_element(std::string_view& rest) {
+  constexpr std::size_t kShortHead = 8;
+  constexpr std::size_t kLongHead = 12;
+  if (rest.size() < kLongHead) return std::nullopt;
+  const HeaderBytes numbers(rest, false);
+  LeadingElement element;
+  element.tag = std::uint32_t{numbers.at<std::uint16_t>(0)} << 16 | numbers.at<std::uint16_t>(2);
+  std::size_t head = kShortHead;
+  auto length = numbers.at<std::uint32_t>(4);
+  if (const std::string_view vr = rest.substr(4, 2); is_representation(vr)) {
+    head = has_short_length(vr) ? kShortHead : kLongHead;
+    length =
+        has_short_length(vr) ? numbers.at<std::uint16_t>(6) : numbers.at<std::uint32_t>(kShortHead);
+  }
+  if (length > rest.size() - head) return std::nullopt;
+  element.value = rest.substr(head, length);
+  rest.remove_prefix(head + length);
+  return element;
+}
+
+bool names_a_standard(Tag tag) {
+  return tag == kMediaStorageSopClassUid || tag == kTransferSyntaxUid || tag == kSopClassUid;
+}
+
+bool begins_with_elements(std::string_view rest) {
+  Tag last = 0;
+  while (const auto element = take_element(rest)) {
+    const unsigned group = element->tag >> 16;
+    if (element->tag <= last || (group != 0x0002 && group != 0x0008)) return false;
+    if (names_a_standard(element->tag)) return element->value.starts_with(kStandardUids);
+    last = element->tag;
+  }
+  return false;
 }
 
 }  // namespace
@@ -118,25 +163,19 @@ std::optional<std::int64_t> DataSet::integer(Tag tag) const {
 std::optional<std::uint32_t> DataSet::unsigned_number(Tag tag) const {
   const Element* element = find(tag);
   if (element == nullptr) return std::nullopt;
-  const std::string& value = element->value;
-  const std::size_t bytes = value.size() >= 4 ? 4 : value.size();
-  if (bytes != 2 && bytes != 4) return std::nullopt;
-  std::uint32_t number = 0;
-  for (std::size_t at = 0; at < bytes; ++at) {
-    const auto byte = static_cast<unsigned char>(value[big_endian ? at : bytes - 1 - at]);
-    number = number << 8 | byte;
-  }
-  return number;
+  const HeaderBytes value(element->value, big_endian);
+  if (element->value.size() >= 4) return value.at<std::uint32_t>(0);
+  if (element->value.size() == 2) return value.at<std::uint16_t>(0);
+  return std::nullopt;
 }
 
 std::vector<std::uint32_t> DataSet::unsigned_numbers(Tag tag) const {
   const Element* element = find(tag);
   if (element == nullptr || element->value.size() % 2 != 0) return {};
+  const HeaderBytes value(element->value, big_endian);
   std::vector<std::uint32_t> numbers;
   for (std::size_t at = 0; at < element->value.size(); at += 2) {
-    const auto first = static_cast<unsigned char>(element->value[at]);
-    const auto second = static_cast<unsigned char>(element->value[at + 1]);
-    numbers.push_back(big_endian ? first << 8U | second : second << 8U | first);
+    numbers.push_back(value.at<std::uint16_t>(at));
   }
   return numbers;
 }
@@ -144,12 +183,10 @@ std::vector<std::uint32_t> DataSet::unsigned_numbers(Tag tag) const {
 std::vector<double> DataSet::binary_reals(Tag tag) const {
   const Element* element = find(tag);
   if (element == nullptr || element->value.size() % sizeof(double) != 0) return {};
+  const HeaderBytes value(element->value, big_endian);
   std::vector<double> result;
   for (std::size_t at = 0; at < element->value.size(); at += sizeof(double)) {
-    std::array<char, sizeof(double)> bytes;
-    std::copy_n(element->value.data() + at, bytes.size(), bytes.begin());
-    if (big_endian) std::ranges::reverse(bytes);
-    result.push_back(std::bit_cast<double>(bytes));
+    result.push_back(value.at<double>(at));
   }
   return result;
 }
@@ -186,6 +223,14 @@ DicomFile::DicomFile(const std::filesystem::path& path, const std::filesystem::p
   ParsedFile parsed = parse_data_set(bytes(), begin, transfer_syntax());
   data_ = std::move(parsed.data);
   pixels_ = std::move(parsed.pixels);
+}
+
+std::optional<std::size_t> find_beginning(std::string_view head) {
+  if (head.size() >= kPreambleBytes && head.substr(kPreambleBytes).starts_with(kPrefix)) {
+    return kPreambleBytes + kPrefix.size();
+  }
+  if (begins_with_elements(head)) return 0;
+  return std::nullopt;
 }
 
 }  // namespace isomesh::import::dicom

@@ -10,6 +10,7 @@
 #include "server/import/dicom/elements/private_elements.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/elements/text.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
@@ -167,12 +168,8 @@ class Parser {
   }
 
   std::uint32_t number(std::uint64_t offset, std::size_t bytes, bool big_endian) {
-    const std::string_view text = window(offset, bytes);
-    std::uint32_t result = 0;
-    for (std::size_t i = 0; i < bytes; ++i) {
-      result = result << 8 | static_cast<unsigned char>(text[big_endian ? i : bytes - 1 - i]);
-    }
-    return result;
+    const HeaderBytes numbers(window(offset, bytes), big_endian);
+    return bytes == 2 ? numbers.at<std::uint16_t>(0) : numbers.at<std::uint32_t>(0);
   }
 
   Tag read_tag(bool big_endian) {

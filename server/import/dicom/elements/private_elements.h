@@ -10,7 +10,7 @@
 namespace isomesh::import::dicom {
 
 // Siemens: the number of slices of a mosaic, and the CSA headers of the image (csa_header.h) and of
-// the series (ascconv.h). United Imaging: the number of slices of a grid, and an item for each.
+// the series (csa_header.h). United Imaging: the number of slices of a grid, and an item for each.
 // Tags are those in block 10.
 inline constexpr Tag kMosaicImages = 0x0019100A;
 inline constexpr Tag kCsaImageHeader = 0x00291010;

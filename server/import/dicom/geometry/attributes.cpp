@@ -77,15 +77,6 @@ bool all_finite(const std::vector<double>& numbers) {
 // File texts that appear in messages.
 constexpr std::size_t kLongestPhase = 64;
 
-// Cut at the start of a character, which may have several bytes.
-std::string shortened(std::string text) {
-  if (text.size() <= kLongestPhase) return text;
-  std::size_t end = kLongestPhase;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-  text.resize(end);
-  return text;
-}
-
 std::string value_of(const DataSet& data, const PhaseRow& row) {
   std::string value;
   switch (row.kind) {
@@ -101,7 +92,7 @@ std::string value_of(const DataSet& data, const PhaseRow& row) {
       if (const auto number = data.unsigned_number(row.tag)) value = std::to_string(*number);
       break;
   }
-  return shortened(std::move(value));
+  return std::string(beginning(value, kLongestPhase));
 }
 
 constexpr auto kPhaseNames = [] {

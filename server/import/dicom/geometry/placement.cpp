@@ -83,6 +83,17 @@ std::string count_of(std::size_t count, const std::string& what) {
   return std::to_string(count) + ' ' + what + (count == 1 ? "" : "s");
 }
 
+std::optional<double> usual_gap(const std::vector<double>& ascending) {
+  if (ascending.size() < 2) return std::nullopt;
+  std::vector<double> gaps;
+  for (std::size_t at = 1; at < ascending.size(); ++at) {
+    gaps.push_back(ascending[at] - ascending[at - 1]);
+  }
+  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
+  std::ranges::nth_element(gaps, middle);
+  return *middle;
+}
+
 std::string in_mm(double value) { return to_text(std::round(value * 1000) / 1000) + " mm"; }
 
 bool same_orientation(const Slice& a, const Slice& b) {

@@ -1,6 +1,7 @@
 // Positions of slices along their normal, and their lattice.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,6 +28,9 @@ std::vector<Placed> placed_along_normal(std::span<const Slice> slices);
 
 // The index of the first slice of each position.
 std::vector<std::size_t> position_starts(std::span<const Placed> placed);
+
+// The usual (median) difference of ascending numbers; empty for fewer than two.
+std::optional<double> usual_gap(const std::vector<double>& ascending);
 
 std::string in_mm(double value);
 std::string count_of(std::size_t count, const std::string& what);

@@ -48,16 +48,6 @@ void refuse_shared_positions(std::span<const Placed> placed, bool from_end) {
                  std::to_string(positions) + " occurs more than once.");
 }
 
-double median_gap(std::span<const Placed> placed) {
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < placed.size(); ++i) {
-    gaps.push_back(placed[i].along - placed[i - 1].along);
-  }
-  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
-  std::nth_element(gaps.begin(), middle, gaps.end());
-  return *middle;
-}
-
 // "slice 41 of 93", "slices 41 and 42 of 93", "slices 3, 9 and 10 of 20", ...
 std::string missing_slices(const std::vector<std::size_t>& places, std::size_t count,
                            bool from_end) {
@@ -76,7 +66,9 @@ std::string missing_slices(const std::vector<std::size_t>& places, std::size_t c
 }
 
 void refuse_gaps(std::span<const Placed> placed, bool from_end) {
-  const double usual = median_gap(placed);
+  std::vector<double> places;
+  for (const Placed& each : placed) places.push_back(each.along);
+  const double usual = usual_gap(places).value();
   std::vector<std::size_t> missing;
   std::size_t place = 0;
   std::size_t uneven = 0;

@@ -37,7 +37,7 @@ struct Stack {
 
 // Sorts slices by position along their normal, never by name or instance number. A tilted gantry
 // gives a sheared lattice: the third axis runs from slice to slice. Does not check frames of
-// reference (frame_of_reference.h).
+// reference (choosing/choice.cpp).
 //
 // Throws Error kUnusableVolume, naming slices, if there are fewer than two; if their sizes,
 // spacings or orientations (a component by more than 5e-4) differ; if several are at one position;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/text.h"
@@ -14,6 +15,7 @@
 #include "server/import/dicom/pixels/pixel_layout.h"
 #include "server/import/dicom/pixels/value_table.h"
 #include "server/import/source/source.h"
+#include "server/volume/object_classes.h"
 
 namespace isomesh::import::dicom {
 namespace {
@@ -142,6 +144,23 @@ Image describe_image(const DicomFile& file) {
   if (frames == 1 && is_mosaic(data)) unfold_mosaic(data, image);
   if (is_in_volume_space(Attributes(data, 0))) image.place = PlaceKind::kVolume;
   return image;
+}
+
+std::optional<std::string> reason_to_ignore(const DicomFile& file) {
+  const DataSet& data = file.data();
+  if (data.find(kDirectoryRecordSequence) != nullptr) return "it is a directory of DICOM files";
+  const std::string_view sop_class = data.text(kSopClassUid);
+  const auto kind = volume::kind_without_images(
+      sop_class.empty() ? std::string_view(file.meta().sop_class_uid) : sop_class);
+  if (kind) {
+    return "it is " + std::string(*kind) + " (modality " + in_quotes(data.text(kModality)) + ")";
+  }
+  if (data.find(kRows) == nullptr && !file.pixels()) {
+    return "it is not an image (modality " + in_quotes(data.text(kModality)) + ")";
+  }
+  const auto types = data.texts(kImageType);
+  if (std::ranges::find(types, "LOCALIZER") != types.end()) return "it is a localiser";
+  return std::nullopt;
 }
 
 }  // namespace isomesh::import::dicom

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "base/text.h"
-#include "server/import/dicom/elements/ascconv.h"
 #include "server/import/dicom/elements/csa_header.h"
 #include "server/import/dicom/elements/private_elements.h"
 #include "server/import/dicom/elements/tags.h"

@@ -38,8 +38,8 @@ bool is_placed_grid(const DataSet& data);
 //
 // A Siemens mosaic is a square of tiles. Its position is that of a slice as large as the mosaic
 // with the centre of the first tile. Its slices follow one another along the normal of the CSA
-// header, in either direction, or as in the protocol (ascconv.h). A grid of United Imaging has as
-// many rows as it needs, and a position for each slice.
+// header, in either direction, or as in the protocol (csa_header.h). A grid of United Imaging has
+// as many rows as it needs, and a position for each slice.
 //
 // Throws Error kUnusableVolume if the object does not define the number and the positions of the
 // slices, or if the tiles do not fit its size.

@@ -1,9 +1,9 @@
-#include "server/http/requests/trace.h"
-
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "server/http/requests/request.h"
 
 namespace isomesh::http {
 namespace {

@@ -1,11 +1,10 @@
 // Texts that switch between character sets. The sets by themselves: import_test.cpp.
-#include "server/import/dicom/elements/character_sets.h"
-
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "base/text.h"
+#include "server/import/dicom/elements/text.h"
 
 namespace isomesh::import::dicom {
 namespace {

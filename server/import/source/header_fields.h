@@ -1,13 +1,24 @@
-// Numbers in a binary header.
+// Fields of headers: numbers in binary ones, and texts by their names in others.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <functional>
+#include <map>
+#include <string>
 #include <string_view>
 
 namespace isomesh::import {
+
+using HeaderTexts = std::map<std::string, std::string, std::less<>>;
+
+// Returns an empty text for a missing field.
+inline std::string_view value_of(const HeaderTexts& texts, std::string_view name) {
+  const auto found = texts.find(name);
+  return found == texts.end() ? std::string_view{} : std::string_view(found->second);
+}
 
 // Reads numbers of either byte order. The caller makes sure that `bytes` holds them.
 class HeaderBytes {
