@@ -207,10 +207,11 @@ class ConnectionsTest : public testing::Test {
       for (const auto& [name, value] : request.query) text += '<' + name + '=' + value + '>';
       response.set_body(text, "text/plain");
     });
-    add("POST", "/body", [](const Request& request, Response& response) {
+    add("POST", "/body", [this](const Request& request, Response& response) {
       std::size_t size = 0;
       const bool whole = request.body->read([&](std::string_view piece) {
         size += piece.size();
+        body_bytes_ += piece.size();
         return true;
       });
       const bool slow = request.body->was_too_slow();
@@ -250,6 +251,7 @@ class ConnectionsTest : public testing::Test {
   std::atomic<int> said_ = 0;
   std::atomic<std::size_t> made_ = 0;
   std::atomic<int> runs_ = 0;
+  std::atomic<std::size_t> body_bytes_ = 0;  // that handlers of /body have read
   std::atomic<int> resumed_ = 0;
   std::atomic<int> cancelled_ = 0;
   std::atomic<bool> ended_ = false;

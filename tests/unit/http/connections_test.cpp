@@ -199,6 +199,7 @@ TEST_F(ConnectionsTest, TheEndCutsBodiesAndAnswersWaiters) {
   ASSERT_TRUE(eventually([&] { return runs_ == 1; }));
   const Connection sending(url_);
   sending.send("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc");
+  ASSERT_TRUE(eventually([&] { return body_bytes_ == 3; }));
   hang_on(3, request("GET", "/words"));
   ASSERT_TRUE(eventually([&] { return connections_->sending() == 3; }));
   connections_->close(1h);
@@ -220,7 +221,8 @@ TEST_F(ConnectionsTest, TheEndRefusesRequestsThatHaveNotBegun) {
   ASSERT_TRUE(hold(request("GET", "/compute")) && eventually([&] { return runs_ == 1; }));
   ASSERT_TRUE(hold(request("GET", "/compute")));
   ASSERT_TRUE(hold(request("GET", "/block")) && eventually([&] { return busy_.load(); }));
-  ASSERT_TRUE(hold("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc"));
+  ASSERT_TRUE(hold("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc") &&
+              eventually([&] { return body_bytes_ == 3; }));
   ASSERT_TRUE(hold(request("POST", "/do", "x")));
   std::jthread closing([&] { connections_->close(1h); });
   EXPECT_EQ(clients_[3].receive().body, "cut 3");
