@@ -66,15 +66,16 @@ class Pages {
   ScratchFile samples_;
 };
 
-Difference difference_of(const TiffMeaning& meaning) {
+// Between volumes that are given by their numbers in the meaning.
+Difference difference_of(const TiffMeaning& meaning, const std::vector<std::uint64_t>& volumes) {
   const bool by_channel = meaning.channels > 1;
   const bool by_time = meaning.times > 1;
   return {.what = by_channel && by_time ? "channel and time"
                   : by_channel          ? "channel"
                                         : "time",
-          .title = [=](std::uint64_t index) {
-            const std::string channel = "channel " + std::to_string(index % meaning.channels);
-            const std::string time = "time " + std::to_string(index / meaning.channels);
+          .title = [=, channels = meaning.channels](std::uint64_t index) {
+            const std::string channel = "channel " + std::to_string(volumes[index] % channels);
+            const std::string time = "time " + std::to_string(volumes[index] / channels);
             if (!by_time) return channel;
             return by_channel ? channel + ", " + time : time;
           }};
@@ -99,9 +100,11 @@ Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   if (meaning.slices == 1)
     tiff.read(0, pages.check(), pages.sink());  // refused, whatever is chosen
   SourceVolume source;
-  choose_volume(meaning.channels * meaning.times, difference_of(meaning), task.options, source);
+  const std::vector<std::uint64_t> volumes = meaning.volumes();
+  choose_volume(volumes.size(), difference_of(meaning, volumes), task.options, source);
   for (std::uint64_t slice = 0; slice < meaning.slices; ++slice) {
-    tiff.read(meaning.page_of(source.chosen.index, slice), pages.check(), pages.sink());
+    const std::uint64_t page = meaning.page_of(volumes[source.chosen.index], slice);
+    tiff.read(page, pages.check(), pages.sink());
   }
   set_meaning(source, meaning);
   source.notes.push_back(lps_assumed("A TIFF image"));
