@@ -111,6 +111,29 @@ Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   return pages.write(std::move(source));
 }
 
+// An image file, inflated if it is compressed.
+class PlainFile {
+ public:
+  PlainFile(const std::filesystem::path& path, const ImportTask& task) : path_(path) {
+    const InputFile file(path);
+    const std::string head = file.text(0, kSniffBytes);
+    if (!is_gzip(std::as_bytes(std::span(head)))) return;
+    inflated_.emplace(task.scratch, ".inflated");
+    path_ = inflated_->path();
+    const std::uint64_t limit = most_image_bytes(file, task).file;
+    const std::uint64_t bytes =
+        inflate_range(file, {0, file.size()}, limit,
+                      [&](std::span<const std::byte> piece) { inflated_->write(piece); });
+    if (bytes > limit) throw_unusable("The compressed image is too large.");
+  }
+
+  InputFile open() const { return InputFile(path_); }
+
+ private:
+  std::filesystem::path path_;
+  std::optional<ScratchFile> inflated_;
+};
+
 TiffMeaning read_page(const InputFile& file, Pages& pages) {
   const std::string head = file.text(0, kSniffBytes);
   if (is_png(head)) {
@@ -122,6 +145,7 @@ TiffMeaning read_page(const InputFile& file, Pages& pages) {
     return {};
   }
   TiffFile tiff(file);
+  if (tiff.pages() > 1) throw_unusable("It has several pages. Send it by itself.");
   tiff.read(0, pages.check(), pages.sink());
   return tiff.meaning();
 }
@@ -134,12 +158,21 @@ void unite(TiffMeaning& all, const TiffMeaning& next) {
   if (next.spacing != all.spacing) all.spacing.reset();
 }
 
-void check_gaps(const std::vector<ImageFile>& files) {
+// In the order of the numbers in their names.
+std::vector<ImageFile> in_order(const std::vector<ImageFile>& files) {
   std::vector<std::string> names;
   for (const ImageFile& file : files) names.push_back(file.name);
-  const std::string missing = missing_between(names);
-  if (missing.empty()) return;
-  throw_unusable("An image is missing between the others: " + printable(missing) + ".");
+  std::vector<ImageFile> sorted;
+  for (const std::size_t at : slice_order(names)) sorted.push_back(files[at]);
+  return sorted;
+}
+
+// Files of one page may tell of all channels and times.
+void check_files(const TiffMeaning& meaning, std::size_t files) {
+  if (meaning.channels * meaning.times == 1 || meaning.slices == files) return;
+  throw_unusable("The descriptions of the TIFF files tell of " + counts_of(meaning) +
+                 ", but there are " + std::to_string(files) +
+                 " files. Put the images of each channel and time into a folder of their own.");
 }
 
 }  // namespace
@@ -157,21 +190,21 @@ bool has_pages(const std::filesystem::path& path) {
 
 Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
   if (files.size() == 1) {
-    const InputFile file(files.front().path);
+    const PlainFile plain(files.front().path, task);
+    const InputFile file = plain.open();
     if (is_tiff(file.text(0, kSniffBytes))) {
       TiffFile tiff(file);
       return read_pages(tiff, task);
     }
   }
-  std::ranges::sort(files, comes_before, &ImageFile::name);
-  check_gaps(files);
+  files = in_order(files);
   SourceVolume source;
   choose_volume(1, {}, task.options, source);
   Pages pages(files.size(), task);
   std::optional<TiffMeaning> all;
   for (const ImageFile& file : files) {
     try {
-      const TiffMeaning meaning = read_page(InputFile(file.path), pages);
+      const TiffMeaning meaning = read_page(PlainFile(file.path, task).open(), pages);
       if (!all) all = meaning;
       unite(*all, meaning);
     } catch (const Error& error) {
@@ -179,7 +212,8 @@ Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
       throw error.with_detail(in_quotes(file.name) + ": " + error.what());
     }
   }
-  set_meaning(source, all.value());
+  check_files(all.value(), files.size());
+  set_meaning(source, *all);
   source.notes.push_back(lps_assumed("A stack of images"));
   return pages.write(std::move(source));
 }

@@ -194,6 +194,9 @@ TEST(Tiff, PagesBeginAtTheirTopLeft) {
   EXPECT_EQ(import_bytes(tiff({stored, stored}, {}, 4), {}, kSpaced).sample_bytes(),
             "ijklefghabcd"
             "ijklefghabcd");
+  std::string different = tiff({stored, stored}, {}, 4);
+  different[different.rfind(std::string("\x12\x01\3\0\1\0\0\0\4", 9)) + 8] = 1;
+  EXPECT_THAT(import_bytes(different, {}, kSpaced).error, HasSubstr("differ in their orientation"));
 }
 
 }  // namespace
