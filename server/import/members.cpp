@@ -15,6 +15,7 @@
 #include "proto/volume_formats.h"
 #include "server/import/archives/archive.h"
 #include "server/import/dicom/import.h"
+#include "server/import/images/natural_order.h"
 #include "server/import/images/stack.h"
 #include "server/import/labels_beside.h"
 #include "server/import/readers.h"
@@ -202,29 +203,61 @@ struct Contents {
   const Reader* slice_reader = nullptr;
   // Other files, listed as ignored.
   std::vector<ArchiveMember> others;
+  // Pictures beside numbered ones, listed as ignored.
+  std::vector<ArchiveMember> unnumbered;
 };
 
-std::vector<Stack> stacks_of(const std::vector<FoundVolume>& pages) {
-  std::vector<Stack> stacks;
-  std::map<std::string, Stack> by_pattern;
-  for (const auto& [member, reader, doubles] : pages) {
-    if (has_pages(member.path)) {
-      stacks.push_back({member.name, reader, {{member.name, member.path}}});
-      continue;
-    }
-    const std::string pattern =
-        std::string(folder_of(member.name)) + "*." + std::string(reader->name);
-    Stack& stack = by_pattern.try_emplace(pattern, Stack{pattern, reader}).first->second;
-    stack.files.push_back({member.name, member.path});
+using Pictures = std::vector<const FoundVolume*>;
+
+void add_stack(const std::string& name, const Pictures& pictures, std::vector<Stack>& stacks) {
+  Stack stack = {name, pictures.front()->reader};
+  for (const FoundVolume* picture : pictures) {
+    stack.files.push_back({picture->member.name, picture->member.path});
   }
-  for (auto& [pattern, stack] : by_pattern) stacks.push_back(std::move(stack));
-  return stacks;
+  stacks.push_back(std::move(stack));
+}
+
+// A folder's pictures of one format. Those whose names differ in numbers only are a volume, and if
+// there are none, all of them together.
+void add_stacks(const std::string& pattern, const Pictures& pictures, Contents& contents) {
+  std::map<std::string, Pictures> by_name;
+  for (const FoundVolume* picture : pictures) {
+    by_name[lower(name_pattern(picture->member.name))].push_back(picture);
+  }
+  const auto numbered =
+      std::ranges::count_if(by_name, [](const auto& named) { return named.second.size() > 1; });
+  if (numbered == 0) {
+    add_stack(pattern, pictures, contents.stacks);
+    return;
+  }
+  for (const auto& [name, group] : by_name) {
+    if (group.size() == 1) {
+      contents.unnumbered.push_back(group.front()->member);
+    } else {
+      add_stack(numbered == 1 ? pattern : name_pattern(group.front()->member.name), group,
+                contents.stacks);
+    }
+  }
+}
+
+void add_stacks(const std::vector<FoundVolume>& pages, Contents& contents) {
+  std::map<std::string, Pictures> by_pattern;
+  for (const FoundVolume& page : pages) {
+    const auto& [member, reader, doubles] = page;
+    if (has_pages(member.path)) {
+      contents.stacks.push_back({member.name, reader, {{member.name, member.path}}});
+    } else {
+      by_pattern[std::string(folder_of(member.name)) + "*." + std::string(reader->name)].push_back(
+          &page);
+    }
+  }
+  for (const auto& [pattern, pictures] : by_pattern) add_stacks(pattern, pictures, contents);
 }
 
 // Pictures beside a volume are not volumes themselves.
 void add_pages(const std::vector<FoundVolume>& pages, Contents& contents) {
   if (contents.volumes.empty() && contents.slices.empty()) {
-    contents.stacks = stacks_of(pages);
+    add_stacks(pages, contents);
     return;
   }
   for (const FoundVolume& page : pages) contents.others.push_back(page.member);
@@ -268,8 +301,13 @@ Volume read_slices(const Contents& contents, const Input& input) {
 }
 
 // Lists files beside a volume as ignored, except tables of its labels.
-void ignore(const std::vector<ArchiveMember>& others, Volume& volume) {
-  for (const ArchiveMember& other : others) {
+void ignore(const Contents& contents, Volume& volume) {
+  for (const ArchiveMember& other : contents.unnumbered) {
+    if (volume.ignored.size() >= kMostNamed) return;
+    volume.ignored.push_back(
+        {printable(base_of(other.name)), "its name is not one of the numbered images beside it"});
+  }
+  for (const ArchiveMember& other : contents.others) {
     if (volume.ignored.size() >= kMostNamed) return;
     if (is_label_table(other.path)) continue;
     volume.ignored.push_back(
@@ -290,7 +328,7 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   for (std::size_t at = 0; at < std::min(kMostNamed, doubles.size()); ++at) {
     volume.ignored.push_back({std::string(base_of(doubles[at])), reason_of_double(member.name)});
   }
-  ignore(contents.others, volume);
+  ignore(contents, volume);
   return volume;
 }
 
@@ -299,7 +337,7 @@ Volume read_stack(const Stack& stack, const Contents& contents, const Input& inp
   Volume volume = import_images(stack.files, input.task);
   volume.format = stack.reader->name;
   if (stack.files.size() == 1) volume.name = std::string(base_of(stack.name));
-  ignore(contents.others, volume);
+  ignore(contents, volume);
   return volume;
 }
 

@@ -124,11 +124,21 @@ std::vector<std::string> numpy_files() {
 }
 
 std::vector<std::string> tiff_files() {
-  return {tiff({kSamples.substr(0, 12), kSamples.substr(12)}),
-          tiff({kSamples.substr(0, 12), kSamples.substr(12)},
-               "ImageJ=1\nimages=2\nslices=2\nunit=mm\nspacing=2\n"),
-          tiff({kSamples.substr(0, 12), kSamples.substr(12)},
-               "<OME><Pixels DimensionOrder='XYZCT' SizeZ='2' PhysicalSizeX='1'/></OME>")};
+  return {
+      tiff({kSamples.substr(0, 12), kSamples.substr(12)}),
+      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+           "ImageJ=1\nimages=2\nslices=2\nunit=mm\nspacing=2\n"),
+      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+           "<OME><Pixels DimensionOrder='XYZCT' SizeZ='2' PhysicalSizeX='1'/></OME>"),
+      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+           "<OME UUID='u'><Pixels DimensionOrder='XYZCT' SizeZ='2' SizeC='2'><TiffData IFD='1'/>"
+           "<TiffData FirstZ='1' PlaneCount='1'><UUID>u</UUID></TiffData></Pixels></OME>",
+           3),
+      tiff({kSamples}, "ImageJ=1\nimages=2\nslices=2\n"),
+      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+           R"({"shape": [2, 1, 3, 4], "axes": "ZCYX"})"),
+      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+           "SCIFIO=0.41.0\naxes=X,Y,Z\nlengths=4,3,2\nscales=1,1,1\nunits=mm,mm,mm\n")};
 }
 
 std::vector<std::string> afni_files() {

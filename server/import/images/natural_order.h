@@ -1,6 +1,7 @@
 // The order of numbered files.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,5 +15,12 @@ bool comes_before(std::string_view one, std::string_view other);
 // The first name that is missing in the sorted names, if these differ in one number only, which
 // grows by a constant step otherwise. Empty if none is missing.
 std::string missing_between(const std::vector<std::string>& sorted);
+
+// The name with "*" for each number, which may have a fraction and a minus: "a-1.5_b2" is "a*_b*".
+std::string name_pattern(std::string_view name);
+
+// The indexes of the names of slices from the first slice to the last. Throws Error kUnusableVolume
+// if a number is missing, or the numbers allow several orders.
+std::vector<std::size_t> slice_order(const std::vector<std::string>& names);
 
 }  // namespace isomesh::import

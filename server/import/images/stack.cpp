@@ -66,15 +66,16 @@ class Pages {
   ScratchFile samples_;
 };
 
-Difference difference_of(const TiffMeaning& meaning) {
+// Between volumes that are given by their numbers in the meaning.
+Difference difference_of(const TiffMeaning& meaning, const std::vector<std::uint64_t>& volumes) {
   const bool by_channel = meaning.channels > 1;
   const bool by_time = meaning.times > 1;
   return {.what = by_channel && by_time ? "channel and time"
                   : by_channel          ? "channel"
                                         : "time",
-          .title = [=](std::uint64_t index) {
-            const std::string channel = "channel " + std::to_string(index % meaning.channels);
-            const std::string time = "time " + std::to_string(index / meaning.channels);
+          .title = [=, channels = meaning.channels](std::uint64_t index) {
+            const std::string channel = "channel " + std::to_string(volumes[index] % channels);
+            const std::string time = "time " + std::to_string(volumes[index] / channels);
             if (!by_time) return channel;
             return by_channel ? channel + ", " + time : time;
           }};
@@ -99,14 +100,39 @@ Volume read_pages(TiffFile& tiff, const ImportTask& task) {
   if (meaning.slices == 1)
     tiff.read(0, pages.check(), pages.sink());  // refused, whatever is chosen
   SourceVolume source;
-  choose_volume(meaning.channels * meaning.times, difference_of(meaning), task.options, source);
+  const std::vector<std::uint64_t> volumes = meaning.volumes();
+  choose_volume(volumes.size(), difference_of(meaning, volumes), task.options, source);
   for (std::uint64_t slice = 0; slice < meaning.slices; ++slice) {
-    tiff.read(meaning.page_of(source.chosen.index, slice), pages.check(), pages.sink());
+    const std::uint64_t page = meaning.page_of(volumes[source.chosen.index], slice);
+    tiff.read(page, pages.check(), pages.sink());
   }
   set_meaning(source, meaning);
   source.notes.push_back(lps_assumed("A TIFF image"));
   return pages.write(std::move(source));
 }
+
+// An image file, inflated if it is compressed.
+class PlainFile {
+ public:
+  PlainFile(const std::filesystem::path& path, const ImportTask& task) : path_(path) {
+    const InputFile file(path);
+    const std::string head = file.text(0, kSniffBytes);
+    if (!is_gzip(head)) return;
+    inflated_.emplace(task.scratch, ".inflated");
+    path_ = inflated_->path();
+    const std::uint64_t limit = most_image_bytes(file, task).file;
+    const std::uint64_t bytes =
+        inflate_range(file, {0, file.size()}, limit,
+                      [&](std::span<const std::byte> piece) { inflated_->write(piece); });
+    if (bytes > limit) throw_unusable("The compressed image is too large.");
+  }
+
+  InputFile open() const { return InputFile(path_); }
+
+ private:
+  std::filesystem::path path_;
+  std::optional<ScratchFile> inflated_;
+};
 
 TiffMeaning read_page(const InputFile& file, Pages& pages) {
   const std::string head = file.text(0, kSniffBytes);
@@ -119,6 +145,7 @@ TiffMeaning read_page(const InputFile& file, Pages& pages) {
     return {};
   }
   TiffFile tiff(file);
+  if (tiff.pages() > 1) throw_unusable("It has several pages. Send it by itself.");
   tiff.read(0, pages.check(), pages.sink());
   return tiff.meaning();
 }
@@ -131,12 +158,21 @@ void unite(TiffMeaning& all, const TiffMeaning& next) {
   if (next.spacing != all.spacing) all.spacing.reset();
 }
 
-void check_gaps(const std::vector<ImageFile>& files) {
+// In the order of the numbers in their names.
+std::vector<ImageFile> in_order(const std::vector<ImageFile>& files) {
   std::vector<std::string> names;
   for (const ImageFile& file : files) names.push_back(file.name);
-  const std::string missing = missing_between(names);
-  if (missing.empty()) return;
-  throw_unusable("An image is missing between the others: " + printable(missing) + ".");
+  std::vector<ImageFile> sorted;
+  for (const std::size_t at : slice_order(names)) sorted.push_back(files[at]);
+  return sorted;
+}
+
+// Files of one page may tell of all channels and times.
+void check_files(const TiffMeaning& meaning, std::size_t files) {
+  if (meaning.channels * meaning.times == 1 || meaning.slices == files) return;
+  throw_unusable("The descriptions of the TIFF files tell of " + counts_of(meaning) +
+                 ", but there are " + std::to_string(files) +
+                 " files. Put the images of each channel and time into a folder of their own.");
 }
 
 }  // namespace
@@ -154,21 +190,21 @@ bool has_pages(const std::filesystem::path& path) {
 
 Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
   if (files.size() == 1) {
-    const InputFile file(files.front().path);
+    const PlainFile plain(files.front().path, task);
+    const InputFile file = plain.open();
     if (is_tiff(file.text(0, kSniffBytes))) {
       TiffFile tiff(file);
       return read_pages(tiff, task);
     }
   }
-  std::ranges::sort(files, comes_before, &ImageFile::name);
-  check_gaps(files);
+  files = in_order(files);
   SourceVolume source;
   choose_volume(1, {}, task.options, source);
   Pages pages(files.size(), task);
   std::optional<TiffMeaning> all;
   for (const ImageFile& file : files) {
     try {
-      const TiffMeaning meaning = read_page(InputFile(file.path), pages);
+      const TiffMeaning meaning = read_page(PlainFile(file.path, task).open(), pages);
       if (!all) all = meaning;
       unite(*all, meaning);
     } catch (const Error& error) {
@@ -176,7 +212,8 @@ Volume import_images(std::vector<ImageFile> files, const ImportTask& task) {
       throw error.with_detail(in_quotes(file.name) + ": " + error.what());
     }
   }
-  set_meaning(source, all.value());
+  check_files(all.value(), files.size());
+  set_meaning(source, *all);
   source.notes.push_back(lps_assumed("A stack of images"));
   return pages.write(std::move(source));
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include <tiffio.h>
@@ -123,21 +124,60 @@ void check_block(std::uint64_t bytes) {
   throw_unusable("The TIFF image's strips or rows of tiles are larger than 256 MiB.");
 }
 
-void read_strips(TIFF* tiff, const PageLayout& layout, const PageSink& sink) {
+// Where the first row and column are.
+struct Corner {
+  bool is_bottom = false;
+  bool is_right = false;
+  bool operator==(const Corner&) const = default;
+};
+
+Corner corner_of(TIFF* tiff) {
+  const auto orientation = field<std::uint16_t>(tiff, TIFFTAG_ORIENTATION);
+  const Corner corner = {
+      .is_bottom = orientation == ORIENTATION_BOTLEFT || orientation == ORIENTATION_BOTRIGHT,
+      .is_right = orientation == ORIENTATION_TOPRIGHT || orientation == ORIENTATION_BOTRIGHT};
+  if (orientation == ORIENTATION_TOPLEFT || corner != Corner{}) return corner;
+  throw_unusable("The TIFF image's orientation " + std::to_string(orientation) +
+                 " exchanges rows and columns, which is not supported.");
+}
+
+// Turns the rows of a block of them so that they begin at the top left.
+void turn(std::span<std::byte> rows, const PageLayout& layout, const Corner& corner) {
+  const std::uint64_t row_bytes = layout.bytes() / layout.height;
+  const std::uint64_t count = rows.size() / row_bytes;
+  for (std::uint64_t row = 0; corner.is_bottom && row < count / 2; ++row) {
+    std::ranges::swap_ranges(rows.subspan(row * row_bytes, row_bytes),
+                             rows.subspan((count - 1 - row) * row_bytes, row_bytes));
+  }
+  if (!corner.is_right) return;
+  with_stored_sample(layout.type, [&](auto sample) {
+    using Sample = decltype(sample);
+    for (std::uint64_t row = 0; row < count; ++row) {
+      auto* first = reinterpret_cast<Sample*>(rows.data() + row * row_bytes);
+      std::reverse(first, first + layout.width);
+    }
+  });
+}
+
+void read_strips(TIFF* tiff, const PageLayout& layout, const Corner& corner, const PageSink& sink) {
   check_block(TIFFStripSize64(tiff));
   std::vector<std::byte> strip(TIFFStripSize64(tiff));
-  std::uint64_t left = layout.bytes();
-  for (std::uint32_t at = 0; left > 0; ++at) {
-    if (at >= TIFFNumberOfStrips(tiff)) throw_damaged_tiff();
-    const std::size_t wanted = std::min<std::uint64_t>(left, strip.size());
-    const auto size = static_cast<tmsize_t>(wanted);
-    if (TIFFReadEncodedStrip(tiff, at, strip.data(), size) != size) throw_damaged_tiff();
-    sink(std::span(strip).first(wanted));
-    left -= wanted;
+  const std::uint64_t strips = (layout.bytes() + strip.size() - 1) / strip.size();
+  if (strips > TIFFNumberOfStrips(tiff)) throw_damaged_tiff();
+  for (std::uint64_t next = 0; next < strips; ++next) {
+    const std::uint64_t at = corner.is_bottom ? strips - 1 - next : next;
+    const std::span rows =
+        std::span(strip).first(std::min(layout.bytes() - at * strip.size(), strip.size()));
+    const auto size = static_cast<tmsize_t>(rows.size());
+    if (TIFFReadEncodedStrip(tiff, static_cast<std::uint32_t>(at), rows.data(), size) != size) {
+      throw_damaged_tiff();
+    }
+    turn(rows, layout, corner);
+    sink(rows);
   }
 }
 
-void read_tiles(TIFF* tiff, const PageLayout& layout, const PageSink& sink) {
+void read_tiles(TIFF* tiff, const PageLayout& layout, const Corner& corner, const PageSink& sink) {
   const auto width = field<std::uint32_t>(tiff, TIFFTAG_TILEWIDTH);
   const auto height = field<std::uint32_t>(tiff, TIFFTAG_TILELENGTH);
   const std::uint64_t row_bytes = layout.bytes() / layout.height;
@@ -148,7 +188,9 @@ void read_tiles(TIFF* tiff, const PageLayout& layout, const PageSink& sink) {
   if (TIFFTileSize64(tiff) != tile_row * height) throw_damaged_tiff();
   std::vector<std::byte> tile(TIFFTileSize64(tiff));
   std::vector<std::byte> rows(row_bytes * height);
-  for (std::uint32_t y = 0; y < layout.height; y += std::min(height, layout.height - y)) {
+  const std::uint32_t bands = layout.height / height + (layout.height % height > 0 ? 1 : 0);
+  for (std::uint32_t next = 0; next < bands; ++next) {
+    const std::uint32_t y = (corner.is_bottom ? bands - 1 - next : next) * height;
     for (std::uint64_t x = 0; x < layout.width; x += width) {
       const std::uint32_t at = TIFFComputeTile(tiff, static_cast<std::uint32_t>(x), y, 0, 0);
       const auto size = static_cast<tmsize_t>(tile.size());
@@ -159,7 +201,10 @@ void read_tiles(TIFF* tiff, const PageLayout& layout, const PageSink& sink) {
         std::memcpy(rows.data() + row * row_bytes + begin, tile.data() + row * tile_row, count);
       }
     }
-    sink(std::span(rows).first(std::min<std::uint64_t>(height, layout.height - y) * row_bytes));
+    const std::span band =
+        std::span(rows).first(std::min<std::uint64_t>(height, layout.height - y) * row_bytes);
+    turn(band, layout, corner);
+    sink(band);
   }
 }
 
@@ -176,6 +221,18 @@ class TiffFile::Library {
 
   TIFF* tiff() const { return tiff_; }
 
+  std::string_view description() const {
+    const char* text = nullptr;
+    return TIFFGetField(tiff_, TIFFTAG_IMAGEDESCRIPTION, &text) == 1 ? text : "";
+  }
+
+  void check_corner(const Corner& corner) {
+    if (first_corner_.value_or(corner) != corner) {
+      throw_unusable("The pages of the TIFF differ in their orientation.");
+    }
+    first_corner_ = corner;
+  }
+
   void go_to(std::uint64_t page) {
     if (page < page_) rewind();
     while (page_ < page) {
@@ -191,10 +248,42 @@ class TiffFile::Library {
       if (++pages > kMostPages) throw_unusable("The TIFF file has more than a million pages.");
     }
     rewind();
-    return pages;
+    if (pages == 1) planes_ = planes_behind();
+    return std::max(pages, planes_);
+  }
+
+  bool has_planes() const { return planes_ > 1; }
+
+  // `page` is below the last count().
+  void read_plane(std::uint64_t page, const PageLayout& layout, const PageSink& sink) const {
+    std::vector<std::byte> piece(std::min<std::uint64_t>(kPieceBytes, layout.bytes()));
+    const std::uint64_t begin = TIFFGetStrileOffset(tiff_, 0) + page * layout.bytes();
+    for (std::uint64_t at = 0; at < layout.bytes(); at += piece.size()) {
+      piece.resize(std::min<std::uint64_t>(piece.size(), layout.bytes() - at));
+      if (position_.file.read(begin + at, piece) != piece.size()) throw_damaged_tiff();
+      if (TIFFIsByteSwapped(tiff_) != 0) swap_bytes(piece, bytes_per_sample(layout.type));
+      sink(piece);
+    }
   }
 
  private:
+  // ImageJ stores large stacks with one page only, and the other planes behind its own.
+  std::uint64_t planes_behind() const {
+    const std::uint64_t images = imagej_images(description());
+    if (images <= 1 || TIFFIsTiled(tiff_) != 0 || corner_of(tiff_) != Corner{} ||
+        field<std::uint16_t>(tiff_, TIFFTAG_COMPRESSION) != COMPRESSION_NONE) {
+      return 0;
+    }
+    for (std::uint32_t strip = 1; strip < TIFFNumberOfStrips(tiff_); ++strip) {
+      const std::uint64_t end =
+          TIFFGetStrileOffset(tiff_, strip - 1) + TIFFGetStrileByteCount(tiff_, strip - 1);
+      if (TIFFGetStrileOffset(tiff_, strip) != end) return 0;
+    }
+    const std::uint64_t begin = TIFFGetStrileOffset(tiff_, 0);
+    const std::uint64_t size = position_.file.size();
+    return begin < size && images <= (size - begin) / layout_of(tiff_).bytes() ? images : 0;
+  }
+
   bool is_reduced() const {
     return (field<std::uint32_t>(tiff_, TIFFTAG_SUBFILETYPE) & FILETYPE_REDUCEDIMAGE) != 0;
   }
@@ -216,6 +305,8 @@ class TiffFile::Library {
   TiffPosition position_;
   TIFF* tiff_;
   std::uint64_t page_ = 0;
+  std::uint64_t planes_ = 0;  // behind each other with one page only; 0 without them
+  std::optional<Corner> first_corner_;
 };
 
 bool is_tiff(std::string_view head) {
@@ -230,25 +321,25 @@ std::uint64_t TiffFile::pages() { return library_->count(); }
 
 TiffMeaning TiffFile::meaning() {
   const std::uint64_t count = pages();
-  const char* description = nullptr;
-  if (TIFFGetField(library_->tiff(), TIFFTAG_IMAGEDESCRIPTION, &description) != 1) {
-    description = "";
-  }
   const TiffResolution resolution = {field<float>(library_->tiff(), TIFFTAG_XRESOLUTION),
                                      field<float>(library_->tiff(), TIFFTAG_YRESOLUTION)};
-  return tiff_meaning(description, resolution, count);
+  return tiff_meaning(library_->description(), resolution, count);
 }
 
 void TiffFile::read(std::uint64_t page, const PageCheck& check, const PageSink& sink) {
-  library_->go_to(page);
+  library_->go_to(library_->has_planes() ? 0 : page);
   TIFF* tiff = library_->tiff();
   check_compression(tiff);
   const PageLayout layout = layout_of(tiff);
+  const Corner corner = corner_of(tiff);
+  library_->check_corner(corner);
   check(layout);
-  if (TIFFIsTiled(tiff) != 0) {
-    read_tiles(tiff, layout, sink);
+  if (library_->has_planes()) {
+    library_->read_plane(page, layout, sink);
+  } else if (TIFFIsTiled(tiff) != 0) {
+    read_tiles(tiff, layout, corner, sink);
   } else {
-    read_strips(tiff, layout, sink);
+    read_strips(tiff, layout, corner, sink);
   }
 }
 

@@ -23,15 +23,15 @@ class TiffFile {
   TiffFile(const TiffFile&) = delete;
   TiffFile& operator=(const TiffFile&) = delete;
 
-  // The number of pages, without reduced copies of others. Throws Error kUnusableVolume if there
-  // are more than a million.
+  // The number of pages, without reduced copies of others, or of ImageJ's planes behind a single
+  // page. Throws Error kUnusableVolume if there are more than a million pages.
   std::uint64_t pages();
 
   // The meaning of these pages.
   TiffMeaning meaning();
 
-  // Reads a page. Fast for pages in ascending order. Throws Error kUnusableVolume, also for
-  // colours, palettes and lossy compression.
+  // Reads a page below pages(), from its top left. Fast for pages in ascending order. Throws Error
+  // kUnusableVolume, also for colours, palettes and lossy compression.
   void read(std::uint64_t page, const PageCheck& check, const PageSink& sink);
 
  private:

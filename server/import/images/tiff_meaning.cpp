@@ -2,85 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <set>
+#include <utility>
 
-#include "base/error.h"
+#include <nlohmann/json.hpp>
+
 #include "base/text.h"
-#include "proto/error.h"
+#include "server/import/images/ome_meaning.h"
+#include "server/import/images/tiff_description.h"
 #include "server/import/source/names.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {
-
-constexpr std::uint64_t kMostOfAKind = 1'000'000;
-
-// The length of a unit in millimetres; empty for unknown units and for pixels.
-std::optional<double> length_of(std::string_view unit) {
-  Geometry geometry;
-  std::vector<Note> notes;
-  try {
-    scale_to_millimetres(geometry, unit == "\\u00B5m" ? "um" : unit, notes);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kUnusableVolume) throw;
-    return std::nullopt;
-  }
-  if (!notes.empty()) return std::nullopt;
-  return geometry.spacing[0];
-}
-
-std::optional<double> positive(std::string_view text) {
-  const auto number = parse_double(text);
-  return number && std::isfinite(*number) && *number > 0 ? number : std::nullopt;
-}
-
-std::uint64_t count_of(std::string_view text, std::uint64_t otherwise) {
-  const auto count = parse_uint64(text);
-  return count && *count >= 1 && *count <= kMostOfAKind ? *count : otherwise;
-}
-
-// --- OME -----------------------------------------------------------------------------------------
-
-// The value of an attribute in the text of one tag.
-std::string_view attribute(std::string_view tag, std::string_view name) {
-  const std::string begin = " " + std::string(name) + "=";
-  const std::size_t at = tag.find(begin);
-  if (at == std::string_view::npos || at + begin.size() >= tag.size()) return {};
-  const char quote = tag[at + begin.size()];
-  const std::size_t from = at + begin.size() + 1;
-  const std::size_t end = tag.find(quote, from);
-  if (end == std::string_view::npos) return {};
-  return tag.substr(from, end - from);
-}
-
-std::optional<std::array<double, 3>> ome_spacing(std::string_view pixels) {
-  std::array<double, 3> spacing = {};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::string name = std::string("PhysicalSize") + "XYZ"[axis];
-    const std::string_view unit = attribute(pixels, name + "Unit");
-    const auto size = positive(attribute(pixels, name));
-    const auto length = length_of(unit.empty() ? "um" : unit);
-    if (!size || !length) return std::nullopt;
-    spacing[axis] = *size * *length;
-  }
-  return spacing;
-}
-
-TiffMeaning ome_meaning(std::string_view description, std::size_t at) {
-  const std::string_view pixels = description.substr(at, description.find('>', at) - at);
-  TiffMeaning meaning;
-  const std::string_view order = attribute(pixels, "DimensionOrder");
-  std::string sorted(order);
-  std::ranges::sort(sorted);
-  if (sorted != "CTXYZ" || !order.starts_with("XY")) {
-    throw_unusable("The DimensionOrder of the OME-TIFF, " + in_quotes(order) + ", is unknown.");
-  }
-  meaning.order = order;
-  meaning.slices = count_of(attribute(pixels, "SizeZ"), 1);
-  meaning.channels = count_of(attribute(pixels, "SizeC"), 1);
-  meaning.times = count_of(attribute(pixels, "SizeT"), 1);
-  meaning.spacing = ome_spacing(pixels);
-  return meaning;
-}
 
 // --- ImageJ --------------------------------------------------------------------------------------
 
@@ -97,11 +32,13 @@ std::string_view described_value(std::string_view description, std::string_view 
 std::optional<std::array<double, 3>> imagej_spacing(std::string_view description,
                                                     const TiffResolution& resolution) {
   const std::string_view unit = described_value(description, "unit");
-  const auto between = positive(described_value(description, "spacing"));
+  std::string_view gap = described_value(description, "spacing");
+  if (gap.starts_with('-')) gap.remove_prefix(1);  // as ImageJ does
+  const auto between = described_positive(gap);
   if (unit.empty() || !between || !(resolution.x > 0) || !(resolution.y > 0)) return std::nullopt;
   const auto length = [&](std::string_view name) {
     const std::string_view own = described_value(description, name);
-    return length_of(own.empty() ? unit : own);
+    return described_length(own.empty() ? unit : own);
   };
   const auto x = length("unit");
   const auto y = length("yunit");
@@ -142,46 +79,181 @@ TiffMeaning imagej_meaning(std::string_view description, const TiffResolution& r
                            std::uint64_t pages) {
   TiffMeaning meaning;
   meaning.order = "XYCZT";
-  meaning.channels = count_of(described_value(description, "channels"), 1);
-  meaning.times = count_of(described_value(description, "frames"), 1);
+  meaning.channels = described_count(described_value(description, "channels"), 1);
+  meaning.times = described_count(described_value(description, "frames"), 1);
   const std::uint64_t others = meaning.channels * meaning.times;
-  meaning.slices = count_of(described_value(description, "slices"), pages / others);
+  meaning.slices = described_count(described_value(description, "slices"), pages / others);
   meaning.spacing = imagej_spacing(description, resolution);
   meaning.rescale = imagej_rescale(description);
   return meaning;
+}
+
+// --- SCIFIO and tifffile -------------------------------------------------------------------------
+
+struct PageAxis {
+  char name = '?';  // Z, C or T
+  std::uint64_t size = 1;
+};
+
+// Of the axes beyond x and y, the fastest first. A single one without a name counts slices.
+TiffMeaning meaning_of(std::vector<PageAxis> axes, std::uint64_t pages) {
+  std::erase_if(axes, [](const PageAxis& axis) { return axis.size == 1; });
+  TiffMeaning meaning;
+  meaning.slices = axes.empty() ? pages : 1;
+  meaning.order = "XY";
+  for (const PageAxis& axis : axes) {
+    const char name = axes.size() == 1 && axis.name == '?' ? 'Z' : axis.name;
+    if (name == '?' || meaning.order.find(name) != std::string::npos) {
+      throw_unusable(
+          "The TIFF's pages have " + std::to_string(axes.size()) +
+          " axes, and its description does not say which of them counts slices, channels and "
+          "times. Save it with the names of its axes, as in ZCYX, or with one volume per file.");
+    }
+    meaning.order += name;
+    (name == 'Z' ? meaning.slices : name == 'C' ? meaning.channels : meaning.times) = axis.size;
+  }
+  for (const char name : std::string_view("ZCT")) {
+    if (meaning.order.find(name) == std::string::npos) meaning.order += name;
+  }
+  return meaning;
+}
+
+std::optional<TiffMeaning> scifio_meaning(std::string_view description, std::uint64_t pages) {
+  const auto list = [&](std::string_view name) {
+    return split(described_value(description, name), ',');
+  };
+  const std::vector<std::string_view> names = list("axes");
+  const std::vector<std::string_view> lengths = list("lengths");
+  if (names.size() < 2 || names[0] != "X" || names[1] != "Y" || lengths.size() != names.size()) {
+    return std::nullopt;
+  }
+  std::vector<PageAxis> axes;
+  for (std::size_t at = 2; at < names.size(); ++at) {
+    const char name = names[at] == "Z"         ? 'Z'
+                      : names[at] == "Channel" ? 'C'
+                      : names[at] == "Time"    ? 'T'
+                                               : '?';
+    axes.push_back({name, described_count(lengths[at], 1)});
+  }
+  TiffMeaning meaning = meaning_of(std::move(axes), pages);
+  const std::vector<std::string_view> scales = list("scales");
+  const std::vector<std::string_view> units = list("units");
+  const auto z = static_cast<std::size_t>(std::ranges::find(names, "Z") - names.begin());
+  if (scales.size() != names.size() || units.size() != names.size() || z == names.size()) {
+    return meaning;
+  }
+  std::array<double, 3> spacing = {};
+  for (const auto& [axis, at] : {std::pair{0, std::size_t{0}}, {1, std::size_t{1}}, {2, z}}) {
+    const auto scale = described_positive(scales[at]);
+    const auto length = described_length(units[at]);
+    if (!scale || !length) return meaning;
+    spacing[static_cast<std::size_t>(axis)] = *scale * *length;
+  }
+  meaning.spacing = spacing;
+  return meaning;
+}
+
+// From the shape of an array, which ends in y and x, and the names of its axes, if they are known.
+std::optional<TiffMeaning> tifffile_meaning(std::string_view description, std::uint64_t pages) {
+  const auto document = nlohmann::json::parse(description, nullptr, false);
+  if (!document.is_object() || !document.contains("shape")) return std::nullopt;
+  std::vector<std::uint64_t> shape;
+  for (const auto& size : document["shape"]) {
+    if (!size.is_number_unsigned()) return std::nullopt;
+    shape.push_back(described_count(size.dump(), 1));
+  }
+  std::string names = document.contains("axes") && document["axes"].is_string()
+                          ? document["axes"].get<std::string>()
+                          : "";
+  if (names.size() != shape.size()) names.clear();
+  if (names.ends_with('S')) {
+    names.pop_back();
+    shape.pop_back();
+  }
+  if (shape.size() < 2 || (!names.empty() && !names.ends_with("YX"))) return std::nullopt;
+  std::vector<PageAxis> axes;
+  for (std::size_t at = shape.size() - 2; at-- > 0;) {
+    const bool is_known = !names.empty() && std::string_view("ZCT").find(names[at]) != names.npos;
+    axes.push_back({is_known ? names[at] : '?', shape[at]});
+  }
+  return meaning_of(std::move(axes), pages);
 }
 
 }  // namespace
 
 TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
                          std::uint64_t pages) {
-  const std::size_t pixels = description.find("<Pixels");
-  if (pixels != std::string_view::npos && description.find("<OME") < pixels) {
-    return ome_meaning(description, pixels);
+  description = trimmed(description);
+  std::optional<TiffMeaning> meaning = ome_meaning(description, pages);
+  if (description.starts_with("ImageJ=")) meaning = imagej_meaning(description, resolution, pages);
+  if (description.starts_with("SCIFIO=")) meaning = scifio_meaning(description, pages);
+  if (description.starts_with('{')) meaning = tifffile_meaning(description, pages);
+  return meaning.value_or(TiffMeaning{.slices = pages});
+}
+
+std::uint64_t imagej_images(std::string_view description) {
+  if (!description.starts_with("ImageJ=")) return 0;
+  return described_count(described_value(description, "images"), 0);
+}
+
+std::vector<std::uint64_t> TiffMeaning::volumes() const {
+  std::set<std::uint64_t> found;
+  if (!page_of_plane) {
+    for (std::uint64_t volume = 0; volume < channels * times; ++volume) found.insert(volume);
+  } else {
+    for (const auto& [plane, page] : *page_of_plane) found.insert(volume_of(plane));
   }
-  if (description.starts_with("ImageJ=")) return imagej_meaning(description, resolution, pages);
-  TiffMeaning meaning;
-  meaning.slices = pages;
-  return meaning;
+  return {found.begin(), found.end()};
+}
+
+std::uint64_t TiffMeaning::size_of(char axis) const {
+  return axis == 'Z' ? slices : axis == 'C' ? channels : times;
+}
+
+std::uint64_t TiffMeaning::plane_of(std::uint64_t volume, std::uint64_t slice) const {
+  const std::uint64_t channel = volume % channels;
+  const std::uint64_t time = volume / channels;
+  std::uint64_t plane = 0;
+  std::uint64_t step = 1;
+  for (const char axis : std::string_view(order).substr(2)) {
+    plane += step * (axis == 'Z' ? slice : axis == 'C' ? channel : time);
+    step *= size_of(axis);
+  }
+  return plane;
+}
+
+std::uint64_t TiffMeaning::volume_of(std::uint64_t plane) const {
+  std::uint64_t volume = 0;
+  for (const char axis : std::string_view(order).substr(2)) {
+    if (axis == 'C') volume += plane % channels;
+    if (axis == 'T') volume += plane % times * channels;
+    plane /= size_of(axis);
+  }
+  return volume;
 }
 
 std::uint64_t TiffMeaning::page_of(std::uint64_t volume, std::uint64_t slice) const {
-  const std::uint64_t channel = volume % channels;
-  const std::uint64_t time = volume / channels;
-  std::uint64_t page = 0;
-  std::uint64_t step = 1;
-  for (const char axis : std::string_view(order).substr(2)) {
-    page += step * (axis == 'Z' ? slice : axis == 'C' ? channel : time);
-    step *= axis == 'Z' ? slices : axis == 'C' ? channels : times;
-  }
-  return page;
+  const std::uint64_t plane = plane_of(volume, slice);
+  if (!page_of_plane) return plane;
+  const auto page = page_of_plane->find(plane);
+  if (page != page_of_plane->end()) return page->second;
+  throw_unusable("Slice " + std::to_string(slice) +
+                 " of the volume is not in this file, by the description of the OME-TIFF. If an "
+                 "OME-TIFF consists of several files, each must have all slices of a volume.");
+}
+
+std::string counts_of(const TiffMeaning& meaning) {
+  return std::to_string(meaning.slices) + " slices, " + std::to_string(meaning.channels) +
+         " channels and " + std::to_string(meaning.times) + " times";
 }
 
 void check_pages(const TiffMeaning& meaning, std::uint64_t pages) {
+  if (meaning.page_of_plane) {
+    if (!meaning.page_of_plane->empty()) return;
+    throw_unusable("By its description, the OME-TIFF has no image: they are in other files.");
+  }
   if (meaning.slices * meaning.channels * meaning.times == pages) return;
-  throw_unusable("The TIFF's description tells of " + std::to_string(meaning.slices) + " slices, " +
-                 std::to_string(meaning.channels) + " channels and " +
-                 std::to_string(meaning.times) + " times, but the file has " +
+  throw_unusable("The TIFF's description tells of " + counts_of(meaning) + ", but the file has " +
                  std::to_string(pages) + (pages == 1 ? " page." : " pages."));
 }
 

@@ -30,11 +30,13 @@ double millimetres_per(std::string_view unit) {
   };
   static const std::vector<Row> units = {
       {1, {"", "?", "???", "mm", "millimeter", "millimeters", "millimetre", "millimetres"}},
+      {0.0000001, {"angstrom", "angstroms", "\xc3\x85", "\xe2\x84\xab"}},
       {0.000001, {"nm", "nanometer", "nanometers", "nanometre", "nanometres"}},
       {0.001,
        {"um", "\xc2\xb5m", "\xce\xbcm", "\xb5m", "micron", "microns", "micrometer", "micrometers",
         "micrometre", "micrometres"}},
       {10, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"}},
+      {25.4, {"in", "inch", "inches"}},
       {1000, {"m", "meter", "meters", "metre", "metres"}}};
   const std::string name = lower(trimmed(unit));
   for (const Row& row : units) {

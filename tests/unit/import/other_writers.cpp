@@ -128,7 +128,8 @@ std::string tiff_entry(std::uint16_t tag, std::uint16_t type, std::uint32_t coun
 
 }  // namespace
 
-std::string tiff(const std::vector<std::string>& pages, const std::string& description) {
+std::string tiff(const std::vector<std::string>& pages, const std::string& description,
+                 int orientation) {
   std::string file = "II*" + std::string(1, '\0') + one<std::uint32_t>(0);
   std::size_t link = 4;
   const auto size = [&] { return static_cast<std::uint32_t>(file.size()); };
@@ -146,6 +147,7 @@ std::string tiff(const std::vector<std::string>& pages, const std::string& descr
         tiff_entry(262, 3, 1, 1),
         tiff_entry(270, 2, static_cast<std::uint32_t>(description.size() + 1), text),
         tiff_entry(273, 4, 1, samples),
+        tiff_entry(274, 3, 1, static_cast<std::uint32_t>(orientation)),
         tiff_entry(277, 3, 1, 1),
         tiff_entry(278, 3, 1, 3),
         tiff_entry(279, 4, 1, static_cast<std::uint32_t>(page.size()))};

@@ -77,7 +77,8 @@ struct ParImage {
 std::string par(const std::vector<ParImage>& images);
 
 // A TIFF with pages of 4 x 3 samples of one byte, without compression, in one strip each.
-std::string tiff(const std::vector<std::string>& pages, const std::string& description = {});
+std::string tiff(const std::vector<std::string>& pages, const std::string& description = {},
+                 int orientation = 1);
 
 // Grey images of one byte a sample, with rows of `width` samples.
 std::string grey_png(std::uint32_t width, std::string_view samples);
