@@ -39,7 +39,7 @@ def check_nginx(folder, service):
     main = read["/etc/nginx/nginx.conf"]
     servers = dict(re.findall(r"^upstream (\w+) \{(.*?)^\}", read["/etc/nginx/upstream.conf"],
                               re.MULTILINE | re.DOTALL))
-    check(set(re.findall(r"proxy_pass http://(\w+);", main)) == set(servers),
+    check(set(re.findall(r"proxy_pass http://(\w+)[;/]", main)) == set(servers),
           "nginx passes requests to other servers than there are")
     check(re.search(r"location ~ \^/v1/\(orders\|pacs\)\(/\|\$\) \{\s*proxy_pass http://iso_orders;", main),
           "nginx does not tell orders apart")
