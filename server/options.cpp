@@ -309,7 +309,8 @@ void add_options(CLI::App& cli, Options& options) {
       ->transform(size_of_bytes())
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50));
   cli.add_option("--drain-seconds", options.drain_seconds,
-                 "Seconds that running jobs have to finish after SIGTERM")
+                 "Seconds that running jobs have to finish after SIGTERM. Less than what stops the "
+                 "daemon waits: TimeoutStopSec= of systemd, --stop-timeout of Docker")
       ->envname("ISOMESH_DRAIN_SECONDS")
       ->capture_default_str();
   cli.add_flag("--open-network", options.open_network,

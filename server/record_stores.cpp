@@ -126,38 +126,36 @@ std::unique_ptr<RecordStores> open_record_stores(const Options& options,
 
 namespace {
 
-// Calls `of_folder` with a connection, or `of_store` with a database.
-template <class OfFolder, class OfStore>
-auto with_audit_trail(const Options& options, const OfFolder& of_folder, const OfStore& of_store) {
-  if (options.store.empty()) {
-    const std::filesystem::path file = options.data / "isomesh.sqlite";
-    if (!std::filesystem::exists(file)) {
-      throw Error(ErrorCode::kNotFound, "the data folder has no data of isomeshd");
-    }
-    store::Connection connection(file, store::Connection::Mode::kRead);
-    store::refuse_moved(connection);
-    return of_folder(connection);
+// Calls `act` with a connection to the records.
+template <class Act>
+auto with_audit_trail(const Options& options, const Act& act) {
+  if (!options.store.empty()) {
+    store::postgresql::check_url(options.store);
+    return act(*store::postgresql::connect_to_trail(options.store));
   }
-  store::postgresql::check_url(options.store);
-  store::postgresql::Database database(
-      {.url = options.store, .node = "audit " + random_hex(8), .connections = 1});
-  return of_store(store::SqlAuditTrail(database));
+  const std::filesystem::path file = options.data / "isomesh.sqlite";
+  if (!std::filesystem::exists(file)) {
+    throw Error(ErrorCode::kNotFound, "the data folder has no data of isomeshd");
+  }
+  store::Connection connection(file, store::Connection::Mode::kRead);
+  store::check_has_trail(connection);
+  store::refuse_moved(connection);
+  return act(connection);
 }
 
 }  // namespace
 
 void read_audit_trail(const Options& options, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line) {
-  with_audit_trail(
-      options,
-      [&](store::Connection& connection) { store::read_audit_trail(connection, after, line); },
-      [&](const store::SqlAuditTrail& trail) { trail.read(after, line); });
+  with_audit_trail(options, [&](store::SqlConnection& connection) {
+    store::read_audit_trail(connection, after, line);
+  });
 }
 
 store::AuditCheck verify_audit_trail(const Options& options) {
-  return with_audit_trail(
-      options, [](store::Connection& connection) { return store::verify_audit_trail(connection); },
-      [](const store::SqlAuditTrail& trail) { return trail.verify(); });
+  return with_audit_trail(options, [](store::SqlConnection& connection) {
+    return store::verify_audit_trail(connection);
+  });
 }
 
 }  // namespace isomesh

@@ -44,7 +44,8 @@ std::unique_ptr<RecordStores> open_record_stores(const Options& options,
                                                  store::BlobStore& blobs,
                                                  std::chrono::milliseconds tolerance);
 
-// Opens only the audit trail, also beside a daemon, and reads it; see AuditTrail::read.
+// Opens only the audit trail, also beside daemons, and reads it; see AuditTrail::read. Changes
+// nothing, not even the tables of an older version.
 void read_audit_trail(const Options& options, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line);
 

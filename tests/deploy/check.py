@@ -39,7 +39,7 @@ def check_nginx(folder, service):
     main = read["/etc/nginx/nginx.conf"]
     servers = dict(re.findall(r"^upstream (\w+) \{(.*?)^\}", read["/etc/nginx/upstream.conf"],
                               re.MULTILINE | re.DOTALL))
-    check(set(re.findall(r"proxy_pass http://(\w+);", main)) == set(servers),
+    check(set(re.findall(r"proxy_pass http://(\w+)[;/]", main)) == set(servers),
           "nginx passes requests to other servers than there are")
     check(re.search(r"location ~ \^/v1/\(orders\|pacs\)\(/\|\$\) \{\s*proxy_pass http://iso_orders;", main),
           "nginx does not tell orders apart")
@@ -93,6 +93,9 @@ def check_chart():
     check(container["livenessProbe"]["httpGet"]["path"] == "/livez", "liveness")
     check("exec" in container["lifecycle"]["preStop"], "preStop")
     environment = {entry["name"]: entry for entry in container["env"]}
+    for name, entry in environment.items():
+        check(not re.fullmatch(r"[\d.]+e[+-]?\d+", entry.get("value", "")), f"{name} is no number for the daemon")
+    check(pod.get("enableServiceLinks") is False, "variables of Kubernetes look like options")
     drain = int(environment["ISOMESH_DRAIN_SECONDS"]["value"])
     check(pod["terminationGracePeriodSeconds"] > drain + 5, "a pod is killed while it drains")
     check(pod["securityContext"]["runAsNonRoot"], "root")
@@ -101,10 +104,11 @@ def check_chart():
     check(not security["allowPrivilegeEscalation"], "privileges")
     check(security["capabilities"]["drop"] == ["ALL"], "capabilities")
     check("secretKeyRef" in environment["ISOMESH_STORE"]["valueFrom"], "the password is no secret")
-    volumes = {volume["name"] for volume in pod["volumes"]}
+    volumes = {volume["name"]: volume for volume in pod["volumes"]}
     mounts = {mount["name"]: mount["mountPath"] for mount in container["volumeMounts"]}
-    check(set(mounts) == volumes, "volumes and mounts differ")
-    check("/var/lib/isomesh" in mounts.values(), "there is no room for data")
+    check(set(mounts) == set(volumes), "volumes and mounts differ")
+    check(mounts["data"] == "/var/lib/isomesh", "there is no room for data")
+    check("ephemeral" in volumes["data"], "the daemon does not see how much room it has")
     if "HorizontalPodAutoscaler" in kinds:
         check("replicas" not in deployment, "two things say how many daemons there are")
         metric = kinds["HorizontalPodAutoscaler"][0]["spec"]["metrics"][0]["object"]["metric"]["name"]

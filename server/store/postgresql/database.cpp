@@ -22,8 +22,6 @@ std::string random_uuid() {
          hex.substr(17, 3) + '-' + hex.substr(20, 12);
 }
 
-constexpr std::chrono::minutes kLongestMigration{10};
-
 constexpr std::int64_t kToleranceUs = 1'000'000;
 
 std::int64_t to_steady_us(std::chrono::steady_clock::time_point time) {
@@ -45,22 +43,30 @@ void check_encoding(Connection& connection) {
                   "UTF8 --template template0), and name it with --store");
 }
 
+// Runs `act`; if it cannot connect, throws Error kUnavailable with the reason for the operator.
+template <class Act>
+auto with_reason(const std::string& url, const Act& act) {
+  try {
+    return act();
+  } catch (const Interrupted&) {
+    const std::string reason = reason_of_no_connection(url);
+    if (reason.empty()) throw;
+    throw Error(ErrorCode::kUnavailable, "the database of --store cannot be used: " + reason);
+  }
+}
+
 // Number of connections that this thread holds, of any database.
 thread_local int borrowed = 0;
 
 }  // namespace
 
 Database::Database(DatabaseOptions options) : options_(std::move(options)), node_(random_uuid()) {
-  try {
-    ask_for(kLongestMigration, [&](Connection& connection, bool) {
+  with_reason(options_.url, [&] {
+    ask([&](Connection& connection, bool) {
       check_encoding(connection);
       migrate(connection);
     });
-  } catch (const Interrupted&) {
-    const std::string reason = reason_of_no_connection(options_.url);
-    if (reason.empty()) throw;
-    throw Error(ErrorCode::kUnavailable, "the database of --store cannot be used: " + reason);
-  }
+  });
   ask([&](Connection& connection, bool) {
     connection.run("INSERT INTO nodes VALUES(?1::uuid, ?2, isomesh_now()) ON CONFLICT DO NOTHING",
                    node_, options_.node);
@@ -185,5 +191,14 @@ void Database::give(std::unique_ptr<Connection> connection) {
 }
 
 void Database::pause() { std::this_thread::sleep_for(kBetweenQuestions); }
+
+std::unique_ptr<Connection> connect_to_trail(const std::string& url) {
+  return with_reason(url, [&] {
+    auto connection = std::make_unique<Connection>(url);
+    check_has_trail(*connection);
+    connection->wait_until(Connection::Clock::time_point::max());  // it has many responses
+    return connection;
+  });
+}
 
 }  // namespace isomesh::store::postgresql

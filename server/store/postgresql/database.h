@@ -123,4 +123,8 @@ class Database : public SqlDatabase {
   std::size_t open_ ISOMESH_GUARDED_BY(mutex_) = 0;
 };
 
+// A connection for commands that read the audit trail beside daemons of any version: it changes
+// nothing. Throws Error as Database does, and kNotFound if there are no tables.
+std::unique_ptr<Connection> connect_to_trail(const std::string& url);
+
 }  // namespace isomesh::store::postgresql

@@ -1,8 +1,13 @@
 #include "server/store/postgresql/schema.h"
 
 #include <array>
+#include <chrono>
 #include <string>
+#include <thread>
 
+#include "base/log.h"
+#include "proto/error.h"
+#include "server/store/sql/audit_trail.h"
 #include "server/store/sql/fair_queue.h"
 
 namespace isomesh::store::postgresql {
@@ -10,6 +15,13 @@ namespace {
 
 // Advisory lock that serialises migrations by several processes.
 constexpr std::int64_t kMigrationLock = 0x69736f6d65736831;  // "isomesh1"
+
+constexpr std::chrono::minutes kLongestMigration{10};
+constexpr std::chrono::seconds kBetweenMigrations{1};
+// A statement may rewrite a large table. But while it waits for a table, all statements of running
+// daemons on that table wait behind it, so it gives way before they fail.
+constexpr const char* kMigrationSession =
+    "SET LOCAL statement_timeout = '10min'; SET LOCAL lock_timeout = '1s'";
 
 // The tables of the first version, then the changes of each later one. Only append; never edit a
 // released version.
@@ -235,15 +247,11 @@ CREATE TABLE tasks(                    -- that one process has at a time; see He
 ) WITH (fillfactor = 50);
 )sql"};
 
+constexpr std::int64_t kChained = 4;  // the first version whose audit trail has digests
 constexpr auto kNewest = static_cast<std::int64_t>(kTables.size());
 
-}  // namespace
-
-void migrate(Connection& connection) {
-  Transaction transaction(connection);
-  transaction->query("SELECT pg_advisory_xact_lock(?1)", kMigrationLock);
-  transaction->script("CREATE TABLE IF NOT EXISTS isomesh_version(version int NOT NULL)");
-  Rows row = transaction->query("SELECT version FROM isomesh_version");
+std::int64_t version_of(Connection& connection) {
+  Rows row = connection.query("SELECT version FROM isomesh_version");
   const std::int64_t version = row.next() ? row.integer(0) : 0;
   if (version > kNewest) {
     throw Error(ErrorCode::kUnavailable,
@@ -251,6 +259,15 @@ void migrate(Connection& connection) {
                     std::to_string(version) + ", this isomeshd reads versions 1 to " +
                     std::to_string(kNewest));
   }
+  return version;
+}
+
+void try_to_migrate(Connection& connection) {
+  Transaction transaction(connection);
+  transaction->query("SELECT pg_advisory_xact_lock(?1)", kMigrationLock);
+  transaction->script(kMigrationSession);
+  transaction->script("CREATE TABLE IF NOT EXISTS isomesh_version(version int NOT NULL)");
+  const std::int64_t version = version_of(connection);
   if (version == 0) transaction->query("INSERT INTO isomesh_version VALUES(0)");
   for (std::int64_t next = version; next < kNewest; ++next) {
     transaction->script(kTables[static_cast<std::size_t>(next)]);
@@ -261,6 +278,36 @@ void migrate(Connection& connection) {
     transaction->query("UPDATE isomesh_version SET version = ?1", kNewest);
   }
   transaction.commit();
+}
+
+}  // namespace
+
+void migrate(Connection& connection) {
+  const auto end = Connection::Clock::now() + kLongestMigration;
+  for (bool is_told = false;; is_told = true) {
+    try {
+      connection.wait_until(Connection::Clock::now() + kLongestMigration);
+      return try_to_migrate(connection);
+    } catch (const Interrupted& error) {
+      if (!connection.is_open() || Connection::Clock::now() >= end) throw;
+      if (!is_told) {
+        log_warning(
+            "the upgrade of the tables waits until other sessions, such as pg_dump or another "
+            "daemon, release them: {}",
+            error.what());
+      }
+    }
+    std::this_thread::sleep_for(kBetweenMigrations);
+  }
+}
+
+void check_has_trail(Connection& connection) {
+  Rows found = connection.query("SELECT to_regclass('isomesh_version') IS NOT NULL");
+  found.next();
+  if (found.integer(0) == 0) {
+    throw Error(ErrorCode::kNotFound, "the database has no data of isomeshd");
+  }
+  refuse_old_trail(version_of(connection), kChained);
 }
 
 }  // namespace isomesh::store::postgresql

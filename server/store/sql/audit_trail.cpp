@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "proto/error.h"
 #include "server/store/microseconds.h"
 
 namespace isomesh::store {
@@ -29,26 +30,6 @@ void read_pieces(const Ask& ask, std::uint64_t after, const Take& take) {
       if (!take(Entry{after, audit_line(after, rows.text(1), rows.text(2)), chain})) return;
     } while (rows.next());
   }
-}
-
-template <class Ask>
-AuditCheck check(const Ask& ask) {
-  AuditCheck result;
-  AuditChain chain;
-  bool has_begun = false;
-  read_pieces(ask, 0, [&](const Entry& entry) {
-    chain.add(entry.line);
-    has_begun = has_begun || entry.chain;
-    if (has_begun && entry.chain != chain.digest()) {
-      result.misfit = entry.number;
-      return false;
-    }
-    ++result.entries;
-    result.last = entry.number;
-    result.digest = chain.digest();
-    return true;
-  });
-  return result;
 }
 
 // The chain over all entries so far: from the last entry that has a digest, and all after it.
@@ -108,12 +89,6 @@ void SqlAuditTrail::read(std::uint64_t after,
               });
 }
 
-AuditCheck SqlAuditTrail::verify() const {
-  return check([this](const char* sql, std::uint64_t from, int most) {
-    return database_.query(sql, from, most);
-  });
-}
-
 std::uint64_t SqlAuditTrail::sent() const {
   Rows row = database_.query("SELECT id FROM audit_sent");
   row.next();
@@ -122,6 +97,15 @@ std::uint64_t SqlAuditTrail::sent() const {
 
 void SqlAuditTrail::note_sent(std::uint64_t number) {
   database_.run(Change::kNeeded, "UPDATE audit_sent SET id = ?1", number);
+}
+
+void refuse_old_trail(std::int64_t version, std::int64_t oldest) {
+  if (version >= oldest) return;
+  throw Error(ErrorCode::kUnavailable,
+              "the records were made by an older isomeshd: they have version " +
+                  std::to_string(version) + ", and the audit trail can be read from version " +
+                  std::to_string(oldest) +
+                  " on. A daemon of this version upgrades them when it starts");
 }
 
 void read_audit_trail(SqlConnection& connection, std::uint64_t after,
@@ -136,9 +120,25 @@ void read_audit_trail(SqlConnection& connection, std::uint64_t after,
 }
 
 AuditCheck verify_audit_trail(SqlConnection& connection) {
-  return check([&](const char* sql, std::uint64_t from, int most) {
+  AuditCheck result;
+  AuditChain chain;
+  bool has_begun = false;
+  const auto ask = [&](const char* sql, std::uint64_t from, int most) {
     return connection.query(sql, from, most);
+  };
+  read_pieces(ask, 0, [&](const Entry& entry) {
+    chain.add(entry.line);
+    has_begun = has_begun || entry.chain;
+    if (has_begun && entry.chain != chain.digest()) {
+      result.misfit = entry.number;
+      return false;
+    }
+    ++result.entries;
+    result.last = entry.number;
+    result.digest = chain.digest();
+    return true;
   });
+  return result;
 }
 
 }  // namespace isomesh::store

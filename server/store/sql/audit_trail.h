@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "server/store/audit_trail.h"
 #include "server/store/sql/sql.h"
 
@@ -14,8 +16,6 @@ class SqlAuditTrail : public AuditTrail {
   void add(const AuditEntry& entry) override;
   void read(std::uint64_t after,
             const std::function<void(std::string_view line)>& line) const override;
-  // Reads every entry. Throws as the other methods do.
-  AuditCheck verify() const;
   std::uint64_t sent() const override;
   void note_sent(std::uint64_t number) override;
 
@@ -23,8 +23,12 @@ class SqlAuditTrail : public AuditTrail {
   SqlDatabase& database_;
 };
 
-// As verify() and read(), on a connection.
+// Throws Error kUnavailable if records of that version have the audit trail in an older form.
+void refuse_old_trail(std::int64_t version, std::int64_t oldest);
+
+// Reads every entry.
 AuditCheck verify_audit_trail(SqlConnection& connection);
+// As read(), on a connection.
 void read_audit_trail(SqlConnection& connection, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line);
 

@@ -21,6 +21,7 @@
 #include "proto/error.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/files/files.h"
+#include "server/store/sqlite/database.h"
 #include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/sqlite.h"
 
@@ -335,6 +336,10 @@ Copied back_up(const fs::path& data, const fs::path& named) {
 
 Copied restore(const fs::path& backup, const fs::path& data) {
   check_is_data_folder(backup);
+  {
+    Connection connection(backup / kRecords, Connection::Mode::kRead);
+    check_version(connection);
+  }
   if (is_in(data, backup)) refuse(data, "is inside the backup");
   std::error_code error;
   const bool is_there = fs::exists(data, error);

@@ -6,6 +6,7 @@
 
 #include "proto/error.h"
 #include "server/store/files/files.h"
+#include "server/store/sql/audit_trail.h"
 #include "server/store/sql/fair_queue.h"
 
 namespace isomesh::store {
@@ -198,6 +199,7 @@ CREATE TABLE turns(           -- of owners' last claims; see fair_queue.h
 
 // Versions 1 and 2 were never released.
 constexpr std::int64_t kFirst = 3;
+constexpr std::int64_t kChained = 8;  // the first version whose audit trail has digests
 constexpr auto kNewest = kFirst + static_cast<std::int64_t>(kSteps.size()) - 1;
 
 std::int64_t version_of(Connection& connection) {
@@ -211,15 +213,8 @@ Connection::Mode migrated(const std::filesystem::path& file) {
   // Records may identify patients. SQLite's other files get the access rights of this one.
   if (!std::filesystem::exists(file)) File::create(file);
   Connection connection(file, Connection::Mode::kWrite);
+  check_version(connection);
   const std::int64_t version = version_of(connection);
-  if (version > kNewest || (version > 0 && version < kFirst)) {
-    throw Error(ErrorCode::kUnavailable,
-                std::string("the data folder was made by ") +
-                    (version > kNewest ? "a newer isomeshd" : "a pre-release isomeshd") +
-                    ": its records have version " + std::to_string(version) +
-                    ", this isomeshd reads versions " + std::to_string(kFirst) + " to " +
-                    std::to_string(kNewest));
-  }
   if (version == kNewest) return Connection::Mode::kWrite;
   Transaction transaction(connection);
   for (std::int64_t next = version == 0 ? kFirst : version + 1; next <= kNewest; ++next) {
@@ -239,6 +234,22 @@ std::uint64_t log_bytes(std::uint64_t disk) {
 }
 
 }  // namespace
+
+void check_version(Connection& connection) {
+  const std::int64_t version = version_of(connection);
+  if (version == 0 || (version >= kFirst && version <= kNewest)) return;
+  throw Error(ErrorCode::kUnavailable,
+              std::string("the data folder was made by ") +
+                  (version > kNewest ? "a newer isomeshd" : "a pre-release isomeshd") +
+                  ": its records have version " + std::to_string(version) +
+                  ", this isomeshd reads versions " + std::to_string(kFirst) + " to " +
+                  std::to_string(kNewest));
+}
+
+void check_has_trail(Connection& connection) {
+  check_version(connection);
+  refuse_old_trail(version_of(connection), kChained);
+}
 
 Database::Database(const DataFolder& folder)
     : folder_(folder), writer_(folder.records(), migrated(folder.records())) {

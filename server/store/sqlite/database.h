@@ -71,6 +71,12 @@ class Database : public SqlDatabase {
   std::atomic<std::size_t> next_ = 0;  // the next reader if all are busy
 };
 
+// Throws Error kUnavailable if this isomeshd cannot read records of that version.
+void check_version(Connection& connection);
+
+// The same for the audit trail without a migration.
+void check_has_trail(Connection& connection);
+
 // Microseconds since 1970 by this machine's clock.
 std::int64_t now_us();
 

@@ -100,5 +100,17 @@ TEST_F(BackupOfAHospitalTest, OfRecordsWithoutOrdersIsRestored) {
   EXPECT_THAT(restore(folder_ / "backup", folder_ / "restored").missing, IsEmpty());
 }
 
+// A daemon would not start with it.
+TEST_F(BackupOfAHospitalTest, OfANewerVersionIsNotRestored) {
+  back_up(root(), folder_ / "backup");
+  Connection(folder_ / "backup/isomesh.sqlite", Connection::Mode::kWrite)
+      .script("PRAGMA user_version=99");
+  const auto error = test::thrown_by([&] { restore(folder_ / "backup", folder_ / "restored"); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error->what(), HasSubstr("a newer isomeshd"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "restored"));
+}
+
 }  // namespace
 }  // namespace isomesh::store

@@ -111,6 +111,12 @@ class ClusterTest : public testing::Test {
                   "pg_backend_pid() AND backend_type = 'client backend'");
   }
   std::string ask(const std::string& sql) { return Postgres::ask(url_, sql); }
+  void make_version_one() {
+    ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
+        "queued_owners; DROP TABLE turns; DROP TABLE tasks; DROP INDEX jobs_by_turn; ALTER TABLE "
+        "jobs DROP COLUMN cost; CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; "
+        "UPDATE isomesh_version SET version = 1");
+  }
   // As when their time is over.
   void end_leases() { ask("UPDATE runs SET lease_until = 0"); }
 

@@ -1,11 +1,14 @@
 // Tests of several processes that share one database's records other than jobs: tables, retention,
 // orders, callbacks and blob ownership.
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/store/postgresql/held_task.h"
 #include "server/store/postgresql/identity.h"
+#include "server/store/postgresql/schema.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
 #include "tests/support/errors.h"
@@ -39,18 +42,41 @@ TEST_F(ClusterTest, ADatabaseThatIsNotOfUtf8IsRefusedWithItsEncoding) {
 
 TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
   const std::string id = submit();
-  ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
-      "queued_owners; DROP TABLE turns; DROP TABLE tasks; DROP INDEX jobs_by_turn; ALTER TABLE "
-      "jobs DROP COLUMN "
-      "cost; "
-      "CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; UPDATE isomesh_version SET "
-      "version = 1");
+  make_version_one();
   one_.emplace(url_, "one", blobs_);
   const Lease lease = one().claimed();
   EXPECT_EQ(lease.id, id);
   one().jobs.renew(lease, {Stage::kSmooth, 0.5, {.load = 1}}, kLongLease);
   EXPECT_EQ(two().jobs.get("", id).timing.load, 1);
   submit(2);
+}
+
+// A large table takes longer than statements of a running daemon may.
+TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
+  make_version_one();
+  ask("CREATE FUNCTION check_patience() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN IF "
+      "current_setting('statement_timeout')::interval < interval '10 minutes' THEN RAISE 'hurry'; "
+      "END IF; RETURN new; END $$; CREATE TRIGGER patience BEFORE UPDATE ON isomesh_version FOR "
+      "EACH ROW EXECUTE FUNCTION check_patience()");
+  Connection connection(url_);
+  std::optional<Transaction> dump(std::in_place, connection);
+  connection.query("SELECT count(*) FROM jobs");
+  std::optional<ErrorCode> failure;
+  std::jthread upgrade([&] {
+    Connection own(url_);
+    failure = code_thrown_by([&] { migrate(own); });
+  });
+  const auto waits = [&] {
+    return ask("SELECT count(*) FROM pg_locks WHERE NOT granted AND mode = 'AccessExclusiveLock' "
+               "AND relation = 'jobs'::regclass") == "1";
+  };
+  EXPECT_TRUE(test::eventually(waits));
+  EXPECT_TRUE(test::eventually([&] { return !waits(); })) << "running daemons have their turn";
+  dump.reset();
+  upgrade.join();
+  EXPECT_FALSE(failure);
+  two_.emplace(url_, "two", blobs_);
+  submit();
 }
 
 TEST_F(ClusterTest, SeveralThatStartAtOnceMakeThemOnce) {
@@ -71,11 +97,30 @@ TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
   }
 }
 
+TEST_F(ClusterTest, WhoeverReadsTheAuditTrailChangesNothing) {
+  SqlAuditTrail(one().database).add({});
+  const auto entries = [&] { return verify_audit_trail(*connect_to_trail(url_)).entries; };
+  ask("UPDATE isomesh_version SET version = 4");
+  EXPECT_EQ(entries(), 1U);
+  EXPECT_EQ(ask("SELECT version FROM isomesh_version"), "4")
+      << "daemons of this version still start";
+  EXPECT_EQ(ask("SELECT count(*) FROM nodes"), "2");
+  for (const std::string version : {"3", "1000"}) {
+    ask("UPDATE isomesh_version SET version = " + version);
+    EXPECT_EQ(code_thrown_by(entries), ErrorCode::kUnavailable) << version;
+  }
+  const std::string unused = Postgres::shared().new_place();
+  EXPECT_EQ(code_thrown_by([&] { connect_to_trail(unused); }), ErrorCode::kNotFound);
+  EXPECT_EQ(
+      Postgres::ask(unused, "SELECT count(*) FROM pg_tables WHERE schemaname = current_schema"),
+      "0");
+}
+
 TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
   for (int n = 0; n < 5; ++n) SqlAuditTrail((n % 2 ? one() : two()).database).add({});
-  EXPECT_EQ(SqlAuditTrail(one().database).verify().entries, 5U);
+  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_)).entries, 5U);
   ask("ALTER TABLE audit DISABLE TRIGGER audit_is_kept; UPDATE audit SET at = '' WHERE id = 3");
-  EXPECT_EQ(SqlAuditTrail(one().database).verify().misfit, 3U);
+  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_)).misfit, 3U);
 }
 
 // --- What is not kept

@@ -48,6 +48,14 @@ TEST_F(DatabaseTest, OfANewerVersionIsRefusedAndLeftAsItIs) {
   EXPECT_THAT(error->what(), testing::HasSubstr("99"));
 }
 
+TEST_F(DatabaseTest, OfAnOlderVersionSaysThatItsAuditTrailHasAnotherForm) {
+  { const Database database(data_); }
+  Connection connection(data_.records(), Connection::Mode::kWrite);
+  check_has_trail(connection);
+  connection.script("PRAGMA user_version=7");
+  EXPECT_EQ(test::code_thrown_by([&] { check_has_trail(connection); }), ErrorCode::kUnavailable);
+}
+
 // Its tables are not those that this version's statements are for.
 TEST_F(DatabaseTest, OfAVersionThatWasNeverReleasedIsRefused) {
   { const Database database(data_); }
@@ -147,9 +155,10 @@ TEST_F(DatabaseTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
     connection.script(sql.c_str());
   };
   const auto check = [this] {
-    Database database(data_);
-    return SqlAuditTrail(database).verify();
+    Connection connection(data_.records(), Connection::Mode::kRead);
+    return verify_audit_trail(connection);
   };
+  { const Database database(data_); }
   EXPECT_EQ(check().entries, 0U);
   // Entries as the previous version wrote them, without digests.
   add(3);
