@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "proto/error.h"
 #include "server/codec/encode.h"
@@ -42,6 +43,16 @@ void set_bounds(std::span<const mesh::Vec3> positions, const Grid& grid, DracoSt
 bool is_own_draco(const DracoParameters& draco) {
   return draco.speed >= kSlowestOurs && draco.speed <= kFastestOurs &&
          draco.position_bits <= edgebreaker::Encoder::kMostPositionBits;
+}
+
+void OwnVertices::begin(std::uint32_t low, std::uint32_t high) {
+  lowest = low;
+  number.assign(std::size_t{high} - low + 1, kUnnamed);
+  origin.clear();
+  positions.clear();
+  normals.clear();
+  distances.clear();
+  triangles.clear();
 }
 
 std::optional<mesh::Topology> topology_of(const mesh::Mesh& mesh, std::span<DracoStream> streams,
@@ -86,11 +97,8 @@ DracoStream DracoEncoder::encode_block(const mesh::Mesh& mesh, const Block& bloc
                                        const DracoOptions& options, const VertexData& data,
                                        const mesh::Context& context) {
   take(mesh, block, data);
-  DracoStream stream = encode({part_.positions,
-                               {part_.normals, part_.distances, data.most_distance},
-                               part_.triangles,
-                               part_.layer_vertices,
-                               part_.layer_triangles},
+  DracoStream stream = encode({part_.positions, part_.data(data.most_distance), part_.triangles,
+                               layer_vertices_, layer_triangles_},
                               options, edgebreaker::Threads::kOne, context);
   set_bounds(part_.positions, options.grid, stream);
   if (stream.topology) stream.topology = in_mesh(*std::move(stream.topology));
@@ -150,8 +158,7 @@ mesh::PartTopology DracoEncoder::in_mesh(mesh::PartTopology part) const {
 // Renumbers the block's vertices in the order of their first use by its triangles. Vertices that a
 // run uses first form the layer above it: only the next run may use them too.
 void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block, const VertexData& data) {
-  constexpr std::uint32_t kUnnamed = std::numeric_limits<std::uint32_t>::max();
-  std::uint32_t low = kUnnamed;
+  std::uint32_t low = std::numeric_limits<std::uint32_t>::max();
   std::uint32_t high = 0;
   for (const Run& run : block) {
     for_each_triangle(mesh, run, [&](const mesh::Triangle& triangle) {
@@ -160,36 +167,43 @@ void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block, const Vertex
     });
   }
   // Triangles of neighbouring layers use vertices of neighbouring layers, so the range is short.
-  part_.number.assign(std::size_t{high} - low + 1, kUnnamed);
-  part_.lowest = low;
-  part_.origin.clear();
-  part_.positions.clear();
-  part_.normals.clear();
-  part_.distances.clear();
-  part_.triangles.clear();
-  part_.layer_vertices.assign(2, 0);
-  part_.layer_triangles.assign(1, 0);
+  part_.begin(low, high);
+  layer_vertices_.assign(2, 0);
+  layer_triangles_.assign(1, 0);
   for (const Run& run : block) {
     for_each_triangle(mesh, run, [&](const mesh::Triangle& triangle) {
-      mesh::Triangle& renumbered = part_.triangles.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        std::uint32_t& vertex = part_.number[triangle[corner] - low];
-        if (vertex == kUnnamed) {
-          vertex = static_cast<std::uint32_t>(part_.positions.size());
-          part_.origin.push_back(triangle[corner]);
-          part_.positions.push_back(mesh.positions[triangle[corner]]);
-          if (!data.normals.empty()) part_.normals.push_back(data.normals[triangle[corner]]);
-          if (!data.distances.empty()) {
-            part_.distances.push_back(data.distances[triangle[corner]]);
-          }
-        }
-        renumbered[corner] = vertex;
-      }
+      part_.add(triangle, mesh.positions.span(), data);
     });
-    part_.layer_vertices.push_back(part_.positions.size());
-    part_.layer_triangles.push_back(part_.triangles.size());
+    layer_vertices_.push_back(part_.positions.size());
+    layer_triangles_.push_back(part_.triangles.size());
   }
-  part_.layer_triangles.push_back(part_.triangles.size());
+  layer_triangles_.push_back(part_.triangles.size());
+}
+
+Encoders& Encoders::instance() {
+  static Encoders encoders;
+  return encoders;
+}
+
+std::unique_ptr<DracoEncoder> Encoders::take(std::size_t triangles) {
+  const Lock lock(mutex_);
+  if (idle_.empty()) return std::make_unique<DracoEncoder>();
+  // The smallest that is large enough, otherwise the largest.
+  const auto best = std::ranges::min_element(idle_, {}, [&](const auto& encoder) {
+    const std::size_t has = encoder->most_triangles();
+    return has >= triangles ? std::pair(0, has) : std::pair(1, triangles - has);
+  });
+  auto encoder = std::move(*best);
+  idle_.erase(best);
+  idle_triangles_ -= encoder->most_triangles();
+  return encoder;
+}
+
+void Encoders::give_back(std::unique_ptr<DracoEncoder> encoder) {
+  const Lock lock(mutex_);
+  if (idle_triangles_ + encoder->most_triangles() > kMostIdleTriangles) return;
+  idle_triangles_ += encoder->most_triangles();
+  idle_.push_back(std::move(encoder));
 }
 
 }  // namespace isomesh::codec

@@ -5,10 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "base/mutex.h"
 #include "server/codec/draco/encoder.h"
 #include "server/codec/draco/grid.h"
 #include "server/mesh/mesh.h"
@@ -59,6 +61,40 @@ struct VertexData {
   bool empty() const { return normals.empty() && distances.empty(); }
 };
 
+// Triangles with only the vertices that they use, in the order of their first use.
+struct OwnVertices {
+  std::vector<mesh::Vec3> positions;
+  std::vector<mesh::Vec3> normals;
+  std::vector<float> distances;
+  std::vector<mesh::Triangle> triangles;
+  std::uint32_t lowest = 0;           // lowest original vertex
+  std::vector<std::uint32_t> number;  // own vertex of each original one from `lowest` on
+  std::vector<std::uint32_t> origin;  // original vertex of each own one
+
+  // For triangles with the original vertices [low, high]. The memory is reused.
+  void begin(std::uint32_t low, std::uint32_t high);
+  void add(const mesh::Triangle& triangle, std::span<const mesh::Vec3> all,
+           const VertexData& data) {
+    mesh::Triangle& renumbered = triangles.emplace_back();
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const std::uint32_t original = triangle[corner];
+      std::uint32_t& vertex = number[original - lowest];
+      if (vertex == kUnnamed) {
+        vertex = static_cast<std::uint32_t>(positions.size());
+        origin.push_back(original);
+        positions.push_back(all[original]);
+        if (!data.normals.empty()) normals.push_back(data.normals[original]);
+        if (!data.distances.empty()) distances.push_back(data.distances[original]);
+      }
+      renumbered[corner] = vertex;
+    }
+  }
+  VertexData data(float most_distance) const { return {normals, distances, most_distance}; }
+
+ private:
+  static constexpr std::uint32_t kUnnamed = ~std::uint32_t{0};
+};
+
 struct DracoOptions {
   Grid grid;
   int speed = 7;
@@ -92,27 +128,36 @@ class DracoEncoder {
     std::span<const std::uint64_t> layer_vertices;
     std::span<const std::uint64_t> layer_triangles;
   };
-  // A block with its own vertices.
-  struct PartMemory {
-    std::vector<mesh::Vec3> positions;
-    std::vector<mesh::Vec3> normals;
-    std::vector<float> distances;
-    std::vector<mesh::Triangle> triangles;
-    std::vector<std::uint64_t> layer_vertices;
-    std::vector<std::uint64_t> layer_triangles;
-    std::uint32_t lowest = 0;           // lowest mesh vertex of the block
-    std::vector<std::uint32_t> number;  // block vertex of each mesh vertex from `lowest` on
-    std::vector<std::uint32_t> origin;  // mesh vertex of each block vertex
-  };
 
   mesh::PartTopology in_mesh(mesh::PartTopology part) const;
   void take(const mesh::Mesh& mesh, const Block& block, const VertexData& data);
   DracoStream encode(const Part& part, const DracoOptions& options, edgebreaker::Threads threads,
                      const mesh::Context& context);
 
-  PartMemory part_;
+  OwnVertices part_;
+  std::vector<std::uint64_t> layer_vertices_;  // of the part
+  std::vector<std::uint64_t> layer_triangles_;
   std::size_t most_triangles_ = 0;
   edgebreaker::Encoder encoder_;
+};
+
+// A pool of encoders with their memory. Fresh memory costs a fifth of the encoding time, so
+// encoders outlive jobs, as the workers' meshes do. Thread safe.
+class Encoders {
+ public:
+  // The process's pool. Idle encoders have together encoded at most kMostIdleTriangles at once,
+  // about 250 MiB.
+  static Encoders& instance();
+  static constexpr std::size_t kMostIdleTriangles = 8'000'000;
+
+  // Returns the idle encoder whose memory fits `triangles` best, or a new one.
+  std::unique_ptr<DracoEncoder> take(std::size_t triangles);
+  void give_back(std::unique_ptr<DracoEncoder> encoder);
+
+ private:
+  Mutex mutex_;
+  std::vector<std::unique_ptr<DracoEncoder>> idle_ ISOMESH_GUARDED_BY(mutex_);
+  std::size_t idle_triangles_ ISOMESH_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace isomesh::codec

@@ -3,7 +3,6 @@
 
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
-#include "server/codec/encoders.h"
 
 namespace isomesh::codec {
 

@@ -30,6 +30,10 @@ struct Frame {
 // Takes the encoded bytes, in order. It may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
 
+inline void put_text(const Sink& sink, std::string_view text) {
+  sink(std::as_bytes(std::span(text)));
+}
+
 // True if our own Draco encoder, and not libdraco, encodes oriented manifolds without distances
 // with these parameters.
 bool is_own_draco(const DracoParameters& draco);
@@ -106,5 +110,38 @@ void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
 std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
                                          const mesh::Context& context, const Sink& sink,
                                          const mesh::TriangleGrid* extracted = nullptr);
+
+// 3MF, a ZIP: "3D Manufacturing Format, Core Specification & Reference Guide", 3MF Consortium, in
+// the Open Packaging Conventions of ECMA-376.
+//
+// One object in millimetres (angstrom are written as such: 3MF has none), in the space of the
+// parameters; numbers as the shortest text that reads as the same float. Its type is "model", for
+// printing, if the surface is closed, manifold and oriented, as the type requires; otherwise
+// "surface". An empty surface is a file without an object. The metadata has the members of
+// asset.extras of GLB. Formatted in parallel and deflated by one thread, in a few megabytes of
+// memory; the bytes do not depend on the number of threads. Returns the mesh's measured topology.
+// Throws Error kInternal if the ZIP library fails, and kCancelled.
+std::optional<mesh::Topology> encode_3mf(const mesh::Mesh& mesh, const Provenance& provenance,
+                                         const mesh::Context& context, const Sink& sink);
+
+// The text form of Universal Scene Description, USD ("Pixar Animation Studios, Universal Scene
+// Description", openusd.org).
+//
+// A stage with Y up whose unit is the millimetre: a point (x, y, z) in LPS is (x, z, -y), which
+// rounds nothing. Numbers are the shortest text that reads as the same float. One Mesh prim and one
+// UsdPreviewSurface, with normals per vertex if the parameters ask for them. An empty surface is a
+// stage without a mesh. The layer's custom data has the members of asset.extras of GLB. Streamed in
+// a few megabytes, and the normals. `format` is the one that errors name. Throws Error kTooLarge as
+// encode_vtk does, and kCancelled.
+void encode_usda(const mesh::Mesh& mesh, const Provenance& provenance, MeshFormat format,
+                 const mesh::Context& context, const Sink& sink);
+
+// USDZ ("USDZ File Format Specification", version 1.3, openusd.org): a ZIP of files that are not
+// compressed and begin at multiples of 64 bytes. It has one file, a USDA of the surface. Its size
+// and checksum stand before it, so it is formatted twice and never held in memory. The bytes do not
+// depend on the number of threads. Throws as encode_usda does, and Error kTooLarge from 4 GiB on:
+// readers of USDZ do not know ZIP64.
+void encode_usdz(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                 const Sink& sink);
 
 }  // namespace isomesh::codec

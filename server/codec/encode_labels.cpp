@@ -86,10 +86,9 @@ void encode_labels_ply(const LabelledSurface& surface, const Frame& frame,
   const mesh::Mesh& mesh = surface.walls.mesh;
   const std::vector<FaceRun> runs = faces_of(surface);
   const std::size_t faces = count_of(runs);
-  const std::string header =
-      ply_header(frame, mesh.positions.size(), faces,
-                 has_wide_labels(surface) ? "property uint label\n" : "property int label\n");
-  sink(std::as_bytes(std::span(header)));
+  put_text(sink,
+           ply_header(frame, mesh.positions.size(), faces,
+                      has_wide_labels(surface) ? "property uint label\n" : "property int label\n"));
   BlockWriter writer(context, sink, mesh.positions.size() + faces);
   writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
     return write_ply_vertex(in_space(mesh.positions[v], frame.space), out);
@@ -107,8 +106,7 @@ void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
                        const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
   const mesh::Mesh& mesh = surface.walls.mesh;
-  const std::string header = obj_header(frame);
-  sink(std::as_bytes(std::span(header)));
+  put_text(sink, obj_header(frame));
   const std::vector<FaceRun> runs = faces_of(surface);
   BlockWriter writer(context, sink, mesh.positions.size() + count_of(runs));
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
@@ -117,8 +115,7 @@ void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
   ObjGroups groups;
   for (std::size_t n = 0; n < runs.size(); ++n) {
     const std::string group = groups.of(surface.labels[n]);
-    const std::string line = "g " + group + "\nusemtl " + group + '\n';
-    sink(std::as_bytes(std::span(line)));
+    put_text(sink, "g " + group + "\nusemtl " + group + '\n');
     writer.write(runs[n].count, kMostObjFaceBytes,
                  [&](std::size_t t, std::byte* out) { return write_obj_face(runs[n].at(t), out); });
   }

@@ -75,4 +75,21 @@ void encode_labels_vtk(const LabelledSurface& surface, const Frame& frame,
 void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
                        const mesh::Context& context, const Sink& sink);
 
+// An object per label that has triangles, with its title as the name, its value as the part number,
+// and its colour. Objects have their own vertices, at the same positions as adjacent labels. Holds
+// one label's surface in memory. Throws as encode_3mf does.
+void encode_labels_3mf(const LabelledSurface& surface, const Provenance& provenance,
+                       const mesh::Context& context, const Sink& sink);
+
+// A Mesh prim and a material for each label that has triangles, named by its title as an
+// identifier; equal names get the label's value appended. The title is its displayName, the value
+// is in its custom data. Meshes have their own vertices, at the same positions as adjacent labels.
+// Holds one label's surface in memory. Throws as encode_usda does.
+void encode_labels_usda(const LabelledSurface& surface, const Provenance& provenance,
+                        MeshFormat format, const mesh::Context& context, const Sink& sink);
+
+// A package as encode_usdz writes it, with a USDA of all labels.
+void encode_labels_usdz(const LabelledSurface& surface, const Provenance& provenance,
+                        const mesh::Context& context, const Sink& sink);
+
 }  // namespace isomesh::codec

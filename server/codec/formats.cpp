@@ -8,10 +8,7 @@
 
 #include "proto/error.h"
 #include "server/codec/decode/decoders.h"
-#include "server/codec/space.h"
-#include "server/codec/threemf.h"
-#include "server/codec/usda.h"
-#include "server/codec/usdz.h"
+#include "server/codec/levels.h"
 
 namespace isomesh::codec {
 namespace {
@@ -37,21 +34,13 @@ double levels_of(const MeshParameters& parameters) {
              : std::accumulate(parameters.lods.begin(), parameters.lods.end(), 0.0);
 }
 
-std::uint64_t no_memory(const SurfaceSize& /*surface*/, const MeshParameters& /*parameters*/) {
-  return 0;
-}
-
-bool never(const MeshParameters& /*parameters*/) { return false; }
-
-bool always(const MeshParameters& /*parameters*/) { return true; }
-
 bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
 
 std::optional<mesh::Topology> encode_turned_drc(const Format::Surface& surface,
                                                 const mesh::Context& context, const Sink& sink) {
-  const DracoParameters& draco = surface.provenance.parameters.draco;
-  if (surface.frame.space == Space::kLps) return encode_drc(surface.mesh, draco, context, sink);
-  return encode_drc(copy_in_space(surface.mesh, surface.frame.space), draco, context, sink);
+  return use_in_space(surface.mesh, surface.frame.space, [&](const mesh::Mesh& mesh) {
+    return encode_drc(mesh, surface.provenance.parameters.draco, context, sink);
+  });
 }
 
 template <auto encode>
@@ -178,8 +167,6 @@ constexpr std::array kFormats = {
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .has_exact_bytes = true,
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_in_frame<encode_stl>},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
@@ -189,8 +176,6 @@ constexpr std::array kFormats = {
                  return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_in_frame<encode_ply>,
            .encode_labels = encode_labels_in_frame<encode_labels_ply>},
     Format{.format = MeshFormat::kObj,
@@ -200,8 +185,6 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_in_frame<encode_obj>,
            .encode_labels = encode_labels_in_frame<encode_labels_obj>},
     Format{.format = MeshFormat::k3mf,
@@ -217,7 +200,7 @@ constexpr std::array kFormats = {
                  constexpr std::uint64_t kLabelPerTriangle = 30;
                  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
                },
-           .shows_topology = always,
+           .shows_topology = [](const MeshParameters&) { return true; },
            .encode =
                [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
                  return encode_3mf(surface.mesh, surface.provenance, context, sink);
@@ -228,7 +211,6 @@ constexpr std::array kFormats = {
            .milliseconds_per_triangle = 3.0e-4,
            .bytes = usd_bytes,
            .memory_bytes = usd_memory,
-           .shows_topology = never,
            .encode =
                [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
                  encode_usda(surface.mesh, surface.provenance, MeshFormat::kUsda, context, sink);
@@ -244,7 +226,6 @@ constexpr std::array kFormats = {
            .milliseconds_per_triangle = 6.0e-4,  // formatted twice
            .bytes = usd_bytes,
            .memory_bytes = usd_memory,
-           .shows_topology = never,
            .encode = encode_with_provenance<encode_usdz>,
            .encode_labels = encode_labels_with_provenance<encode_labels_usdz>},
     Format{.format = MeshFormat::kOff,
@@ -254,8 +235,6 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 100 + 28 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_in_frame<encode_off>},
     Format{.format = MeshFormat::kVtk,
            .media_type = kUnregistered,
@@ -266,8 +245,6 @@ constexpr std::array kFormats = {
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_in_frame<encode_vtk>,
            .encode_labels = encode_labels_in_frame<encode_labels_vtk>},
     Format{.format = MeshFormat::kVtp,
@@ -279,8 +256,6 @@ constexpr std::array kFormats = {
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_with_provenance<encode_vtp>,
            .encode_labels = encode_labels_with_provenance<encode_labels_vtp>},
     Format{.format = MeshFormat::kGii,
@@ -290,8 +265,6 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 2500 + 16 * as_double(surface.vertices) + 16 * as_double(surface.triangles);
                },
-           .memory_bytes = no_memory,
-           .shows_topology = never,
            .encode = encode_with_provenance<encode_gii>},
     Format{.format = MeshFormat::kZip,
            .media_type = "application/zip",
@@ -315,7 +288,6 @@ constexpr std::array kFormats = {
                  }
                  return bytes;
                },
-           .shows_topology = never,
            .encode = nullptr},
 };
 

@@ -37,9 +37,13 @@ struct Format {
   // True if that is exact but for the header.
   bool has_exact_bytes = false;
   // The encoder's peak memory without the mesh; an upper estimate.
-  std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
+  std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface,
+                                const MeshParameters& parameters) =
+      [](const mesh::SurfaceSize&, const MeshParameters&) { return std::uint64_t{0}; };
   // True if encoding nearly always yields the mesh's topology.
-  bool (*shows_topology)(const MeshParameters& parameters);
+  bool (*shows_topology)(const MeshParameters& parameters) = [](const MeshParameters&) {
+    return false;
+  };
   // Null for a format that holds files of labels only.
   std::optional<mesh::Topology> (*encode)(const Surface& surface, const mesh::Context& context,
                                           const Sink& sink);

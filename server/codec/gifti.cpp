@@ -48,28 +48,27 @@ void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
   const std::size_t vertices = mesh.positions.size();
   const std::size_t triangles = mesh.triangles.size();
   check_signed_indices(vertices, triangles, MeshFormat::kGii);
-  const auto text = [&](const std::string& lines) { sink(std::as_bytes(std::span(lines))); };
   // Few readers accept empty arrays.
   const bool is_empty = triangles == 0;
-  text(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-      "<!DOCTYPE GIFTI SYSTEM \"http://www.nitrc.org/frs/download.php/115/gifti.dtd\">\n"
-      "<GIFTI Version=\"1.0\" NumberOfDataArrays=\"" +
-      std::string(is_empty ? "0" : "2") +
-      "\">\n<MetaData>\n<MD><Name>isomesh:provenance</Name><Value>" +
-      provenance_for_xml(provenance) + "</Value></MD>\n</MetaData>\n<LabelTable/>\n");
-  if (is_empty) return text("</GIFTI>\n");
-  text(array_head("NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", vertices) +
-       std::string(kCoordinateSystem) + "<Data>");
+  put_text(sink,
+           "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+           "<!DOCTYPE GIFTI SYSTEM \"http://www.nitrc.org/frs/download.php/115/gifti.dtd\">\n"
+           "<GIFTI Version=\"1.0\" NumberOfDataArrays=\"" +
+               std::string(is_empty ? "0" : "2") +
+               "\">\n<MetaData>\n<MD><Name>isomesh:provenance</Name><Value>" +
+               provenance_for_xml(provenance) + "</Value></MD>\n</MetaData>\n<LabelTable/>\n");
+  if (is_empty) return put_text(sink, "</GIFTI>\n");
+  put_text(sink, array_head("NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", vertices) +
+                     std::string(kCoordinateSystem) + "<Data>");
   BlockWriter writer(context, sink, vertices + triangles);
   writer.write(vertices, kRecordText + 1, [&](std::size_t v, std::byte* out) {
     return write_record(in_space(mesh.positions[v], Space::kRas), out);
   });
-  text("</Data>\n</DataArray>\n" +
-       array_head("NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", triangles) + "<Data>");
+  put_text(sink, "</Data>\n</DataArray>\n" +
+                     array_head("NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", triangles) + "<Data>");
   writer.write(triangles, kRecordText + 1,
                [&](std::size_t t, std::byte* out) { return write_record(mesh.triangles[t], out); });
-  text("</Data>\n</DataArray>\n</GIFTI>\n");
+  put_text(sink, "</Data>\n</DataArray>\n</GIFTI>\n");
 }
 
 }  // namespace isomesh::codec

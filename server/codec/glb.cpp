@@ -10,7 +10,6 @@
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
 #include "server/codec/encode_labels.h"
-#include "server/codec/encoders.h"
 #include "server/codec/glb_document.h"
 #include "server/codec/levels.h"
 #include "server/mesh/measure/distance.h"
@@ -145,8 +144,8 @@ struct LevelProgress {
     const auto count = static_cast<double>(levels);
     const double begin = static_cast<double>(level) / count;
     const double encoding = level == 0 ? begin : begin + kSimplifyShare / count;
-    simplify = portion_of(context, begin, encoding);
-    encode = portion_of(context, encoding, static_cast<double>(level + 1) / count);
+    simplify = context.part(begin, encoding);
+    encode = context.part(encoding, static_cast<double>(level + 1) / count);
   }
 };
 

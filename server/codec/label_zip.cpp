@@ -11,7 +11,7 @@
 #include "proto/error.h"
 #include "server/codec/draco/grid.h"
 #include "server/codec/formats.h"
-#include "server/codec/space.h"
+#include "server/codec/levels.h"
 #include "server/codec/zip_writer.h"
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"
@@ -73,8 +73,9 @@ struct Encoded {
 
 Grid shared_grid(const mesh::Mesh& walls, const MeshParameters& parameters) {
   const Space space = space_of(MeshFormat::kDrc, parameters);
-  const int bits = parameters.draco.position_bits;
-  return space == Space::kLps ? grid_of(walls, bits) : grid_of(copy_in_space(walls, space), bits);
+  return use_in_space(walls, space, [&](const mesh::Mesh& mesh) {
+    return grid_of(mesh, parameters.draco.position_bits);
+  });
 }
 
 Encoded encode_one(const mesh::Mesh& mesh, MeshFormat format, const Grid& grid,
@@ -87,14 +88,9 @@ Encoded encode_one(const mesh::Mesh& mesh, MeshFormat format, const Grid& grid,
   };
   if (format == MeshFormat::kDrc) {
     const Space space = space_of(format, provenance.parameters);
-    const auto write = [&](const mesh::Mesh& placed) {
+    use_in_space(mesh, space, [&](const mesh::Mesh& placed) {
       encode_drc(placed, provenance.parameters.draco, context, sink, &grid);
-    };
-    if (space == Space::kLps) {
-      write(mesh);
-    } else {
-      write(copy_in_space(mesh, space));
-    }
+    });
   } else {
     encode(mesh, format, provenance, context, sink);
   }

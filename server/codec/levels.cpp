@@ -28,7 +28,7 @@ void coarsen_in_steps(std::uint64_t triangles, const mesh::Context& context, con
     const double end = is_last ? 1 : begin + (1 - begin) * (1 - 1.0 / kMostAtOnce);
     const mesh::SimplificationEffect effect =
         simplify({.triangles = std::max({triangles, nearer, std::uint64_t{1}})},
-                 portion_of(context, begin, end), surface);
+                 context.part(begin, end), surface);
     if (effect.triangles_after == effect.triangles_before) return;
     begin = end;
   }
@@ -65,13 +65,6 @@ void coarsen(std::uint64_t triangles, const mesh::Context& context, mesh::Mesh& 
 void coarsen(std::uint64_t triangles, const mesh::Context& context,
              mesh::SeparatingSurface& walls) {
   coarsen_in_steps(triangles, context, walls.mesh, walls);
-}
-
-mesh::Context portion_of(const mesh::Context& context, double begin, double end) {
-  if (!context.progress) return context;
-  return {context.stop, [&context, begin, end](double share) {
-            context.progress(begin + (end - begin) * share);
-          }};
 }
 
 }  // namespace isomesh::codec

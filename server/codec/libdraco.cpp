@@ -52,37 +52,6 @@ std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
   return result;
 }
 
-// The triangles with only the vertices that they use. Draco's decoder rejects sequential streams
-// with more vertices than corners.
-struct Named {
-  explicit Named(const Arrays& arrays) : most_distance(arrays.data.most_distance) {
-    constexpr std::uint32_t kUnnamed = ~std::uint32_t{0};
-    std::vector<std::uint32_t> number(arrays.positions.size(), kUnnamed);
-    for (const mesh::Triangle& triangle : arrays.triangles) {
-      mesh::Triangle& renumbered = triangles.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        std::uint32_t& vertex = number[triangle[corner]];
-        if (vertex == kUnnamed) {
-          vertex = static_cast<std::uint32_t>(positions.size());
-          positions.push_back(arrays.positions[triangle[corner]]);
-          const VertexData& data = arrays.data;
-          if (!data.normals.empty()) normals.push_back(data.normals[triangle[corner]]);
-          if (!data.distances.empty()) distances.push_back(data.distances[triangle[corner]]);
-        }
-        renumbered[corner] = vertex;
-      }
-    }
-  }
-
-  Arrays arrays() const { return {positions, {normals, distances, most_distance}, triangles}; }
-
-  std::vector<mesh::Vec3> positions;
-  std::vector<mesh::Vec3> normals;
-  std::vector<float> distances;
-  float most_distance;
-  std::vector<mesh::Triangle> triangles;
-};
-
 // Edgebreaker drops triangles that repeat a vertex.
 bool is_sequential(std::span<const mesh::Triangle> triangles, int speed) {
   return speed == kSequentialSpeed || std::ranges::any_of(triangles, [](const auto& triangle) {
@@ -95,8 +64,14 @@ bool is_sequential(std::span<const mesh::Triangle> triangles, int speed) {
 
 DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int speed) {
   if (arrays.positions.size() > 3 * arrays.triangles.size()) {
-    const Named named(arrays);
-    return encode_with_libdraco(named.arrays(), grid, speed);
+    // Draco's decoder rejects sequential streams with more vertices than corners.
+    OwnVertices own;
+    own.begin(0, static_cast<std::uint32_t>(arrays.positions.size() - 1));
+    for (const mesh::Triangle& triangle : arrays.triangles) {
+      own.add(triangle, arrays.positions, arrays.data);
+    }
+    return encode_with_libdraco({own.positions, own.data(arrays.data.most_distance), own.triangles},
+                                grid, speed);
   }
   DracoStream stream;
   const std::unique_ptr<draco::Mesh> draco_mesh =

@@ -34,8 +34,7 @@ std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
 void encode_obj(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
   context.throw_if_stopped();
-  const std::string header = obj_header(frame);
-  sink(std::as_bytes(std::span(header)));
+  put_text(sink, obj_header(frame));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
     return write_obj_vertex(in_space(mesh.positions[v], frame.space), out);

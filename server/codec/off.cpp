@@ -27,11 +27,10 @@ char* write_numbers(Number a, Number b, Number c, char* out) {
 void encode_off(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
   context.throw_if_stopped();
-  const std::string header = "OFF\n# isomesh, " + std::string(frame.unit.name) + ", " +
-                             std::string(letters_of(frame.space)) + '\n' +
-                             std::to_string(mesh.positions.size()) + ' ' +
-                             std::to_string(mesh.triangles.size()) + " 0\n";
-  sink(std::as_bytes(std::span(header)));
+  put_text(sink, "OFF\n# isomesh, " + std::string(frame.unit.name) + ", " +
+                     std::string(letters_of(frame.space)) + '\n' +
+                     std::to_string(mesh.positions.size()) + ' ' +
+                     std::to_string(mesh.triangles.size()) + " 0\n");
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostVertexLineBytes, [&](std::size_t v, std::byte* out) {
     const auto& [x, y, z] = in_space(mesh.positions[v], frame.space);

@@ -34,8 +34,7 @@ std::byte* write_ply_face(const mesh::Triangle& triangle, std::byte* out) {
 void encode_ply(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
                 const Sink& sink) {
   context.throw_if_stopped();
-  const std::string header = ply_header(frame, mesh.positions.size(), mesh.triangles.size(), "");
-  sink(std::as_bytes(std::span(header)));
+  put_text(sink, ply_header(frame, mesh.positions.size(), mesh.triangles.size(), ""));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
     return write_ply_vertex(in_space(mesh.positions[v], frame.space), out);

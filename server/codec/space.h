@@ -15,9 +15,6 @@ inline mesh::Vec3 in_space(const mesh::Vec3& position, Space space) {
   return {0 - position[0], 0 - position[1], position[2]};  // avoids negative zeros
 }
 
-// For encoders that take whole meshes. Needs the memory of another mesh.
-mesh::Mesh copy_in_space(const mesh::Mesh& mesh, Space space);
-
 constexpr std::string_view letters_of(Space space) { return space == Space::kLps ? "LPS" : "RAS"; }
 
 }  // namespace isomesh::codec

@@ -8,6 +8,7 @@
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
 #include "server/codec/space.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::codec {
 namespace {
@@ -18,15 +19,8 @@ constexpr std::size_t kHeaderBytes = 80;
 constexpr std::size_t kFacetBytes = 50;
 
 mesh::Vec3 unit_normal(const mesh::Vec3& a, const mesh::Vec3& b, const mesh::Vec3& c) {
-  std::array<double, 3> u;
-  std::array<double, 3> v;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = double{b[axis]} - a[axis];
-    v[axis] = double{c[axis]} - a[axis];
-  }
-  const std::array<double, 3> n = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                                   u[0] * v[1] - u[1] * v[0]};
-  const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  const mesh::Point n = mesh::normal_of(mesh::to_point(a), mesh::to_point(b), mesh::to_point(c));
+  const double length = std::sqrt(mesh::dot(n, n));
   const double scale = length > 0 ? 1 / length : 0;
   return {static_cast<float>(n[0] * scale), static_cast<float>(n[1] * scale),
           static_cast<float>(n[2] * scale)};

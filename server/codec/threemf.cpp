@@ -1,5 +1,3 @@
-#include "server/codec/threemf.h"
-
 #include <array>
 #include <cmath>
 #include <limits>
@@ -8,6 +6,7 @@
 
 #include "base/xml.h"
 #include "server/codec/block_writer.h"
+#include "server/codec/encode_labels.h"
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
 #include "server/codec/space.h"
@@ -151,7 +150,7 @@ class Package {
     write(kXml);
     write(content);
   }
-  void write(std::string_view text) { zip_.write(std::as_bytes(std::span(text))); }
+  void write(std::string_view text) { put_text(bytes_, text); }
 
   ZipWriter zip_;
   const Space space_;

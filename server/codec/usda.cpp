@@ -1,5 +1,3 @@
-#include "server/codec/usda.h"
-
 #include <algorithm>
 #include <array>
 #include <set>
@@ -10,6 +8,7 @@
 
 #include "proto/parameters.h"
 #include "server/codec/block_writer.h"
+#include "server/codec/encode_labels.h"
 #include "server/codec/faces.h"
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
@@ -115,7 +114,7 @@ class Stage {
   void finish() { write("}\n"); }
 
  private:
-  void write(std::string_view text) { sink_(std::as_bytes(std::span(text))); }
+  void write(std::string_view text) { put_text(sink_, text); }
 
   // Renderers for phones ignore displayColor.
   void write_material(const std::string& name, const std::string& color) {

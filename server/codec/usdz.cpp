@@ -1,5 +1,3 @@
-#include "server/codec/usdz.h"
-
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -8,8 +6,7 @@
 
 #include <zlib.h>
 
-#include "server/codec/levels.h"
-#include "server/codec/usda.h"
+#include "server/codec/encode_labels.h"
 
 namespace isomesh::codec {
 namespace {
@@ -82,7 +79,7 @@ void write_package(const Encode& encode, const mesh::Context& context, const Sin
   constexpr std::uint64_t kForTheRest = 1024;
   constexpr std::uint64_t kMostBytes = std::numeric_limits<std::uint32_t>::max() - kForTheRest;
   File file;
-  encode(portion_of(context, 0, 0.5), [&](std::span<const std::byte> piece) {
+  encode(context.part(0, 0.5), [&](std::span<const std::byte> piece) {
     file.checksum = static_cast<std::uint32_t>(
         crc32_z(file.checksum, reinterpret_cast<const Bytef*>(piece.data()), piece.size()));
     file.bytes += piece.size();
@@ -91,10 +88,9 @@ void write_package(const Encode& encode, const mesh::Context& context, const Sin
                 "The surface is larger than a USDZ file can be (4 GiB). Set \"triangles\" to "
                 "simplify it.");
   });
-  const auto write = [&](const std::string& bytes) { sink(std::as_bytes(std::span(bytes))); };
-  write(header_of(file));
-  encode(portion_of(context, 0.5, 1), sink);
-  write(directory_of(file));
+  put_text(sink, header_of(file));
+  encode(context.part(0.5, 1), sink);
+  put_text(sink, directory_of(file));
 }
 
 }  // namespace

@@ -30,11 +30,10 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   const std::size_t vertices = mesh.positions.size();
   const std::size_t faces = count_of(runs);
   check_signed_indices(vertices, faces, MeshFormat::kVtk);
-  const auto text = [&](const std::string& line) { sink(std::as_bytes(std::span(line))); };
   // 3D Slicer reads the space from the title in the second line.
-  text("# vtk DataFile Version 3.0\nisomesh, " + std::string(frame.unit.name) +
-       ", SPACE=" + std::string(letters_of(frame.space)) + "\nBINARY\nDATASET POLYDATA\nPOINTS " +
-       std::to_string(vertices) + " float\n");
+  put_text(sink, "# vtk DataFile Version 3.0\nisomesh, " + std::string(frame.unit.name) +
+                     ", SPACE=" + std::string(letters_of(frame.space)) +
+                     "\nBINARY\nDATASET POLYDATA\nPOINTS " + std::to_string(vertices) + " float\n");
   BlockWriter writer(context, sink, vertices + faces * (label_type == nullptr ? 1 : 2));
   writer.write(vertices, kVertexBytes, [&](std::size_t v, std::byte* out) {
     for (const float coordinate : in_space(mesh.positions[v], frame.space)) {
@@ -42,7 +41,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
     }
     return out;
   });
-  text("\nPOLYGONS " + std::to_string(faces) + ' ' + std::to_string(4 * faces) + '\n');
+  put_text(sink, "\nPOLYGONS " + std::to_string(faces) + ' ' + std::to_string(4 * faces) + '\n');
   for (const FaceRun& run : runs) {
     writer.write(run.count, kCellBytes, [&](std::size_t t, std::byte* out) {
       out = write_turned(3, out);
@@ -50,15 +49,15 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
       return out;
     });
   }
-  text("\n");
+  put_text(sink, "\n");
   if (label_type == nullptr) return;
-  text("CELL_DATA " + std::to_string(faces) + "\nSCALARS label " + label_type +
-       " 1\nLOOKUP_TABLE default\n");
+  put_text(sink, "CELL_DATA " + std::to_string(faces) + "\nSCALARS label " + label_type +
+                     " 1\nLOOKUP_TABLE default\n");
   for (const FaceRun& run : runs) {
     writer.write(run.count, sizeof run.label,
                  [&](std::size_t, std::byte* out) { return write_turned(run.label, out); });
   }
-  text("\n");
+  put_text(sink, "\n");
 }
 
 }  // namespace

@@ -50,7 +50,6 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   const std::uint64_t point_bytes = vertices * sizeof(mesh::Vec3);
   const std::uint64_t corner_bytes = faces * sizeof(mesh::Triangle);
   const std::uint64_t face_bytes = faces * sizeof(std::uint32_t);
-  const auto text = [&](const std::string& line) { sink(std::as_bytes(std::span(line))); };
   Appended appended;
   std::string header =
       "<?xml version=\"1.0\"?>\n"
@@ -72,7 +71,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
     header += appended.element(label_type, "label", "", face_bytes);
     header += "</CellData>\n";
   }
-  text(header + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
+  put_text(sink, header + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
 
   const auto begin_array = [&](std::uint64_t bytes) { sink(std::as_bytes(std::span(&bytes, 1))); };
   BlockWriter writer(context, sink, vertices + faces * (label_type == nullptr ? 2 : 3));
@@ -105,7 +104,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
                    [&](std::size_t, std::byte* out) { return write_word(run.label, out); });
     }
   }
-  text("\n</AppendedData>\n</VTKFile>\n");
+  put_text(sink, "\n</AppendedData>\n</VTKFile>\n");
 }
 
 }  // namespace

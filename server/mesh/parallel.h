@@ -1,6 +1,7 @@
 // Loops that run on several threads.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 
@@ -13,6 +14,29 @@ namespace isomesh::mesh {
 // ends the loop and is thrown on. All loops of the process share its threads; see set_thread_count.
 void parallel_for(const Context& context, std::size_t tasks,
                   const std::function<void(std::size_t)>& body);
+
+inline constexpr std::size_t kChunk = 1 << 14;
+
+inline std::size_t chunks_of(std::size_t count, std::size_t size = kChunk) {
+  return (count + size - 1) / size;
+}
+
+// Calls body(begin, end) for the chunks of [0, count), several at once. Their size is fixed, so
+// what is computed chunk by chunk does not depend on the number of threads.
+template <class Body>
+void for_chunks(const Context& context, std::size_t count, Body body, std::size_t size = kChunk) {
+  parallel_for(context, chunks_of(count, size),
+               [&](std::size_t chunk) { body(chunk * size, std::min(count, (chunk + 1) * size)); });
+}
+
+// Calls body(i) for each number in [0, count), chunk by chunk.
+template <class Body>
+void for_each(const Context& context, std::size_t count, Body body, std::size_t size = kChunk) {
+  const auto run = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  };
+  for_chunks(context, count, run, size);
+}
 
 // While it lives, the loops that its thread begins run on that thread alone: with little to do,
 // waking the others takes longer, and within a loop's task they have tasks of their own.

@@ -1,6 +1,7 @@
 #include "server/codec/decode/decode.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -17,13 +18,12 @@ constexpr std::size_t kElementsPerTask = std::size_t{1} << 16;
 
 template <class T, class Holds>
 bool all_of(const mesh::Buffer<T>& elements, const mesh::Context& context, const Holds& holds) {
-  std::vector<char> fine((elements.size() + kElementsPerTask - 1) / kElementsPerTask);
-  mesh::parallel_for({context.stop, nullptr}, fine.size(), [&](std::size_t task) {
-    const std::size_t begin = task * kElementsPerTask;
-    const std::size_t count = std::min(kElementsPerTask, elements.size() - begin);
-    fine[task] = std::ranges::all_of(elements.span().subspan(begin, count), holds) ? 1 : 0;
-  });
-  return std::ranges::all_of(fine, [](char is_fine) { return is_fine != 0; });
+  std::atomic<bool> all = true;
+  const auto look = [&](std::size_t begin, std::size_t end) {
+    if (!std::ranges::all_of(elements.span().subspan(begin, end - begin), holds)) all = false;
+  };
+  mesh::for_chunks({context.stop, nullptr}, elements.size(), look, kElementsPerTask);
+  return all;
 }
 
 }  // namespace

@@ -39,10 +39,10 @@ void EdgeRows::begin(const Range& range, std::uint32_t* words) {
   const std::uint64_t rows = std::min<std::uint64_t>(ring, std::max<Vertex>(1, range.owned));
   mask_ = rows == ring ? static_cast<std::uint32_t>(ring - 1) : ~std::uint32_t{0};
   spare_ = static_cast<std::uint32_t>(rows);
-  rows_.reserve(rows + 1);
-  std::memset(used_.reserve(rows + 1), 0, rows + 1);
-  std::memset(found_.reserve(rows + 1), 0, rows + 1);
-  downs_.reserve(3 * std::size_t{kBlock} + 1);
+  rows_.resize_for_overwrite(rows + 1);
+  std::memset(used_.resize_for_overwrite(rows + 1), 0, rows + 1);
+  std::memset(found_.resize_for_overwrite(rows + 1), 0, rows + 1);
+  downs_.resize_for_overwrite(3 * std::size_t{kBlock} + 1);
 }
 
 void EdgeRows::add(const mesh::Triangle* triangles, Face begin, Face end) {

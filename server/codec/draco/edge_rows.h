@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "server/codec/draco/corners.h"
-#include "server/codec/draco/scratch.h"
+#include "server/mesh/buffer.h"
 
 namespace isomesh::codec::edgebreaker {
 
@@ -65,10 +65,10 @@ class EdgeRows {
   std::uint32_t mask_ = 0;
   std::uint32_t spare_ = 0;  // the row for half-edges of others
   bool clash_ = false;
-  Scratch<Row> rows_;
-  Scratch<std::uint8_t> used_;                         // slots of each row
-  Scratch<std::uint8_t> found_;                        // one bit per slot: its partner was found
-  Scratch<Down> downs_;                                // of one block
+  mesh::Buffer<Row> rows_;
+  mesh::Buffer<std::uint8_t> used_;                    // slots of each row
+  mesh::Buffer<std::uint8_t> found_;                   // one bit per slot: its partner was found
+  mesh::Buffer<Down> downs_;                           // of one block
   std::vector<Down> waiting_;                          // without a partner yet
   std::unordered_map<std::uint64_t, Corner> crowded_;  // ascending half-edges whose row was full
 };

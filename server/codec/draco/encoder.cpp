@@ -10,15 +10,14 @@
 #include "server/codec/draco/fans.h"
 #include "server/codec/draco/normal_coder.h"
 #include "server/codec/draco/opposites.h"
-#include "server/codec/draco/part_topology.h"
 #include "server/codec/draco/quantise.h"
 #include "server/codec/draco/residual_coder.h"
 #include "server/codec/draco/residuals.h"
-#include "server/codec/draco/scratch.h"
 #include "server/codec/draco/starts.h"
 #include "server/codec/draco/stream.h"
 #include "server/codec/draco/traversal.h"
 #include "server/codec/draco/value_order.h"
+#include "server/mesh/buffer.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::codec::edgebreaker {
@@ -53,6 +52,43 @@ void run(Threads threads, const mesh::Context& context, std::size_t tasks, Body 
   }
 }
 
+// For a surface after its traversal, with every vertex in a triangle. `boundary` holds the corners
+// without an opposite. Vertices are numbered as before Fans::separate.
+mesh::PartTopology part_topology(const Connectivity& surface,
+                                 const std::vector<std::vector<Corner>>& boundary, const Fans& fans,
+                                 const Traversal& traversal) {
+  const std::vector<Vertex>& originals = fans.originals();
+  const auto vertices = surface.vertices - static_cast<Vertex>(originals.size());
+  const auto original = [&](Vertex vertex) {
+    return vertex < vertices ? vertex : originals[vertex - vertices];
+  };
+  mesh::PartTopology part;
+  part.inner.assign((vertices + 63) / 64, ~std::uint64_t{0});
+  if (vertices % 64 != 0) part.inner.back() = (std::uint64_t{1} << vertices % 64) - 1;
+  fans.for_each_on_boundary([&](Vertex vertex) {
+    if (vertex < vertices) part.inner[vertex / 64] &= ~(std::uint64_t{1} << vertex % 64);
+  });
+  for (const std::vector<Corner>& corners : boundary) {
+    for (const Corner outer : corners) {
+      // Each open fan begins at a boundary edge.
+      for (Corner corner = next(outer);;) {
+        part.rim.push_back({original(surface.vertex(corner)),
+                            original(surface.vertex(next(corner))),
+                            original(surface.vertex(previous(corner)))});
+        const Corner across = surface.opposite(next(corner));
+        if (across == surface.none) break;
+        corner = next(across);
+      }
+    }
+  }
+  part.components = traversal.components();
+  part.rim_components.reserve(traversal.rim().size());
+  for (const auto& [vertex, component] : traversal.rim()) {
+    part.rim_components.push_back({original(vertex), component});
+  }
+  return part;
+}
+
 }  // namespace
 
 // The stages, sequential and parallel, with their memory.
@@ -82,7 +118,7 @@ class Encoder::Stages {
   Connectivity surface_;
   Opposites opposites_;
   Fans fans_;
-  Scratch<GridPoint> points_;
+  mesh::Buffer<GridPoint> points_;
   Starts starts_;
   Traversal traversal_;
   ValueOrder order_;
@@ -132,7 +168,7 @@ bool Encoder::Stages::prepare(const Surface& surface, const Grid& grid, Threads 
                               const mesh::Context& context) {
   const std::span<const mesh::Vec3> positions = surface.positions;
   if (!surface.normals.empty()) normals_.reserve(surface_.vertices);
-  GridPoint* const points = points_.reserve(surface_.vertices);
+  GridPoint* const points = points_.resize_for_overwrite(surface_.vertices);
   constexpr std::size_t kParts = 4;
   std::array<Extent, kParts> extents;
   std::array<bool, kParts> on_grid = {};
@@ -195,7 +231,7 @@ void Encoder::Stages::put_in_order() {
 
 std::vector<std::byte> Encoder::Stages::stream_of(const Grid& grid, bool has_normals) {
   residuals_.predict_firsts(order_, histograms_[0]);
-  std::optional<CodedNormals> normals;
+  std::optional<CodedValues> normals;
   if (has_normals) normals = normals_.code(surface_, order_);
   return assemble({.traversal = traversal_,
                    .faces = surface_.faces,

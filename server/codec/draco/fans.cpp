@@ -33,7 +33,7 @@ void Fans::separate(const std::vector<std::vector<Corner>>& boundary, Connectivi
 void Fans::copy_vertex(Corner first, Connectivity& surface) {
   const Vertex original = surface.vertex(first);
   if (originals_.empty()) {
-    mesh::Triangle* const copy = triangles_.reserve(surface.faces);
+    mesh::Triangle* const copy = triangles_.resize_for_overwrite(surface.faces);
     std::copy_n(surface.triangles, surface.faces, copy);
     surface.triangles = copy;
   }

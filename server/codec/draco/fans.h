@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/codec/draco/corners.h"
-#include "server/codec/draco/scratch.h"
+#include "server/mesh/buffer.h"
 
 namespace isomesh::codec::edgebreaker {
 
@@ -39,7 +39,7 @@ class Fans {
 
   std::vector<Vertex> originals_;
   std::vector<std::uint64_t> on_boundary_;
-  Scratch<mesh::Triangle> triangles_;
+  mesh::Buffer<mesh::Triangle> triangles_;
 };
 
 }  // namespace isomesh::codec::edgebreaker

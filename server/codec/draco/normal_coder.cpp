@@ -7,8 +7,6 @@
 #include <draco/compression/attributes/prediction_schemes/prediction_scheme_normal_octahedron_canonicalized_encoding_transform.h>
 
 #include "server/codec/draco/encoder.h"
-#include "server/codec/draco/rans.h"
-#include "server/codec/draco/raw_symbols.h"
 
 namespace isomesh::codec::edgebreaker {
 namespace {
@@ -55,8 +53,8 @@ void NormalCoder::quantise(std::span<const mesh::Vec3> normals, std::size_t begi
   }
 }
 
-CodedNormals NormalCoder::code(const Connectivity& surface, const ValueOrder& order) {
-  symbols_.reserve(order.count());
+CodedValues NormalCoder::code(const Connectivity& surface, const ValueOrder& order) {
+  symbols_.resize_for_overwrite(order.count());
   std::vector<std::uint64_t> counts(kSymbols);
   const Transform transform(static_cast<std::int32_t>(kSymbols) - 1);
   std::array<std::int32_t, 2> before = {0, 0};
@@ -75,16 +73,7 @@ CodedNormals NormalCoder::code(const Connectivity& surface, const ValueOrder& or
       ++counts[symbols_[i][1]];
     }
   }
-  const RawCoding coding = best_coding(counts);
-  coded_.reserve(RansEncoder::most_bytes(coding.data_bits, 2 * std::uint64_t{order.count()}));
-  RansEncoder encoder(coding.probabilities, coded_.data());
-  for (const ValueRange& component : order.components()) {
-    encoder.put_backwards(
-        symbols_[component.begin].data(),
-        symbols_[component.begin].data() + 2 * std::size_t{component.end - component.begin});
-  }
-  const auto bytes = static_cast<std::size_t>(encoder.finish() - coded_.data());
-  return {head_of(coding, bytes), {coded_.data(), bytes}};
+  return code_raw(best_coding(counts), symbols_.data()->data(), 2, order, coded_);
 }
 
 }  // namespace isomesh::codec::edgebreaker

@@ -5,20 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "server/codec/draco/corners.h"
-#include "server/codec/draco/scratch.h"
+#include "server/codec/draco/raw_symbols.h"
 #include "server/codec/draco/value_order.h"
+#include "server/mesh/buffer.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::codec::edgebreaker {
-
-// Encoded normals; the coder owns the data.
-struct CodedNormals {
-  std::vector<std::byte> head;
-  std::span<const std::byte> data;
-};
 
 // Unit vectors on an octahedron unfolded to a square (Cigolle and others, "A Survey of Efficient
 // Representations for Independent Unit Vectors", 2014), quantised. Each is predicted by its
@@ -29,19 +23,19 @@ class NormalCoder {
  public:
   // Quantises the normals [begin, end). Several threads may quantise disjoint ranges after
   // reserve().
-  void reserve(std::size_t vertices) { coordinates_.reserve(vertices); }
+  void reserve(std::size_t vertices) { coordinates_.resize_for_overwrite(vertices); }
   void quantise(std::span<const mesh::Vec3> normals, std::size_t begin, std::size_t end);
 
   void copy(std::size_t from, std::size_t to) { coordinates_[to] = coordinates_[from]; }
 
-  CodedNormals code(const Connectivity& surface, const ValueOrder& order);
+  CodedValues code(const Connectivity& surface, const ValueOrder& order);
 
  private:
   using Coordinates = std::array<std::uint16_t, 2>;
 
-  Scratch<Coordinates> coordinates_;
-  Scratch<Coordinates> symbols_;  // in stream order
-  Scratch<std::byte> coded_;
+  mesh::Buffer<Coordinates> coordinates_;
+  mesh::Buffer<Coordinates> symbols_;  // in stream order
+  mesh::Buffer<std::byte> coded_;
 };
 
 }  // namespace isomesh::codec::edgebreaker

@@ -46,7 +46,7 @@ std::size_t cut_at(const Surface& surface, std::size_t slab, std::size_t slabs) 
 
 bool Opposites::find(const Surface& surface, std::size_t slabs, const mesh::Context& context) {
   const std::size_t faces = surface.triangles.size();
-  words_.reserve(kWordsPerFace * (faces + 1) + kSpareWords * slabs);
+  words_.resize_for_overwrite(kWordsPerFace * (faces + 1) + kSpareWords * slabs);
   boundary_.resize(slabs);
   for (std::vector<Corner>& corners : boundary_) corners.clear();
   while (rows_.size() < slabs) rows_.emplace_back();

@@ -7,7 +7,7 @@
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/edge_rows.h"
 #include "server/codec/draco/encoder.h"
-#include "server/codec/draco/scratch.h"
+#include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
 
 namespace isomesh::codec::edgebreaker {
@@ -39,7 +39,7 @@ class Opposites {
                std::vector<Corner>& boundary, const mesh::Context& context);
   void repeat_first_words(std::uint64_t begin, std::uint64_t end);
 
-  Scratch<std::uint32_t> words_;
+  mesh::Buffer<std::uint32_t> words_;
   std::vector<std::vector<Corner>> boundary_;
   std::deque<EdgeRows> rows_;  // one per slab
 };

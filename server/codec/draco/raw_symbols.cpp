@@ -43,13 +43,23 @@ RawCoding best_coding(std::span<const std::uint64_t> counts) {
   return best;
 }
 
-std::vector<std::byte> head_of(const RawCoding& coding, std::size_t bytes) {
+CodedValues code_raw(const RawCoding& coding, const std::uint16_t* symbols, std::size_t per_vertex,
+                     const ValueOrder& order, mesh::Buffer<std::byte>& memory) {
+  memory.resize_for_overwrite(
+      RansEncoder::most_bytes(coding.data_bits, per_vertex * std::uint64_t{order.count()}));
+  RansEncoder encoder(coding.probabilities, memory.data());
+  // The decoder visits components from last to first.
+  for (const ValueRange& component : order.components()) {
+    encoder.put_backwards(symbols + per_vertex * component.begin,
+                          symbols + per_vertex * component.end);
+  }
+  const auto bytes = static_cast<std::size_t>(encoder.finish() - memory.data());
   ByteWriter out;
   out.byte(kRawSymbols);
   out.byte(static_cast<std::uint32_t>(coding.length_bits));
   coding.probabilities.write(out);
   out.varint(bytes);
-  return out.take();
+  return {out.take(), {memory.data(), bytes}};
 }
 
 }  // namespace isomesh::codec::edgebreaker

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "server/codec/draco/rans.h"
+#include "server/codec/draco/value_order.h"
+#include "server/mesh/buffer.h"
 
 namespace isomesh::codec::edgebreaker {
 
@@ -23,7 +25,14 @@ struct RawCoding {
 // At least one count is nonzero.
 RawCoding best_coding(std::span<const std::uint64_t> counts);
 
-// The header of `bytes` bytes of coded symbols.
-std::vector<std::byte> head_of(const RawCoding& coding, std::size_t bytes);
+// Encoded values of an attribute; the coder owns the data.
+struct CodedValues {
+  std::vector<std::byte> head;
+  std::span<const std::byte> data;
+};
+
+// Codes the symbols of all components, `per_vertex` for each vertex; `memory` gets the data.
+CodedValues code_raw(const RawCoding& coding, const std::uint16_t* symbols, std::size_t per_vertex,
+                     const ValueOrder& order, mesh::Buffer<std::byte>& memory);
 
 }  // namespace isomesh::codec::edgebreaker

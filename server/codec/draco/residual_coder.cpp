@@ -4,10 +4,8 @@
 #include <array>
 #include <bit>
 
-#include "server/codec/draco/bits.h"
 #include "server/codec/draco/bytes.h"
 #include "server/codec/draco/rans.h"
-#include "server/codec/draco/raw_symbols.h"
 
 namespace isomesh::codec::edgebreaker {
 namespace {
@@ -43,8 +41,8 @@ double tagged_bits(const Residuals& residuals, std::uint32_t vertices) {
 
 }  // namespace
 
-CodedResiduals ResidualCoder::code(const Residuals& residuals, const ValueOrder& order,
-                                   std::span<const Histogram> histograms) {
+CodedValues ResidualCoder::code(const Residuals& residuals, const ValueOrder& order,
+                                std::span<const Histogram> histograms) {
   std::vector<std::uint64_t> counts(residuals.wrap().symbols());
   for (std::uint32_t symbol = 0; symbol < counts.size(); ++symbol) {
     for (const Histogram& histogram : histograms) counts[symbol] += histogram.count(symbol);
@@ -53,21 +51,12 @@ CodedResiduals ResidualCoder::code(const Residuals& residuals, const ValueOrder&
   if (tagged_bits(residuals, order.count()) < coding.all_bits()) {
     return code_tagged(residuals, order);
   }
-  coded_.reserve(RansEncoder::most_bytes(coding.data_bits, 3 * std::uint64_t{order.count()}));
-  RansEncoder encoder(coding.probabilities, coded_.data());
-  // The decoder visits components from last to first.
-  for (const ValueRange& component : order.components()) {
-    encoder.put_backwards(residuals.symbols() + 3 * std::size_t{component.begin},
-                          residuals.symbols() + 3 * std::size_t{component.end});
-  }
-  const std::byte* const end = encoder.finish();
-  const auto bytes = static_cast<std::size_t>(end - coded_.data());
-  return {head_of(coding, bytes), {coded_.data(), bytes}};
+  return code_raw(coding, residuals.symbols(), 3, order, coded_);
 }
 
-CodedResiduals ResidualCoder::code_tagged(const Residuals& residuals, const ValueOrder& order) {
+CodedValues ResidualCoder::code_tagged(const Residuals& residuals, const ValueOrder& order) {
   TagCounts counts = {};
-  bits_.reserve(order.count());
+  bits_.resize_for_overwrite(order.count());
   for (std::uint32_t vertex = 0; vertex < order.count(); ++vertex) {
     const std::uint32_t bits = bits_of(residuals.symbols() + 3 * std::size_t{vertex});
     bits_[vertex] = static_cast<std::uint16_t>(bits);
@@ -89,7 +78,7 @@ CodedResiduals ResidualCoder::code_tagged(const Residuals& residuals, const Valu
   out.counted(std::span(tags).first(static_cast<std::size_t>(end - tags.data())));
 
   const std::size_t bytes = BitWriter::bytes_of(value_bits);
-  BitWriter values(coded_.reserve(bytes));
+  BitWriter values(coded_.resize_for_overwrite(bytes));
   for (auto component = order.components().rbegin(); component != order.components().rend();
        ++component) {
     for (std::uint32_t vertex = component->begin; vertex < component->end; ++vertex) {

@@ -40,7 +40,7 @@ void Residuals::prepare(const Connectivity& surface, const GridPoint* points,
   surface_ = surface;
   points_ = points;
   wrap_ = Wrap(extent);
-  symbols_.reserve(3 * std::size_t{surface.vertices} + 3);
+  symbols_.resize_for_overwrite(3 * std::size_t{surface.vertices} + 3);
 }
 
 void Residuals::predict(const std::uint32_t* order, std::uint32_t begin, std::uint32_t end,

@@ -8,8 +8,8 @@
 
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/quantise.h"
-#include "server/codec/draco/scratch.h"
 #include "server/codec/draco/value_order.h"
+#include "server/mesh/buffer.h"
 
 namespace isomesh::codec::edgebreaker {
 
@@ -89,7 +89,7 @@ class Residuals {
   Connectivity surface_;
   const GridPoint* points_ = nullptr;
   Wrap wrap_ = Wrap({});
-  Scratch<std::uint16_t> symbols_;
+  mesh::Buffer<std::uint16_t> symbols_;
 };
 
 }  // namespace isomesh::codec::edgebreaker

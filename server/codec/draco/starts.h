@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "server/codec/draco/corners.h"
-#include "server/codec/draco/scratch.h"
+#include "server/mesh/buffer.h"
 
 namespace isomesh::codec::edgebreaker {
 
@@ -23,7 +23,7 @@ class Starts {
  public:
   // There are at most `most` starts.
   void reset(std::size_t most) {
-    starts_.reserve(most);
+    starts_.resize_for_overwrite(most);
     state_.store(0, std::memory_order_relaxed);
   }
 
@@ -57,7 +57,7 @@ class Starts {
   static constexpr std::uint32_t kClosed = 1U << 31;     // flag of the state, whose other bits are
                                                          // their number
 
-  Scratch<std::uint32_t> starts_;
+  mesh::Buffer<std::uint32_t> starts_;
   std::atomic<std::uint32_t> state_ = 0;
 };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <string_view>
 
-#include "server/codec/draco/bits.h"
 #include "server/codec/draco/bytes.h"
 #include "server/codec/draco/encoder.h"
 #include "server/codec/draco/rans.h"

@@ -7,9 +7,8 @@
 
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/grid.h"
-#include "server/codec/draco/normal_coder.h"
 #include "server/codec/draco/quantise.h"
-#include "server/codec/draco/residual_coder.h"
+#include "server/codec/draco/raw_symbols.h"
 #include "server/codec/draco/traversal.h"
 
 namespace isomesh::codec::edgebreaker {
@@ -18,8 +17,8 @@ struct StreamParts {
   const Traversal& traversal;
   std::uint32_t faces = 0;
   std::uint32_t vertices = 0;  // in faces
-  CodedResiduals residuals;
-  std::optional<CodedNormals> normals;
+  CodedValues residuals;
+  std::optional<CodedValues> normals;
   Extent extent;
   const Grid& grid;
 };

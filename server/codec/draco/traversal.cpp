@@ -37,11 +37,11 @@ bool Traversal::run(const Fans& fans, Starts& starts, const mesh::Context& conte
 void Traversal::prepare(const Connectivity& surface, const Fans& fans) {
   surface_ = surface;
   const std::size_t faces = surface.faces;
-  std::memset(face_state_.reserve(faces + 1), kLeft, faces);
+  std::memset(face_state_.resize_for_overwrite(faces + 1), kLeft, faces);
   face_state_[faces] = kGone;  // beyond the boundary
-  std::memset(known_.reserve(surface.vertices), 0, surface.vertices);
+  std::memset(known_.resize_for_overwrite(surface.vertices), 0, surface.vertices);
   fans.for_each_on_boundary([&](Vertex vertex) { known_[vertex] = kRim; });
-  symbols_.reserve(faces);
+  symbols_.resize_for_overwrite(faces);
   waiting_.clear();
   all_splits_.clear();
   ends_.clear();

@@ -7,8 +7,8 @@
 
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/fans.h"
-#include "server/codec/draco/scratch.h"
 #include "server/codec/draco/starts.h"
+#include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
 
 namespace isomesh::codec::edgebreaker {
@@ -87,9 +87,9 @@ class Traversal {
 
   const std::size_t least_to_look_ahead_;
   Connectivity surface_;
-  Scratch<std::uint8_t> face_state_;
-  Scratch<std::uint8_t> known_;  // per vertex: 0, kKnown or kRim
-  Scratch<std::uint8_t> symbols_;
+  mesh::Buffer<std::uint8_t> face_state_;
+  mesh::Buffer<std::uint8_t> known_;  // per vertex: 0, kKnown or kRim
+  mesh::Buffer<std::uint8_t> symbols_;
   std::vector<Corner> waiting_;  // the left sides of splits
   std::vector<Split> all_splits_;
   std::vector<Corner> ends_;  // the tips of the E symbols

@@ -7,11 +7,11 @@ namespace isomesh::codec::edgebreaker {
 void ValueOrder::prepare(const Connectivity& surface, const Fans& fans) {
   surface_ = surface;
   const std::size_t faces = surface.faces;
-  std::memset(face_gone_.reserve(faces + 1), 0, faces);
+  std::memset(face_gone_.resize_for_overwrite(faces + 1), 0, faces);
   face_gone_[faces] = 1;  // beyond the boundary
-  std::memset(vertex_state_.reserve(surface.vertices), 0, surface.vertices);
+  std::memset(vertex_state_.resize_for_overwrite(surface.vertices), 0, surface.vertices);
   fans.for_each_on_boundary([&](Vertex vertex) { vertex_state_[vertex] = kBoundary; });
-  order_.reserve(surface.vertices);
+  order_.resize_for_overwrite(surface.vertices);
   waiting_.clear();
   components_.clear();
   firsts_.clear();

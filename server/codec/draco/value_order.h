@@ -8,8 +8,8 @@
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/fans.h"
 #include "server/codec/draco/prefetch.h"
-#include "server/codec/draco/scratch.h"
 #include "server/codec/draco/starts.h"
+#include "server/mesh/buffer.h"
 
 namespace isomesh::codec::edgebreaker {
 
@@ -52,9 +52,9 @@ class ValueOrder {
   void put(Corner corner);
 
   Connectivity surface_;
-  Scratch<std::uint8_t> face_gone_;
-  Scratch<std::uint8_t> vertex_state_;
-  Scratch<std::uint32_t> order_;
+  mesh::Buffer<std::uint8_t> face_gone_;
+  mesh::Buffer<std::uint8_t> vertex_state_;
+  mesh::Buffer<std::uint32_t> order_;
   std::vector<Corner> waiting_;
   std::vector<ValueRange> components_;
   std::vector<std::uint32_t> firsts_;

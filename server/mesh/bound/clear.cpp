@@ -13,6 +13,17 @@ double floor_of(double x) {
   return whole > x ? whole - 1 : whole;
 }
 
+// F at a place that is counted from the sample at `base`.
+template <class Planes>
+double value_from(const float* base, const SampleSteps& steps, Vecd place) {
+  const Vecd cell = {floor_of(place.x), floor_of(place.y), floor_of(place.z)};
+  const auto x = static_cast<std::ptrdiff_t>(cell.x);
+  const auto y = static_cast<std::ptrdiff_t>(cell.y);
+  const auto z = static_cast<std::ptrdiff_t>(cell.z);
+  return Planes::value(base + (x + y * steps.y + z * steps.z), steps, ((x + y + z) & 1) != 0,
+                       place - cell);
+}
+
 }  // namespace
 
 // In Kuhn's tetrahedra the way from a cell's first corner to its last goes along the axes in the
@@ -79,12 +90,7 @@ Vecf Clear<Planes>::base(Vecf a) {
 
 template <class Planes>
 double Clear<Planes>::value(Vecd place) const {
-  const Vecd cell = {floor_of(place.x), floor_of(place.y), floor_of(place.z)};
-  const auto x = static_cast<std::ptrdiff_t>(cell.x);
-  const auto y = static_cast<std::ptrdiff_t>(cell.y);
-  const auto z = static_cast<std::ptrdiff_t>(cell.z);
-  return Planes::value(at_base_ + (x + y * steps_.y + z * steps_.z), steps_, ((x + y + z) & 1) != 0,
-                       place - cell);
+  return value_from<Planes>(at_base_, steps_, place);
 }
 
 template <class Planes>
@@ -177,15 +183,9 @@ template class Clear<FivePlanes>;
 
 double value_at(const Field& field, Vecf place) {
   const SampleSteps steps = {1, field.step_y(), field.step_z()};
-  const Vecd cell = {floor_of(place.x), floor_of(place.y), floor_of(place.z)};
-  const auto x = static_cast<std::ptrdiff_t>(cell.x);
-  const auto y = static_cast<std::ptrdiff_t>(cell.y);
-  const auto z = static_cast<std::ptrdiff_t>(cell.z);
-  const float* const corner = field.values.data() + (x + y * steps.y + z * steps.z);
-  const bool is_odd = ((x + y + z) & 1) != 0;
-  const Vecd in_cell = wide(place) - cell;
-  return field.scheme == Scheme::kSix ? SixPlanes::value(corner, steps, is_odd, in_cell)
-                                      : FivePlanes::value(corner, steps, is_odd, in_cell);
+  const float* const base = field.values.data();
+  return field.scheme == Scheme::kSix ? value_from<SixPlanes>(base, steps, wide(place))
+                                      : value_from<FivePlanes>(base, steps, wide(place));
 }
 
 }  // namespace isomesh::mesh::bound

@@ -7,7 +7,7 @@
 #include <random>
 #include <utility>
 
-#include "server/mesh/bound/chunks.h"
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh::bound {
 namespace {

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <utility>
 
-#include "server/mesh/bound/chunks.h"
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh::bound {
 namespace {

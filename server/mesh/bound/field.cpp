@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "proto/samples.h"
-#include "server/mesh/bound/chunks.h"
 #include "server/mesh/lattice/border.h"
 #include "server/mesh/lattice/placement.h"
 #include "server/mesh/lattice/tetrahedra.h"
@@ -164,7 +163,8 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
   const double nearest = Placement::nearest_share(lattice.dims, lattice.to_space);
   const double kept = field.margin == 0 ? nearest : nearest_on_border(nearest);
   std::vector<double> most(chunks_of(crossings.size()), of_caps);
-  for_chunks(context, crossings.size(), [&](std::size_t begin, std::size_t end, std::size_t chunk) {
+  for_chunks(context, crossings.size(), [&](std::size_t begin, std::size_t end) {
+    double& farthest = most[begin / kChunk];
     for (const auto& [inside, outside] : crossings.subspan(begin, end - begin)) {
       if (field.is_phantom(outside)) continue;
       const double a = difference(inside);
@@ -174,7 +174,7 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
       const double placed = std::clamp(a / (a - b), kept, 1 - kept);
       const double moved = std::abs(placed - p / (p - q)) *
                            length(metric.mm(field.place(outside) - field.place(inside)));
-      if (!(moved <= most[chunk])) most[chunk] = moved;
+      if (!(moved <= farthest)) farthest = moved;
     }
   });
   return std::ranges::max(most) * (1 + 1e-6);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <atomic>
 
-#include "server/mesh/bound/chunks.h"
 #include "server/mesh/bound/cover.h"
 #include "server/mesh/bound/one_sign.h"
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh::bound {
 namespace {

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <utility>
 
-#include "server/mesh/bound/chunks.h"
 #include "server/mesh/bound/faults.h"
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh::bound {
 namespace {

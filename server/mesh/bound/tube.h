@@ -54,11 +54,6 @@ inline Vecf snap(Vecd a) {
 // The ends of a triangle that is wider than this are not told apart exactly.
 inline constexpr float kWidest = 60;
 
-inline bool is_wide(Vecf a, Vecf b) {
-  return !(std::abs(a.x - b.x) < kWidest && std::abs(a.y - b.y) < kWidest &&
-           std::abs(a.z - b.z) < kWidest);
-}
-
 // True if, at each corner, the vectors from T- to T and from T to T+ point to the triangle's front.
 // T does not turn back over an edge between such triangles. `planes`: one bit for each face of the
 // volume that all corners stay in: low x, high x, low y, ... If any is set, the front must face the

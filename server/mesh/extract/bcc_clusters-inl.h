@@ -149,9 +149,8 @@ class BccClusterWalk {
       if (!row.may_cross(w)) continue;
       const CornerWords corners = row.corners(w);
       auto crossed = row.crossed_edges(w, corners);
-      for (const Word edges : crossed)
-        layer_.vertices += static_cast<unsigned>(std::popcount(edges));
-      layer_.triangles += count_bcc_triangles(row, w, corners, extraction_.splits[0]);
+      layer_.vertices += count_bits(crossed);
+      layer_.triangles += row.count_triangles(w, corners);
       // Phantom cells have no centre, and no point of theirs may join crossings.
       crossed[0] &= ~row.split_in_six(w);
       for (unsigned slot = 0; slot < kBccDiagonalSlot; ++slot) {

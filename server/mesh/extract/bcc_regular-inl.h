@@ -126,8 +126,7 @@ class BccRegular {
           {y - margin - (r & 1), z - margin - (r >> 1), margin, edges_[r]}, shares_[r].data());
     }
     const LatticeToSpace& map = extraction_.to_space;
-    const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
+    const Double4 row_at = row_origin(map, y - margin, z - margin);
     for (const Cluster& cluster : clusters_) {
       Double4 sum = {};
       for (Directions rest = cluster.directions; rest != 0; rest &= rest - 1) {

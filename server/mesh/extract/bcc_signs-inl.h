@@ -91,7 +91,8 @@ class BccRow {
   // `shape` must outlive the row.
   BccRow(const Extraction& extraction, const BccShape& shape, const SignPlane& low,
          const SignPlane& high, const Centres& centres, std::uint32_t y, std::uint32_t z)
-      : shape_(shape),
+      : six_(extraction.splits[0]),
+        shape_(shape),
         centres_(centres),
         has_y_(y + 1 < extraction.dims.y),
         has_z_(z + 1 < extraction.dims.z),
@@ -114,23 +115,41 @@ class BccRow {
   }
 
   // Quick test on the signs alone: false when nothing of word w is crossed.
-  HWY_INLINE bool may_cross(std::size_t w) const {
-    Word any = 0;
-    Word all = ~Word{0};
-    for (const Word* row : looked_at_) {
-      any |= row[w] | row[w + 1] << 63;
-      all &= row[w] & (row[w + 1] << 63 | ~Word{0} >> 1);
-    }
-    return any != 0 && all != ~Word{0};
-  }
+  HWY_INLINE bool may_cross(std::size_t w) const { return have_both_signs(looked_at_, w); }
 
   HWY_INLINE CornerWords corners(std::size_t w) const {
     CornerWords corners;
     for (std::size_t r = 0; r < 4; ++r) {
       corners[2 * r] = samples_[r][w];
-      corners[2 * r + 1] = next(samples_[r], w);
+      corners[2 * r + 1] = next_bits(samples_[r], w);
     }
     return corners;
+  }
+
+  unsigned count_triangles(std::size_t w, const CornerWords& corners) const {
+    unsigned count = 0;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      for (const BccSide side : kBccSides) {
+        const BccFaceWords words = faces(w, axis, side, corners);
+        if (words.faces == 0) continue;
+        const bool inner = side == BccSide::kInner;
+        for (std::size_t t = 0; t < (inner ? 4 : 2); ++t) {
+          const auto& tetrahedron = (inner ? kBccInnerTetrahedra : kBccBorderTetrahedra)[t];
+          count += count_in_tetrahedron(words.points, tetrahedron, words.faces);
+        }
+      }
+    }
+    if (const Word cells = split_in_six(w); cells != 0) {
+      for (std::size_t t = 0; t < six_.tetrahedra; ++t) {
+        count += count_in_tetrahedron(corners, six_.corners[t], cells);
+      }
+    }
+    return count;
+  }
+
+  WordCount count(std::size_t w) const {
+    const CornerWords corners = this->corners(w);
+    return {count_bits(crossed_edges(w, corners)), count_triangles(w, corners)};
   }
 
   // The cells whose centre is inside.
@@ -145,7 +164,7 @@ class BccRow {
     if (has_centres_) {
       const Word centre = centres_.own[w];
       for (std::size_t c = 0; c < 8; ++c) crossed[c] = (corners[c] ^ centre) & cells;
-      crossed[11] = (centre ^ next(centres_.own, w)) & cells & along_x.next;
+      crossed[11] = (centre ^ next_bits(centres_.own, w)) & cells & along_x.next;
       if (has_next_y_) crossed[12] = (centre ^ centres_.next_y[w]) & cells;
       if (has_next_z_) crossed[13] = (centre ^ centres_.next_z[w]) & cells;
     }
@@ -207,12 +226,10 @@ class BccRow {
   }
 
  private:
-  static Word next(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << 63; }
-
   Word cells_of(std::size_t w) const { return has_centres_ ? shape_.along_x(w).cells : 0; }
 
   Word next_centres(std::size_t w, unsigned axis) const {
-    if (axis == 0) return next(centres_.own, w);
+    if (axis == 0) return next_bits(centres_.own, w);
     return axis == 1 ? centres_.next_y[w] : centres_.next_z[w];
   }
 
@@ -226,6 +243,7 @@ class BccRow {
     return (axis == 1 ? has_last_y_ : has_last_z_) ? ~Word{0} : 0;
   }
 
+  const CellSplit& six_;  // of cells without a centre
   const BccShape& shape_;
   std::array<const Word*, 4> samples_;    // as those of SignRow
   std::array<const Word*, 7> looked_at_;  // by may_cross
@@ -240,34 +258,11 @@ class BccRow {
   bool has_last_z_;
 };
 
-// The sides that faces lie on.
-inline constexpr std::array kBccSides = {BccSide::kInner, BccSide::kLow, BccSide::kHigh};
-
-inline unsigned count_bcc_triangles(const BccRow& row, std::size_t w, const CornerWords& corners,
-                                    const CellSplit& six) {
-  unsigned count = 0;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    for (const BccSide side : kBccSides) {
-      const BccFaceWords words = row.faces(w, axis, side, corners);
-      if (words.faces == 0) continue;
-      const bool inner = side == BccSide::kInner;
-      for (std::size_t t = 0; t < (inner ? 4 : 2); ++t) {
-        const auto& tetrahedron = (inner ? kBccInnerTetrahedra : kBccBorderTetrahedra)[t];
-        count += count_in_tetrahedron(words.points, tetrahedron, words.faces);
-      }
-    }
-  }
-  if (const Word cells = row.split_in_six(w); cells != 0) {
-    for (std::size_t t = 0; t < six.tetrahedra; ++t) {
-      count += count_in_tetrahedron(corners, six.corners[t], cells);
-    }
-  }
-  return count;
-}
-
 // The signs of the planes around the one that is worked on, each found once as z rises.
 class BccField {
  public:
+  using Marched = Extraction;
+
   BccField(const Extraction& extraction, std::uint32_t first)
       : extraction_(extraction),
         shape_(extraction),
@@ -325,7 +320,7 @@ class BccField {
         Word any = 0;
         Word all = ~Word{0};
         for (const Word* row : rows) {
-          const Word next = row[w] >> 1 | row[w + 1] << 63;
+          const Word next = next_bits(row, w);
           any |= row[w] | next;
           all &= row[w] & next;
         }

@@ -18,6 +18,7 @@
 #include <hwy/highway.h>
 
 #include "server/mesh/extract/bcc_signs-inl.h"
+#include "server/mesh/extract/slab_walk-inl.h"
 #include "server/mesh/extract/slabs.h"
 #include "server/mesh/lattice/rows-inl.h"
 
@@ -83,27 +84,6 @@ class BccPlain {
   BccPlain(const Extraction& /*extraction*/, std::uint32_t /*first*/) {}
 };
 
-// The numbers of the rows that cells still need: as in RowRing one plane and two rows.
-template <class Numbers>
-class BccRing {
- public:
-  BccRing(const Dims& dims, IndexMemory& memory)
-      : dims_(dims), rows_(std::size_t{dims.y} + 2), memory_(memory), numbers_(memory.take()) {}
-  ~BccRing() { memory_.give_back(std::move(numbers_)); }
-  BccRing(const BccRing&) = delete;
-  BccRing& operator=(const BccRing&) = delete;
-
-  std::uint32_t* row(std::uint32_t y, std::uint32_t z) {
-    return numbers_.get() + (std::size_t{z} * dims_.y + y) % rows_ * dims_.x * Numbers::kPlaces;
-  }
-
- private:
-  const Dims dims_;
-  const std::size_t rows_;
-  IndexMemory& memory_;
-  IndexMemory::Block numbers_;
-};
-
 // `Joined`: BccPlain, or BccRegular.
 template <class Joined>
 class BccWriter {
@@ -144,8 +124,8 @@ class BccWriter {
  private:
   void number_row(std::uint32_t y, std::uint32_t z, std::uint32_t& vertex) {
     if constexpr (Joined::kHasClusters) {
-      const std::array rows = {rows_.row(y, z), rows_.row(y - 1, z), rows_.row(y, z - 1),
-                               rows_.row(y - 1, z - 1)};
+      const std::array rows = {rows_.indices(y, z), rows_.indices(y - 1, z),
+                               rows_.indices(y, z - 1), rows_.indices(y - 1, z - 1)};
       vertex = joined_.number_clusters(y, z, rows, vertex, z < slab_.end ? &mesh_ : nullptr);
     }
     find_vertices(y, z, vertex);
@@ -156,7 +136,7 @@ class BccWriter {
   // Numbers the vertices that the row's samples own from `vertex` on, and lists them in order.
   void find_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
     const BccRow row = field_.row(y, z);
-    std::uint32_t* numbers = rows_.row(y, z);
+    std::uint32_t* numbers = rows_.indices(y, z);
     std::uint32_t* const list = vertices_.data();
     std::uint32_t* next = list;
     for (std::size_t w = 0; w < words_; ++w) {
@@ -212,9 +192,6 @@ class BccWriter {
   // Places the vertices of the row, the first of which is `vertex`.
   void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
     if (extraction_.margin == 0) return place_inner(0, found_, y, z, vertex);
-    const auto is_at_border = [](std::uint32_t at, std::uint32_t samples) {
-      return at <= 1 || at + 2 >= samples;
-    };
     const bool row_is = is_at_border(y, dims_.y) || is_at_border(z, dims_.z);
     std::size_t begin = 0;  // of a run that is not at the border
     for (std::size_t i = 0; i < found_; ++i) {
@@ -252,8 +229,7 @@ class BccWriter {
     extraction_.samples->bcc_shares(
         {y - margin, z - margin, margin, std::span(vertices_).subspan(begin, end - begin)},
         shares_.data());
-    const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
+    const Double4 row_at = row_origin(map, y - margin, z - margin);
     const Double4 step_x = lanes(map.step_x);
     Vec3* out = mesh_.positions.data() + vertex;
     for (std::size_t i = begin; i < end; ++i) {
@@ -269,7 +245,7 @@ class BccWriter {
 
   Triangle* write_triangles(std::uint32_t y, std::uint32_t z, Triangle* out) {
     const BccRow row = field_.row(y, z);
-    for (unsigned r = 0; r < 4; ++r) around_[r] = rows_.row(y + (r & 1), z + (r >> 1));
+    for (unsigned r = 0; r < 4; ++r) around_[r] = rows_.indices(y + (r & 1), z + (r >> 1));
     for (std::size_t w = 0; w < words_; ++w) {
       if (!row.may_cross(w)) continue;
       const CornerWords corners = row.corners(w);
@@ -377,7 +353,7 @@ class BccWriter {
   const BccFaces& faces_;
   BccField field_;
   Joined joined_;
-  BccRing<Numbers> rows_;
+  IndexRing<Numbers::kPlaces> rows_;
   const std::size_t words_;
   std::vector<std::uint32_t> vertices_;  // of the row that is numbered: kBccSlotRange x + slot
   std::size_t found_ = 0;
@@ -386,29 +362,6 @@ class BccWriter {
   const Triangle* const end_;                        // of the slab's triangles
   std::array<const std::uint32_t*, 4> around_ = {};  // the rows of the cells that are written
 };
-
-inline void count_bcc_slab(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
-  BccField field(extraction, slab.begin);
-  const std::size_t words = words_of(extraction.dims.x);
-  for (std::uint32_t z = slab.begin; z < slab.end; ++z) {
-    field.reach(z);
-    std::uint64_t vertices = 0;
-    std::uint64_t triangles = 0;
-    for (std::uint32_t y = 0; y < extraction.dims.y; ++y) {
-      const BccRow row = field.row(y, z);
-      for (std::size_t w = 0; w < words; ++w) {
-        if (!row.may_cross(w)) continue;
-        const CornerWords corners = row.corners(w);
-        for (const Word edges : row.crossed_edges(w, corners)) {
-          vertices += static_cast<unsigned>(std::popcount(edges));
-        }
-        triangles += count_bcc_triangles(row, w, corners, extraction.splits[0]);
-      }
-    }
-    count.layer_vertices[z + 1] = vertices;
-    count.layer_triangles[z + 1] = triangles;
-  }
-}
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -18,6 +18,7 @@
 
 #include "server/mesh/extract/clusters.h"
 #include "server/mesh/extract/links.h"
+#include "server/mesh/extract/slabs.h"
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/lattice/rows-inl.h"
 
@@ -26,20 +27,14 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 
 // The edges that 64 samples own, by place: those whose crossing belongs to a cluster of the first
 // end, and of the second.
-template <std::size_t kPlaces>
 struct JoinedWords {
-  std::array<Word, kPlaces> first = {};
-  std::array<Word, kPlaces> second = {};
+  std::array<Word, kEdgePlaces> first = {};
+  std::array<Word, kEdgePlaces> second = {};
 };
 
-// `kKinds`: how many rows of points that join crossings belong to each row of samples.
-template <std::size_t kPlaces, std::size_t kKinds = 1>
 class JoinedEdges {
  public:
-  using Words = JoinedWords<kPlaces>;
-
-  // `links`: of each kind of points.
-  JoinedEdges(const Dims& dims, std::uint32_t first, const std::array<const Links*, kKinds>& links)
+  JoinedEdges(const Dims& dims, std::uint32_t first, const Links& links)
       : rows_in_plane_(dims.y),
         rows_(2 * std::size_t{dims.y} + 4),
         words_(words_of(dims.x)),
@@ -49,7 +44,7 @@ class JoinedEdges {
 
   // The words of a row and one more of zeros, valid when mark() has reached the next row of the
   // next plane, until the one after that.
-  const Words* row(std::uint32_t y, std::uint32_t z) const {
+  const JoinedWords* row(std::uint32_t y, std::uint32_t z) const {
     return at(std::size_t{z} * rows_in_plane_ + y);
   }
 
@@ -57,36 +52,32 @@ class JoinedEdges {
   void mark(std::span<const ClusterLayer> clusters, std::uint32_t y, std::uint32_t z) {
     const std::size_t last = std::size_t{z + 1} * rows_in_plane_ + y + 1;
     for (; next_row_ <= last; ++next_row_) {
-      std::fill_n(at(next_row_), words_, Words{});
+      std::fill_n(at(next_row_), words_, JoinedWords{});
       const std::size_t plane = next_row_ / rows_in_plane_;
       if (plane >= clusters.size()) continue;
-      for (std::size_t kind = 0; kind < kKinds; ++kind) {
-        const std::size_t row = next_row_ % rows_in_plane_ * kKinds + kind;
-        for (const JoiningWord& word : clusters[plane].row(static_cast<std::uint32_t>(row))) {
-          mark_word(clusters[plane], word, *links_[kind]);
-        }
-      }
+      const auto row = static_cast<std::uint32_t>(next_row_ % rows_in_plane_);
+      for (const JoiningWord& word : clusters[plane].row(row)) mark_word(clusters[plane], word);
     }
   }
 
  private:
   // Samples own some of the edges around the samples after them in each direction.
-  void mark_word(const ClusterLayer& layer, const JoiningWord& word, const Links& links) {
+  void mark_word(const ClusterLayer& layer, const JoiningWord& word) {
     std::array<BitBytes, (kMostDirections + 7) / 8> bytes = {};
     visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
       for (std::size_t i = 0; i < bytes.size(); ++i) {
         bytes[i][bit] = static_cast<std::uint8_t>(joined.directions() >> (8 * i));
       }
     });
-    const auto directions = links.directions();
+    const auto directions = links_.directions();
     const std::array rows = {at(next_row_), at(next_row_ - 1), at(next_row_ - rows_in_plane_),
                              at(next_row_ - rows_in_plane_ - 1)};
     for (std::size_t begin = 0; begin < directions.size(); begin += 8) {
       const BitWords words = transpose(bytes[begin / 8]);
       for (std::size_t d = begin; d < std::min(begin + 8, directions.size()); ++d) {
         const LinkDirection& direction = directions[d];
-        Words* owners = rows[direction.corner >> 1] + word.word;
-        const auto mark = [&](Words& edges, Word bits) {
+        JoinedWords* owners = rows[direction.corner >> 1] + word.word;
+        const auto mark = [&](JoinedWords& edges, Word bits) {
           (direction.is_end ? edges.second : edges.first)[direction.place] |= bits;
         };
         const Word bits = words[d - begin];
@@ -100,14 +91,14 @@ class JoinedEdges {
     }
   }
 
-  const Words* at(std::size_t row) const { return &edges_[row % rows_ * (words_ + 1)]; }
-  Words* at(std::size_t row) { return &edges_[row % rows_ * (words_ + 1)]; }
+  const JoinedWords* at(std::size_t row) const { return &edges_[row % rows_ * (words_ + 1)]; }
+  JoinedWords* at(std::size_t row) { return &edges_[row % rows_ * (words_ + 1)]; }
 
   const std::size_t rows_in_plane_;
   const std::size_t rows_;  // as many as are needed, from the cells' row to the last one marked
   const std::size_t words_;
-  const std::array<const Links*, kKinds> links_;
-  std::vector<Words> edges_;
+  const Links& links_;
+  std::vector<JoinedWords> edges_;
   std::size_t next_row_;  // the first that is not marked
 };
 

@@ -6,6 +6,7 @@
 
 #include "server/mesh/lattice/bcc_faces.h"
 #include "server/mesh/lattice/tetrahedra.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -16,8 +17,6 @@ Step position(unsigned corner) {
   return {static_cast<int>(corner & 1), static_cast<int>(corner >> 1 & 1),
           static_cast<int>(corner >> 2)};
 }
-
-Step minus(const Step& a, const Step& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 bool is_later(const Step& step) {
   return std::tuple(step[2], step[1], step[0]) > std::tuple(0, 0, 0);
@@ -117,7 +116,7 @@ void Links::add_directions(BccPoint point) {
     }
     directions_.push_back(is_centre
                               ? LinkDirection{to_corner, 0, corner, false}
-                              : LinkDirection{minus({0, 0, 0}, to_corner), corner, corner, true});
+                              : LinkDirection{minus(Step{}, to_corner), corner, corner, true});
   }
   for (unsigned axis = 0; axis < 3; ++axis) {
     Step step = {0, 0, 0};
@@ -125,7 +124,7 @@ void Links::add_directions(BccPoint point) {
     const auto corner = static_cast<std::uint8_t>(1U << axis);
     const auto slot = static_cast<std::uint8_t>((is_centre ? kBccCentreSlot : kBccAxisSlot) + axis);
     directions_.push_back({step, 0, slot, false});
-    directions_.push_back({minus({0, 0, 0}, step), corner, slot, true});
+    directions_.push_back({minus(Step{}, step), corner, slot, true});
   }
 }
 
@@ -134,7 +133,7 @@ void Links::sort_directions() {
   const auto rank = [](const LinkDirection& direction) {
     Step step = direction.step;
     const bool later = is_later(step);
-    if (!later) step = minus({0, 0, 0}, step);
+    if (!later) step = minus(Step{}, step);
     return std::tuple(!later, axes_of(step), step);
   };
   std::ranges::sort(directions_, {}, rank);

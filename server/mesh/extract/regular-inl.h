@@ -29,8 +29,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-using RegularWords = JoinedWords<kEdgePlaces>;
-
 // SignCells, and for each sample the set of its edges that no cluster has.
 struct RegularCells : SignCells {
   BitBytes lone;
@@ -39,7 +37,7 @@ struct RegularCells : SignCells {
 // A row without the vertices that clusters have instead of its edges.
 class RegularRow : public SignRow {
  public:
-  RegularRow(const SignRow& row, const RegularWords* joined) : SignRow(row), joined_(joined) {}
+  RegularRow(const SignRow& row, const JoinedWords* joined) : SignRow(row), joined_(joined) {}
 
   Word describe(std::size_t w, RegularCells& cells) const {
     const CornerWords signs = corners(w);
@@ -61,7 +59,7 @@ class RegularRow : public SignRow {
   }
 
  private:
-  const RegularWords* joined_;
+  const JoinedWords* joined_;
 };
 
 // The crossings around 64 cells that are joined. `rows`: of the samples at (y, z), (y + 1, z),
@@ -71,8 +69,8 @@ struct JoinedCorners {
   template <unsigned kAt, unsigned kTo>
   HWY_INLINE Word at() const {
     constexpr unsigned kOwner = kAt & kTo;
-    const RegularWords* words = rows[kOwner >> 1] + w;
-    const auto bits_of = [](const RegularWords& edges) {
+    const JoinedWords* words = rows[kOwner >> 1] + w;
+    const auto bits_of = [](const JoinedWords& edges) {
       // An edge's first end is its corner of the smaller number.
       return kAt < kTo ? edges.first[kAt ^ kTo] : edges.second[kAt ^ kTo];
     };
@@ -80,7 +78,7 @@ struct JoinedCorners {
     return (kOwner & 1) == 0 ? bits : bits >> 1 | bits_of(words[1]) << 63;
   }
 
-  const std::array<const RegularWords*, 4>& rows;
+  const std::array<const JoinedWords*, 4>& rows;
   std::size_t w;
 };
 
@@ -89,7 +87,7 @@ class RegularCellWriter {
  public:
   // `joined`: as JoinedCorners::rows.
   RegularCellWriter(std::span<const PlacedTriangles> triangles, const SignRow& row,
-                    const std::array<const RegularWords*, 4>& joined, const EdgeOffsets& offsets)
+                    const std::array<const JoinedWords*, 4>& joined, const EdgeOffsets& offsets)
       : triangles_{triangles.front().data(), triangles.back().data()},
         row_(row),
         joined_(joined),
@@ -153,7 +151,7 @@ class RegularCellWriter {
 
   std::array<const std::array<std::array<EdgeName, 4>, kTrianglePlaces>*, 2> triangles_;
   const SignRow row_;
-  const std::array<const RegularWords*, 4> joined_;
+  const std::array<const JoinedWords*, 4> joined_;
   const EdgeOffsets& offsets_;
 };
 
@@ -168,7 +166,7 @@ class RegularField : public SignField {
         extraction_(extraction),
         dims_(extraction.dims),
         links_(links_of(extraction.scheme)),
-        joined_(dims_, first, {&links_}),
+        joined_(dims_, first, links_),
         edges_(std::size_t{dims_.x} * kMostDirections + kMembersRoom),
         numbers_(edges_.size()),
         sums_(dims_.x * kMostComponents) {
@@ -283,8 +281,7 @@ class RegularField : public SignField {
       sums_[numbers_[i] - vertex].points += frames_[place].start + frames_[place].run * shares_[i];
     }
     const LatticeToSpace& map = extraction_.to_space;
-    const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
+    const Double4 row_at = row_origin(map, y - margin, z - margin);
     for (std::size_t cluster = 0; cluster < clusters_; ++cluster) {
       const Sum& sum = sums_[cluster];
       const Double4 at = row_at + lanes(map.step_x) * static_cast<double>(sum.x - margin);
@@ -303,7 +300,7 @@ class RegularField : public SignField {
   const Extraction& extraction_;
   const Dims dims_;
   const Links& links_;
-  JoinedEdges<kEdgePlaces> joined_;
+  JoinedEdges joined_;
   std::array<EdgeSamples, std::size_t{2}* kClusterPlaces> ends_ = {};  // by parity and direction
   std::array<EdgeFrame, std::size_t{2}* kClusterPlaces> frames_ = {};
   // The edges of the current row's clusters, cluster by cluster, as kClusterPlaces * x + direction,

@@ -59,6 +59,21 @@ inline void classify(const Extraction& extraction, std::uint32_t z, SignPlane& p
   }
 }
 
+// The bits of the samples after those of word w.
+HWY_INLINE Word next_bits(const Word* row, std::size_t w) { return row[w] >> 1 | row[w + 1] << 63; }
+
+// True if the samples of word w of some rows, and the next one of each, are not all on one side.
+template <std::size_t kRows>
+HWY_INLINE bool have_both_signs(const std::array<const Word*, kRows>& rows, std::size_t w) {
+  Word any = 0;
+  Word all = ~Word{0};
+  for (const Word* row : rows) {
+    any |= row[w] | row[w + 1] << 63;
+    all &= row[w] & (row[w + 1] << 63 | ~Word{0} >> 1);
+  }
+  return any != 0 && all != ~Word{0};
+}
+
 inline unsigned count_in_tetrahedron(const CornerWords& corners,
                                      const std::array<std::uint8_t, 4>& tetrahedron, Word cells) {
   const Word a = corners[tetrahedron[0]];
@@ -86,15 +101,7 @@ class SignRow : public RowShape {
         rows_{low.row(y), low.row(next_row(y)), high.row(y), high.row(next_row(y))} {}
 
   // Quick test on the signs alone: false when no sample of word w has a crossed edge.
-  bool may_cross(std::size_t w) const {
-    Word any = 0;
-    Word all = ~Word{0};
-    for (const Word* row : rows_) {
-      any |= row[w] | row[w + 1] << 63;
-      all &= row[w] & (row[w + 1] << 63 | ~Word{0} >> 1);
-    }
-    return any != 0 && all != ~Word{0};
-  }
+  bool may_cross(std::size_t w) const { return have_both_signs(rows_, w); }
 
   // The samples of word w that own a crossed edge; what is known of its cells goes to `cells`.
   Word describe(std::size_t w, SignCells& cells) const {
@@ -117,19 +124,14 @@ class SignRow : public RowShape {
 
   WordCount count(std::size_t w) const {
     const CornerWords signs = corners(w);
-    WordCount count;
-    for (const Word edges : crossed_edges(w, signs)) {
-      count.vertices += static_cast<unsigned>(std::popcount(edges));
-    }
-    count.triangles = count_triangles(w, signs);
-    return count;
+    return {count_bits(crossed_edges(w, signs)), count_triangles(w, signs)};
   }
 
   CornerWords corners(std::size_t w) const {
     CornerWords corners;
     for (unsigned r = 0; r < 4; ++r) {
       corners[std::size_t{2} * r] = rows_[r][w];
-      corners[std::size_t{2} * r + 1] = rows_[r][w] >> 1 | rows_[r][w + 1] << 63;
+      corners[std::size_t{2} * r + 1] = next_bits(rows_[r], w);
     }
     return corners;
   }

@@ -24,42 +24,56 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-// The numbered rows that cells still need: the indices of the vertices that the rows' samples own
-// (valid where there is a vertex), and what is known of their cells. Cells are walked row by row,
-// and each needs the rows around it: its own, the one behind, and both of the plane above. So one
-// plane and two rows are kept, and each row that is numbered takes the place of the oldest.
-template <class Cells, std::size_t kPlaces>
-class RowRing {
+// The numbered rows that cells still need: the indices of the vertices that the rows' samples own,
+// valid where there is a vertex. Cells are walked row by row, and each needs the rows around it:
+// its own, the one behind, and both of the plane above. So one plane and two rows are kept, and
+// each row that is numbered takes the place of the oldest.
+template <std::size_t kPlaces>
+class IndexRing {
  public:
-  RowRing(const Dims& dims, IndexMemory& memory)
-      : dims_(dims),
-        rows_(std::size_t{dims.y} + 2),
-        words_(words_of(dims.x)),
-        memory_(memory),
-        indices_(memory.take()),
-        cells_(rows_ * words_) {}
-  ~RowRing() { memory_.give_back(std::move(indices_)); }
-  RowRing(const RowRing&) = delete;
-  RowRing& operator=(const RowRing&) = delete;
+  IndexRing(const Dims& dims, IndexMemory& memory)
+      : dims_(dims), rows_(std::size_t{dims.y} + 2), memory_(memory), indices_(memory.take()) {}
+  ~IndexRing() { memory_.give_back(std::move(indices_)); }
+  IndexRing(const IndexRing&) = delete;
+  IndexRing& operator=(const IndexRing&) = delete;
 
   std::uint32_t* indices(std::uint32_t y, std::uint32_t z) {
     return indices_.get() + row(y, z) * dims_.x * kPlaces;
   }
-  Cells* cells(std::uint32_t y, std::uint32_t z) { return &cells_[row(y, z) * words_]; }
-  std::size_t words() const { return words_; }
 
- private:
+ protected:
   std::size_t row(std::uint32_t y, std::uint32_t z) const {
     return (std::size_t{z} * dims_.y + y) % rows_;
   }
 
   const Dims dims_;
   const std::size_t rows_;
-  const std::size_t words_;
+
+ private:
   IndexMemory& memory_;
   IndexMemory::Block indices_;
+};
+
+// Also what is known of the rows' cells.
+template <class Cells, std::size_t kPlaces>
+class RowRing : public IndexRing<kPlaces> {
+ public:
+  RowRing(const Dims& dims, IndexMemory& memory)
+      : IndexRing<kPlaces>(dims, memory), words_(words_of(dims.x)), cells_(this->rows_ * words_) {}
+
+  Cells* cells(std::uint32_t y, std::uint32_t z) { return &cells_[this->row(y, z) * words_]; }
+  std::size_t words() const { return words_; }
+
+ private:
+  const std::size_t words_;
   std::vector<Cells> cells_;
 };
+
+// True for edges that may lie in a face of the box of a closed volume or leave it: samples there
+// own them.
+inline bool is_at_border(std::uint32_t at, std::uint32_t samples) {
+  return at <= 1 || at + 2 >= samples;
+}
 
 template <class Field>
 class SlabWriter {
@@ -144,10 +158,6 @@ class SlabWriter {
   void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) {
     if constexpr (Field::kHasLines) mark_lines(vertex);
     if (marched_.margin == 0) return place_inner(0, vertices_found_, y, z, vertex);
-    // Edges that lie in a face of the volume's box or leave it have samples here as their owners.
-    const auto is_at_border = [](std::uint32_t at, std::uint32_t samples) {
-      return at <= 1 || at + 2 >= samples;
-    };
     std::size_t begin = 0;
     std::size_t end = vertices_found_;
     if (is_at_border(y, dims_.y) || is_at_border(z, dims_.z)) {
@@ -168,8 +178,7 @@ class SlabWriter {
     const LatticeToSpace& map = marched_.to_space;
     const std::uint32_t margin = marched_.margin;
     const auto share = field_.shares(y, z, std::span(vertices_).subspan(begin, end - begin));
-    const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
+    const Double4 row_at = row_origin(map, y - margin, z - margin);
     const Double4 step_x = lanes(map.step_x);
     const unsigned row_parity = marched_.parity(0, y, z);
     Vec3* out = mesh_.positions.data() + vertex;

@@ -23,7 +23,7 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
   if (extraction.scheme == Scheme::kBcc) {
     return extraction.regularize ? BccClusterWalk(extraction, slab, count).count()
-                                 : count_bcc_slab(extraction, slab, count);
+                                 : count_slab_of<BccField>(extraction, slab, count);
   }
   if (extraction.regularize) return ClusterWalk<SignClusters>(extraction, slab, count).count();
   count_slab_of<SignField>(extraction, slab, count);

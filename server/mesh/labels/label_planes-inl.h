@@ -77,17 +77,11 @@ inline void classify(const Separation& separation, std::uint32_t z, LabelPlane& 
   }
 }
 
-// The samples of a word that have another label in `a` than in `b`.
-HWY_INLINE Word differing(const PartNumber* a, const PartNumber* b) {
+// The samples of a word of which `compare` holds for their labels in `a` and in `b`.
+template <class Compare>
+HWY_INLINE Word compared(const PartNumber* a, const PartNumber* b, Compare compare) {
   std::array<std::uint8_t, kWordBits> flags;
-  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] != b[x] ? 1 : 0;
-  return pack_word(flags);
-}
-
-// Those that have a larger one in `a` than in `b`.
-HWY_INLINE Word larger(const PartNumber* a, const PartNumber* b) {
-  std::array<std::uint8_t, kWordBits> flags;
-  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] > b[x] ? 1 : 0;
+  for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = compare(a[x], b[x]) ? 1 : 0;
   return pack_word(flags);
 }
 

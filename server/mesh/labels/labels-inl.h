@@ -12,6 +12,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <utility>
 
@@ -95,16 +96,13 @@ class LabelRow : public RowShape {
   Word first_is_larger(std::size_t w, unsigned direction) const {
     return between_ends(direction, [&](unsigned a, unsigned b) {
       const std::size_t x = w * kWordBits;
-      return larger(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1));
+      return compared(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1), std::greater<>());
     });
   }
 
   WordCount count(std::size_t w) const {
     const CornerWords others = differing_corners(w);
-    WordCount count;
-    for (const Word edges : crossed_edges(w, others)) {
-      count.vertices += static_cast<unsigned>(std::popcount(edges));
-    }
+    WordCount count = {.vertices = count_bits(crossed_edges(w, others))};
     LabelCells cells;
     describe(w, others, cells);
     visit_walls(w, cells, [&](PartNumber, PartNumber, unsigned n) { count.triangles += n; });
@@ -171,7 +169,8 @@ class LabelRow : public RowShape {
   // The cells in which corners a and b have different labels.
   Word differ(std::size_t w, unsigned a, unsigned b) const {
     const std::size_t x = w * kWordBits;
-    return differing(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1));
+    return compared(rows_[a >> 1] + x + (a & 1), rows_[b >> 1] + x + (b & 1),
+                    std::not_equal_to<>());
   }
 
   // Word c: the cells whose corner c has another label than corner 0.
@@ -369,9 +368,8 @@ class LabelField {
     const Slot& slot = separation_.walls[separation_.parity(x, y, z)].slots[place];
     const LatticeToSpace& map = separation_.to_space;
     // In the lattice's own numbers, in the order of place_inner for the same bits.
-    const Double4 row_at = lanes(map.origin) + lanes(map.step_y) * (static_cast<double>(y) - 1) +
-                           lanes(map.step_z) * (static_cast<double>(z) - 1);
-    const Double4 at = row_at + lanes(map.step_x) * (static_cast<double>(x) - 1);
+    const Double4 at = row_origin(map, static_cast<double>(y) - 1, static_cast<double>(z) - 1) +
+                       lanes(map.step_x) * (static_cast<double>(x) - 1);
     Double4 exact = at + frame.start + frame.run * 0.5;
     const std::array<std::uint32_t, 3> cell = {x, y, z};
     std::array<bool, 6> in_face = {true, true, true, true, true, true};

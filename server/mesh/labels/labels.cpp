@@ -15,18 +15,12 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::uint32_t kPlanesPerTask = 16;
+constexpr std::size_t kPlanesPerTask = 16;
 constexpr std::size_t kMostValues = kMostLabels + 1;  // with the background
 
 void add_run(LabelVoxels& label, std::uint32_t begin, std::uint32_t end, std::uint32_t y,
              std::uint32_t z) {
-  const std::array<std::uint32_t, 3> first = {begin, y, z};
-  const std::array<std::uint32_t, 3> last = {end - 1, y, z};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    label.low[axis] = label.voxels == 0 ? first[axis] : std::min(label.low[axis], first[axis]);
-    label.high[axis] = std::max(label.high[axis], last[axis]);
-  }
-  label.voxels += end - begin;
+  add_voxels({.voxels = end - begin, .low = {begin, y, z}, .high = {end - 1, y, z}}, label);
 }
 
 // The labels that have been met, by value.
@@ -127,11 +121,12 @@ void throw_too_many_labels() {
 template <class T>
 std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& context) {
   const std::uint32_t planes = lattice.dims.samples() == 0 ? 0 : lattice.dims.z;
-  std::vector<std::vector<LabelVoxels>> parts((planes + kPlanesPerTask - 1) / kPlanesPerTask);
-  parallel_for(context, parts.size(), [&](std::size_t task) {
-    const auto begin = static_cast<std::uint32_t>(task) * kPlanesPerTask;
-    parts[task] = count_planes(lattice, begin, std::min(planes, begin + kPlanesPerTask));
-  });
+  std::vector<std::vector<LabelVoxels>> parts(chunks_of(planes, kPlanesPerTask));
+  const auto count = [&](std::size_t begin, std::size_t end) {
+    parts[begin / kPlanesPerTask] =
+        count_planes(lattice, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
+  };
+  for_chunks(context, planes, count, kPlanesPerTask);
   std::unordered_map<std::int64_t, LabelVoxels> joined;
   for (std::vector<LabelVoxels>& part : parts) {
     for (const LabelVoxels& label : std::exchange(part, {})) add_voxels(label, joined[label.label]);

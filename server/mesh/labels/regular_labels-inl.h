@@ -83,8 +83,7 @@ class RegularLabelField : public LabelField {
         });
     const LatticeToSpace& map = separation_.to_space;
     const double margin = separation_.margin;
-    const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
+    const Double4 row_at = row_origin(map, y - margin, z - margin);
     visit_joining(
         separation_.clusters, y, z,
         [&](std::uint32_t x, const Joined& all, const JoinedPoints* points) {

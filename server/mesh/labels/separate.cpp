@@ -11,11 +11,6 @@ bool has_walls(const Dims& dims, const SeparateOptions& options) {
   return dims.has_cells() && !options.labels.empty();
 }
 
-void count_all(const Separation& separation, const Context& context, SurfaceCount& count) {
-  count_pass(separation, context, count);
-  prefix_pass(count);
-}
-
 void tally_all(const Separation& separation, const Context& context,
                std::vector<std::uint64_t>& triangles) {
   const auto slabs = cut_slabs(separation.dims.z, [](std::uint32_t z) { return z; });
@@ -27,10 +22,6 @@ void tally_all(const Separation& separation, const Context& context,
   for (const std::vector<std::uint64_t>& part : parts) {
     for (std::size_t n = 0; n < part.size(); ++n) triangles[n] += part[n];
   }
-}
-
-void write_all(const Separation& separation, const Context& context, SeparatingSurface& surface) {
-  write_pass(separation, kSlotPlaces, context, surface.mesh, surface);
 }
 
 }  // namespace
@@ -51,7 +42,8 @@ SurfaceCount count_walls(const Lattice<T>& lattice, const SeparateOptions& optio
   }
   const Separation separation(lattice, options);
   if (options.regularize) count.clusters.resize(separation.dims.z);
-  count_all(separation, context, count);
+  count_pass(separation, context, count);
+  prefix_pass(count);
   return count;
 }
 
@@ -81,7 +73,7 @@ void extract_walls(const Lattice<T>& lattice, const SeparateOptions& options,
 
   Separation separation(lattice, options);
   separation.clusters = count.clusters;
-  write_all(separation, context, surface);
+  write_pass(separation, kSlotPlaces, context, surface.mesh, surface);
 }
 
 #define ISOMESH_INSTANTIATE(T)                                                                  \

@@ -5,6 +5,8 @@
 #include <span>
 #include <utility>
 
+#include "server/mesh/points.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -118,21 +120,8 @@ class TetrahedronBuilder {
     return way;
   }
 
-  // The side of a plane along `a` and `b` that `outward` points to.
-  static bool faces(const Point& a, const Point& b, const Point& outward) {
-    const Point normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                          a[0] * b[1] - a[1] * b[0]};
-    return normal[0] * outward[0] + normal[1] * outward[1] + normal[2] * outward[2] > 0;
-  }
-
   void add(unsigned back, unsigned front, const Point& outward, const Spot& a, Spot b, Spot c) {
-    Point ab;
-    Point ac;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      ab[axis] = b.at[axis] - a.at[axis];
-      ac[axis] = c.at[axis] - a.at[axis];
-    }
-    if (!faces(ab, ac, outward)) std::swap(b, c);
+    if (dot(normal_of(a.at, b.at, c.at), outward) <= 0) std::swap(b, c);
     walls_.walls[walls_.triangles++] = {{a.name, b.name, c.name}, corners_[back], corners_[front]};
   }
 
@@ -176,9 +165,7 @@ class TetrahedronBuilder {
     const Spot face2 = spot(a2, b, c);
     add(b, c, way(b, c), spot(b, c), face, face2);
     for (const unsigned single : singles) {
-      Point outward = way(a, single);
-      const Point more = way(a2, single);
-      for (std::size_t axis = 0; axis < 3; ++axis) outward[axis] += more[axis];
+      const Point outward = plus(way(a, single), way(a2, single));
       add(a, single, outward, spot(a, single), spot(a2, single), face2);
       add(a, single, outward, spot(a, single), face2, face);
     }

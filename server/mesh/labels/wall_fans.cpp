@@ -1,7 +1,7 @@
 #include "server/mesh/labels/wall_fans.h"
 
 #include <algorithm>
-#include <limits>
+#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -143,12 +143,9 @@ std::uint32_t WallFans::find(std::size_t vertex, const Wall& wall) const {
 }
 
 void WallFans::find_neighbors(const Context& context) {
-  constexpr std::size_t kFansPerTask = 16384;
-  const std::size_t tasks = (size() + kFansPerTask - 1) / kFansPerTask;
-  const auto visit = [&](std::size_t task, const auto& use) {
+  const auto visit = [&](std::size_t begin, std::size_t end, const auto& use) {
     std::vector<std::uint32_t> vertices;
-    for (std::size_t fan = task * kFansPerTask; fan < std::min(size(), (task + 1) * kFansPerTask);
-         ++fan) {
+    for (std::size_t fan = begin; fan < end; ++fan) {
       vertices.clear();
       for (const Spoke& spoke : spokes(fan)) vertices.push_back(spoke.next);
       // A fan that is open has an end that is only a previous corner.
@@ -160,17 +157,18 @@ void WallFans::find_neighbors(const Context& context) {
       use(fan, vertices);
     }
   };
-  std::vector<std::uint64_t> before(tasks + 1, 0);
-  parallel_for(context, tasks, [&](std::size_t task) {
-    visit(task, [&](std::size_t, const auto& vertices) { before[task + 1] += vertices.size(); });
+  std::vector<std::uint64_t> before(chunks_of(size()) + 1, 0);
+  for_chunks(context, size(), [&](std::size_t begin, std::size_t end) {
+    std::uint64_t& sum = before[begin / kChunk + 1];
+    visit(begin, end, [&](std::size_t, const auto& vertices) { sum += vertices.size(); });
   });
-  for (std::size_t task = 0; task < tasks; ++task) before[task + 1] += before[task];
+  std::partial_sum(before.begin(), before.end(), before.begin());
   neighbors_begin_.resize_for_overwrite(size() + 1);
-  neighbors_.resize_for_overwrite(before[tasks]);
-  neighbors_begin_[size()] = before[tasks];
-  parallel_for(context, tasks, [&](std::size_t task) {
-    std::uint64_t next = before[task];
-    visit(task, [&](std::size_t fan, const auto& vertices) {
+  neighbors_.resize_for_overwrite(before.back());
+  neighbors_begin_[size()] = before.back();
+  for_chunks(context, size(), [&](std::size_t begin, std::size_t end) {
+    std::uint64_t next = before[begin / kChunk];
+    visit(begin, end, [&](std::size_t fan, const auto& vertices) {
       neighbors_begin_[fan] = next;
       for (const std::uint32_t v : vertices) neighbors_[next++] = find(v, walls_[fan]);
     });

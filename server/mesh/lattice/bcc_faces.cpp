@@ -4,6 +4,8 @@
 #include <span>
 #include <utility>
 
+#include "server/mesh/points.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -12,13 +14,6 @@ constexpr unsigned kFirstCorner = 2;
 constexpr std::uint8_t kNone = 0xFF;
 
 using Place = std::array<int, 3>;  // in half cells
-
-Place difference(const Place& a, const Place& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
-int determinant(const Place& a, const Place& b, const Place& c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
 
 // Builds the cases of one face.
 class FaceBuilder {
@@ -101,8 +96,8 @@ class FaceBuilder {
   }
 
   int volume(unsigned from, unsigned a, unsigned b, unsigned c) const {
-    const auto way = [&](std::uint8_t to) { return difference(place(to), place(from)); };
-    return determinant(way(a), way(b), way(c));
+    const auto way = [&](unsigned to) { return minus(place(to), place(from)); };
+    return dot(way(a), cross(way(b), way(c)));
   }
 
   using Ends = std::array<unsigned, 2>;
@@ -124,7 +119,7 @@ class FaceBuilder {
 BccFaces make_faces(bool left_handed) {
   BccFaces faces;
   for (unsigned axis = 0; axis < 3; ++axis) {
-    for (const BccSide side : {BccSide::kInner, BccSide::kLow, BccSide::kHigh}) {
+    for (const BccSide side : kBccSides) {
       faces[axis][static_cast<std::size_t>(side)] = FaceBuilder(axis, side, left_handed).build();
     }
   }

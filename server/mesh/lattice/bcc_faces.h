@@ -69,6 +69,8 @@ enum class BccSide : std::uint8_t {
   kHigh,   // at the upper border: the lower cell's alone
 };
 
+inline constexpr std::array kBccSides = {BccSide::kInner, BccSide::kLow, BccSide::kHigh};
+
 // The tetrahedra of a face by the points of a case.
 using BccTetrahedra = std::array<std::array<std::uint8_t, 4>, 4>;
 inline constexpr BccTetrahedra kBccInnerTetrahedra = {

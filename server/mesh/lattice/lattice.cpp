@@ -4,11 +4,7 @@
 
 namespace isomesh::mesh {
 
-double LatticeToSpace::determinant() const {
-  const auto& [a, b, c] = std::array{step_x, step_y, step_z};
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
+double LatticeToSpace::determinant() const { return dot(step_x, cross(step_y, step_z)); }
 
 LatticeToSpace lattice_to_space(const Geometry& geometry) {
   const auto column = [&](std::size_t axis) {

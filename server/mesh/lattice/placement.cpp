@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "server/mesh/points.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -32,8 +34,8 @@ bool is_axis_aligned(const LatticeToSpace& to_space) {
 // The smallest distance between neighbouring planes of samples.
 double plane_distance(const LatticeToSpace& to_space) {
   const auto area = [](const Offset& a, const Offset& b) {
-    return std::hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                      a[0] * b[1] - a[1] * b[0]);
+    const Offset normal = cross(a, b);
+    return std::hypot(normal[0], normal[1], normal[2]);
   };
   const double volume = std::abs(to_space.determinant());
   return std::min({volume / area(to_space.step_y, to_space.step_z),

@@ -85,6 +85,13 @@ struct WordCount {
   unsigned triangles = 0;
 };
 
+template <std::size_t kWords>
+HWY_INLINE unsigned count_bits(const std::array<Word, kWords>& words) {
+  unsigned count = 0;
+  for (const Word word : words) count += static_cast<unsigned>(std::popcount(word));
+  return count;
+}
+
 // The edges that the samples of a row own, and its cells. Beyond the upper borders of the lattice
 // the last rows stand for those that are missing, and everything that depends on them is masked.
 class RowShape {
@@ -191,6 +198,11 @@ HWY_INLINE Double4 lanes(const std::array<double, 3>& offset) {
 HWY_INLINE Double4 space_offset(const LatticeToSpace& map, unsigned corner) {
   return lanes(map.step_x) * (corner & 1) + lanes(map.step_y) * (corner >> 1 & 1) +
          lanes(map.step_z) * (corner >> 2);
+}
+
+// The sample x = 0 of a row, in millimetres.
+HWY_INLINE Double4 row_origin(const LatticeToSpace& map, double y, double z) {
+  return lanes(map.origin) + lanes(map.step_y) * y + lanes(map.step_z) * z;
 }
 
 // The edge of a vertex: where it begins and its direction, in millimetres, relative to the sample

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/mesh/points.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -11,28 +13,17 @@ using Point = std::array<int, 3>;
 
 Point position(Corner corner) { return {corner & 1, corner >> 1 & 1, corner >> 2 & 1}; }
 
-Point operator-(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
-Point operator+(const Point& a, const Point& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-
-int dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 struct Edge {
   Corner inside = 0;
   Corner outside = 0;
 
   EdgeName name() const { return edge_name(inside & outside, inside ^ outside); }
-  Point middle() const { return position(inside) + position(outside); }  // times two
+  Point middle() const { return plus(position(inside), position(outside)); }  // times two
 };
 
 // Adds the triangle with its normal towards `outward`; the midpoints of the edges tell the side.
 void add_triangle(CellCase& out, Edge a, Edge b, Edge c, const Point& outward) {
-  const Point normal = cross(b.middle() - a.middle(), c.middle() - a.middle());
-  if (dot(normal, outward) < 0) std::swap(b, c);
+  if (dot(normal_of(a.middle(), b.middle(), c.middle()), outward) < 0) std::swap(b, c);
   out.edges[out.triangles++] = {a.name(), b.name(), c.name()};
 }
 
@@ -51,7 +42,7 @@ void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsigned inside_
   }
   for (std::size_t i = 0; i < insides; ++i) {
     for (std::size_t o = 0; o < outsides; ++o) {
-      outward = outward + (position(outside[o]) - position(inside[i]));
+      outward = plus(outward, minus(position(outside[o]), position(inside[i])));
     }
   }
   if (insides == 1) {

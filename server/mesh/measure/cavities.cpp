@@ -129,18 +129,18 @@ Dropped fill_cavities(const Context& context, Mesh& mesh) {
   }
 
   std::vector<std::uint8_t> stays(shells.size(), 0);
-  constexpr std::size_t kPerTask = 256;
-  parallel_for(context, (shells.size() + kPerTask - 1) / kPerTask, [&](std::size_t task) {
+  const auto find_shells = [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> near;
-    const std::size_t end = std::min(shells.size(), (task + 1) * kPerTask);
-    for (std::size_t n = task * kPerTask; n < end; ++n) {
+    for (std::size_t n = begin; n < end; ++n) {
       const Shell& shell = shells[n];
       if (is_wall(static_cast<std::uint32_t>(n))) continue;
       if (shell.first_triangle == TriangleGrid::kNone) continue;  // a vertex of no triangle
       const Point point = point_in(mesh, mesh.triangles[shell.first_triangle]);
       stays[n] = point[0] > end_x || crossings(point, walls, end_x, near) == 0 ? 1 : 0;
     }
-  });
+  };
+  constexpr std::size_t kPerTask = 256;
+  for_chunks(context, shells.size(), find_shells, kPerTask);
   context.throw_if_stopped();
   return leave_out({stays.begin(), stays.end()}, triangles_of(components, mesh), components, mesh);
 }

@@ -42,15 +42,7 @@ class Points {
   std::size_t size() const { return size_; }
 
   Point operator[](std::size_t measured) const {
-    const std::size_t number = measured + measured / kRun * (step_ - 1) * kRun;
-    if (number < surface_.positions.size()) return to_point(surface_.positions[number]);
-    Point centre = {0, 0, 0};
-    for (const std::uint32_t vertex : surface_.triangles[number - surface_.positions.size()]) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        centre[axis] += surface_.positions[vertex][axis] / 3.0;
-      }
-    }
-    return centre;
+    return measured_point(surface_, measured + measured / kRun * (step_ - 1) * kRun);
   }
 
  private:
@@ -72,19 +64,19 @@ float distance_of(const Point& point, const TriangleGrid& to, std::uint32_t& gue
 std::vector<Sums> measure(const Points& points, std::size_t count, const TriangleGrid& to,
                           const Context& context, Buffer<float>& distances) {
   distances.resize_for_overwrite(count);
-  std::vector<Sums> blocks((count + kBlock - 1) / kBlock);
-  parallel_for(context, blocks.size(), [&](std::size_t block) {
-    Sums& sums = blocks[block];
+  std::vector<Sums> blocks(chunks_of(count, kBlock));
+  const auto measure_block = [&](std::size_t begin, std::size_t end) {
+    Sums& sums = blocks[begin / kBlock];
     std::uint32_t guess = TriangleGrid::kNone;
-    const std::size_t end = std::min(count, (block + 1) * kBlock);
-    for (std::size_t n = block * kBlock; n < end; ++n) {
+    for (std::size_t n = begin; n < end; ++n) {
       const float distance = distance_of(points[n], to, guess);
       distances[n] = distance;
       sums.sum += distance;
       sums.squares += double{distance} * distance;
       sums.max = std::max(sums.max, distance);
     }
-  });
+  };
+  for_chunks(context, count, measure_block, kBlock);
   return blocks;
 }
 
@@ -134,18 +126,11 @@ DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to
 
 Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context,
                     std::size_t most) {
-  // Each direction counts as half of the work.
-  const auto half = [&](double begin) {
-    Context part = {context.stop, nullptr};
-    if (context.progress) {
-      part.progress = [&, begin](double share) { context.progress(begin + share / 2); };
-    }
-    return part;
-  };
   Certificate certificate;
-  certificate.from_mesh = measure_distance(mesh, TriangleGrid(reference, context), half(0), most);
+  certificate.from_mesh =
+      measure_distance(mesh, TriangleGrid(reference, context), context.part(0, 0.5), most);
   certificate.from_reference =
-      measure_distance(reference, TriangleGrid(mesh, context), half(0.5), most);
+      measure_distance(reference, TriangleGrid(mesh, context), context.part(0.5, 1), most);
   return certificate;
 }
 

@@ -4,14 +4,13 @@
 #include <cmath>
 
 #include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::mesh {
 namespace {
 
 // Each run looks at the triangles of one more layer.
 constexpr std::size_t kLayersPerSlab = 16;
-
-Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 // Writes the normals of these layers' vertices, which only triangles of the same layers and of the
 // one below name.
@@ -34,10 +33,8 @@ void write_normals(const Mesh& mesh, std::size_t first_layer, std::size_t end_la
 }  // namespace
 
 Vec3 area_normal(const Mesh& mesh, const Triangle& triangle) {
-  const Vec3& corner = mesh.positions[triangle[0]];
-  const Vec3 u = mesh.positions[triangle[1]] - corner;
-  const Vec3 v = mesh.positions[triangle[2]] - corner;
-  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  return normal_of(mesh.positions[triangle[0]], mesh.positions[triangle[1]],
+                   mesh.positions[triangle[2]]);
 }
 
 Vec3 unit(const Vec3& v) {
@@ -57,11 +54,10 @@ void vertex_normals(const Mesh& mesh, const Context& context, Buffer<Vec3>& norm
     std::ranges::copy(mesh.normals, normals.begin());
     return;
   }
-  const std::size_t slabs = (mesh.layers() + kLayersPerSlab - 1) / kLayersPerSlab;
-  parallel_for(context, slabs, [&](std::size_t slab) {
-    const std::size_t first = slab * kLayersPerSlab;
-    write_normals(mesh, first, std::min(mesh.layers(), first + kLayersPerSlab), normals.data());
-  });
+  const auto write = [&](std::size_t first_layer, std::size_t end_layer) {
+    write_normals(mesh, first_layer, end_layer, normals.data());
+  };
+  for_chunks(context, mesh.layers(), write, kLayersPerSlab);
 }
 
 }  // namespace isomesh::mesh

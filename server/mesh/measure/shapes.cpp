@@ -217,8 +217,6 @@ HWY_EXPORT(measure_shapes_of);
 
 constexpr std::size_t kMeasuredPerRun = 32768;
 
-constexpr std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
-
 Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSums::*quantity) {
   Distribution result;
   std::size_t triangles = 0;
@@ -245,15 +243,15 @@ Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSum
 Shapes measure_shapes(const Mesh& mesh, const Context& context) {
   const std::size_t triangles = mesh.triangles.size();
   const std::size_t step =
-      triangles <= kMostMeasuredTriangles ? 1 : ceil_div(triangles, kMostMeasuredTriangles / 2);
-  const std::size_t blocks = ceil_div(triangles, kBlock);
+      triangles <= kMostMeasuredTriangles ? 1 : chunks_of(triangles, kMostMeasuredTriangles / 2);
+  const std::size_t blocks = chunks_of(triangles, kBlock);
   const std::size_t per_run = kMeasuredPerRun / kBlock * step;
-  std::vector<ShapeSums> runs(ceil_div(blocks, per_run));
+  std::vector<ShapeSums> runs(chunks_of(blocks, per_run));
   const auto measure = HWY_DYNAMIC_DISPATCH(measure_shapes_of);
-  parallel_for(context, runs.size(), [&](std::size_t run) {
-    const std::size_t begin = run * per_run;
-    measure(mesh, {begin, std::min(blocks, begin + per_run), step}, runs[run]);
-  });
+  const auto measure_run = [&](std::size_t begin, std::size_t end) {
+    measure(mesh, {begin, end, step}, runs[begin / per_run]);
+  };
+  for_chunks(context, blocks, measure_run, per_run);
   return {summed(runs, &ShapeSums::aspect_ratio), summed(runs, &ShapeSums::smallest_angle_deg)};
 }
 

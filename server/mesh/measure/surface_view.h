@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "server/mesh/mesh.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::mesh {
 
@@ -19,5 +19,18 @@ struct SurfaceView {
   std::span<const Vec3> positions;
   std::span<const Triangle> triangles;
 };
+
+// The points by which distances are measured, by number: the vertices, then the triangles' centres.
+inline Point measured_point(const SurfaceView& surface, std::size_t number) {
+  const std::size_t vertices = surface.positions.size();
+  if (number < vertices) return to_point(surface.positions[number]);
+  Point centre = {0, 0, 0};
+  for (const std::uint32_t vertex : surface.triangles[number - vertices]) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      centre[axis] += surface.positions[vertex][axis] / 3.0;
+    }
+  }
+  return centre;
+}
 
 }  // namespace isomesh::mesh

@@ -65,13 +65,9 @@ Corners corners_of(const SurfaceView& surface, std::size_t triangle) {
 
 Bounds bounds_of(const SurfaceView& surface, const Context& context) {
   const std::size_t triangles = surface.triangles.size();
-  std::vector<Bounds> parts((triangles + kTrianglesPerTask - 1) / kTrianglesPerTask);
-  parallel_for(context, parts.size(), [&](std::size_t task) {
-    const std::size_t end = std::min(triangles, (task + 1) * kTrianglesPerTask);
-    for (std::size_t t = task * kTrianglesPerTask; t < end; ++t) {
-      parts[task].add(corners_of(surface, t));
-    }
-  });
+  std::vector<Bounds> parts(chunks_of(triangles, kTrianglesPerTask));
+  const auto add = [&](std::size_t t) { parts[t / kTrianglesPerTask].add(corners_of(surface, t)); };
+  for_each(context, triangles, add, kTrianglesPerTask);
   Bounds whole;
   for (const Bounds& part : parts) whole.add(part);
   return whole;
@@ -215,15 +211,12 @@ void TriangleGrid::fill_slabs(const Context& context) {
   const std::size_t triangles = surface_.triangles.size();
   // The layers of words that each triangle reaches; a slab looks at all triangles.
   std::vector<std::array<std::uint16_t, 2>> layers(triangles);
-  parallel_for(context, (triangles + kTrianglesPerTask - 1) / kTrianglesPerTask,
-               [&](std::size_t task) {
-                 const std::size_t end = std::min(triangles, (task + 1) * kTrianglesPerTask);
-                 for (std::size_t t = task * kTrianglesPerTask; t < end; ++t) {
-                   const StepRange box = box_of(corners_of(surface_, t));
-                   layers[t] = {static_cast<std::uint16_t>(cell_of(box.low)[2] / kWordSide),
-                                static_cast<std::uint16_t>(cell_of(box.high)[2] / kWordSide)};
-                 }
-               });
+  const auto find_layers = [&](std::size_t t) {
+    const StepRange box = box_of(corners_of(surface_, t));
+    layers[t] = {static_cast<std::uint16_t>(cell_of(box.low)[2] / kWordSide),
+                 static_cast<std::uint16_t>(cell_of(box.high)[2] / kWordSide)};
+  };
+  for_each(context, triangles, find_layers, kTrianglesPerTask);
   const std::uint32_t all = levels_[0].words[2];
   const std::uint64_t layer_words = std::uint64_t{levels_[0].words[0]} * levels_[0].words[1];
   const std::uint32_t wanted = triangles < kTrianglesPerTask ? 1 : std::min(all, kMostSlabs);

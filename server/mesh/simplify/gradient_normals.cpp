@@ -14,7 +14,6 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kChunk = 1 << 14;
 constexpr double kLeastAgreement = 0.25;  // a cosine
 
 template <class T>
@@ -92,18 +91,15 @@ void set_gradient_normals(const Lattice<T>& lattice, const Context& context, Mes
   vertex_normals(mesh, context, of_triangles);
   mesh.normals.assign(of_triangles.begin(), of_triangles.end());
   const Gradient<T> gradient(lattice);
-  const std::size_t count = mesh.positions.size();
-  parallel_for(context, (count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    for (std::size_t v = chunk * kChunk; v < std::min(count, (chunk + 1) * kChunk); ++v) {
-      if (mesh.is_on_border(v)) continue;
-      const Point inward = gradient.at(mesh.positions[v]);
-      const double length = -std::sqrt(dot(inward, inward));
-      Vec3& normal = mesh.normals[v];
-      const double agreement =
-          (inward[0] * normal[0] + inward[1] * normal[1] + inward[2] * normal[2]) / length;
-      if (!(agreement > kLeastAgreement)) continue;
-      for (std::size_t i = 0; i < 3; ++i) normal[i] = static_cast<float>(inward[i] / length);
-    }
+  for_each(context, mesh.positions.size(), [&](std::size_t v) {
+    if (mesh.is_on_border(v)) return;
+    const Point inward = gradient.at(mesh.positions[v]);
+    const double length = -std::sqrt(dot(inward, inward));
+    Vec3& normal = mesh.normals[v];
+    const double agreement =
+        (inward[0] * normal[0] + inward[1] * normal[1] + inward[2] * normal[2]) / length;
+    if (!(agreement > kLeastAgreement)) return;
+    for (std::size_t i = 0; i < 3; ++i) normal[i] = static_cast<float>(inward[i] / length);
   });
 }
 

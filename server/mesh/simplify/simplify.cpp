@@ -126,10 +126,8 @@ class Simplifier {
   std::vector<std::uint32_t> cubes_of_triangles(int round) const {
     std::vector<std::uint32_t> cubes(current_.size());
     constexpr std::size_t kPerTask = 1 << 15;
-    parallel_for(quiet_, (cubes.size() + kPerTask - 1) / kPerTask, [&](std::size_t task) {
-      const std::size_t end = std::min(cubes.size(), (task + 1) * kPerTask);
-      for (std::size_t t = task * kPerTask; t < end; ++t) cubes[t] = cube_of(t, round);
-    });
+    for_each(
+        quiet_, cubes.size(), [&](std::size_t t) { cubes[t] = cube_of(t, round); }, kPerTask);
     return cubes;
   }
 
@@ -245,12 +243,7 @@ class Simplifier {
     std::atomic<std::uint64_t> blocks = 0;
     std::atomic<std::uint64_t> repeated = 0;
     std::atomic<std::uint64_t> taken_back = 0;
-    Context context = quiet_;
-    if (context_.progress) {
-      context.progress = [&, round](double share) {
-        context_.progress(std::min(1.0, round == 0 ? share * 0.7 : 0.7 + share * 0.3));
-      };
-    }
+    const Context context = round == 0 ? context_.part(0, 0.7) : context_.part(0.7, 1);
     parallel_for(context, results.size(), [&](std::size_t b) {
       results[b] = block_from(b);
       if (results[b].triangles.empty()) return;

@@ -11,19 +11,6 @@
 
 namespace isomesh::mesh {
 
-// The points by which distances are measured, by number: the vertices, then the triangles' centres.
-inline Point measured_point(const SurfaceView& surface, std::size_t number) {
-  const std::size_t vertices = surface.positions.size();
-  if (number < vertices) return to_point(surface.positions[number]);
-  Point centre = {0, 0, 0};
-  for (const std::uint32_t vertex : surface.triangles[number - vertices]) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      centre[axis] += surface.positions[vertex][axis] / 3.0;
-    }
-  }
-  return centre;
-}
-
 // The first request, as a share of the bound. A quadric's error is only a mean. Junction curves
 // were simplified before, and the walls' own distance adds to theirs.
 inline constexpr double kFirstError = 0.5;

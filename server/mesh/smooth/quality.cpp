@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "server/mesh/points.h"
 #include "server/mesh/smooth/fans.h"
 #include "server/mesh/smooth/rings.h"
+#include "server/mesh/smooth/sweep.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -60,21 +60,15 @@ class QualitySmoother {
   }
 
   void add_displacements(SmoothingEffect& effect) const {
-    std::vector<double> sums(slabs_.size(), 0);
-    std::vector<double> largest(slabs_.size(), 0);
+    std::vector<LayerDisplacement> of_slabs(slabs_.size());
     parallel_for(quiet_, slabs_.size(), [&](std::size_t slab) {
-      double sum = 0;
       for (std::uint64_t v = first_vertex(slab); v < first_vertex(slab + 1); ++v) {
-        const Point way = minus(to_point(mesh_.positions[v]), to_point(extracted_[v]));
-        const double length = std::sqrt(dot(way, way));
-        sum += length;
-        largest[slab] = std::max(largest[slab], length);
+        of_slabs[slab].add(extracted_[v], mesh_.positions[v]);
       }
-      sums[slab] = sum;
     });
-    for (std::size_t slab = 0; slab < slabs_.size(); ++slab) {
-      effect.mean_displacement_mm += sums[slab] / static_cast<double>(mesh_.positions.size());
-      effect.max_displacement_mm = std::max(effect.max_displacement_mm, largest[slab]);
+    for (const auto& [sum, largest] : of_slabs) {
+      effect.mean_displacement_mm += sum / static_cast<double>(mesh_.positions.size());
+      effect.max_displacement_mm = std::max(effect.max_displacement_mm, largest);
     }
   }
 

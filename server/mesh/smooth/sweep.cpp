@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/mesh/buffer.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -431,12 +432,10 @@ class Sweep {
 }  // namespace
 
 void LayerDisplacement::add(const Vec3& extracted, const Vec3& moved) {
-  const double x = double{moved[0]} - extracted[0];
-  const double y = double{moved[1]} - extracted[1];
-  const double z = double{moved[2]} - extracted[2];
-  const double way = std::sqrt(x * x + y * y + z * z);
-  sum += way;
-  largest = std::max(largest, way);
+  const Point way = minus(to_point(moved), to_point(extracted));
+  const double length = std::sqrt(dot(way, way));
+  sum += length;
+  largest = std::max(largest, length);
 }
 
 void list_flat(const Mesh& mesh, std::size_t layer, FlatVertices* flat) {

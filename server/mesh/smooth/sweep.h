@@ -31,7 +31,7 @@ struct LayerCopy {
   }
 };
 
-// Sums over one layer's vertices.
+// Sums over the vertices of a layer, or of several.
 struct LayerDisplacement {
   double sum = 0;
   double largest = 0;

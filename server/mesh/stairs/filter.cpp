@@ -41,14 +41,12 @@ void filter(const std::vector<std::uint32_t>& vertices, const std::vector<float>
   std::vector<Lanes> before = first;  // T[j - 2], then T[j]
   std::vector<Lanes> now = first;     // T[j - 1]
   for (std::size_t j = 1; j < series.size(); ++j) {
-    for_runs(context, vertices.size(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t v = vertices[i];
-        const Lanes step = shape.kept(v, shares[v] * (shape.mean(v, now) - now[v]));
-        const Lanes moved = now[v] + step;
-        before[v] = j == 1 ? moved : 2.0F * moved - before[v];
-        shape.at[v] += series[j] * (before[v] - first[v]);  // the sum of all is 1
-      }
+    for_each(context, vertices.size(), [&](std::size_t i) {
+      const std::size_t v = vertices[i];
+      const Lanes step = shape.kept(v, shares[v] * (shape.mean(v, now) - now[v]));
+      const Lanes moved = now[v] + step;
+      before[v] = j == 1 ? moved : 2.0F * moved - before[v];
+      shape.at[v] += series[j] * (before[v] - first[v]);  // the sum of all is 1
     });
     before.swap(now);
   }

@@ -45,16 +45,13 @@ class Finder {
  private:
   template <class Body>
   void for_vertices(const Body& body) const {
-    for_runs(context_, shape_.vertices(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) body(v);
-    });
+    for_each(context_, shape_.vertices(), body);
   }
 
   template <class Body>
   void for_curves(const Body& body) const {
-    for_runs(context_, found_.curves.size(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) body(std::size_t{found_.curves[i]});
-    });
+    for_each(context_, found_.curves.size(),
+             [&](std::size_t i) { body(std::size_t{found_.curves[i]}); });
   }
 
   void find_staircases() {

@@ -77,9 +77,7 @@ class Remover {
 
   void restore() {
     keeper_.restore(shape_);
-    for_runs(context_, shape_.vertices(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) hold(v, kMostSamples);
-    });
+    for_each(context_, shape_.vertices(), [&](std::size_t v) { hold(v, kMostSamples); });
   }
 
   // Along themselves, no coordinate by more than a step from the start; then the walls beside them
@@ -112,9 +110,10 @@ struct Displacements {
 Displacements take_over(const WallShape& shape, const LatticeToSpace& to_space, double most,
                         const Context& context, Mesh& mesh) {
   const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
-  std::vector<Displacements> runs(runs_of(mesh.positions.size()));
-  for_runs(context, mesh.positions.size(), [&](std::size_t begin, std::size_t end) {
-    Displacements& here = runs[begin / kRunLength];
+  constexpr std::size_t kRun = 8192;
+  std::vector<Displacements> runs(chunks_of(mesh.positions.size(), kRun));
+  const auto take_run = [&](std::size_t begin, std::size_t end) {
+    Displacements& here = runs[begin / kRun];
     for (std::size_t v = begin; v < end; ++v) {
       const Lanes moved = shape.at[v] - shape.start()[v];
       Point way = {0, 0, 0};
@@ -134,7 +133,8 @@ Displacements take_over(const WallShape& shape, const LatticeToSpace& to_space, 
       here.sum += size * share;
       here.largest = std::max(here.largest, size * share);
     }
-  });
+  };
+  for_chunks(context, mesh.positions.size(), take_run, kRun);
   Displacements all;
   for (const Displacements& run : runs) {
     all.sum += run.sum;

@@ -17,11 +17,9 @@ class WallNormals {
  public:
   WallNormals(const WallShape& shape, const Context& context)
       : shape_(shape), normals_(shape.fans().size()) {
-    for_runs(context, normals_.size(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t fan = begin; fan < end; ++fan) {
-        for (const Spoke& spoke : shape.fans().spokes(fan)) {
-          normals_[fan] += shape.normal(shape.fans().vertex(fan), spoke);
-        }
+    for_each(context, normals_.size(), [&](std::size_t fan) {
+      for (const Spoke& spoke : shape.fans().spokes(fan)) {
+        normals_[fan] += shape.normal(shape.fans().vertex(fan), spoke);
       }
     });
   }
@@ -55,24 +53,22 @@ std::vector<Suspect> find_suspects(const WallShape& shape, const Context& contex
   constexpr int kEdges = 2;
   const WallNormals normals(shape, context);
   const WallFans& fans = shape.fans();
-  std::vector<std::vector<Suspect>> found(runs_of(shape.vertices()));
-  for_runs(context, shape.vertices(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      shape.visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
-        // Each triangle once, at its first corner.
-        if (spoke.next < v || spoke.previous < v) return;
-        const std::array corners = {static_cast<std::uint32_t>(v), spoke.next, spoke.previous};
-        const Wall& wall = fans.wall(fan);
-        const std::array own = {static_cast<std::uint32_t>(fan), fans.find(spoke.next, wall),
-                                fans.find(spoke.previous, wall)};
-        Lanes near = {};
-        for (const std::uint32_t each : own) near += normals.around(each, 0);
-        if (!is_less(normal_of(shape, corners), near, kSuspect)) return;
-        Lanes wide = {};
-        for (const std::uint32_t each : own) wide += normals.around(each, kEdges);
-        found[begin / kRunLength].push_back({corners, wide});
-      });
-    }
+  std::vector<std::vector<Suspect>> found(chunks_of(shape.vertices()));
+  for_each(context, shape.vertices(), [&](std::size_t v) {
+    shape.visit_spokes(v, [&](std::size_t fan, const Spoke& spoke) {
+      // Each triangle once, at its first corner.
+      if (spoke.next < v || spoke.previous < v) return;
+      const std::array corners = {static_cast<std::uint32_t>(v), spoke.next, spoke.previous};
+      const Wall& wall = fans.wall(fan);
+      const std::array own = {static_cast<std::uint32_t>(fan), fans.find(spoke.next, wall),
+                              fans.find(spoke.previous, wall)};
+      Lanes near = {};
+      for (const std::uint32_t each : own) near += normals.around(each, 0);
+      if (!is_less(normal_of(shape, corners), near, kSuspect)) return;
+      Lanes wide = {};
+      for (const std::uint32_t each : own) wide += normals.around(each, kEdges);
+      found[v / kChunk].push_back({corners, wide});
+    });
   });
   std::vector<Suspect> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

@@ -6,13 +6,6 @@
 namespace isomesh::mesh {
 namespace {
 
-template <class Body>
-void for_each(const Context& context, std::size_t count, const Body& body) {
-  for_runs(context, count, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) body(i);
-  });
-}
-
 // A vertex's part of the volume that one of its triangles has swept since the start, in the
 // direction of its normal. The parts of the three corners add up to all of it.
 float swept(const WallShape& shape, std::size_t v, const Spoke& spoke) {

@@ -40,22 +40,20 @@ void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
     low_[axis] = std::min(first, last);
     high_[axis] = std::max(first, last);
   }
-  for_runs(context, mesh.positions.size(), [&](std::size_t begin, std::size_t end) {
+  for_each(context, mesh.positions.size(), [&](std::size_t v) {
     constexpr double kNear = 1e-3;  // as single precision leaves it, far from the origin
-    for (std::size_t v = begin; v < end; ++v) {
-      const auto index = index_of(to_space, to_point(mesh.positions[v]));
-      std::uint8_t axes = 0;
-      start_[v] = Lanes{};
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        start_[v][static_cast<int>(axis)] = static_cast<float>(index[axis]);
-        const double last = samples[axis] - 1 + beyond;
-        const bool is_in_face =
-            std::abs(index[axis] + beyond) < kNear || std::abs(index[axis] - last) < kNear;
-        if (is_in_face) axes |= static_cast<std::uint8_t>(1U << axis);
-      }
-      start_[v] *= spacing_;
-      flags_[v] = !closed_ || mesh.is_on_border(v) ? axes : 0;
+    const auto index = index_of(to_space, to_point(mesh.positions[v]));
+    std::uint8_t axes = 0;
+    start_[v] = Lanes{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      start_[v][static_cast<int>(axis)] = static_cast<float>(index[axis]);
+      const double last = samples[axis] - 1 + beyond;
+      const bool is_in_face =
+          std::abs(index[axis] + beyond) < kNear || std::abs(index[axis] - last) < kNear;
+      if (is_in_face) axes |= static_cast<std::uint8_t>(1U << axis);
     }
+    start_[v] *= spacing_;
+    flags_[v] = !closed_ || mesh.is_on_border(v) ? axes : 0;
   });
   at = start_;
 }
@@ -91,23 +89,19 @@ void WallShape::find_curves(const Context& context) {
     return count > 1 || (count == 1 && fans_.neighbors(first).size() != fans_.spokes(first).size());
   };
   curve_begin_.assign(vertices() + 1, 0);
-  const auto visit = [&](std::size_t begin, std::size_t end, const auto& use) {
-    for (std::size_t v = begin; v < end; ++v) {
+  const auto visit = [&](const auto& use) {
+    for_each(context, vertices(), [&](std::size_t v) {
       if (may_be_on_curve(v)) use(v, neighbors_along_curves(v));
-    }
-  };
-  for_runs(context, vertices(), [&](std::size_t begin, std::size_t end) {
-    visit(begin, end, [&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
-      curve_begin_[v + 1] = static_cast<std::uint32_t>(neighbors.size());
-      if (!neighbors.empty()) flags_[v] |= kCurve;
     });
+  };
+  visit([&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
+    curve_begin_[v + 1] = static_cast<std::uint32_t>(neighbors.size());
+    if (!neighbors.empty()) flags_[v] |= kCurve;
   });
   for (std::size_t v = 0; v < vertices(); ++v) curve_begin_[v + 1] += curve_begin_[v];
   curve_neighbors_.resize(curve_begin_.back());
-  for_runs(context, vertices(), [&](std::size_t begin, std::size_t end) {
-    visit(begin, end, [&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
-      std::ranges::copy(neighbors, curve_neighbors_.begin() + curve_begin_[v]);
-    });
+  visit([&](std::size_t v, const std::vector<std::uint32_t>& neighbors) {
+    std::ranges::copy(neighbors, curve_neighbors_.begin() + curve_begin_[v]);
   });
 }
 

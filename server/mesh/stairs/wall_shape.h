@@ -32,19 +32,6 @@ inline Lanes cross(Lanes a, Lanes b) {
 
 inline float length(Lanes a) { return std::sqrt(dot(a, a)); }
 
-// Their length is fixed, so what is computed run by run does not depend on the number of threads.
-inline constexpr std::size_t kRunLength = 8192;
-
-inline std::size_t runs_of(std::size_t count) { return (count + kRunLength - 1) / kRunLength; }
-
-// Calls body(begin, end) for the runs of [0, count), several at once.
-template <class Body>
-void for_runs(const Context& context, std::size_t count, const Body& body) {
-  parallel_for(context, runs_of(count), [&](std::size_t task) {
-    body(task * kRunLength, std::min(count, (task + 1) * kRunLength));
-  });
-}
-
 // Places are in millimetres along the lattice's axes, as if those were orthogonal. Threads may read
 // it while none writes.
 class WallShape {

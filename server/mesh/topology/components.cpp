@@ -61,17 +61,16 @@ std::uint64_t join_vertices(const Mesh& mesh, const Context& context,
                             std::span<std::uint32_t> parents) {
   Forest forest(parents);
   const std::size_t layers = mesh.layers();
-  const std::size_t slabs = (layers + kLayersPerSlab - 1) / kLayersPerSlab;
   // Triangles within a slab come first, slabs in parallel; triangles between slabs follow.
-  std::vector<std::uint64_t> joined(slabs);
-  parallel_for(context, slabs, [&](std::size_t slab) {
-    const std::size_t begin = slab * kLayersPerSlab;
-    const std::size_t end = std::min(layers, begin + kLayersPerSlab);
+  std::vector<std::uint64_t> joined(chunks_of(layers, kLayersPerSlab));
+  const auto join_slab = [&](std::size_t begin, std::size_t end) {
     forest.begin_sets(mesh.layer_vertices[begin], mesh.layer_vertices[end]);
-    joined[slab] = forest.join(mesh.triangles_of(begin, end == layers ? end : end - 1));
-  });
+    joined[begin / kLayersPerSlab] =
+        forest.join(mesh.triangles_of(begin, end == layers ? end : end - 1));
+  };
+  for_chunks(context, layers, join_slab, kLayersPerSlab);
   std::uint64_t components = parents.size();
-  for (std::size_t slab = 0; slab < slabs; ++slab) {
+  for (std::size_t slab = 0; slab < joined.size(); ++slab) {
     const std::size_t end = (slab + 1) * kLayersPerSlab;
     if (end < layers) joined[slab] += forest.join(mesh.triangles_of(end - 1, end));
     components -= joined[slab];
@@ -89,19 +88,19 @@ std::vector<std::uint32_t> nearest_vertices(std::span<const std::array<double, 3
     double squared_mm = std::numeric_limits<double>::infinity();
     std::uint32_t vertex = 0;
   };
-  const std::size_t tasks = (count + kPerTask - 1) / kPerTask;
+  const std::size_t tasks = chunks_of(count, kPerTask);
   std::vector<Nearest> found(tasks * places.size());
-  parallel_for({context.stop, nullptr}, tasks, [&](std::size_t task) {
-    const std::size_t end = std::min(count, (task + 1) * kPerTask);
+  const auto find = [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = 0; n < places.size(); ++n) {
-      Nearest& nearest = found[task * places.size() + n];
-      for (std::size_t v = task * kPerTask; v < end; ++v) {
+      Nearest& nearest = found[begin / kPerTask * places.size() + n];
+      for (std::size_t v = begin; v < end; ++v) {
         const Point way = minus(to_point(mesh.positions[v]), places[n]);
         const double squared_mm = dot(way, way);
         if (squared_mm < nearest.squared_mm) nearest = {squared_mm, static_cast<std::uint32_t>(v)};
       }
     }
-  });
+  };
+  for_chunks({context.stop, nullptr}, count, find, kPerTask);
   std::vector<std::uint32_t> vertices;
   for (std::size_t n = 0; n < places.size(); ++n) {
     Nearest nearest;

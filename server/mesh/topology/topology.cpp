@@ -73,12 +73,11 @@ Topology check_layers(const Mesh& mesh, std::size_t first_layer, std::size_t end
 }  // namespace
 
 Topology measure_topology(const Mesh& mesh, const Context& context) {
-  const std::size_t slabs = (mesh.layers() + kLayersPerPart - 1) / kLayersPerPart;
-  std::vector<Topology> parts(slabs);
-  parallel_for(context, slabs, [&](std::size_t slab) {
-    const std::size_t first = slab * kLayersPerPart;
-    parts[slab] = check_layers(mesh, first, std::min(mesh.layers(), first + kLayersPerPart));
-  });
+  std::vector<Topology> parts(chunks_of(mesh.layers(), kLayersPerPart));
+  const auto check = [&](std::size_t first, std::size_t end) {
+    parts[first / kLayersPerPart] = check_layers(mesh, first, end);
+  };
+  for_chunks(context, mesh.layers(), check, kLayersPerPart);
   Topology whole;
   for (const Topology& part : parts) {
     whole.boundary_edges += part.boundary_edges;

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/formats.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/meshes.h"
@@ -30,13 +31,7 @@ class EncodeInBlocks : public testing::TestWithParam<MeshFormat> {
 };
 
 TEST_P(EncodeInBlocks, IsTheSameOnAnyNumberOfThreads) {
-  std::string first;
-  for (const int threads : {1, 2, 16}) {
-    const test::ThreadCount count(threads);
-    const std::string bytes = test::encoded(test::large_mesh(), GetParam());
-    if (first.empty()) first = bytes;
-    EXPECT_TRUE(bytes == first) << threads;
-  }
+  test::expect_same_on_any_threads([] { return test::encoded(test::large_mesh(), GetParam()); });
 }
 
 TEST_P(EncodeInBlocks, HandsOverPiecesWhileProgressGrowsToOne) {
@@ -75,13 +70,7 @@ TEST_P(EncodeInBlocks, PassesOnWhatItsSinkThrows) {
   EXPECT_EQ(test::code_thrown_by([&] { encode_to({}, full); }), ErrorCode::kOutOfSpace);
 }
 
-std::vector<MeshFormat> formats_of_exact_numbers() {
-  std::vector<MeshFormat> formats = test::formats_of_a_surface();
-  std::erase_if(formats, [](MeshFormat format) { return rounds(format, {}); });
-  return formats;
-}
-
-INSTANTIATE_TEST_SUITE_P(Formats, EncodeInBlocks, testing::ValuesIn(formats_of_exact_numbers()),
+INSTANTIATE_TEST_SUITE_P(Formats, EncodeInBlocks, testing::ValuesIn(test::exact_formats()),
                          [](const auto& test) { return std::string(to_string(test.param)); });
 
 TEST(Formats, EveryOneHasItsRow) {

@@ -20,20 +20,9 @@ namespace {
 
 using mesh::Vec3;
 using test::encoded;
+using test::exact_formats;
 using test::PlacedTriangle;
 using test::read_exactly;
-
-std::vector<MeshFormat> exact_formats() {
-  std::vector<MeshFormat> formats = test::formats_of_a_surface();
-  std::erase_if(formats, [](MeshFormat format) { return rounds(format, {}); });
-  return formats;
-}
-
-Provenance in(Space space) {
-  Provenance provenance;
-  provenance.parameters.space = space;
-  return provenance;
-}
 
 // The triangles of the mesh where a file in that space has them, in their order.
 std::vector<PlacedTriangle> triangles_in(Space space, const mesh::Mesh& mesh) {
@@ -50,7 +39,7 @@ class ExactFormat : public testing::TestWithParam<MeshFormat> {
  protected:
   static void expect_exact(const mesh::Mesh& mesh) {
     for (const Space asked : {Space::kLps, Space::kRas}) {
-      const Provenance provenance = in(asked);
+      const Provenance provenance = test::provenance_in(asked);
       const Space space = space_of(GetParam(), provenance.parameters);
       const auto found = read_exactly(encoded(mesh, GetParam(), provenance), GetParam());
       EXPECT_TRUE(found == triangles_in(space, mesh)) << to_string(asked);

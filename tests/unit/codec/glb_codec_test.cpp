@@ -11,6 +11,7 @@
 #include "server/codec/decode/decode.h"
 #include "server/codec/encode.h"
 #include "server/mesh/measure/normals.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/glb_container.h"
@@ -78,14 +79,8 @@ TEST(MeshoptGlb, KeepsCoordinatesOfMoreThan16BitsAsTheyAre) {
 }
 
 TEST(MeshoptGlb, IsTheSameOnAnyNumberOfThreads) {
-  std::string first;
-  for (const int threads : {1, 2, 16}) {
-    const test::ThreadCount count(threads);
-    const std::string bytes =
-        encoded(test::large_mesh(), MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt));
-    if (first.empty()) first = bytes;
-    EXPECT_TRUE(bytes == first) << threads;
-  }
+  test::expect_same_on_any_threads(
+      [] { return encoded(test::large_mesh(), MeshFormat::kGlb, with_codec(GlbCodec::kMeshopt)); });
 }
 
 TEST(MeshoptGlb, OfNothingIsAFileWithoutAMesh) {
@@ -160,13 +155,7 @@ TEST_P(MergedGlb, IsTheSameOnAnyNumberOfThreads) {
   const mesh::Mesh mesh = test::several_blocks();
   Provenance provenance = with_codec(GetParam());
   provenance.parameters.merge = true;
-  std::string first;
-  for (const int threads : {1, 2, 16}) {
-    const test::ThreadCount count(threads);
-    const std::string bytes = encoded(mesh, MeshFormat::kGlb, provenance);
-    if (first.empty()) first = bytes;
-    EXPECT_TRUE(bytes == first) << threads;
-  }
+  test::expect_same_on_any_threads([&] { return encoded(mesh, MeshFormat::kGlb, provenance); });
 }
 
 INSTANTIATE_TEST_SUITE_P(Codecs, MergedGlb, testing::Values(GlbCodec::kDraco, GlbCodec::kMeshopt),

@@ -107,4 +107,16 @@ std::vector<MeshFormat> formats_of_a_surface() {
   return formats;
 }
 
+std::vector<MeshFormat> exact_formats() {
+  std::vector<MeshFormat> formats = formats_of_a_surface();
+  std::erase_if(formats, [](MeshFormat format) { return codec::rounds(format, {}); });
+  return formats;
+}
+
+codec::Provenance provenance_in(Space space) {
+  codec::Provenance provenance;
+  provenance.parameters.space = space;
+  return provenance;
+}
+
 }  // namespace isomesh::test

@@ -28,6 +28,12 @@ mesh::Mesh several_blocks();
 // All but ZIP, which holds labels.
 std::vector<MeshFormat> formats_of_a_surface();
 
+// Those that round nothing.
+std::vector<MeshFormat> exact_formats();
+
+// Of a mesh whose files are to be in that space.
+codec::Provenance provenance_in(Space space);
+
 // All bytes that an encoder hands to its sink.
 std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco = {});
 std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const codec::Provenance& provenance);

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/formats.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/label_files.h"
@@ -57,13 +58,11 @@ TEST_P(ReadBack, OfAnEmptySurfaceIsEmpty) {
 
 TEST_P(ReadBack, IsTheSameOnAnyNumberOfThreads) {
   const std::string file = encoded(test::large_mesh(), GetParam());
-  const DecodedSurface first = decoded(file, GetParam());
-  for (const int threads : {1, 3, 16}) {
-    const test::ThreadCount count(threads);
-    const DecodedSurface again = decoded(file, GetParam());
-    EXPECT_TRUE(std::ranges::equal(again.positions, first.positions)) << threads;
-    EXPECT_TRUE(std::ranges::equal(again.triangles, first.triangles)) << threads;
-  }
+  test::expect_same_on_any_threads([&] { return decoded(file, GetParam()); },
+                                   [](const DecodedSurface& a, const DecodedSurface& b) {
+                                     return std::ranges::equal(a.positions, b.positions) &&
+                                            std::ranges::equal(a.triangles, b.triangles);
+                                   });
 }
 
 TEST_P(ReadBack, OfAFileThatEndsTooSoonIsRefused) {

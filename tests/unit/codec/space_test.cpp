@@ -17,12 +17,7 @@ namespace {
 
 using mesh::Vec3;
 using test::encoded;
-
-Provenance in(Space space) {
-  Provenance provenance;
-  provenance.parameters.space = space;
-  return provenance;
-}
+using test::provenance_in;
 
 mesh::Mesh oblique() { return std::move(test::meshes_to_encode().at(3).mesh); }
 
@@ -33,7 +28,7 @@ TEST_P(SpaceOfFiles, IsReadBackToWhereTheSurfaceLies) {
   const mesh::Mesh mesh = oblique();
   for (const Space space : {Space::kLps, Space::kRas}) {
     SCOPED_TRACE(to_string(space));
-    const Provenance provenance = in(space);
+    const Provenance provenance = provenance_in(space);
     const std::string file = encoded(mesh, GetParam(), provenance);
     const DecodedSurface read = decode(std::as_bytes(std::span(file)), GetParam(),
                                        space_of(GetParam(), provenance.parameters), {});
@@ -55,19 +50,19 @@ TEST(SpaceOf, IsThatOfTheParameterUnlessTheFormatHasItsOwn) {
   for (const MeshFormat format : test::formats_of_a_surface()) {
     const bool has_own = format == MeshFormat::kGlb || format == MeshFormat::kGii ||
                          format == MeshFormat::kUsda || format == MeshFormat::kUsdz;
-    EXPECT_EQ(space_of(format, in(Space::kRas).parameters) ==
-                  space_of(format, in(Space::kLps).parameters),
+    EXPECT_EQ(space_of(format, provenance_in(Space::kRas).parameters) ==
+                  space_of(format, provenance_in(Space::kLps).parameters),
               has_own)
         << to_string(format);
     // GLB, GIFTI and USD say in their provenance alone which space was asked for.
-    EXPECT_NE(encoded(oblique(), format, in(Space::kLps)),
-              encoded(oblique(), format, in(Space::kRas)))
+    EXPECT_NE(encoded(oblique(), format, provenance_in(Space::kLps)),
+              encoded(oblique(), format, provenance_in(Space::kRas)))
         << to_string(format);
   }
 }
 
 TEST(SpaceOfStl, IsToldInTheHeader) {
-  EXPECT_NE(encoded(oblique(), MeshFormat::kStl, in(Space::kRas)).find("SPACE=RAS"),
+  EXPECT_NE(encoded(oblique(), MeshFormat::kStl, provenance_in(Space::kRas)).find("SPACE=RAS"),
             std::string::npos);
 }
 

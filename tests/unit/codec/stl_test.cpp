@@ -87,18 +87,5 @@ TEST(Stl, AnEmptyMeshIsAHeaderOnly) {
   EXPECT_EQ(value_at<std::uint32_t>(stl, kHeaderBytes), 0U);
 }
 
-TEST(Stl, EveryFacetOfALargeMeshIsInItsPlace) {
-  const mesh::Mesh mesh = test::large_mesh();
-  ASSERT_GT(mesh.triangles.size(), 3U * 8192);
-  const std::string stl = encoded(mesh, MeshFormat::kStl);
-  ASSERT_EQ(stl.size(), kHeaderBytes + 4 + mesh.triangles.size() * kFacetBytes);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto corners = facet(stl, t);
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      ASSERT_EQ(corners[corner + 1], mesh.positions[mesh.triangles[t][corner]]) << t;
-    }
-  }
-}
-
 }  // namespace
 }  // namespace isomesh::codec

@@ -15,6 +15,7 @@
 #include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/smooth/smooth.h"
 #include "server/mesh/topology/topology.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/exact_distance.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
@@ -213,17 +214,12 @@ TEST(BoundTest, StopsAtEnoughTriangles) {
 
 TEST(BoundTest, GivesTheSameMeshForAnyNumberOfThreads) {
   const auto volume = test::sample<float>(test::gyroid(17), {48, 44, 46});
-  std::vector<std::vector<Vec3>> positions;
-  std::vector<std::vector<Triangle>> triangles;
-  for (const int threads : {1, 2, 5}) {
-    const test::ThreadCount count(threads);
+  const auto make = [&] {
     Mesh mesh = test::extracted(volume, {});
-    ASSERT_TRUE(simplified(volume, {}, {.max_error_mm = 0.1}, mesh));
-    positions.emplace_back(mesh.positions.begin(), mesh.positions.end());
-    triangles.emplace_back(mesh.triangles.begin(), mesh.triangles.end());
-  }
-  EXPECT_TRUE(positions[0] == positions[1] && positions[0] == positions[2]);
-  EXPECT_TRUE(triangles[0] == triangles[1] && triangles[0] == triangles[2]);
+    EXPECT_TRUE(simplified(volume, {}, {.max_error_mm = 0.1}, mesh));
+    return mesh;
+  };
+  test::expect_same_on_any_threads(make, test::kSameBytes);
 }
 
 TEST(BoundTest, ClaimsNothingWhereItProvesNothing) {

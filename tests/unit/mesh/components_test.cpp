@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/extract/extract.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
@@ -174,13 +175,12 @@ TEST(KeepComponents, TakesTheFirstOfEqualOnes) {
 }
 
 TEST(KeepComponents, AreTheSameOnAnyNumberOfThreads) {
-  std::vector<Mesh> meshes;
-  for (const int threads : {1, 3, 16}) {
-    const test::ThreadCount count(threads);
-    meshes.push_back(specks());
-    keep_components({.keep = 9, .min_triangles = {}, .nearest_to = {}}, {}, meshes.back());
-    EXPECT_TRUE(test::same_bytes(meshes[0], meshes.back()));
-  }
+  const auto make = [] {
+    Mesh mesh = specks();
+    keep_components({.keep = 9, .min_triangles = {}, .nearest_to = {}}, {}, mesh);
+    return mesh;
+  };
+  test::expect_same_on_any_threads(make, test::kSameBytes);
 }
 
 TEST(KeepComponents, OfNothingAreNothing) {

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/points.h"
@@ -260,14 +261,8 @@ TEST(Distance, IsTheSameOnAnyNumberOfThreads) {
   const Mesh a = ball(0.95, 76);
   const Mesh b = ball(0.94, 70);
   ASSERT_GT(a.triangles.size(), 33'000U);  // several slabs
-  std::vector<Certificate> certificates;
-  for (const int threads : {1, 2, 5}) {
-    const test::ThreadCount on(threads);
-    certificates.push_back(certify(a, b, {}));
-  }
-  EXPECT_EQ(certificates[0], certificates[1]);
-  EXPECT_EQ(certificates[0], certificates[2]);
-  EXPECT_GT(certificates[0].max_mm(), 0);
+  const auto certificate = test::expect_same_on_any_threads([&] { return certify(a, b, {}); });
+  EXPECT_GT(certificate.max_mm(), 0);
 }
 
 TEST(Distance, OfManyPointsIsMeasuredAtRunsOfThem) {

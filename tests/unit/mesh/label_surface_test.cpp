@@ -10,6 +10,7 @@
 
 #include "server/mesh/measure/normals.h"
 #include "server/mesh/smooth/smooth.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/nifti.h"
 #include "tests/unit/mesh/separated.h"
@@ -230,16 +231,13 @@ TEST(MeasureLabels, SaysWhatEachSurfaceIs) {
 TEST(MeasureLabels, IsTheSameForAnyNumberOfThreads) {
   const SeparatingSurface surface =
       separated(label_cells(9, {40, 21, 30}, 12, 96), {consecutive<std::int64_t>(1, 9)});
-  const auto figures = [&](int threads) {
-    const test::ThreadCount some(threads);
+  test::expect_same_on_any_threads([&] {
     std::vector<double> result;
     for (const LabelMeasure& m : measure_labels(surface, LabelTriangles(surface), {})) {
       result.insert(result.end(), {m.extent.area_mm2, m.extent.volume_mm3, m.extent.low[0]});
     }
     return result;
-  };
-  const auto single = figures(1);
-  for (const int threads : {2, 16}) EXPECT_EQ(figures(threads), single);
+  });
 }
 
 TEST(MeasureLabels, EndsWhenItIsCancelled) {

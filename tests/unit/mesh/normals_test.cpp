@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
@@ -68,11 +69,7 @@ TEST(Normals, PointOut) {
 
 TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   const Mesh mesh = sphere();
-  const test::ThreadCount one(1);
-  const Buffer<Vec3> first = normals_of(mesh);
-  const test::ThreadCount many(7);
-  const Buffer<Vec3> other = normals_of(mesh);
-  EXPECT_TRUE(std::equal(first.begin(), first.end(), other.begin(), other.end()));
+  test::expect_same_on_any_threads([&] { return normals_of(mesh); }, std::ranges::equal);
 }
 
 TEST(Normals, WithoutADirectionPointUp) {

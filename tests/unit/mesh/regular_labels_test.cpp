@@ -5,6 +5,7 @@
 
 #include "server/mesh/labels/label_surface.h"
 #include "server/mesh/labels/separate.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/regular_label_reference.h"
 #include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
@@ -130,19 +131,10 @@ TEST(RegularLabels, HaveTheSameBytesOnEveryNumberOfThreads) {
   for (const SeparateOptions& plain : all_separations({1, 2, 3, 4})) {
     const SeparateOptions options = regularized(plain);
     SCOPED_TRACE(describe(volume.dims, options));
-    SeparatingSurface single;
-    std::vector<std::uint64_t> counted;
-    {
-      const test::ThreadCount one(1);
-      separate_into(single, volume, options);
-      counted = count_label_triangles(volume.lattice(), options, {});
-    }
-    for (const int threads : {2, 3, 16, 200}) {
-      SCOPED_TRACE(threads);
-      const test::ThreadCount several(threads);
-      EXPECT_TRUE(same_bytes(single, separated(volume, options)));
-      EXPECT_EQ(counted, count_label_triangles(volume.lattice(), options, {}));
-    }
+    test::expect_same_on_any_threads([&] { return separated(volume, options); }, test::kSameBytes,
+                                     {3, 16, 200});
+    test::expect_same_on_any_threads(
+        [&] { return count_label_triangles(volume.lattice(), options, {}); });
   }
 }
 

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/smooth/smooth.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"
@@ -199,16 +200,10 @@ TEST(SelfIntersections, OfABallThatIsPushedThroughItselfAreARing) {
 }
 
 TEST(SelfIntersections, AreTheSameOnAnyNumberOfThreads) {
-  std::vector<SelfIntersections> all;
-  for (const int threads : {1, 2, 5}) {
-    const test::ThreadCount on(threads);
-    all.push_back(find_self_intersections(pierced_ball(), {}));
-  }
-  for (const SelfIntersections& found : all) {
-    EXPECT_EQ(found.pairs, all[0].pairs);
-    EXPECT_EQ(found.triangles, all[0].triangles);
-    EXPECT_EQ(found.places, all[0].places);
-  }
+  test::expect_same_on_any_threads([] {
+    const auto [pairs, triangles, places] = find_self_intersections(pierced_ball(), {});
+    return std::tuple(pairs, triangles, places);
+  });
 }
 
 TEST(SelfIntersections, OfNothingAreNone) {

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
@@ -211,15 +212,7 @@ TEST(SeparateThreads, GiveTheSameBytes) {
   const auto volume = many_layers();
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 12))) {
     SCOPED_TRACE(describe(volume.dims, options));
-    SeparatingSurface single;
-    {
-      const test::ThreadCount one(1);
-      separate_into(single, volume, options);
-    }
-    for (const int threads : {2, 3, 16}) {
-      const test::ThreadCount several(threads);
-      EXPECT_TRUE(same_bytes(single, separated(volume, options))) << threads << " threads";
-    }
+    test::expect_same_on_any_threads([&] { return separated(volume, options); }, test::kSameBytes);
   }
 }
 

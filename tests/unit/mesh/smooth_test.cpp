@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/any_threads.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
@@ -130,16 +131,7 @@ TEST_P(Smooth, LeavesBoundaryVerticesWhereTheyAre) {
 
 TEST_P(Smooth, GivesTheSameBytesOnAnyNumberOfThreads) {
   const Mesh mesh = open_noise();
-  Mesh single;
-  {
-    const test::ThreadCount one(1);
-    single = smoothed(mesh, GetParam());
-  }
-  for (const int threads : {2, 3, 16}) {
-    SCOPED_TRACE(threads);
-    const test::ThreadCount several(threads);
-    EXPECT_TRUE(test::same_bytes(smoothed(mesh, GetParam()), single));
-  }
+  test::expect_same_on_any_threads([&] { return smoothed(mesh, GetParam()); }, test::kSameBytes);
 }
 
 INSTANTIATE_TEST_SUITE_P(Passes, Smooth,
@@ -209,16 +201,9 @@ Mesh deep_noise() {
 TEST(SmoothDeepVolume, IsTheSameInOneRoundAndInSeveral) {
   const Mesh mesh = deep_noise();
   const SmoothOptions options = {means(14, {0.7})};
-  Mesh single;
-  {
-    const test::ThreadCount one(1);
-    single = smoothed(mesh, options);
-  }
+  const Mesh single =
+      test::expect_same_on_any_threads([&] { return smoothed(mesh, options); }, test::kSameBytes);
   EXPECT_LT(largest_error(mesh, single, options), 5e-4);
-  for (const int threads : {2, 4, 16}) {
-    const test::ThreadCount several(threads);
-    EXPECT_TRUE(test::same_bytes(smoothed(mesh, options), single)) << threads << " threads";
-  }
 }
 
 // Twenty triangles around one vertex, their outer edges on the boundary.

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/smooth/smooth.h"
+#include "tests/support/any_threads.h"
 #include "tests/support/points.h"
 #include "tests/support/step.h"
 #include "tests/unit/mesh/separated.h"
@@ -128,17 +129,12 @@ TEST_P(SmoothWalls, MovesVerticesAsTheNaiveWayDoes) {
 TEST_P(SmoothWalls, GivesTheSameBytesOnAnyNumberOfThreads) {
   const auto volume = label_cells(12, {30, 21, 90}, 12, 104);
   for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 12))) {
-    SeparatingSurface single = separated(volume, options);
-    {
-      const test::ThreadCount one(1);
-      smooth_walls(GetParam(), single);
-    }
-    for (const int threads : {2, 16}) {
-      const test::ThreadCount several(threads);
-      SeparatingSurface other = separated(volume, options);
-      smooth_walls(GetParam(), other);
-      EXPECT_TRUE(same_bytes(other, single)) << threads << " threads";
-    }
+    const auto make = [&] {
+      SeparatingSurface surface = separated(volume, options);
+      smooth_walls(GetParam(), surface);
+      return surface;
+    };
+    test::expect_same_on_any_threads(make, test::kSameBytes);
   }
 }
 
