@@ -12,7 +12,7 @@ import './style/compare.css';
 import './style/small.css';
 import './style/contrast.css';
 import './ui/kept_token';
-import { client, connected } from './client';
+import { client, connected, onReconnect } from './client';
 import { ApiError, asApiError } from './api/problem';
 import { surfaceInWords } from './job/parameters';
 import { WatchedJobs } from './job/watched';
@@ -70,9 +70,9 @@ function showOrders(): void {
     },
     // The server is unreachable, which the banner says. The page asks again when it is back.
     () => {
-      const stop = connected.subscribe((isConnected) => {
-        if (!isConnected) return;
-        stop();
+      const waiting = new Scope();
+      onReconnect(waiting, () => {
+        waiting.end();
         showOrders();
       });
     },
@@ -161,12 +161,7 @@ async function show(): Promise<void> {
     const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
     main.replaceChildren(h('h1', { class: 'sr-only' }, 'This page cannot be shown'), h('div', { class: 'page-problem' }, shown));
     // If the server could not be reached, the page tries again when the connection is back.
-    if (failure.isUnreachable) {
-      const stop = connected.subscribe((isConnected) => {
-        if (isConnected) void show();
-      });
-      mine.onEnd(stop);
-    }
+    if (failure.isUnreachable) onReconnect(mine, () => void show());
   } finally {
     clearTimeout(slow);
     if (!mine.isOver) main.removeAttribute('aria-busy');

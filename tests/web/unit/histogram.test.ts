@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { barHeights, defaultWindow, niceStep, partAbove, quantile, ticks } from '@/volume/histogram';
+import { barHeights, defaultWindow, niceStep, quantile, ticks } from '@/volume/histogram';
 
 const even = { range: [0, 100] as [number, number], counts: Array.from({ length: 10 }, () => 10) };
 
@@ -18,12 +18,6 @@ describe('histogram', () => {
     expect(quantile(even, 0)).toBe(0);
     expect(quantile(even, 0.25)).toBeCloseTo(25);
     expect(quantile(even, 1)).toBeCloseTo(100);
-  });
-
-  it('tells which part of the samples a surface encloses', () => {
-    expect(partAbove(even, 0)).toBeCloseTo(1);
-    expect(partAbove(even, 75)).toBeCloseTo(0.25);
-    expect(partAbove(even, 101)).toBe(0);
   });
 
   it('opens a window that outliers do not stretch, but the iso-value does', () => {

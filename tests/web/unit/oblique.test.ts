@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '@/api/types';
-import { cross, dot, lineIn, obliqueFrame, sectionOf, spanOf, through, type Angles } from '@/volume/oblique';
+import { cross, dot } from '@/volume/geometry';
+import { lineIn, obliqueFrame, sectionOf, spanOf, through, type Angles } from '@/volume/oblique';
 
 const degrees = Math.PI / 180;
 const axial: Vec3 = [0, 0, 1];

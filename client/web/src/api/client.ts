@@ -1,7 +1,7 @@
 // One client of one server: the server's routes as methods. A failure is thrown as an ApiError.
 import { Connection } from './connection';
 import { follow } from './follow';
-import { JobEvents } from './job_events';
+import { JobEvents, sleep } from './job_events';
 import { asApiError } from './problem';
 import type {
   Axis,
@@ -158,7 +158,7 @@ export class Client {
         });
       } catch (error) {
         if (attempt > submitRetries || !asApiError(error).isUnreachable) throw error;
-        await new Promise((resolve) => setTimeout(resolve, 500 * attempt));
+        await sleep(500 * attempt);
       }
     }
   }

@@ -124,6 +124,11 @@ export function isPassing(status: number): boolean {
   return [0, 408, 429, 502, 503, 504].includes(status);
 }
 
+// Returns whether what was asked for is not there, or not any more.
+export function isGone(error: unknown): boolean {
+  return [404, 410].includes(asApiError(error).status);
+}
+
 // Returns whether the same request may succeed later.
 export function mayPass({ status }: ApiError): boolean {
   return ![400, 404, 410, 413, 415, 422].includes(status);

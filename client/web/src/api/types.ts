@@ -87,6 +87,6 @@ export interface Uploaded {
   kept?: string;
 }
 
-export function isFinal(state: JobState): boolean {
+export function isFinal(state: JobState | OrderState): boolean {
   return state === 'succeeded' || state === 'failed' || state === 'cancelled';
 }

@@ -1,5 +1,5 @@
 // The jobs of the list of all jobs, kept up to date by few requests: what runs, what waits, and pages of the others.
-import { asApiError } from '../api/problem';
+import { isGone } from '../api/problem';
 import { isFinal, type Job, type JobList as Page, type JobState } from '../api/types';
 import { priorities } from './table';
 
@@ -140,8 +140,7 @@ export class JobList {
     try {
       return await this.source.getJob(id);
     } catch (error) {
-      const { status } = asApiError(error);
-      if (status === 404 || status === 410) return null;
+      if (isGone(error)) return null;
       throw error;
     }
   }

@@ -12,8 +12,10 @@ export async function submitVariant(job: Job, variant: Partial<JobParameters>): 
   return client.submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
+export type MakeVariant = (variant: Partial<JobParameters>) => void;
+
 // Starts a job with these changes and goes to it.
-export function makeVariant(job: Job): (variant: Partial<JobParameters>) => void {
+export function makeVariant(job: Job): MakeVariant {
   return (variant) =>
     void submitVariant(job, variant).then(({ id }) => {
       tell('A new job was started.');

@@ -1,6 +1,6 @@
 // Jobs that this tab has started: a person who went elsewhere is told when one has ended.
 import { client } from '../client';
-import { asApiError } from '../api/problem';
+import { isGone } from '../api/problem';
 import { isFinal, type Job } from '../api/types';
 
 const key = 'isomesh.jobs';
@@ -61,7 +61,7 @@ export class WatchedJobs {
       this.tell(job);
     } catch (error) {
       // One that is gone is waited for no more; of any other the stream tells again.
-      if ([404, 410].includes(asApiError(error).status)) this.ids = this.ids.filter((other) => other !== id);
+      if (isGone(error)) this.ids = this.ids.filter((other) => other !== id);
     }
   }
 }

@@ -1,6 +1,6 @@
 // Makes coarse copies of a surface beside the page, from the coarse copies of its blocks.
 import { levelsOf, merged, type Coarse } from './coarse';
-import { buffersIn } from './transfer';
+import { buffersIn, type WorkerScope } from './transfer';
 
 export interface CoarseRequest {
   // Of blocks that came since the last request; each belongs to the surface of that number.
@@ -12,11 +12,7 @@ export interface CoarseRequest {
 // For each level, the surfaces by their numbers.
 export type CoarseAnswer = (readonly Coarse[])[];
 
-interface WorkerScope {
-  onmessage: ((event: MessageEvent<CoarseRequest>) => void) | null;
-  postMessage(message: CoarseAnswer, transfer: Transferable[]): void;
-}
-const scope = self as unknown as WorkerScope;
+const scope = self as unknown as WorkerScope<CoarseRequest, CoarseAnswer>;
 const known: Coarse[][] = [];
 
 scope.onmessage = ({ data: { parts, most } }) => {

@@ -2,7 +2,7 @@
 import create, { type DracoAttribute, type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
 import wasmUrl from 'three/examples/jsm/libs/draco/gltf/draco_decoder.wasm?url';
 import { prepare, split, type Block, type Triangles } from './blocks';
-import { buffersIn } from './transfer';
+import { buffersIn, type WorkerScope } from './transfer';
 
 export interface DecodeRequest {
   id: number;
@@ -23,11 +23,7 @@ export interface DecodeAnswer {
   error: string;
 }
 
-interface WorkerScope {
-  onmessage: ((event: MessageEvent<DecodeRequest>) => void) | null;
-  postMessage(message: DecodeAnswer, transfer: Transferable[]): void;
-}
-const scope = self as unknown as WorkerScope;
+const scope = self as unknown as WorkerScope<DecodeRequest, DecodeAnswer>;
 
 const ready = fetch(wasmUrl)
   .then((answer) => {

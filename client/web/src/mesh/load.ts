@@ -1,5 +1,6 @@
 // A finished job's mesh, part by part: downloaded, decoded in workers, and handed over as it comes.
 import { client, connected } from '../client';
+import { sleep } from '../api/job_events';
 import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
 import type { Job, MeshFile } from '../api/types';
 import { coarseCell, type Block } from './blocks';
@@ -35,10 +36,6 @@ export function viewableFile(job: Job): { file: MeshFile; format: 'glb' | 'drc' 
   if (files?.glb && codec === 'draco') return { file: files.glb, format: 'glb' };
   if (files?.drc && space === 'lps') return { file: files.drc, format: 'drc' };
   return null;
-}
-
-function wait(milliseconds: number): Promise<void> {
-  return new Promise((resolve) => setTimeout(resolve, milliseconds));
 }
 
 // Waits until somebody answers again, however long that takes.
@@ -94,7 +91,7 @@ async function download(
       resumes = received > before ? 1 : resumes + 1;
       if (!failure.isUnreachable || resumes > mostResumes) throw failure;
       connected.value = false;
-      await wait(resumeDelay * resumes);
+      await sleep(resumeDelay * resumes);
       await reconnected(signal);
     }
   }

@@ -8,3 +8,9 @@ export function buffersIn(value: unknown): ArrayBuffer[] {
   look(value);
   return [...found];
 }
+
+// A worker's own scope, as far as these use it.
+export interface WorkerScope<Request, Answer> {
+  onmessage: ((event: MessageEvent<Request>) => void) | null;
+  postMessage(message: Answer, transfer: Transferable[]): void;
+}

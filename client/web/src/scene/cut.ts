@@ -15,8 +15,8 @@ import {
   type Raycaster,
 } from 'three';
 import type { Axis, Vec3, Volume } from '../api/types';
-import { axisDirection, axisIndex, pictureAxes, toPatient } from '../volume/geometry';
-import { cross, dot, sectionOf } from '../volume/oblique';
+import { axisDirection, axisIndex, cross, dot, pictureAxes, toPatient } from '../volume/geometry';
+import { sectionOf } from '../volume/oblique';
 import type { Square } from '../volume/reslice';
 
 export interface CutPlace {

@@ -4,21 +4,26 @@ import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  type Data3DTexture,
-  type DataTexture,
+  Data3DTexture,
+  DataTexture,
+  FloatType,
   GLSL3,
+  LinearFilter,
   LineBasicMaterial,
   LineSegments,
   Matrix3,
   Mesh,
+  NearestFilter,
   RawShaderMaterial,
+  RedFormat,
+  RGFormat,
   Scene,
   PerspectiveCamera,
   Vector3,
   WebGLRenderer,
   type WebGLRenderTarget,
 } from 'three';
-import type { Look } from '../volume/looks';
+import { sumsOf, type Look } from '../volume/looks';
 import { blockSize, type Preview } from '../volume/preview';
 import { compile } from './compile';
 import {
@@ -35,8 +40,44 @@ import {
   type LiveScene,
 } from './live_painter';
 import { fragmentShader, vertexShader } from './live_shader';
-import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import { Painting } from './painting';
+
+// What the shader looks things up in.
+interface Drawable {
+  preview: Preview;
+  samples: Data3DTexture;
+  blocks: Data3DTexture;
+}
+
+function drawable(preview: Preview): Drawable {
+  const samples = new Data3DTexture(preview.samples, ...preview.dims);
+  samples.format = RedFormat;
+  samples.minFilter = LinearFilter;
+  samples.magFilter = LinearFilter;
+  const blocks = new Data3DTexture(preview.blocks, ...preview.blockDims);
+  blocks.format = RGFormat;
+  blocks.minFilter = NearestFilter;
+  blocks.magFilter = NearestFilter;
+  for (const texture of [samples, blocks]) {
+    texture.unpackAlignment = 1;
+    texture.needsUpdate = true;
+  }
+  return { preview, samples, blocks };
+}
+
+function letGo({ samples, blocks }: Drawable): void {
+  samples.dispose();
+  blocks.dispose();
+}
+
+function tablesOf(look: Look): { table: DataTexture; sums: DataTexture } {
+  const table = new DataTexture(look.table, 256, 1);
+  table.minFilter = LinearFilter;
+  table.magFilter = LinearFilter;
+  const sums = new DataTexture(sumsOf(look), 257, 1, RedFormat, FloatType);
+  for (const texture of [table, sums]) texture.needsUpdate = true;
+  return { table, sums };
+}
 
 export class GlPainter implements LivePainter {
   readonly name = 'webgl2';

@@ -78,23 +78,39 @@ float valueAt(vec3 p) {
   return texture(samples, (p + 0.5) / dims).r;
 }
 
-vec3 normalAt(vec3 p) {
-  vec3 slope = vec3(
+vec3 slopeAt(vec3 p) {
+  return vec3(
     valueAt(p + vec3(1, 0, 0)) - valueAt(p - vec3(1, 0, 0)),
     valueAt(p + vec3(0, 1, 0)) - valueAt(p - vec3(0, 1, 0)),
     valueAt(p + vec3(0, 0, 1)) - valueAt(p - vec3(0, 0, 1)));
+}
+
+// Either side is seen.
+vec3 seenNormal(vec3 slope) {
   vec3 normal = toNormal * slope;
   float size = length(normal);
-  return size > 0.0 ? normal / size : towardsEye;
+  vec3 unit = size > 0.0 ? normal / size : towardsEye;
+  return dot(unit, towardsEye) < 0.0 ? -unit : unit;
+}
+
+float shineOf(vec3 normal) {
+  return pow(max(0.0, dot(normal, normalize(towardsLight + towardsEye))), 24.0);
 }
 
 vec4 shaded(vec3 p) {
-  vec3 normal = normalAt(p);
-  // Either side is seen.
-  if (dot(normal, towardsEye) < 0.0) normal = -normal;
+  vec3 normal = seenNormal(slopeAt(p));
   float diffuse = 0.28 + 0.78 * max(0.0, dot(normal, towardsLight));
-  float shine = 0.10 * pow(max(0.0, dot(normal, normalize(towardsLight + towardsEye))), 24.0);
-  return vec4(colour * diffuse + shine, 1.0);
+  return vec4(colour * diffuse + 0.10 * shineOf(normal), 1.0);
+}
+
+// Where the ray leaves the block that it is in, and the values in that.
+float blockEndAt(vec3 direction, float t, float stride, out vec2 range) {
+  vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
+  ivec3 block = ivec3(p / blockSize);
+  vec3 low = vec3(block) * blockSize;
+  vec3 exits = (low + step(vec3(0.0), direction) * blockSize - eye) / direction;
+  range = texelFetch(blocks, block, 0).rg;
+  return min(min(exits.x, exits.y), exits.z);
 }
 
 bool hasAny(vec2 range) {
@@ -106,22 +122,14 @@ bool hasAny(vec2 range) {
 vec4 seenAt(vec3 p, float stride) {
   vec4 here = texture(look, vec2((255.0 * valueAt(p) + 0.5) / 256.0, 0.5));
   if (here.a <= 0.0) return vec4(0.0);
-  vec3 slope = 0.5 * vec3(
-    valueAt(p + vec3(1, 0, 0)) - valueAt(p - vec3(1, 0, 0)),
-    valueAt(p + vec3(0, 1, 0)) - valueAt(p - vec3(0, 1, 0)),
-    valueAt(p + vec3(0, 0, 1)) - valueAt(p - vec3(0, 0, 1)));
-  float steep = length(slope);
-  vec3 normal = toNormal * slope;
-  float size = length(normal);
-  normal = size > 0.0 ? normal / size : towardsEye;
-  if (dot(normal, towardsEye) < 0.0) normal = -normal;
+  vec3 slope = 0.5 * slopeAt(p);
+  vec3 normal = seenNormal(slope);
   float light = 0.35 + 0.7 * max(0.0, dot(normal, towardsLight));
-  float shine = 0.12 * pow(max(0.0, dot(normal, normalize(towardsLight + towardsEye))), 24.0);
   // What hardly changes has no border to be lit.
-  float isBorder = clamp(steep * 24.0, 0.0, 1.0);
+  float isBorder = clamp(length(slope) * 24.0, 0.0, 1.0);
   float opacity = here.a * mix(1.0, isBorder, edges);
   opacity = 1.0 - pow(1.0 - min(opacity, 0.999), stride);
-  return vec4((here.rgb * mix(0.75, light, isBorder) + shine * isBorder) * opacity, opacity);
+  return vec4((here.rgb * mix(0.75, light, isBorder) + 0.12 * shineOf(normal) * isBorder) * opacity, opacity);
 }
 
 vec4 lookedThrough(vec3 direction, float t, float end, float stride) {
@@ -131,12 +139,9 @@ vec4 lookedThrough(vec3 direction, float t, float end, float stride) {
   t += stride * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
   for (int i = 0; i < mostSteps && t < end; i++) {
     if (t >= blockEnd) {
-      vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
-      ivec3 block = ivec3(p / blockSize);
-      vec3 low = vec3(block) * blockSize;
-      vec3 exits = (low + step(vec3(0.0), direction) * blockSize - eye) / direction;
-      blockEnd = min(min(exits.x, exits.y), exits.z);
-      if (!hasAny(texelFetch(blocks, block, 0).rg)) {
+      vec2 range;
+      blockEnd = blockEndAt(direction, t, stride, range);
+      if (!hasAny(range)) {
         t += max(1.0, ceil((blockEnd - t) / stride)) * stride;
         continue;
       }
@@ -155,15 +160,13 @@ vec4 labelAt(vec3 p) {
 }
 
 // Turned to where nothing is seen around it.
-vec3 labelNormal(vec3 p) {
+vec3 openAround(vec3 p) {
   vec3 open = vec3(0.0);
   for (int i = 0; i < 27; i++) {
     vec3 offset = vec3(i % 3, (i / 3) % 3, i / 9) - 1.0;
     if (labelAt(p + 1.5 * offset).a <= 0.0) open += offset / max(1.0, length(offset));
   }
-  vec3 normal = toNormal * open;
-  float size = length(normal);
-  return size > 0.0 ? normal / size : towardsEye;
+  return open;
 }
 
 // The first label that is met.
@@ -171,12 +174,9 @@ vec4 labelled(vec3 direction, float t, float end, float stride) {
   float blockEnd = -1.0;
   for (int i = 0; i < mostSteps && t < end; i++) {
     if (t >= blockEnd) {
-      vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
-      ivec3 block = ivec3(p / blockSize);
-      vec3 low = vec3(block) * blockSize;
-      vec3 exits = (low + step(vec3(0.0), direction) * blockSize - eye) / direction;
-      blockEnd = min(min(exits.x, exits.y), exits.z);
-      if (!hasAny(texelFetch(blocks, block, 0).rg)) {
+      vec2 range;
+      blockEnd = blockEndAt(direction, t, stride, range);
+      if (!hasAny(range)) {
         t = max(blockEnd, t + 0.01 * stride);
         continue;
       }
@@ -184,11 +184,43 @@ vec4 labelled(vec3 direction, float t, float end, float stride) {
     vec3 p = eye + t * direction;
     vec4 here = labelAt(p);
     if (here.a > 0.0) {
-      vec3 normal = labelNormal(p);
-      if (dot(normal, towardsEye) < 0.0) normal = -normal;
-      return vec4(here.rgb * (0.32 + 0.74 * max(0.0, dot(normal, towardsLight))), 1.0);
+      return vec4(here.rgb * (0.32 + 0.74 * max(0.0, dot(seenNormal(openAround(p)), towardsLight))), 1.0);
     }
     t += stride;
+  }
+  return vec4(0.0);
+}
+
+bool isInsideAt(vec3 direction, float t) {
+  return valueAt(eye + t * direction) >= iso;
+}
+
+vec4 surface(vec3 direction, float t, float end, float stride) {
+  bool isInside = isInsideAt(direction, t);
+  float blockEnd = -1.0;
+  // A crop closes the surface where it is cut.
+  if (isCropped && isInside) return vec4(0.62 * colour, 1.0);
+  for (int i = 0; i < mostSteps && t < end; i++) {
+    if (t >= blockEnd) {
+      vec2 range;
+      blockEnd = blockEndAt(direction, t, stride, range);
+      if (iso <= range.x || iso > range.y) {
+        isInside = iso <= range.x;
+        t = max(blockEnd, t + 0.01 * stride);
+        continue;
+      }
+    }
+    float next = min(t + stride, end);
+    if (isInsideAt(direction, next) == isInside) {
+      t = next;
+      continue;
+    }
+    for (int n = 0; n < halvings; n++) {
+      float middle = 0.5 * (t + next);
+      if (isInsideAt(direction, middle) == isInside) t = middle;
+      else next = middle;
+    }
+    return shaded(eye + next * direction);
   }
   return vec4(0.0);
 }
@@ -204,50 +236,9 @@ void main() {
   if (!(t < end)) discard;
 
   float stride = reach / max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
-  if (isOfLabels) {
-    pixel = labelled(direction, t, end, stride);
-    if (pixel.a <= 0.0) discard;
-    return;
-  }
-  if (isThrough) {
-    pixel = lookedThrough(direction, t, end, stride);
-    if (pixel.a < 0.004) discard;
-    return;
-  }
-  bool isInside = valueAt(eye + t * direction) >= iso;
-  float blockEnd = -1.0;
-  // A crop closes the surface where it is cut.
-  if (isCropped && isInside) {
-    pixel = vec4(0.62 * colour, 1.0);
-    return;
-  }
-  for (int i = 0; i < mostSteps && t < end; i++) {
-    if (t >= blockEnd) {
-      vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
-      ivec3 block = ivec3(p / blockSize);
-      vec3 low = vec3(block) * blockSize;
-      vec3 exits = (low + step(vec3(0.0), direction) * blockSize - eye) / direction;
-      blockEnd = min(min(exits.x, exits.y), exits.z);
-      vec2 range = texelFetch(blocks, block, 0).rg;
-      if (iso <= range.x || iso > range.y) {
-        isInside = iso <= range.x;
-        t = max(blockEnd, t + 0.01 * stride);
-        continue;
-      }
-    }
-    float next = min(t + stride, end);
-    if ((valueAt(eye + next * direction) >= iso) == isInside) {
-      t = next;
-      continue;
-    }
-    for (int n = 0; n < halvings; n++) {
-      float middle = 0.5 * (t + next);
-      if ((valueAt(eye + middle * direction) >= iso) == isInside) t = middle;
-      else next = middle;
-    }
-    pixel = shaded(eye + next * direction);
-    return;
-  }
-  discard;
+  if (isOfLabels) pixel = labelled(direction, t, end, stride);
+  else if (isThrough) pixel = lookedThrough(direction, t, end, stride);
+  else pixel = surface(direction, t, end, stride);
+  if (pixel.a < 0.004) discard;
 }
 `;

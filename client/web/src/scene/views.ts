@@ -1,5 +1,6 @@
 // Where the camera stands, in the patient's directions: LPS millimetres, the head up.
 import type { Vec3 } from '../api/types';
+import { dot } from '../volume/geometry';
 
 export const viewNames = ['A', 'P', 'L', 'R', 'S', 'I'] as const;
 export type ViewName = (typeof viewNames)[number];
@@ -55,7 +56,6 @@ export function fitDistance(size: Vec3, offset: Vec3, verticalAngle: number, asp
   const flat = Math.hypot(back[0], back[1]) || 1;
   const right: Vec3 = [-back[1] / flat, back[0] / flat, 0];
   const up: Vec3 = [-back[2] * right[1], back[2] * right[0], back[0] * right[1] - back[1] * right[0]];
-  const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const tangent = Math.tan(verticalAngle / 2);
   let distance = 0;
   for (let corner = 0; corner < 8; corner += 1) {

@@ -74,6 +74,24 @@ export function field(label: string, control: HTMLElement, hint = ''): HTMLEleme
   return h('div', { class: 'field' }, h('label', { for: control.id }, label), control, note);
 }
 
+// A list of values and their names, one of which is chosen.
+export function select<T extends string>(
+  choices: readonly (readonly [T, string])[],
+  value: string | undefined,
+  onChange: (value: T) => void = () => undefined,
+  attributes: Record<string, Attribute> = {},
+): HTMLSelectElement {
+  const options = choices.map(([name, text]) => h('option', { value: name, selected: name === value }, text));
+  const element = h('select', attributes, ...options);
+  element.addEventListener('change', () => onChange(element.value as T));
+  return element;
+}
+
+// Terms and what is said of each.
+export function definitions(rows: readonly (readonly [string, Child])[]): HTMLElement {
+  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+}
+
 export interface Choice<T extends string> {
   value: T;
   label: string;

@@ -18,10 +18,6 @@ export class History<T> {
     return this.past.length > 0;
   }
 
-  get canRedo(): boolean {
-    return this.future.length > 0;
-  }
-
   change(next: T): void {
     if (JSON.stringify(next) === JSON.stringify(this.present)) return;
     const now = this.now();

@@ -54,6 +54,14 @@ export class Scope {
     target.addEventListener(name, handler as EventListener, { ...options, signal: this.signal });
   }
 
+  // Calls it so often while the page is seen. A lost connection is said at the top of the page.
+  repeat(milliseconds: number, refresh: () => Promise<void>): void {
+    const timer = setInterval(() => {
+      if (!document.hidden) refresh().catch(() => undefined);
+    }, milliseconds);
+    this.onEnd(() => clearInterval(timer));
+  }
+
   end(): void {
     if (this.isOver) return;
     this.controller.abort();

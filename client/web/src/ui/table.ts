@@ -9,6 +9,16 @@ export function row(attributes: Record<string, Attribute>, ...cells: HTMLElement
   return h('tr', { role: 'row', ...attributes }, ...cells);
 }
 
+// Replaces rows; whoever is on one of them with the keyboard stays there. `name` is the data attribute with a row's id.
+export function keepFocus(body: HTMLElement, name: 'job' | 'order', replace: () => void): void {
+  const { activeElement } = document;
+  const id = activeElement?.closest('tr')?.dataset[name];
+  const label = activeElement?.getAttribute('aria-label');
+  replace();
+  if (id === undefined || !label) return;
+  body.querySelector<HTMLElement>(`tr[data-${name}="${id}"] [aria-label="${label}"]`)?.focus();
+}
+
 // The names of columns in `unseen` are for those who hear the table.
 export function table(columns: readonly string[], unseen: readonly string[], rows: readonly HTMLElement[]): HTMLTableElement {
   const heads = columns.map((name) =>

@@ -1,5 +1,6 @@
 // Looks into DICOM files that are to be uploaded, so that a person can tell series apart: their dates and a picture. What
 // cannot be read here (compressed, big-endian, not DICOM) has neither; the daemon decides what a file is.
+import { dateOf } from './names';
 
 export interface Picture {
   width: number;
@@ -147,11 +148,6 @@ export function peekAt(bytes: ArrayBuffer): Peek | null {
     studyTitle: [texts.get(studyDescription), dateOf(texts.get(studyDate))].filter(Boolean).join(', '),
     picture,
   };
-}
-
-function dateOf(text = ''): string {
-  const [, year, month, day] = /^(\d{4})(\d{2})(\d{2})$/.exec(text) ?? [];
-  return year === undefined ? '' : `${year}-${month}-${day}`;
 }
 
 const mostFiles = 512;

@@ -34,7 +34,6 @@ export function toSamples(volume: Geometry, point: Vec3): Vec3 {
     axisDirection(volume, axis).map((value) => value * volume.spacing[axis]),
   ) as [Vec3, Vec3, Vec3];
   const from = point.map((value, axis) => value - volume.origin[axis as 0]) as Vec3;
-  const cross = (u: Vec3, v: Vec3): Vec3 => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
   // Cramer's rule.
   const volumeOf = dot(a, cross(b, c));
   return [dot(from, cross(b, c)) / volumeOf, dot(a, cross(from, c)) / volumeOf, dot(a, cross(b, from)) / volumeOf];
@@ -89,11 +88,15 @@ export interface SlicePlane {
   down: SliceAxis;
 }
 
-function dot(a: Vec3, b: Vec3): number {
+export function dot(a: Vec3, b: Vec3): number {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-function opposite(vector: Vec3): Vec3 {
+export function cross(a: Vec3, b: Vec3): Vec3 {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}
+
+export function opposite(vector: Vec3): Vec3 {
   return [-vector[0], -vector[1], -vector[2]];
 }
 

@@ -31,18 +31,6 @@ export function quantile(histogram: Histogram, part: number): number {
   return high;
 }
 
-// The part of all samples at or above a value: what a surface encloses of the volume.
-export function partAbove(histogram: Histogram, value: number): number {
-  const total = histogram.counts.reduce((a, b) => a + b, 0);
-  if (total === 0) return 0;
-  const position = (value - histogram.range[0]) / (binWidth(histogram) || 1);
-  const above = histogram.counts.reduce(
-    (sum, count, bin) => sum + count * Math.min(1, Math.max(0, bin + 1 - position)),
-    0,
-  );
-  return above / total;
-}
-
 // A window that shows most of the volume, stretched so that the iso-value lies in it.
 export function defaultWindow(histogram: Histogram, iso: number): [number, number] {
   const low = Math.min(quantile(histogram, 0.005), iso);

@@ -1,6 +1,6 @@
 // Volumes by their ids, each asked for once: to call those by their names that jobs were made of.
 import { client } from '../client';
-import { asApiError } from '../api/problem';
+import { isGone } from '../api/problem';
 import type { Volume } from '../api/types';
 import { volumeName } from './names';
 
@@ -20,8 +20,7 @@ export class KnownVolumes {
         try {
           this.known.set(id, await client.getVolume(id));
         } catch (error) {
-          const { status } = asApiError(error);
-          if (status !== 404 && status !== 410) throw error;
+          if (!isGone(error)) throw error;
           this.known.set(id, null);
         }
       }),

@@ -1,4 +1,5 @@
 // Labels in pictures of eight bits: which windows tell their values exactly, and what is drawn of them.
+import { rgbOf } from './looks';
 import type { Window } from './slices';
 
 export interface MappedLabel {
@@ -83,8 +84,7 @@ export interface LabelLook {
 export function coloursOf({ map, colourOf: colour, isShown }: LabelLook): Uint8Array<ArrayBuffer> {
   const table = new Uint8Array(4 * (map.labels.length + 1));
   map.labels.forEach(({ label }, at) => {
-    const value = Number.parseInt(colour(label).slice(1), 16);
-    if (isShown(label)) table.set([value >> 16, (value >> 8) & 255, value & 255, 255], 4 * (at + 1));
+    if (isShown(label)) table.set([...rgbOf(colour(label)), 255], 4 * (at + 1));
   });
   return table;
 }

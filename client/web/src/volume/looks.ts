@@ -90,7 +90,7 @@ export function looksFor(volume: Pick<Volume, 'modality' | 'range'>): LookName[]
   return presets.map(({ name }) => name).filter((name) => isCt(volume) !== (name === 'MR'));
 }
 
-function rgbOf(colour: string): [number, number, number] {
+export function rgbOf(colour: string): [number, number, number] {
   const value = Number.parseInt(colour.slice(1), 16);
   return [value >> 16, (value >> 8) & 255, value & 255];
 }

@@ -1,6 +1,7 @@
 // Lengths, angles and areas of points in millimetres.
 import type { Vec3 } from '../api/types';
 import { formatNumber, formatSize } from '../ui/format';
+import { cross, dot } from './geometry';
 
 export type MeasureKind = 'length' | 'angle' | 'area';
 
@@ -8,15 +9,10 @@ function between(a: Vec3, b: Vec3): Vec3 {
   return [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
 }
 
-function cross(u: Vec3, v: Vec3): Vec3 {
-  return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-}
-
 // At the second of three points, in degrees.
 export function angleAt(a: Vec3, middle: Vec3, b: Vec3): number {
   const [u, v] = [between(middle, a), between(middle, b)];
-  const dot = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-  return (Math.atan2(Math.hypot(...cross(u, v)), dot) * 180) / Math.PI;
+  return (Math.atan2(Math.hypot(...cross(u, v)), dot(u, v)) * 180) / Math.PI;
 }
 
 // Of a polygon in a plane.

@@ -3,9 +3,9 @@ import type { Volume } from '../api/types';
 import { formatDims, volumeFormatTitle } from '../ui/format';
 
 // A date of DICOM, 20240501, for people.
-function dateOf(text: string | undefined): string {
-  const match = /^(\d{4})(\d{2})(\d{2})$/.exec(text ?? '');
-  return match ? `${match[1]}-${match[2]}-${match[3]}` : '';
+export function dateOf(text = ''): string {
+  const [, year, month, day] = /^(\d{4})(\d{2})(\d{2})$/.exec(text) ?? [];
+  return year === undefined ? '' : `${year}-${month}-${day}`;
 }
 
 // Patient, name and date of a volume, or its kind if none of these is known.
@@ -53,4 +53,14 @@ export function noteTexts(volume: Volume): string[] {
 // The form that a note on a NIfTI file says would place the samples differently. Null: it names none.
 export function otherForm(detail: string): string | null {
   return /\bnifti_form=(sform|qform)\b/.exec(detail)?.[1] ?? null;
+}
+
+const mostNamed = 5;
+
+// Says which files of an upload are part of no volume. '' if there are none. Each volume of an upload may list the same ones.
+export function skippedText(volumes: readonly Pick<Volume, 'ignored'>[]): string {
+  const names = [...new Set(volumes.flatMap(({ ignored }) => ignored.map(({ name }) => name)))];
+  if (names.length === 0) return '';
+  const more = names.length > mostNamed ? ` and ${names.length - mostNamed} more` : '';
+  return `${names.length === 1 ? '1 file was' : `${names.length} files were`} skipped: ${names.slice(0, mostNamed).join(', ')}${more}`;
 }

@@ -1,6 +1,7 @@
 // A plane through a point of the patient, at any angle: with no angles as a coronal slice is seen, turned around the patient's long
 // axis and then tilted.
 import type { Vec3 } from '../api/types';
+import { cross, dot } from './geometry';
 
 // In radians.
 export interface Angles {
@@ -16,14 +17,6 @@ export interface ObliqueFrame {
 }
 
 const parallel = 0.05;
-
-export function dot(a: Vec3, b: Vec3): number {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-export function cross(a: Vec3, b: Vec3): Vec3 {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-}
 
 export function obliqueFrame({ turn, tilt }: Angles): ObliqueFrame {
   const [sin, cos] = [Math.sin(turn), Math.cos(turn)];

@@ -1,4 +1,5 @@
 // Reads previews beside the page.
+import type { WorkerScope } from '../mesh/transfer';
 import { labelPreviewOf, previewOf, type Preview } from './preview';
 import type { MappedLabel } from './label_map';
 import type { Window } from './slices';
@@ -11,11 +12,7 @@ export interface PreviewAnswer {
   error: string;
 }
 
-interface WorkerScope {
-  onmessage: ((event: MessageEvent<PreviewRequest>) => void) | null;
-  postMessage(message: PreviewAnswer, transfer: Transferable[]): void;
-}
-const scope = self as unknown as WorkerScope;
+const scope = self as unknown as WorkerScope<PreviewRequest, PreviewAnswer>;
 
 scope.onmessage = ({ data }) => {
   try {

@@ -1,7 +1,6 @@
 // A volume's values where the samples of another one's slice lie in the patient, and through a slab around that slice.
 import type { Axis, Vec3, Volume } from '../api/types';
-import { axisDirection, axisIndex, pictureAxes, toPatient, toSamples } from './geometry';
-import { cross, dot } from './oblique';
+import { axisDirection, axisIndex, cross, dot, pictureAxes, toPatient, toSamples } from './geometry';
 import type { Preview } from './preview';
 
 export type Projection = 'maximum' | 'mean';

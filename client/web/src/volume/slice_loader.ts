@@ -1,5 +1,5 @@
 // Brings the slice that is wanted: one request at a time, of which the next is for what is wanted last.
-import { connected } from '../client';
+import { onReconnect } from '../client';
 import { asApiError, mayPass, type ApiError } from '../api/problem';
 import type { Axis } from '../api/types';
 import type { Scope } from '../ui/signal';
@@ -42,11 +42,7 @@ export class SliceLoader {
     private readonly scope: Scope,
     private readonly host: SliceLoaderHost,
   ) {
-    scope.onEnd(
-      connected.subscribe((isConnected) => {
-        if (isConnected && this.error?.isUnreachable) this.load();
-      }),
-    );
+    onReconnect(scope, () => this.error?.isUnreachable && this.load());
     scope.onEnd(() => {
       clearTimeout(this.retry);
       clearTimeout(this.late);

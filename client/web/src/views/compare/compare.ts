@@ -6,8 +6,8 @@ import { changeOf } from '../../job/changes';
 import { titlesOf } from '../../job/differences';
 import { LabelState, labelsOfMesh } from '../../job/labels';
 import type { SurfaceStyle } from '../../scene/style';
-import { placeOfText, placeToText, viewNames, viewTitles, type CameraPlace } from '../../scene/views';
-import { button, h } from '../../ui/dom';
+import { placeOfText, type CameraPlace } from '../../scene/views';
+import { button, definitions, h } from '../../ui/dom';
 import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../../ui/format';
 import { refusal } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
@@ -16,9 +16,9 @@ import { KnownVolumes } from '../../volume/known';
 import { distributionChart } from '../jobs/charts';
 import { styleOfText, styleToText } from '../surface/look_text';
 import { SurfacePane } from '../surface/surface_pane';
+import { cameraNote, viewButtons } from '../surface/view_tools';
 
 const most = 4;
-const noteDelay = 300;
 
 function numbersOf(job: Job): HTMLElement {
   const { mesh } = job;
@@ -35,7 +35,7 @@ function numbersOf(job: Job): HTMLElement {
     // An equal job's files were there already.
     ['Time', work < 1 ? 'already made' : formatMilliseconds(work)],
   ];
-  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+  return definitions(rows);
 }
 
 async function finished(id: string, scope: Scope, onChange: (job: Job) => void): Promise<Job> {
@@ -92,7 +92,7 @@ class Cell {
 class Comparison {
   readonly element: HTMLElement;
   private readonly panes: SurfacePane[] = [];
-  private noting = 0;
+  private readonly noteCamera: (place: CameraPlace) => void;
   // Those of all surfaces, also of those that are still to come.
   private readonly look: URLSearchParams;
 
@@ -114,14 +114,11 @@ class Comparison {
       this.head(title, jobs.map(({ id }) => id)),
       h('div', { class: 'grid' }, ...cells),
     );
-    scope.onEnd(() => clearTimeout(this.noting));
+    this.noteCamera = cameraNote(scope);
   }
 
   private head(title: string, jobs: readonly string[]): HTMLElement {
     const style = styleOfText(this.look.get('style') ?? '');
-    const views = viewNames.map((name) =>
-      button(name, () => this.panes[0]?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] }),
-    );
     return h(
       'div',
       { class: 'section-head' },
@@ -129,8 +126,7 @@ class Comparison {
       h(
         'div',
         { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all surfaces' },
-        ...views,
-        button('Fit', () => this.panes[0]?.fit()),
+        ...viewButtons((name) => this.panes[0]?.look(name), () => this.panes[0]?.fit()),
         this.styleButton('Flat', style.shading === 'flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
         this.styleButton('Edges', style.wireframe, (isOn) => ({ wireframe: isOn })),
       ),
@@ -199,8 +195,7 @@ class Comparison {
     this.panes.push(pane);
     pane.onCamera = (place) => {
       for (const other of this.panes) if (other !== pane) other.follow(place);
-      clearTimeout(this.noting);
-      this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
+      this.noteCamera(place);
     };
     return pane;
   }

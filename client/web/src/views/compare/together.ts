@@ -8,17 +8,17 @@ import type { Part } from '../../mesh/glb';
 import { loadMesh, viewableFile } from '../../mesh/load';
 import { surfaceDrawing } from '../../scene/graphics';
 import type { Surface } from '../../scene/surface';
-import { placeOfText, placeToText, viewNames, viewTitles } from '../../scene/views';
-import { button, checkbox, h } from '../../ui/dom';
+import { placeOfText } from '../../scene/views';
+import { checkbox, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { KnownVolumes } from '../../volume/known';
+import { cameraNote, viewButtons } from '../surface/view_tools';
 import { looksOfText, looksToText, usual, type SurfaceLook } from './together_look';
 
 const most = 8;
-const noteDelay = 300;
 
 export async function togetherView(scope: Scope, route: Route): Promise<HTMLElement> {
   const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
@@ -40,7 +40,6 @@ class Together {
   // Of which job and label, and the number and colour of that in the scene.
   private readonly parts: { at: number; label: number | undefined; id: number; colour: string }[] = [];
   private surface: Surface | null = null;
-  private noting = 0;
 
   constructor(
     private readonly scope: Scope,
@@ -67,7 +66,6 @@ class Together {
         if (!scope.isOver) tellError(error);
       });
     });
-    scope.onEnd(() => clearTimeout(this.noting));
   }
 
   private tools(): HTMLElement {
@@ -80,8 +78,7 @@ class Together {
         h(
           'div',
           { class: 'tool-group' },
-          ...viewNames.map((name) => button(name, () => this.surface?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] })),
-          button('Fit', () => this.surface?.fit()),
+          ...viewButtons((name) => this.surface?.look(name), () => this.surface?.fit()),
         ),
       ),
     );
@@ -151,10 +148,8 @@ class Together {
     surface.setBounds(around(this.jobs));
     const camera = placeOfText(this.query.get('cam') ?? '');
     if (camera) surface.moveTo(camera);
-    surface.onCamera = () => {
-      clearTimeout(this.noting);
-      this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(surface.place) }), noteDelay);
-    };
+    const noteCamera = cameraNote(this.scope);
+    surface.onCamera = () => noteCamera(surface.place);
     const totals = this.jobs.map(({ mesh }) => mesh?.triangles ?? 0);
     const show = (): void => {
       const total = totals.reduce((sum, count) => sum + count, 0);

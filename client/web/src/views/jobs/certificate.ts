@@ -1,11 +1,12 @@
 // The measured error of a mesh and the faults of its surface: the certificate, self-intersections,
 // openings.
-import type { DistanceSummary, Job, JobParameters, MeshSummary } from '../../api/types';
+import type { DistanceSummary, Job, MeshSummary } from '../../api/types';
+import type { MakeVariant } from '../../job/variants';
 import { button, h, svg, type Child } from '../../ui/dom';
 import { formatCount, formatSize, formatValue, meshFormatTitle, millimetres } from '../../ui/format';
+import { stepsPath } from './charts';
 
 type Certificate = NonNullable<MeshSummary['certificate']>;
-type MakeVariant = (variant: Partial<JobParameters>) => void;
 
 const width = 320;
 const height = 64;
@@ -14,13 +15,8 @@ const height = 64;
 // their logarithms, and a bin with a single point is still seen.
 export function histogramPath({ histogram, max_mm: max }: DistanceSummary, most: number, top: number): string {
   if (max === 0) return '';
-  const step = (width * max) / most / histogram.length;
-  const parts = histogram.map((count, bin) => {
-    const share = count === 0 ? 0 : (1 + Math.log10(count)) / (1 + Math.log10(top));
-    const y = (height - share * (height - 2)).toFixed(1);
-    return `L${(bin * step).toFixed(1)} ${y}L${((bin + 1) * step).toFixed(1)} ${y}`;
-  });
-  return `M0 ${height}${parts.join('')}L${(histogram.length * step).toFixed(1)} ${height}Z`;
+  const shares = histogram.map((count) => (count === 0 ? 0 : (1 + Math.log10(count)) / (1 + Math.log10(top))));
+  return stepsPath(shares, (width * max) / most, height);
 }
 
 function chart({ from_mesh: mesh, from_extracted: extracted, found_mm: most }: Certificate): HTMLElement | null {

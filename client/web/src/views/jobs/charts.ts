@@ -65,6 +65,16 @@ export function waterfall(steps: readonly Step[], total: number): HTMLElement {
   );
 }
 
+// The outline of bars that fill the width, whose heights are these shares of the height.
+export function stepsPath(shares: readonly number[], width: number, height: number): string {
+  const step = width / Math.max(1, shares.length);
+  const parts = shares.map((share, bin) => {
+    const y = (height - share * (height - 2)).toFixed(1);
+    return `L${(bin * step).toFixed(1)} ${y}L${((bin + 1) * step).toFixed(1)} ${y}`;
+  });
+  return `M0 ${height}${parts.join('')}L${width.toFixed(1)} ${height}Z`;
+}
+
 const width = 150;
 const height = 44;
 
@@ -78,14 +88,7 @@ export function distributionChart(
 ): HTMLElement {
   const { extracted, smoothed } = stages;
   const top = Math.max(1, ...extracted.histogram, ...smoothed.histogram);
-  const outline = ({ histogram }: Distribution): string => {
-    const step = width / Math.max(1, histogram.length);
-    const points = histogram.map((count, bin) => {
-      const y = (height - (count / top) * (height - 2)).toFixed(1);
-      return `L${(bin * step).toFixed(1)} ${y}L${((bin + 1) * step).toFixed(1)} ${y}`;
-    });
-    return `M0 ${height}${points.join('')}L${width} ${height}Z`;
-  };
+  const outline = ({ histogram }: Distribution): string => stepsPath(histogram.map((count) => count / top), width, height);
   const digits = most > 1 ? 1 : 3;
   const said = (value: number): string => {
     const isTiny = value > 0 && value < 10 ** -digits;

@@ -1,8 +1,9 @@
 // Exports beside the files of a job: for a 3D printer, for a phone, and the certificate of the measurements.
-import type { Job, JobParameters, Volume } from '../../api/types';
+import type { Job, Volume } from '../../api/types';
 import { withGlb } from '../../job/parameters';
 import { certificateFile, isForPrinting, printingVariant } from '../../job/printing';
 import { isByLabels } from '../../job/table';
+import { fileNameOf, makeVariant } from '../../job/variants';
 import { viewableFile } from '../../mesh/load';
 import { button, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
@@ -11,10 +12,10 @@ import { saveBlob } from '../../ui/save';
 // The number of triangles that a phone can show.
 const triangles = 150_000;
 
-type Make = (variant: Partial<JobParameters>) => void;
-
-export function exportActions(job: Job, volume: Volume | null, make: Make, nameOf: (suffix: string) => string): HTMLElement | null {
+export function exportActions(job: Job, volume: Volume | null): HTMLElement | null {
   const { mesh, parameters } = job;
+  const make = makeVariant(job);
+  const nameOf = (suffix: string): string => fileNameOf(job, volume, suffix);
   if (!mesh || mesh.empty) return null;
   const usdz = async (): Promise<void> => {
     if (mesh.triangles > triangles) {

@@ -8,7 +8,7 @@ import { LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords, surfaceInWords } from '../../job/parameters';
 import { changeLink } from '../../job/variants';
 import { surfaceDrawing } from '../../scene/graphics';
-import { placeOfText, placeToText } from '../../scene/views';
+import { placeOfText } from '../../scene/views';
 import { button, h } from '../../ui/dom';
 import { formatIso, shortId } from '../../ui/format';
 import { refusal, tellError } from '../../ui/notices';
@@ -19,8 +19,7 @@ import { accuracy, againSection, compareSection, downloads, numbers, quality, se
 import { SlicesBeside } from './job_slices';
 import { LabelList } from '../labels/label_list';
 import { SurfacePane } from '../surface/surface_pane';
-
-const noteDelay = 300;
+import { cameraNote } from '../surface/view_tools';
 
 // The stages of this job.
 function stagesOf({ parameters }: Job): string[] {
@@ -180,12 +179,7 @@ function showSurface(
   pane.onLook = noteInAddress;
   slices?.linkTo(pane);
   pane.onTools = () => slices?.restore();
-  let noting = 0;
-  pane.onCamera = (place) => {
-    clearTimeout(noting);
-    noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
-  };
-  scope.onEnd(() => clearTimeout(noting));
+  pane.onCamera = cameraNote(scope);
   stageArea.replaceChildren(pane.element);
   const times = timings(job);
   panel.replaceChildren(

@@ -6,7 +6,7 @@ import { isSameJob, variantOf, withGlb } from '../../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
 import { fits, isByLabels, isOfKind, meshFormats, parameterOf, valueIn, valuesOf } from '../../job/table';
 import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
-import { button, h, type Child } from '../../ui/dom';
+import { button, definitions, h, type Child } from '../../ui/dom';
 import { formatBytes, formatCount, formatNumber, formatSize, formatValue, meshFormatTitle } from '../../ui/format';
 import { tell, tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
@@ -17,10 +17,6 @@ import { distributionChart, stepsOf, totalOf, waterfall, type Durations } from '
 
 export function section(title: string, ...children: Child[]): HTMLElement {
   return h('section', { class: 'panel-section' }, h('h2', {}, title), ...children);
-}
-
-function definitions(rows: readonly (readonly [string, Child])[]): HTMLElement {
-  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
 }
 
 function change(before: number, after: number): string {
@@ -169,7 +165,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
           button(meshFormatTitle(format), () => void make(format), { class: 'chip' }),
         ),
       ),
-    exportActions(job, volume, makeVariant(job), (suffix) => fileNameOf(job, volume, suffix)),
+    exportActions(job, volume),
   );
 }
 

@@ -4,10 +4,6 @@ import { formatBytes, formatCount, formatTime } from '../../ui/format';
 
 export const orderStates: readonly OrderState[] = ['waiting', 'fetching', 'meshing', 'sending', 'succeeded', 'failed', 'cancelled'];
 
-export function isOver(state: OrderState): boolean {
-  return state === 'succeeded' || state === 'failed' || state === 'cancelled';
-}
-
 // "in 12 s", "in 5 min", or the time of the day where it is farther away.
 export function untilText(iso: string, now: number): string {
   const seconds = Math.ceil((new Date(iso).getTime() - now) / 1000);

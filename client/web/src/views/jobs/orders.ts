@@ -1,14 +1,14 @@
 // A hospital's orders: what waits and why, what failed, and how the PACS are. #/orders
 import { client } from '../../client';
-import type { Order, OrderList, OrderState, PacsList } from '../../api/types';
+import { isFinal, type Order, type OrderList, type OrderState, type PacsList } from '../../api/types';
 import { surfaceInWords } from '../../job/parameters';
-import { button, field, h } from '../../ui/dom';
+import { button, field, h, select } from '../../ui/dom';
 import { formatTime, shortId } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
-import { cell, row, table } from '../../ui/table';
-import { isOver, orderStates, saidOf } from './order_texts';
+import { cell, keepFocus, row, table } from '../../ui/table';
+import { orderStates, saidOf } from './order_texts';
 
 const refreshEvery = 2000;
 const columns = ['State', 'Details', 'Series', 'Rule', 'Created', 'Action'];
@@ -18,7 +18,7 @@ export async function ordersView(scope: Scope, route: Route): Promise<HTMLElemen
   const wanted = route.query.get('state') as OrderState | null;
   const orders = new Orders(scope, wanted && orderStates.includes(wanted) ? wanted : '');
   await orders.refresh();
-  orders.keepFresh();
+  scope.repeat(refreshEvery, () => orders.refresh());
   return orders.element;
 }
 
@@ -51,16 +51,11 @@ class Orders {
     private readonly scope: Scope,
     private state: OrderState | '',
   ) {
-    const choice = h(
-      'select',
-      {},
-      h('option', { value: '' }, 'all'),
-      ...orderStates.map((name) => h('option', { value: name, selected: name === state }, name)),
-    );
-    choice.addEventListener('change', () => {
-      this.state = choice.value as OrderState | '';
+    const states = orderStates.map((name) => [name, name] as const);
+    const choice = select<OrderState | ''>([['', 'all'], ...states], state, (chosen) => {
+      this.state = chosen;
       this.pages = 1;
-      noteInAddress({ state: this.state });
+      noteInAddress({ state: chosen });
       this.refresh().catch(tellError);
     });
     this.element = h(
@@ -71,14 +66,6 @@ class Orders {
       this.body,
       h('div', { class: 'actions' }, this.more),
     );
-  }
-
-  keepFresh(): void {
-    const timer = setInterval(() => {
-      // A lost connection is said at the top of the page.
-      if (!document.hidden) this.refresh().catch(() => undefined);
-    }, refreshEvery);
-    this.scope.onEnd(() => clearInterval(timer));
   }
 
   async refresh(): Promise<void> {
@@ -110,20 +97,13 @@ class Orders {
 
   private show(): void {
     this.more.hidden = this.next === null;
-    const focused = document.activeElement;
-    const order = focused?.closest('tr')?.dataset.order;
-    const label = focused?.getAttribute('aria-label');
     const now = Date.now();
     const none = this.state === '' ? 'No orders yet.' : `No orders are ${this.state}.`;
-    this.body.replaceChildren(
+    const shown =
       this.orders.length === 0
         ? h('p', { class: 'empty' }, none)
-        : table(columns, ['Action'], this.orders.map((each) => this.row(each, now))),
-    );
-    // The rows are made anew; whoever is on one of them with the keyboard stays there.
-    if (order !== undefined && label) {
-      this.body.querySelector<HTMLElement>(`tr[data-order="${order}"] [aria-label="${label}"]`)?.focus();
-    }
+        : table(columns, ['Action'], this.orders.map((each) => this.row(each, now)));
+    keepFocus(this.body, 'order', () => this.body.replaceChildren(shown));
   }
 
   private row(order: Order, now: number): HTMLElement {
@@ -154,6 +134,6 @@ class Orders {
     };
     const named = (text: string): Record<string, string> => ({ class: 'quiet', 'aria-label': `${text} order ${shortId(id)}` });
     if (state === 'failed') return button('Retry', act((order) => client.retryOrder(order)), named('Retry'));
-    return isOver(state) ? null : button('Cancel', act((order) => client.cancelOrder(order)), named('Cancel'));
+    return isFinal(state) ? null : button('Cancel', act((order) => client.cancelOrder(order)), named('Cancel'));
   }
 }

@@ -8,7 +8,7 @@ import { formatCount, formatMilliseconds, formatTime, shortId } from '../../ui/f
 import { tellError } from '../../ui/notices';
 import { go, hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
-import { cell, row, table } from '../../ui/table';
+import { cell, keepFocus, row, table } from '../../ui/table';
 import { KnownVolumes } from '../../volume/known';
 
 const refreshEvery = 1500;
@@ -51,11 +51,9 @@ export async function queueView(scope: Scope, { query }: Route): Promise<HTMLEle
   const queue = new Queue();
   await queue.refresh();
   queue.restore((query.get('chosen') ?? '').split(','));
-  const timer = setInterval(() => {
-    // A lost connection is said at the top of the page.
-    if (!document.hidden && !queue.isBusy) queue.refresh().catch(() => undefined);
-  }, refreshEvery);
-  scope.onEnd(() => clearInterval(timer));
+  scope.repeat(refreshEvery, async () => {
+    if (!queue.isBusy) await queue.refresh();
+  });
   return queue.element;
 }
 
@@ -142,7 +140,7 @@ class Queue {
     this.rows = new Map(rows.map((row) => [row.element.dataset.job ?? '', row]));
     const shown: Element = rows.length === 0 ? this.empty : this.table;
     if (this.body.firstElementChild !== shown) this.body.replaceChildren(shown);
-    this.keepFocus(() => this.arrange(rows.map(({ element }) => element)));
+    keepFocus(this.body, 'job', () => this.arrange(rows.map(({ element }) => element)));
   }
 
   // Leaves rows alone that stay: laying out a thousand of them takes long.
@@ -155,16 +153,6 @@ class Queue {
       const there = tbody.children[at] ?? null;
       if (there !== row) tbody.insertBefore(row, there);
     });
-  }
-
-  // Rows that have changed are made anew; whoever is on one of them with the keyboard stays there.
-  private keepFocus(replace: () => void): void {
-    const { activeElement } = document;
-    const job = activeElement?.closest('tr')?.dataset.job;
-    const label = activeElement?.getAttribute('aria-label');
-    replace();
-    if (job === undefined || !label) return;
-    this.body.querySelector<HTMLElement>(`tr[data-job="${job}"] [aria-label="${label}"]`)?.focus();
   }
 
   // The one of before if it would look the same.

@@ -10,7 +10,7 @@ import { NumberField } from '../../ui/number_field';
 import type { Scope } from '../../ui/signal';
 import { colourOf, LabelMap, seriesColour, type LabelLook } from '../../volume/label_map';
 import { opacityControl } from './label_opacity';
-import { LabelSearch } from './label_search';
+import { LabelSearch, swatchOf } from './label_search';
 
 export type Choice = Pick<JobParameters, 'labels' | 'background'>;
 
@@ -142,18 +142,9 @@ export class LabelChoice {
       else this.chosen.delete(label.label);
       this.changed();
     });
-    const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
-    // Not an attribute, which the content policy would not take.
-    swatch.style.backgroundColor = colourOf(label);
     const size = h('span', { class: 'faint number' });
     const box = {
-      element: h(
-        'li',
-        { 'data-label': label.label },
-        swatch,
-        check,
-        size,
-      ),
+      element: h('li', { 'data-label': label.label }, swatchOf(colourOf(label)), check, size),
       input: check.querySelector('input') as HTMLInputElement,
       size,
       voxels: label.voxels,

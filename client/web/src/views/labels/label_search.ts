@@ -6,6 +6,13 @@ import { formatCount } from '../../ui/format';
 // More rows than these a person searches.
 const mostRows = 500;
 
+// Not an attribute, which the content policy would not take.
+export function swatchOf(colour: string): HTMLElement {
+  const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
+  swatch.style.backgroundColor = colour;
+  return swatch;
+}
+
 export class LabelSearch<Label extends Named> {
   readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
   readonly count = h('p', { class: 'hint', role: 'status' });

@@ -4,6 +4,7 @@ import { labelTitle, type LabelState } from '../../job/labels';
 import { button, h } from '../../ui/dom';
 import type { Scope } from '../../ui/signal';
 import { areaText, volumeText } from './label_list';
+import { swatchOf } from './label_search';
 
 export class PickedLabel {
   // Announces what is picked.
@@ -36,10 +37,8 @@ export class PickedLabel {
       this.element.replaceChildren();
       return;
     }
-    const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
-    swatch.style.backgroundColor = this.state.colours.value.get(picked.label) ?? '';
     this.element.replaceChildren(
-      swatch,
+      swatchOf(this.state.colours.value.get(picked.label) ?? ''),
       h('b', {}, labelTitle(picked)),
       h('span', {}, `volume ${volumeText(picked)}, area ${areaText(picked)}`),
       button('Hide', () => this.hide(), { class: 'quiet', title: 'Hide this label (h)' }),

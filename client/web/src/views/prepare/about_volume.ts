@@ -5,8 +5,7 @@ import { button, h } from '../../ui/dom';
 import { formatDims, volumeFormatTitle, formatSpacing, formatValue } from '../../ui/format';
 import { askText, tellError } from '../../ui/notices';
 import { go } from '../../ui/route';
-import { skippedText } from '../../volume/skipped';
-import { noteTexts, otherForm, spanOf, volumeName } from '../../volume/names';
+import { noteTexts, otherForm, skippedText, spanOf, volumeName } from '../../volume/names';
 import { uploads } from '../volumes/upload_panel';
 
 // Lists the skipped files of an upload, because a user may miss them.

@@ -1,6 +1,6 @@
 // The texts of a job's estimate.
 import type { Estimate } from '../../api/types';
-import { h } from '../../ui/dom';
+import { definitions, h } from '../../ui/dom';
 import { formatBytes, formatCount, formatMilliseconds, meshFormatTitle } from '../../ui/format';
 
 function warning(text: string): HTMLElement {
@@ -19,7 +19,7 @@ export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElem
   ];
   const before = estimate.queue.queued + estimate.queue.running;
   if (before > 0) rows.push(['Jobs ahead', before === 1 ? '1 job' : `${before} jobs`]);
-  const texts: HTMLElement[] = [h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]))];
+  const texts: HTMLElement[] = [definitions(rows)];
   if (estimate.triangles === 0) {
     texts.push(
       warning(

@@ -1,5 +1,5 @@
 // The surface at the iso-value, beside the slices and as it changes: drawn from a reduced copy of the volume.
-import { connected } from '../../client';
+import { onReconnect } from '../../client';
 import { asApiError } from '../../api/problem';
 import type { Vec3, Volume } from '../../api/types';
 import { graphicsStarted } from '../../scene/graphics';
@@ -74,11 +74,7 @@ export class LiveView {
       this.loading?.abort();
       this.surface?.dispose();
     });
-    scope.onEnd(
-      connected.subscribe((isConnected) => {
-        if (isConnected && this.hasFailed) this.load();
-      }),
-    );
+    onReconnect(scope, () => this.hasFailed && this.load());
   }
 
   private lookChoice(): HTMLElement {

@@ -2,13 +2,13 @@
 import type { Axis, Vec3, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
 import { Signal, type Scope } from '../../ui/signal';
-import { axisDirection, pictureAxes, sampleAt, sideOf, toPatient, toSamples } from '../../volume/geometry';
-import { cross, lineIn, obliqueFrame, through, type Angles } from '../../volume/oblique';
+import { axisDirection, cross, opposite, pictureAxes, sampleAt, sideOf, toPatient, toSamples } from '../../volume/geometry';
+import { lineIn, obliqueFrame, through, type Angles } from '../../volume/oblique';
 import type { Preview } from '../../volume/preview';
 import { sampledSquare } from '../../volume/reslice';
 import { greyTable, type Window } from '../../volume/slices';
 import type { SliceGrip, Spot } from './slice_grip';
-import { pixelsOf, sliceColours } from './slice_looks';
+import { paintLetters, pixelsOf, sliceColours } from './slice_looks';
 import { anglesOfText, anglesToText } from './slice_texts';
 
 const colour = '#c792ea';
@@ -210,28 +210,10 @@ export class ObliqueView {
     context.fillStyle = colour;
     context.fillRect(pixels / 2 - 8, pixels / 2 - 0.5, 16, 1);
     context.fillRect(pixels / 2 - 0.5, pixels / 2 - 8, 1, 16);
-    this.paintLetters(context, right, down);
+    paintLetters(context, { left: sideOf(opposite(right)), right: sideOf(right), top: sideOf(opposite(down)), bottom: sideOf(down) }, 8, 1);
     const [turn, tilt] = [this.turn.value, this.tilt.value];
     this.canvas.dataset.angles = `${turn},${tilt}`;
     this.canvas.setAttribute('aria-label', `Oblique plane, turned by ${turn} and tilted by ${tilt} degrees, its right side towards ${sideOf(right)}`);
-  }
-
-  private paintLetters(context: CanvasRenderingContext2D, right: Vec3, down: Vec3): void {
-    const opposite = (vector: Vec3): Vec3 => vector.map((value) => -value) as Vec3;
-    context.save();
-    context.font = '600 11px system-ui, sans-serif';
-    context.fillStyle = 'rgba(255, 255, 255, 0.75)';
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    const edge = 8;
-    const places: [Vec3, number, number][] = [
-      [right, pixels - edge, pixels / 2],
-      [opposite(right), edge, pixels / 2],
-      [down, pixels / 2, pixels - edge],
-      [opposite(down), pixels / 2, edge],
-    ];
-    for (const [vector, x, y] of places) context.fillText(sideOf(vector), x, y);
-    context.restore();
   }
 
   // A drag turns it, the wheel moves it along its normal, and a click sends the slices there.

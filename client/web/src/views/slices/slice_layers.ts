@@ -1,7 +1,7 @@
 // Layers of slices beside their own samples: another volume over them, and a projection of the slab around them.
-import { client, connected } from '../../client';
+import { client, onReconnect } from '../../client';
 import type { Axis, Volume } from '../../api/types';
-import { checkbox, field, h } from '../../ui/dom';
+import { checkbox, field, h, select } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { Signal, type Scope } from '../../ui/signal';
@@ -88,11 +88,7 @@ export class SliceLayers {
       },
     });
     scope.onEnd(() => this.wanted.abort());
-    scope.onEnd(
-      connected.subscribe((isConnected) => {
-        if (isConnected) this.own.retry();
-      }),
-    );
+    onReconnect(scope, () => this.own.retry());
     this.slab = slabOfText(host.query.get('slab') ?? '');
     this.showsOblique = host.oblique.restore(host.query.get('oblique') ?? '');
     this.opacity.hidden = true;
@@ -159,17 +155,16 @@ export class SliceLayers {
   private slabControls(): HTMLElement[] {
     const kinds = [['', 'Slice'], ['maximum', 'Maximum of a slab'], ['mean', 'Mean of a slab']] as const;
     const { slab } = this;
-    const kind = h('select', {}, ...kinds.map(([value, text]) => h('option', { value, selected: value === slab?.projection }, text)));
-    const thick = h('select', {}, ...thicknesses.map((value) => h('option', { value, selected: value === (slab?.thickness ?? 10) }, `${value} mm`)));
-    const thickness = field('Thickness', thick);
-    thickness.hidden = slab === null;
     const take = (): void => {
       this.slab = slabOfText(`${kind.value}-${thick.value}`);
       thickness.hidden = this.slab === null;
       this.askForOwn();
       this.changed();
     };
-    for (const select of [kind, thick]) select.addEventListener('change', take);
+    const kind = select(kinds, slab?.projection, take);
+    const thick = select(thicknesses.map((value) => [String(value), `${value} mm`]), String(slab?.thickness ?? 10), take);
+    const thickness = field('Thickness', thick);
+    thickness.hidden = slab === null;
     return [field('Show', kind), thickness];
   }
 

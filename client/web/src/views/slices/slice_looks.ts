@@ -1,12 +1,12 @@
 // How slices are looked at, on the whole page: their colours, and the coordinates that are told.
 import type { Vec3 } from '../../api/types';
 import { colourTable } from '../../scene/colour_map';
-import { field, h, segmented } from '../../ui/dom';
+import { field, h, segmented, select } from '../../ui/dom';
 import { formatNumber } from '../../ui/format';
 import { Signal, type Scope } from '../../ui/signal';
 import type { MeasureKind } from '../../volume/measure';
 import { textOfWindow, type Window } from '../../volume/slices';
-import { layoutNames, paneLayout, type Layout } from './pane_area';
+import { layoutNames, paneLayout } from './pane_area';
 import type { SliceMeasures } from './slice_measure';
 
 type ColourName = 'grey' | 'inverted' | 'hot' | 'even';
@@ -65,6 +65,21 @@ export function pixelsOf(name: ColourName): Uint32Array {
   });
 }
 
+// The letters of the patient's sides, so far from the edges of the canvas.
+export function paintLetters(context: CanvasRenderingContext2D, sides: Record<'left' | 'right' | 'top' | 'bottom', string>, edge: number, ratio: number): void {
+  const { width, height } = context.canvas;
+  context.save();
+  context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+  context.fillStyle = 'rgba(255, 255, 255, 0.75)';
+  context.textAlign = 'center';
+  context.textBaseline = 'middle';
+  context.fillText(sides.left, edge, height / 2);
+  context.fillText(sides.right, width - edge, height / 2);
+  context.fillText(sides.top, width / 2, edge);
+  context.fillText(sides.bottom, width / 2, height - edge);
+  context.restore();
+}
+
 // In millimetres, with digits enough to tell neighbouring samples apart.
 export function placeText([left, posterior, superior]: Vec3, space: Space, spacing: Vec3): string {
   const digits = Math.max(1, 1 - Math.floor(Math.log10(Math.min(...spacing))));
@@ -72,16 +87,15 @@ export function placeText([left, posterior, superior]: Vec3, space: Space, spaci
   return `${space} ${[sign * left, sign * posterior, superior].map((value) => formatNumber(value, digits)).join(', ')} mm`;
 }
 
-function layoutChoice(): HTMLElement {
-  const choice = select('Layout', Object.entries(layoutNames) as [Layout, string][], paneLayout.value, (name) => (paneLayout.value = name));
-  choice.classList.add('layout-choice');
-  return choice;
+// One of those names for the whole page.
+function lookChoice<T extends string>(label: string, names: Record<T, string>, look: Signal<T>): HTMLElement {
+  return field(label, select(Object.entries(names) as [T, string][], look.value, (name) => (look.value = name)));
 }
 
-function select<T extends string>(label: string, options: readonly (readonly [T, string])[], value: T, onChange: (value: T) => void): HTMLElement {
-  const element = h('select', {}, ...options.map(([name, text]) => h('option', { value: name, selected: name === value }, text)));
-  element.addEventListener('change', () => onChange(element.value as T));
-  return field(label, element);
+function layoutChoice(): HTMLElement {
+  const choice = lookChoice('Layout', layoutNames, paneLayout);
+  choice.classList.add('layout-choice');
+  return choice;
 }
 
 // The name of a window for CT; '' for any other one.
@@ -133,9 +147,9 @@ export function sliceControls(windows: WindowChoice | null, measures: SliceMeasu
       'div',
       { class: 'row' },
       windows?.element,
-      select('Colours', Object.entries(colourNames) as [ColourName, string][], sliceColours.value, (name) => (sliceColours.value = name)),
+      lookChoice('Colours', colourNames, sliceColours),
       layoutChoice(),
-      select('Coordinates', Object.entries(spaces) as [Space, string][], sliceSpace.value, (space) => (sliceSpace.value = space)),
+      lookChoice('Coordinates', spaces, sliceSpace),
     ),
     segmented<MeasureKind | 'none'>('Measure in slices', kinds, 'none', (kind) => (measures.kind.value = kind === 'none' ? null : kind)),
   );

@@ -6,7 +6,7 @@ import { contour } from '../../volume/contour';
 import { coloursOf, paintLabels, type LabelLook } from '../../volume/label_map';
 import { labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
-import { pixelsOf, sliceColours, sliceSpace } from './slice_looks';
+import { paintLetters, pixelsOf, sliceColours, sliceSpace } from './slice_looks';
 import type { ObliqueView } from './oblique_view';
 import type { SliceGrip, Spot } from './slice_grip';
 import type { SliceLayers } from './slice_layers';
@@ -204,7 +204,8 @@ export class SliceView {
       this.paintSlice(context, slice, ratio);
       context.globalAlpha = 1;
     }
-    this.paintLetters(context, ratio);
+    const { right, down } = this.layout;
+    paintLetters(context, { left: right.begin, right: right.end, top: down.begin, bottom: down.end }, (padding / 2) * ratio, ratio);
     this.readout.show(cursor);
     const says = error ? `Slice ${index + 1} could not be loaded` : isLate ? `Loading slice ${index + 1}` : '';
     if (this.state.textContent !== says) this.state.textContent = says;
@@ -267,22 +268,6 @@ export class SliceView {
       pixels[i] = colours[table[value] ?? 0] ?? 0;
     });
     context.putImageData(picture, 0, 0);
-  }
-
-  private paintLetters(context: CanvasRenderingContext2D, ratio: number): void {
-    const { width, height } = this.canvas;
-    const { right, down } = this.layout;
-    context.save();
-    context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
-    context.fillStyle = 'rgba(255, 255, 255, 0.75)';
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    const edge = (padding / 2) * ratio;
-    context.fillText(right.begin, edge, height / 2);
-    context.fillText(right.end, width - edge, height / 2);
-    context.fillText(down.begin, width / 2, edge);
-    context.fillText(down.end, width / 2, height - edge);
-    context.restore();
   }
 
   // The column and row of the picture under a point of the screen.

@@ -3,7 +3,7 @@ import { client } from '../../client';
 import type { Axis, Job, Volume } from '../../api/types';
 import type { LabelState } from '../../job/labels';
 import type { Surface } from '../../scene/surface';
-import { button, checkbox, h } from '../../ui/dom';
+import { button, checkbox, h, select } from '../../ui/dom';
 import { formatSize } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import type { Scope } from '../../ui/signal';
@@ -45,7 +45,7 @@ export class CutTool {
   private readonly free: FreeCut;
   private isFree = false;
   // Axial first: what most people think of as a slice.
-  private readonly axes: [string, Axis][];
+  private readonly axes: [Axis, string][];
   private window: Window | null = null;
   private pictureWanted = '';
   private isFetching = false;
@@ -62,9 +62,9 @@ export class CutTool {
   ) {
     const [sagittal, coronal, axial] = patientAxes(volume);
     this.axes = [
-      ['Axial', axial],
-      ['Coronal', coronal],
-      ['Sagittal', sagittal],
+      [axial, 'Axial'],
+      [coronal, 'Coronal'],
+      [sagittal, 'Sagittal'],
     ];
     this.axis = axial;
     this.index = this.middle;
@@ -116,25 +116,21 @@ export class CutTool {
   }
 
   private showControls(): void {
-    const directions: [string, Axis | 'free'][] = [...this.axes, ['Free', 'free']];
+    const directions: [Axis | 'free', string][] = [...this.axes, ['free', 'Free']];
     const shown = this.isFree ? 'free' : this.axis;
-    const choice = h(
-      'select',
-      { 'aria-label': 'Direction of the cut' },
-      ...directions.map(([name, value]) => h('option', { value, selected: value === shown }, name)),
-    );
-    choice.addEventListener('change', () => {
-      this.isFree = choice.value === 'free';
-      if (this.isFree) {
+    const take = (direction: Axis | 'free'): void => {
+      this.isFree = direction === 'free';
+      if (direction === 'free') {
         this.free.faceView(this.surface);
       } else {
-        this.axis = choice.value as Axis;
+        this.axis = direction;
         this.index = this.middle;
       }
       this.showControls();
       this.place();
       if (!this.isFree) this.surface.faceCut();
-    });
+    };
+    const choice = select(directions, shown, take, { 'aria-label': 'Direction of the cut' });
     this.element.replaceChildren(choice, ...(this.isFree ? this.freeControls() : this.sliceControls()));
   }
 

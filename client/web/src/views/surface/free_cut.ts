@@ -1,9 +1,9 @@
 // A cut at any angle: parallel to the screen as it was when it was turned to the view, and moved along its normal.
 import type { Vec3, Volume } from '../../api/types';
 import type { Surface } from '../../scene/surface';
-import { toPatient } from '../../volume/geometry';
+import { dot, opposite, toPatient } from '../../volume/geometry';
 import type { LabelLook } from '../../volume/label_map';
-import { dot, spanOf } from '../../volume/oblique';
+import { spanOf } from '../../volume/oblique';
 import { fetchLabelPreview, fetchPreview, largestPreview } from '../../volume/preview_file';
 import type { Preview } from '../../volume/preview';
 import { sampledSquare, type Resliced, type Square } from '../../volume/reslice';
@@ -45,7 +45,7 @@ export class FreeCut {
   }
 
   flip(): void {
-    this.normal = this.normal.map((value) => -value) as Vec3;
+    this.normal = opposite(this.normal);
     this.depth = -this.depth;
   }
 

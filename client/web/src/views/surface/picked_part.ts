@@ -3,6 +3,7 @@ import type { Job, JobParameters, Vec3 } from '../../api/types';
 import type { PartFinder, PartSummary } from '../../mesh/part_finder';
 import type { Picked } from '../../scene/picked';
 import { isByLabels } from '../../job/table';
+import type { MakeVariant } from '../../job/variants';
 import { button, h } from '../../ui/dom';
 import { formatCount, formatSize, formatValue } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
@@ -29,7 +30,7 @@ export class PickedPart {
   constructor(
     private readonly scope: Scope,
     private readonly job: Job,
-    private readonly make: (variant: Partial<JobParameters>) => void,
+    private readonly make: MakeVariant,
   ) {
     this.parts = isByLabels(job.parameters) ? 1 : (job.mesh?.components ?? 1);
   }

@@ -22,6 +22,7 @@ import { DistanceLook } from './distance_look';
 import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from './look_text';
 import { PickedLabel } from '../labels/picked_label';
 import { PickedPart } from './picked_part';
+import { viewButtons } from './view_tools';
 
 const turnStep = Math.PI / 36;
 
@@ -291,13 +292,7 @@ export class SurfacePane {
       h(
         'div',
         { class: 'tool-group' },
-        ...viewNames.map((name) =>
-          button(name, () => this.look(name), {
-            title: `${viewTitles[name]} (${name.toLowerCase()})`,
-            'aria-label': viewTitles[name],
-          }),
-        ),
-        button('Fit', () => surface.fit(), { title: 'Show the whole surface (f)' }),
+        ...viewButtons((name) => this.look(name), () => surface.fit(), true),
       ),
       h(
         'div',

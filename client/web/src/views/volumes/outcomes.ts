@@ -4,7 +4,7 @@ import type { UploadedVolume, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
 import { formatDims } from '../../ui/format';
 import { hashOf } from '../../ui/route';
-import { skippedText } from '../../volume/skipped';
+import { skippedText } from '../../volume/names';
 import type { NamedFile } from '../../volume/tar';
 import { acceptButton, choiceLists, openQuestion, questionOf, type Asked, type Choices } from './remedies';
 

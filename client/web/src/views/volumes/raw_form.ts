@@ -1,5 +1,5 @@
 import type { RawDescription, SampleType } from '../../api/types';
-import { button, field, h } from '../../ui/dom';
+import { button, field, h, select } from '../../ui/dom';
 import { NumberField } from '../../ui/number_field';
 import { rawFault, sampleBytes } from '../../volume/raw';
 
@@ -42,18 +42,9 @@ const unknown: RawDescription = { dims: [0, 0, 0], type: 'int16', spacing: [1, 1
 export function rawForm(size: number, onDescribed: (raw: RawDescription) => void, described = unknown): HTMLElement {
   const dims = triple('Samples', described.dims);
   const spacing = triple('Spacing in mm', described.spacing);
-  const type = h(
-    'select',
-    {},
-    ...Object.keys(sampleBytes).map((name) => h('option', { value: name, selected: name === described.type }, name)),
-  );
+  const type = select(Object.keys(sampleBytes).map((name) => [name, name]), described.type);
   const chosenType = (): SampleType => type.value as SampleType;
-  const order = h(
-    'select',
-    {},
-    h('option', { value: 'little' }, 'little-endian'),
-    h('option', { value: 'big', selected: described.byteOrder === 'big' }, 'big-endian'),
-  );
+  const order = select([['little', 'little-endian'], ['big', 'big-endian']], described.byteOrder);
   const fault = h('p', { class: 'warning', role: 'status' });
   const submit = button(
     'Upload as raw samples',

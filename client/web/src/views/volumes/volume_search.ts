@@ -1,6 +1,6 @@
 // Finds volumes by what they are called, and sorts them.
 import type { Volume } from '../../api/types';
-import { h } from '../../ui/dom';
+import { h, select } from '../../ui/dom';
 import { volumeKind, volumeName } from '../../volume/names';
 
 const orders: Record<string, { title: string; compare: ((a: Volume, b: Volume) => number) | null }> = {
@@ -23,16 +23,13 @@ export function foundVolumes(volumes: readonly Volume[], text: string, order: st
 export class VolumeSearch {
   readonly element: HTMLElement;
   private readonly input = h('input', { type: 'search', placeholder: 'Search', 'aria-label': 'Search volumes' });
-  private readonly order = h(
-    'select',
-    { 'aria-label': 'Sort volumes' },
-    ...Object.entries(orders).map(([value, { title }]) => h('option', { value }, title)),
-  );
+  private readonly order: HTMLSelectElement;
 
   constructor(onChange: () => void) {
+    const titles = Object.entries(orders).map(([value, { title }]) => [value, title] as const);
+    this.order = select(titles, 'newest', onChange, { 'aria-label': 'Sort volumes' });
     this.element = h('div', { class: 'volume-search', role: 'search' }, this.input, this.order);
     this.input.addEventListener('input', onChange);
-    this.order.addEventListener('change', onChange);
   }
 
   // True if all volumes have to be loaded.

@@ -212,8 +212,7 @@ class Home {
       // A lost connection is said at the top of the page.
       if (!document.hidden && !this.scope.isOver) this.refresh().catch(() => undefined);
     };
-    const timer = setInterval(refresh, refreshEvery);
-    this.scope.onEnd(() => clearInterval(timer));
+    this.scope.repeat(refreshEvery, () => this.refresh());
     this.scope.onEnd(() => clearTimeout(this.soon));
     const refreshSoon = (): void => {
       if (this.soon !== 0) return;
