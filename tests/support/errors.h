@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "proto/error.h"
 
 namespace isomesh::test {
@@ -18,6 +20,13 @@ inline std::optional<Error> thrown_by(const std::function<void()>& action) {
     return error;
   }
   return std::nullopt;
+}
+
+// The Error that `action` throws, which it has to.
+inline Error error_of(const std::function<void()>& action) {
+  const auto error = thrown_by(action);
+  if (!error) ADD_FAILURE() << "nothing was thrown";
+  return error.value_or(Error(ErrorCode::kInternal, "nothing was thrown"));
 }
 
 inline std::optional<ErrorCode> code_thrown_by(const std::function<void()>& action) {

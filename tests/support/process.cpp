@@ -108,6 +108,12 @@ bool Process::has_ended() {
   return true;
 }
 
+std::vector<std::string> with(std::vector<std::string> words,
+                              const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
 Finished run(const std::vector<std::string>& command, const std::vector<std::string>& environment) {
   Process process(command, environment);
   const int status = process.wait();

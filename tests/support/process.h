@@ -59,6 +59,9 @@ struct Finished {
   std::string errors;
 };
 
+// The words of a command and more of them.
+std::vector<std::string> with(std::vector<std::string> words, const std::vector<std::string>& more);
+
 Finished run(const std::vector<std::string>& command,
              const std::vector<std::string>& environment = {});
 

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cstdlib>
 #include <future>
-#include <mutex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -19,26 +19,13 @@
 namespace isomesh::cli {
 namespace {
 
+using test::end_of;
+using test::options_from;
+using test::with;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
-
-Options options_from(const std::vector<std::string>& words) {
-  std::vector<const char*> arguments = {"isomesh"};
-  for (const std::string& word : words) arguments.push_back(word.c_str());
-  return parse_options(static_cast<int>(arguments.size()), arguments.data());
-}
-
-// The status and the text that the arguments end with; -1 if they are accepted.
-std::pair<int, std::string> end_of(const std::vector<std::string>& words) {
-  try {
-    options_from(words);
-  } catch (const EarlyExit& exit) {
-    return {exit.status(), exit.what()};
-  }
-  return {-1, ""};
-}
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
@@ -52,11 +39,9 @@ class CommandLine : public testing::Test {
   CommandLine() { test::write_file(folder_ / "head.nii", "x"); }
 
   // The words of `isomesh mesh` with an iso-value and a file of that format.
-  std::vector<std::string> mesh(std::vector<std::string> more, const std::string& suffix = ".glb") {
-    const std::vector<std::string> words = {"mesh", file_, "--iso",
-                                            "1",    "-o",  (folder_ / ("head" + suffix)).string()};
-    more.insert(more.begin(), words.begin(), words.end());
-    return more;
+  std::vector<std::string> mesh(const std::vector<std::string>& more,
+                                const std::string& suffix = ".glb") {
+    return with({"mesh", file_, "--iso", "1", "-o", folder_ / ("head" + suffix)}, more);
   }
 
   test::TemporaryFolder folder_;
@@ -105,8 +90,7 @@ TEST_F(CommandLine, MeshTakesEveryParameterOfTheTable) {
     if (path != "iso" && !is_by_labels) words.insert(words.end(), {"--iso", "1"});
     const JobParameters without =
         path == "labels" || path == "iso" ? JobParameters{} : options_from(words).parameters;
-    const std::vector<std::string> value = some_value(parameter, member);
-    words.insert(words.end(), value.begin(), value.end());
+    words = with(words, some_value(parameter, member));
     const auto [status, text] = end_of(words);
     EXPECT_EQ(status, -1) << path << ": " << text;
     if (status != -1) return;

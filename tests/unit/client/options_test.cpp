@@ -12,23 +12,11 @@
 namespace isomesh::cli {
 namespace {
 
+using test::end_of;
+using test::options_from;
+using test::with;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-Options parse(std::vector<const char*> arguments) {
-  arguments.insert(arguments.begin(), "isomesh");
-  return parse_options(static_cast<int>(arguments.size()), arguments.data());
-}
-
-// The status and the text that the arguments end with; -1 when they are fine.
-std::pair<int, std::string> ending_of(const std::vector<const char*>& arguments) {
-  try {
-    parse(arguments);
-  } catch (const EarlyExit& exit) {
-    return {exit.status(), exit.what()};
-  }
-  return {-1, ""};
-}
 
 class OptionsTest : public testing::Test {
  protected:
@@ -41,9 +29,9 @@ class OptionsTest : public testing::Test {
 };
 
 TEST_F(OptionsTest, ReadsRawSamples) {
-  const Options options = parse({"upload", file_.c_str(), "--dims", "512,512,300", "--type",
-                                 "int16", "--spacing", "0.7,0.7,1", "--origin", "-90,0,1.5",
-                                 "--direction", "1,0,0,0,1,0,0,0,-1", "--byte-order", "big"});
+  const Options options = options_from(
+      {"upload", file_, "--dims", "512,512,300", "--type", "int16", "--spacing", "0.7,0.7,1",
+       "--origin", "-90,0,1.5", "--direction", "1,0,0,0,1,0,0,0,-1", "--byte-order", "big"});
   ASSERT_TRUE(options.upload.raw);
   EXPECT_THAT(options.upload.raw->dims, ElementsAre(512, 512, 300));
   EXPECT_EQ(options.upload.raw->type, SampleType::kInt16);
@@ -55,65 +43,60 @@ TEST_F(OptionsTest, ReadsRawSamples) {
 }
 
 TEST_F(OptionsTest, AnIsoValueMayBeAPreset) {
-  EXPECT_EQ(parse({"submit", "abc", "--iso", "bone"}).preset, "bone");
-  EXPECT_EQ(parse({"submit", "abc", "--iso", "Soft-Tissue"}).preset, "soft tissue");
-  EXPECT_EQ(parse({"submit", "abc", "--iso", "250"}).preset, "");
-  EXPECT_EQ(ending_of({"submit", "abc", "--iso", "bones"}).first, kWrongUsage);
+  EXPECT_EQ(options_from({"submit", "abc", "--iso", "bone"}).preset, "bone");
+  EXPECT_EQ(options_from({"submit", "abc", "--iso", "Soft-Tissue"}).preset, "soft tissue");
+  EXPECT_EQ(options_from({"submit", "abc", "--iso", "250"}).preset, "");
+  EXPECT_EQ(end_of({"submit", "abc", "--iso", "bones"}).first, kWrongUsage);
 }
 
 TEST_F(OptionsTest, OutputsAreFilesFoldersNamesOrStandardOutput) {
-  const auto outputs_of = [&](std::vector<const char*> more) {
-    more.insert(more.begin(), {"mesh", file_.c_str(), "--iso", "1"});
-    return parse(more).outputs;
+  const std::vector<std::string> mesh = {"mesh", file_, "--iso", "1"};
+  const auto outputs_of = [&](const std::vector<std::string>& more) {
+    return options_from(with(mesh, more)).outputs;
   };
   const std::string folder = folder_.path().string();
   const std::string upper = folder + "/brain.DRC";
   const std::string named = folder + "/{name}-skin.ply";
-  EXPECT_EQ(outputs_of({"-o", upper.c_str()}), (std::vector<Output>{{upper, MeshFormat::kDrc}}));
-  EXPECT_EQ(outputs_of({"-o", named.c_str()}), (std::vector<Output>{{named, MeshFormat::kPly}}));
-  EXPECT_EQ(outputs_of({"-o", folder.c_str()}),
+  EXPECT_EQ(outputs_of({"-o", upper}), (std::vector<Output>{{upper, MeshFormat::kDrc}}));
+  EXPECT_EQ(outputs_of({"-o", named}), (std::vector<Output>{{named, MeshFormat::kPly}}));
+  EXPECT_EQ(outputs_of({"-o", folder}),
             (std::vector<Output>{{folder + "/{name}.drc", MeshFormat::kDrc}}));
-  EXPECT_EQ(outputs_of({"-o", folder.c_str(), "--format", "STL,glb"}),
+  EXPECT_EQ(outputs_of({"-o", folder, "--format", "STL,glb"}),
             (std::vector<Output>{{folder + "/{name}.stl", MeshFormat::kStl},
                                  {folder + "/{name}.glb", MeshFormat::kGlb}}));
   EXPECT_EQ(outputs_of({"-o", "-", "--format", "stl"}),
             (std::vector<Output>{{"-", MeshFormat::kStl}}));
 
   const std::string absent = folder + "/absent/";
-  const char* drc = drc_.c_str();
-  for (const std::vector<const char*>& wrong :
-       std::vector<std::vector<const char*>>{{"-o", "-"},
+  for (const std::vector<std::string>& wrong :
+       std::vector<std::vector<std::string>>{{"-o", "-"},
                                              {"-o", "-", "--format", "stl,glb"},
                                              {"-o", "-", "--format", "stl", "--json"},
-                                             {"-o", "-", "--format", "stl", "-o", drc},
-                                             {"-o", absent.c_str()},
-                                             {"-o", drc, "--format", "drc"},
-                                             {"-o", drc, "-o", named.c_str()},
-                                             {"-o", folder.c_str(), "--format", "xyz"},
-                                             {"-o", drc, "--jobs", "0"},
-                                             {"-o", drc, "--jobs", "65"},
+                                             {"-o", "-", "--format", "stl", "-o", drc_},
+                                             {"-o", absent},
+                                             {"-o", drc_, "--format", "drc"},
+                                             {"-o", drc_, "-o", named},
+                                             {"-o", folder, "--format", "xyz"},
+                                             {"-o", drc_, "--jobs", "0"},
+                                             {"-o", drc_, "--jobs", "65"},
                                              {}}) {
-    std::vector<const char*> all = {"mesh", file_.c_str(), "--iso", "1"};
-    all.insert(all.end(), wrong.begin(), wrong.end());
-    EXPECT_EQ(ending_of(all).first, kWrongUsage) << testing::PrintToString(wrong);
+    EXPECT_EQ(end_of(with(mesh, wrong)).first, kWrongUsage) << testing::PrintToString(wrong);
   }
-  EXPECT_EQ(ending_of({"mesh", "-", "-", "--iso", "1", "-o", folder.c_str()}).first, kWrongUsage);
+  EXPECT_EQ(end_of({"mesh", "-", "-", "--iso", "1", "-o", folder}).first, kWrongUsage);
 }
 
 TEST_F(OptionsTest, ADryRunNeedsNoOutput) {
   const Options options =
-      parse({"mesh", file_.c_str(), "--iso", "1", "--dry-run", "--format", "stl,obj"});
+      options_from({"mesh", file_, "--iso", "1", "--dry-run", "--format", "stl,obj"});
   EXPECT_TRUE(options.dry_run);
   EXPECT_THAT(options.parameters.formats, ElementsAre(MeshFormat::kStl, MeshFormat::kObj));
-  EXPECT_EQ(
-      ending_of({"mesh", file_.c_str(), "--labels", "1", "--dry-run", "--label-values", "1=2"})
-          .first,
-      kWrongUsage);
+  EXPECT_EQ(end_of({"mesh", file_, "--labels", "1", "--dry-run", "--label-values", "1=2"}).first,
+            kWrongUsage);
 }
 
 // A query carries no names of labels and no callback.
 TEST_F(OptionsTest, AnEstimateHasTheOptionsThatAQueryCarries) {
-  const std::string help = ending_of({"estimate", "--help"}).second;
+  const std::string help = end_of({"estimate", "--help"}).second;
   JobParameters parameters;
   parameters.callback.emplace();
   visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter, const auto&) {
@@ -125,29 +108,29 @@ TEST_F(OptionsTest, AnEstimateHasTheOptionsThatAQueryCarries) {
 }
 
 TEST_F(OptionsTest, LocalTakesWhatMeshTakes) {
-  const Options options = parse({"local", file_.c_str(), "--iso", "1", "-o", drc_.c_str(), "-q"});
+  const Options options = options_from({"local", file_, "--iso", "1", "-o", drc_, "-q"});
   EXPECT_EQ(options.command, Command::kMesh);
   EXPECT_TRUE(options.is_local);
   EXPECT_TRUE(options.quiet);
-  EXPECT_FALSE(parse({"mesh", file_.c_str(), "--iso", "1", "-o", drc_.c_str()}).is_local);
+  EXPECT_FALSE(options_from({"mesh", file_, "--iso", "1", "-o", drc_}).is_local);
 }
 
 TEST_F(OptionsTest, DescribesItselfToShellsAndReaders) {
-  const auto [status, manual] = ending_of({"manual"});
+  const auto [status, manual] = end_of({"manual"});
   EXPECT_EQ(status, 0);
   EXPECT_THAT(manual, HasSubstr(".SH NAME\nisomesh \\- "));
   EXPECT_THAT(manual, HasSubstr("\\fB\\-\\-max\\-displacement\\fR"));
   for (const char* shell : {"bash", "zsh", "fish"}) {
-    EXPECT_THAT(ending_of({"completion", shell}).second, HasSubstr("max-displacement")) << shell;
+    EXPECT_THAT(end_of({"completion", shell}).second, HasSubstr("max-displacement")) << shell;
   }
-  EXPECT_EQ(ending_of({"completion", "cmd"}).first, kWrongUsage);
+  EXPECT_EQ(end_of({"completion", "cmd"}).first, kWrongUsage);
 }
 
 TEST_F(OptionsTest, TakesGlobalOptionsBeforeAndAfterTheCommand) {
   for (const auto& options :
-       {parse({"--server", "unix:/s", "--token", "t", "--json", "status", "7"}),
-        parse({"status", "7", "--server", "unix:/s", "--token", "t", "--json"}),
-        parse({"status", "--json", "7", "--server=unix:/s", "--token=t"})}) {
+       {options_from({"--server", "unix:/s", "--token", "t", "--json", "status", "7"}),
+        options_from({"status", "7", "--server", "unix:/s", "--token", "t", "--json"}),
+        options_from({"status", "--json", "7", "--server=unix:/s", "--token=t"})}) {
     EXPECT_EQ(options.server, "unix:/s");
     EXPECT_EQ(options.token, "t");
     EXPECT_TRUE(options.json);
@@ -158,81 +141,80 @@ TEST_F(OptionsTest, TakesGlobalOptionsBeforeAndAfterTheCommand) {
 TEST_F(OptionsTest, TakesServerAndTokenFromTheEnvironment) {
   ::setenv("ISOMESH_SERVER", "http://elsewhere:1", 1);
   ::setenv("ISOMESH_TOKEN", "from-environment", 1);
-  const Options fallback = parse({"list"});
-  const Options given = parse({"list", "--server", "http://here:2"});
+  const Options fallback = options_from({"list"});
+  const Options given = options_from({"list", "--server", "http://here:2"});
   ::unsetenv("ISOMESH_SERVER");
   ::unsetenv("ISOMESH_TOKEN");
   EXPECT_EQ(fallback.server, "http://elsewhere:1");
   EXPECT_EQ(fallback.token, "from-environment");
   EXPECT_EQ(given.server, "http://here:2");
-  EXPECT_EQ(parse({"list"}).server, "http://127.0.0.1:8080");
+  EXPECT_EQ(options_from({"list"}).server, "http://127.0.0.1:8080");
 }
 
 TEST_F(OptionsTest, RefusesWrongUsage) {
-  const char* file = file_.c_str();
-  const char* drc = drc_.c_str();
-  const std::vector<std::vector<const char*>> wrong = {
+  const std::vector<std::vector<std::string>> wrong = {
       {},
       {"frobnicate"},
       {"status"},
       {"status", "7", "8"},
-      {"mesh", file, "-o", drc},
-      {"mesh", file, "--iso", "60"},
-      {"mesh", file, "--iso", "sixty", "-o", drc},
-      {"mesh", file, "--iso", "nan", "-o", drc},
-      {"mesh", file, "--iso", "60x", "-o", drc},
-      {"mesh", file, "--iso", "", "-o", drc},
-      {"mesh", file, "--iso", "60", "--passes", "1.5", "-o", drc},
-      {"mesh", file, "--iso", "60", "--passes", "99999999999", "-o", drc},
-      {"mesh", file, "--iso", "60", "--smoothing", "gauss", "-o", drc},
-      {"mesh", file, "--iso", "60", "-o", "brain.xyz"},
-      {"mesh", file, "--iso", "60", "-o", "brain"},
-      {"mesh", file, "--iso", "60", "-o", "/nowhere/brain.drc"},
-      {"mesh", "/nowhere/head.nii", "--iso", "60", "-o", drc},
-      {"upload", file, "--dims", "1,2,3"},
-      {"upload", file, "--type", "int16"},
-      {"upload", file, "--origin", "1,1,1"},
-      {"upload", file, "--spacing", "0,1,1"},
-      {"upload", file, "--dims", "1,2", "--type", "int16"},
-      {"upload", file, "--dims", "1,2,3,4", "--type", "int16"},
-      {"upload", file, "--dims", "1,,3", "--type", "int16"},
-      {"upload", file, "--dims", "1,2,3,", "--type", "int16"},
-      {"upload", file, "--dims", "1,2,3", "--type", "int12"},
-      {"upload", file, "--dims", "1,2,3", "--type", "int16", "--byte-order", "middle"},
+      {"mesh", file_, "-o", drc_},
+      {"mesh", file_, "--iso", "60"},
+      {"mesh", file_, "--iso", "sixty", "-o", drc_},
+      {"mesh", file_, "--iso", "nan", "-o", drc_},
+      {"mesh", file_, "--iso", "60x", "-o", drc_},
+      {"mesh", file_, "--iso", "", "-o", drc_},
+      {"mesh", file_, "--iso", "60", "--passes", "1.5", "-o", drc_},
+      {"mesh", file_, "--iso", "60", "--passes", "99999999999", "-o", drc_},
+      {"mesh", file_, "--iso", "60", "--smoothing", "gauss", "-o", drc_},
+      {"mesh", file_, "--iso", "60", "-o", "brain.xyz"},
+      {"mesh", file_, "--iso", "60", "-o", "brain"},
+      {"mesh", file_, "--iso", "60", "-o", "/nowhere/brain.drc"},
+      {"mesh", "/nowhere/head.nii", "--iso", "60", "-o", drc_},
+      {"upload", file_, "--dims", "1,2,3"},
+      {"upload", file_, "--type", "int16"},
+      {"upload", file_, "--origin", "1,1,1"},
+      {"upload", file_, "--spacing", "0,1,1"},
+      {"upload", file_, "--dims", "1,2", "--type", "int16"},
+      {"upload", file_, "--dims", "1,2,3,4", "--type", "int16"},
+      {"upload", file_, "--dims", "1,,3", "--type", "int16"},
+      {"upload", file_, "--dims", "1,2,3,", "--type", "int16"},
+      {"upload", file_, "--dims", "1,2,3", "--type", "int12"},
+      {"upload", file_, "--dims", "1,2,3", "--type", "int16", "--byte-order", "middle"},
+      {"submit", "abc"},
       {"submit", "abc", "--iso", "60", "--format", "drc,xyz"},
       {"list", "--state", "melted"}};
   for (const auto& arguments : wrong) {
-    const auto [status, text] = ending_of(arguments);
+    const auto [status, text] = end_of(arguments);
     EXPECT_EQ(status, kWrongUsage) << (arguments.empty() ? "" : arguments.back());
     EXPECT_FALSE(text.empty());
   }
 }
 
 TEST_F(OptionsTest, SaysThatAnOptionWasGivenTwice) {
-  const auto [status, text] = ending_of({"submit", "abc", "--passes", "1", "--passes", "2"});
+  const auto [status, text] = end_of({"submit", "abc", "--passes", "1", "--passes", "2"});
   EXPECT_EQ(status, kWrongUsage);
   EXPECT_THAT(text, HasSubstr("--passes can only be given once"));
 }
 
 TEST_F(OptionsTest, TextsAreUtf8) {
-  EXPECT_EQ(parse({"rename", "abc", "Gr\u00f6\u00dfe \"1\""}).name, "Gr\u00f6\u00dfe \"1\"");
-  for (const std::vector<const char*>& arguments :
-       {std::vector<const char*>{"rename", "abc", "\xff"},
-        std::vector<const char*>{"upload", file_.c_str(), "--name",
+  EXPECT_EQ(options_from({"rename", "abc", "Gr\u00f6\u00dfe \"1\""}).name, "Gr\u00f6\u00dfe \"1\"");
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"rename", "abc", "\xff"},
+        std::vector<std::string>{"upload", file_, "--name",
                                  "Gr\xf6\xdf"
                                  "e"}}) {
-    const auto [status, text] = ending_of(arguments);
+    const auto [status, text] = end_of(arguments);
     EXPECT_EQ(status, kWrongUsage) << arguments.front();
-    EXPECT_THAT(text, HasSubstr(arguments.front()[0] == 'r' ? "NAME: is not UTF-8"
-                                                            : "--name: is not UTF-8"));
+    EXPECT_THAT(text, HasSubstr(arguments.front() == "rename" ? "NAME: is not UTF-8"
+                                                              : "--name: is not UTF-8"));
   }
   const std::string latin = (folder_ / "gr\xf6.nii").string();
   test::write_file(latin, "x");
-  EXPECT_EQ(parse({"upload", latin.c_str()}).files.front(), latin);
+  EXPECT_EQ(options_from({"upload", latin}).files.front(), latin);
 }
 
 TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
-  const std::string help = ending_of({"submit", "--help"}).second;
+  const std::string help = end_of({"submit", "--help"}).second;
   JobParameters parameters;
   visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter, const auto&) {
     if (path == "volume") return;
@@ -250,37 +232,35 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
         "(default: drc)"}) {
     EXPECT_THAT(words, HasSubstr(text));
   }
-  EXPECT_THAT(ending_of({"mesh", "--help"}).second,
+  EXPECT_THAT(end_of({"mesh", "--help"}).second,
               testing::Not(HasSubstr("The file formats to write")));
 }
 
 TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {
   const std::string glb = (folder_ / "body.glb").string();
   const Options options =
-      parse({"mesh", file_.c_str(), "--labels", "1,5", "--background", "9", "--label-name",
-             "1=Left lung", "--label-name", "5=Heart", "--label-color", "5=#ff0000",
-             "--label-values", "5=5,6", "-o", glb.c_str()});
+      options_from({"mesh", file_, "--labels", "1,5", "--background", "9", "--label-name",
+                    "1=Left lung", "--label-name", "5=Heart", "--label-color", "5=#ff0000",
+                    "--label-values", "5=5,6", "-o", glb});
   const JobParameters& parameters = options.parameters;
   EXPECT_EQ(parameters.labels, (LabelChoice{{1, 5}}));
   EXPECT_EQ(parameters.background, 9);
   EXPECT_EQ(parameters.passes, label_parameters({}).passes);
   EXPECT_EQ(parameters.smoothing, Smoothing::kLabels);
   EXPECT_TRUE(parameters.regularize);
-  EXPECT_FALSE(
-      parse({"mesh", file_.c_str(), "--labels", "all", "--no-regularize", "-o", glb.c_str()})
-          .parameters.regularize);
+  EXPECT_FALSE(options_from({"mesh", file_, "--labels", "all", "--no-regularize", "-o", glb})
+                   .parameters.regularize);
   EXPECT_EQ(parameters.label_names, (LabelTexts{{1, "Left lung"}, {5, "Heart"}}));
   EXPECT_EQ(parameters.label_colors, (LabelTexts{{5, "#ff0000"}}));
   EXPECT_EQ(parameters.label_values, (LabelValues{{5, {5, 6}}}));
-  EXPECT_EQ(parse({"mesh", file_.c_str(), "--labels", "all", "--passes", "5", "-o", glb.c_str()})
+  EXPECT_EQ(options_from({"mesh", file_, "--labels", "all", "--passes", "5", "-o", glb})
                 .parameters.passes,
             5);
 }
 
 TEST_F(OptionsTest, RefusesWhatIsForLabelsWithoutThem) {
-  const auto status_with = [&](std::vector<const char*> more) {
-    more.insert(more.begin(), {"mesh", file_.c_str(), "-o", drc_.c_str()});
-    return ending_of(more).first;
+  const auto status_with = [&](const std::vector<std::string>& more) {
+    return end_of(with({"mesh", file_, "-o", drc_}, more)).first;
   };
   EXPECT_EQ(status_with({"--iso", "3"}), -1);
   EXPECT_EQ(status_with({}), 2);

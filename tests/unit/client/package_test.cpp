@@ -1,7 +1,6 @@
 #include "client/isomesh/package.h"
 
 #include <algorithm>
-#include <map>
 
 #include <archive.h>
 #include <archive_entry.h>

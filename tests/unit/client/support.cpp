@@ -1,6 +1,5 @@
 #include "tests/unit/client/support.h"
 
-#include <array>
 #include <stdexcept>
 
 #include <arpa/inet.h>
@@ -135,13 +134,19 @@ Job finished_job(const std::string& id, const std::string& mesh_bytes) {
   return job;
 }
 
-Error error_of(const std::function<void()>& action) {
+cli::Options options_from(const std::vector<std::string>& words) {
+  std::vector<const char*> arguments = {"isomesh"};
+  for (const std::string& word : words) arguments.push_back(word.c_str());
+  return cli::parse_options(static_cast<int>(arguments.size()), arguments.data());
+}
+
+std::pair<int, std::string> end_of(const std::vector<std::string>& words) {
   try {
-    action();
-  } catch (const Error& error) {
-    return error;
+    options_from(words);
+  } catch (const cli::EarlyExit& exit) {
+    return {exit.status(), exit.what()};
   }
-  return {ErrorCode::kInternal, "nothing was thrown"};
+  return {-1, ""};
 }
 
 }  // namespace isomesh::test

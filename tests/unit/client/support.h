@@ -5,13 +5,17 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <httplib.h>
 
+#include "client/cli/options.h"
 #include "client/isomesh/client.h"
 #include "proto/types.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/process.h"
 
 namespace isomesh::test {
 
@@ -73,7 +77,10 @@ void answer_with(httplib::Response& response, const Error& error);
 // A job that has succeeded with one Draco file of these bytes.
 Job finished_job(const std::string& id, const std::string& mesh_bytes);
 
-// The Error that `action` throws; one with the detail "nothing was thrown" when it does not.
-Error error_of(const std::function<void()>& action);
+// The options of the command with these arguments.
+cli::Options options_from(const std::vector<std::string>& words);
+
+// The status and the text that the arguments end with; -1 if they are accepted.
+std::pair<int, std::string> end_of(const std::vector<std::string>& words);
 
 }  // namespace isomesh::test
