@@ -53,7 +53,7 @@ struct Node {
 
   static JobStoreOptions for_tests(JobStoreOptions options) {
     options.retry_delay = milliseconds(0);
-    options.mesher_version = "test";
+    if (options.mesher_version.empty()) options.mesher_version = "test";
     return options;
   }
 

@@ -42,7 +42,7 @@ TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
   ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
       "queued_owners; DROP TABLE turns; DROP TABLE tasks; DROP INDEX jobs_by_turn; ALTER TABLE "
       "jobs DROP COLUMN "
-      "cost; "
+      "cost, DROP COLUMN version; DROP FUNCTION claim_job; "
       "CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; UPDATE isomesh_version SET "
       "version = 1");
   one_.emplace(url_, "one", blobs_);
