@@ -44,6 +44,7 @@
 #include "server/net/descriptors.h"
 #include "server/net/tls.h"
 #include "server/options.h"
+#include "server/process/child.h"
 #include "server/record_stores.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
@@ -62,11 +63,11 @@ std::uint64_t default_job_memory(std::size_t workers) {
 }
 
 // In the folder of a build or of an installation.
-std::filesystem::path program_of_ours(const std::string& name) {
+process::Program program_of_ours(const std::string& name) {
   const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   for (const auto& program :
        {folder / name, (folder / ISOMESH_LIBEXEC / name).lexically_normal()}) {
-    if (::access(program.c_str(), X_OK) == 0) return program;
+    if (::access(program.c_str(), X_OK) == 0) return process::hold_program(program);
   }
   throw Error(ErrorCode::kInternal, "the program " + name +
                                         " is missing: it is neither beside isomeshd nor in " +

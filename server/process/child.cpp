@@ -10,6 +10,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -58,15 +59,15 @@ class Inheritance {
   Inheritance(const Inheritance&) = delete;
   Inheritance& operator=(const Inheritance&) = delete;
 
-  pid_t start(const std::filesystem::path& program) const {
-    std::string name = program.filename();
+  pid_t start(const Program& program) const {
+    std::string name = program.name;
     const std::array<char*, 2> arguments = {name.data(), nullptr};
     // All symbols are found before main(): each copy of the program would look up again whatever
     // it had not yet called.
     std::string bind_now = "LD_BIND_NOW=1";
     const std::array<char*, 2> environment = {bind_now.data(), nullptr};
     pid_t pid = -1;
-    require_spawn(::posix_spawn(&pid, program.c_str(), &files_, &attributes_, arguments.data(),
+    require_spawn(::posix_spawn(&pid, program.file.c_str(), &files_, &attributes_, arguments.data(),
                                 environment.data()),
                   "posix_spawn");
     return pid;
@@ -176,7 +177,19 @@ std::string how_it_ended(const std::optional<int>& status) {
   return "with signal " + std::to_string(WTERMSIG(*status)) + " (" + name + ')';
 }
 
-Child start_program(const std::filesystem::path& program) {
+Program hold_program(const std::filesystem::path& path) {
+  Program program = path;
+  program.held = std::make_shared<const Descriptor>(::open(path.c_str(), O_PATH | O_CLOEXEC));
+  const int number = program.held->number();
+  if (number < 0) throw_system_error("open", errno);
+  // Not "self": a program inherits no such descriptor.
+  program.file = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(number);
+  return program;
+}
+
+void show_name() { ::prctl(PR_SET_NAME, program_invocation_short_name); }
+
+Child start_program(const Program& program) {
   SocketPair sockets = make_socket_pair();
   const pid_t pid = Inheritance(sockets.theirs.number()).start(program);
   return {pid, std::move(sockets.ours)};

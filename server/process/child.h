@@ -4,10 +4,12 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <sys/types.h>
 
@@ -88,9 +90,29 @@ class Child {
 // Ends a sentence.
 std::string how_it_ended(const std::optional<int>& status);
 
+// A program: its file, and the name of its processes.
+struct Program {
+  Program(std::filesystem::path path = {})  // NOLINT(google-explicit-constructor)
+      : file(std::move(path)), name(file.filename()) {}
+  Program(const char* path)  // NOLINT(google-explicit-constructor)
+      : Program(std::filesystem::path(path)) {}
+
+  std::filesystem::path file;
+  std::string name;
+  std::shared_ptr<const Descriptor> held = {};  // the opened file, if `file` is a link to it
+};
+
+// The program that is in the file now, also after an upgrade of the package has replaced the file:
+// this process understands no other one. The program calls show_name(). Throws Error kInternal.
+Program hold_program(const std::filesystem::path& path);
+
+// Called by a program first: gives its process the program's name. The name of a program that is
+// held would be the number of a descriptor.
+void show_name();
+
 // Starts a program that inherits only one end of a socket: its environment is empty, its signal
 // handlers are the defaults, and it leads a process group of its own. Safe with threads running.
 // Throws Error kInternal.
-Child start_program(const std::filesystem::path& program);
+Child start_program(const Program& program);
 
 }  // namespace isomesh::process

@@ -75,6 +75,7 @@ void become_copy(Descriptor socket, const std::function<void()>& work) {
 }  // namespace
 
 void serve_copies(const std::function<void()>& work) {
+  show_name();
   die_with_daemon(kChildDescriptor);
   for (;;) {
     Descriptor socket = receive_descriptor();

@@ -18,8 +18,8 @@ constexpr milliseconds kLongestPause{1000};
 
 }  // namespace
 
-PreparedProcesses::PreparedProcesses(const std::filesystem::path& program, std::size_t count)
-    : program_(program), count_(count), keeper_([this](const std::stop_token& end) {
+PreparedProcesses::PreparedProcesses(Program program, std::size_t count)
+    : program_(std::move(program)), count_(count), keeper_([this](const std::stop_token& end) {
         keep(stop_.get_token());
         // Keep running: taken children would die with this thread.
         Lock lock(mutex_);

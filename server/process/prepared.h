@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <filesystem>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -18,7 +17,7 @@ namespace isomesh::process {
 // Keeps `count` copies of a program that serves copies (fork_server.h). Thread safe.
 class PreparedProcesses {
  public:
-  PreparedProcesses(const std::filesystem::path& program, std::size_t count);
+  PreparedProcesses(Program program, std::size_t count);
   // Ends the prepared processes. Taken ones also die with this object, whoever owns them.
   ~PreparedProcesses();
   PreparedProcesses(const PreparedProcesses&) = delete;
@@ -41,7 +40,7 @@ class PreparedProcesses {
   void prepare_one(const std::stop_token& stop);
   Child copy(std::uint64_t generation, const std::stop_token& stop);
 
-  const std::filesystem::path program_;
+  const Program program_;
   const std::size_t count_;
   Mutex mutex_;
   Condition changed_;

@@ -9,6 +9,7 @@
 #include "base/share.h"
 #include "proto/error.h"
 #include "proto/json.h"
+#include "proto/json_values.h"
 #include "server/store/microseconds.h"
 
 namespace isomesh::store {
@@ -55,15 +56,24 @@ void throw_no_volume(bool is_gone) {
 }
 
 std::optional<Job> readable_job(const std::string& record, const std::string& id,
-                                const std::string& volume) {
+                                const std::string& volume, bool is_newer) {
   try {
     Job job = job_from_record(record);
     if (job.id == id && (volume.empty() || job.parameters.volume == volume)) return job;
   } catch (const Error&) {
     // Logged below, as a record of another job is.
   }
-  log_error("the record of job {} is damaged: no version of this service wrote it", id);
+  if (!is_newer) {
+    log_error("the record of job {} is damaged: no version of this service wrote it", id);
+  }
   return std::nullopt;
+}
+
+std::string with_end_of(const Job& job, const std::string& record) {
+  JsonTree tree(record);
+  json_values::write_field(tree.root(), "state", job.state);
+  json_values::write_field(tree.root(), "finished", job.finished);
+  return dump(tree.root());
 }
 
 Job damaged_job(const JobColumns& columns) {
@@ -79,6 +89,12 @@ Job damaged_job(const JobColumns& columns) {
 }
 
 void throw_damaged_job() { throw Error(ErrorCode::kInternal, kDamagedJob, {{"id", kDamagedJob}}); }
+
+void throw_newer_job() {
+  throw Error(ErrorCode::kUnavailable,
+              "a newer version of the service accepted this job, and this daemon cannot read it: "
+              "try again");
+}
 
 void throw_no_job(bool is_gone) {
   if (is_gone) throw Error(ErrorCode::kGone, "the job has expired");

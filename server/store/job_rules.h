@@ -37,9 +37,14 @@ struct JobColumns {
 };
 
 // The job in a record. Empty if the record is damaged, which is logged: it must not hide or block
-// other jobs. The volume of the job's columns is compared, too, if the caller knows it.
+// other jobs. The volume of the job's columns is compared, too, if the caller knows it. A record of
+// a newer version is not damaged if this version cannot read it, so that is not logged.
 std::optional<Job> readable_job(const std::string& record, const std::string& id,
-                                const std::string& volume = {});
+                                const std::string& volume = {}, bool is_newer = false);
+
+// The record of a newer version with the end of the job, without losing what only that version
+// knows.
+std::string with_end_of(const Job& job, const std::string& record);
 
 // Stands for a job with a damaged record. Its parameters are lost, so it can only fail, with the
 // error that this sets.
@@ -47,6 +52,8 @@ Job damaged_job(const JobColumns& columns);
 
 // Throws Error kInternal.
 [[noreturn]] void throw_damaged_job();
+// Throws Error kUnavailable: another daemon can respond.
+[[noreturn]] void throw_newer_job();
 
 // Throws Error kNotFound, or kGone if the job's volume has expired.
 [[noreturn]] void throw_no_volume(bool is_gone);

@@ -129,6 +129,9 @@ struct JobStoreOptions {
   // After the first attempt; four times longer after each further one.
   std::chrono::milliseconds retry_delay{1000};
   std::string mesher_version = {};  // meshes of other versions are not reused
+  // For engines shared by several processes: of the jobs that this process accepts. Newer jobs are
+  // left to newer processes, and an older job becomes one of this version when it is claimed.
+  int job_version = 1;
   // For engines shared by several processes: the time after an outage during which expired leases
   // of other processes are not reaped. All processes see the outage and holders keep trying to
   // renew, so a holder that is alive has renewed by then.

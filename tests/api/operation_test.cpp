@@ -58,6 +58,24 @@ TEST(Start, WithoutStandardDescriptors) {
   EXPECT_EQ(daemon.wait(), 0);
 }
 
+// As an upgrade of the package replaces them, a while before it restarts the daemon.
+TEST(Start, TheProgramsMayBeReplacedAfterIt) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  const fs::path programs = folder / "programs";
+  fs::create_directory(programs);
+  for (const std::string name : {"isomeshd", "isomesh-import", "isomesh-job"}) {
+    fs::copy_file(fs::path(ISOMESHD).parent_path() / name, programs / name);
+  }
+  const std::string replace = "shift; exec " + (programs / "isomeshd").string() + " \"$@\"";
+  const Daemon daemon(folder / "data", "127.0.0.1:0", {}, {"bash", "-c", replace, "bash"});
+  for (const std::string name : {"isomesh-import", "isomesh-job"}) {
+    fs::remove(programs / name);
+    fs::copy_file("/bin/false", programs / name);
+  }
+  EXPECT_EQ(finished_job(daemon).state, JobState::kSucceeded);
+}
+
 TEST(Start, HelpAndVersion) {
   const Finished help = run({ISOMESHD, "--help"});
   EXPECT_EQ(help.status, 0);

@@ -14,6 +14,7 @@
 #include "server/http/observe/metrics.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/volume_library.h"
+#include "server/process/child.h"
 #include "server/store/audit_trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/expiry.h"
@@ -32,7 +33,7 @@ struct WingSettings {
   std::uint64_t max_upload_bytes = 0;
   std::chrono::hours keep{30 * 24};  // for ended work
   // The programs of this installation. Throws Error kInternal when one is missing.
-  std::function<std::filesystem::path(const std::string& name)> program;
+  std::function<process::Program(const std::string& name)> program;
 };
 
 // Dependencies of a wing, which must outlive it.

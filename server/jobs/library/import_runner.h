@@ -17,7 +17,7 @@ struct RunnerOptions {
   process::ImportBounds bounds;
   // Further imports wait; also the number of idle processes kept ready.
   std::size_t at_once = 2;
-  std::filesystem::path program;  // isomesh-import
+  process::Program program;  // isomesh-import
 };
 
 // The bounds of one import: at most `most`, and less time for a small upload, which takes long only

@@ -277,6 +277,7 @@ const char* __tsan_default_options() { return "halt_on_error=1"; }
 #endif
 
 int main() {
+  process::show_name();
   be_nicer(kJobNiceness);
   keep_freed_memory();
   Lines lines;

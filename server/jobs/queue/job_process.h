@@ -20,7 +20,7 @@
 namespace isomesh::jobs {
 
 struct JobProgram {
-  std::filesystem::path file;  // isomesh-job
+  process::Program file;  // isomesh-job
   JobSetup setup;
 };
 

@@ -42,8 +42,8 @@ DECLARE s record; old record; n bigint; latest text;
 BEGIN
   SELECT * INTO s FROM jsonb_to_record(p) AS t(
     id text, owner text, priority int, volume text, result_key text, accepted bigint, receiver text, url text,
-    idempotency_key text, request_digest text, record text, cost bigint, node uuid, latest text, reuses boolean,
-    blobs jsonb, most bigint, has_share boolean);
+    idempotency_key text, request_digest text, record text, cost bigint, version int, node uuid, latest text,
+    reuses boolean, blobs jsonb, most bigint, has_share boolean);
   IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = s.id) THEN  -- asked again after a lost connection
     RETURN QUERY SELECT 'new', s.id;
     RETURN;
@@ -76,9 +76,9 @@ BEGIN
     IF NOT s.has_share THEN RETURN QUERY SELECT 'no share', NULL::text; RETURN; END IF;
   END IF;
   INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
-                   request_digest, record, cost)
+                   request_digest, record, cost, version)
     VALUES(s.id, s.owner, {job.queued}, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url,
-           s.idempotency_key, s.request_digest, s.record, coalesce(s.cost, 1000000))  -- older daemons tell none
+           s.idempotency_key, s.request_digest, s.record, coalesce(s.cost, 1000000), coalesce(s.version, 1))  -- older daemons tell none
     ON CONFLICT DO NOTHING;
   IF NOT FOUND THEN                    -- two with one key
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
@@ -97,8 +97,9 @@ END $$;
 
 -- A claim that is lost with the database's power is made again, so it does not wait for the disk. The fence is
 -- never one that a lost claim had: the time is in it. Claims are made one after the other, so that each sees the turns
--- that the others have taken.
-CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint)
+-- that the others have taken. Jobs of a newer version than p_newest wait for a newer daemon. An older one is not claimed
+-- but returned without a fence: the caller adopts it and claims again. Daemons of the first version do not tell theirs.
+CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint, p_newest int DEFAULT 1)
 RETURNS TABLE(id text, fence bigint, attempts int, owner text, record text, accepted bigint, claimed bigint)
 LANGUAGE plpgsql AS $$
 DECLARE turn record; c record; now_us bigint; f bigint;
@@ -110,6 +111,7 @@ BEGIN
     SELECT head.id, q.priority, q.start_tag INTO turn FROM queued_owners q CROSS JOIN LATERAL (
         SELECT j.id, j.seq FROM jobs j
           WHERE j.state = {job.queued} AND j.priority = q.priority AND j.owner = q.owner AND j.not_before <= now_us
+            AND j.version <= p_newest
             AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)
           ORDER BY j.seq LIMIT 1) AS head
       ORDER BY q.priority, q.start_tag, head.seq LIMIT 1;
@@ -117,9 +119,13 @@ BEGIN
       DELETE FROM turns;
       RETURN;
     END IF;
-    SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted, j.cost INTO c FROM jobs j
+    SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted, j.cost, j.version INTO c FROM jobs j
       WHERE j.id = turn.id AND j.state = {job.queued} FOR UPDATE;
     CONTINUE WHEN NOT FOUND;           -- cancelled meanwhile
+    IF c.version < p_newest THEN
+      RETURN QUERY SELECT c.id, NULL::bigint, c.attempts, c.owner, c.record, c.accepted, now_us;
+      RETURN;
+    END IF;
     f := greatest(c.fence + 1, now_us);
     INSERT INTO runs(job, fence, owner, result_key, node, worker, claimed, lease_until)
       VALUES(c.id, f, c.owner, c.result_key, p_node, p_worker, now_us, now_us + p_lease);
@@ -156,6 +162,7 @@ END $$;
 --   cancelled        the record, should it have been asked to stop
 --   blobs            of the mesh of one that succeeded
 --   alike            those like it that end with it, as far as the caller knows: objects of `id` and `record`
+--   newest           the version of those that the caller can read
 -- The outcome is 'lost' (the lease), 'done', or 'alike': these jobs are to be told of, too.
 CREATE OR REPLACE FUNCTION finish_run(p jsonb) RETURNS TABLE(outcome text, id text, record text, accepted bigint)
 LANGUAGE plpgsql AS $$
@@ -163,7 +170,7 @@ DECLARE s record; j record; r record; other record;
 BEGIN
   SELECT * INTO s FROM jsonb_to_record(p) AS t(
     id text, fence bigint, node uuid, is_again boolean, ends_others boolean, state int, record text, delay bigint,
-    waiting_for int, counts boolean, cancelled text, blobs jsonb, alike jsonb);
+    waiting_for int, counts boolean, cancelled text, blobs jsonb, alike jsonb, newest int);
   SELECT t.owner, t.result_key, t.ended_by INTO j FROM jobs t WHERE t.id = s.id FOR UPDATE;
   SELECT t.cancelling, t.lease_until, t.node INTO r FROM runs t WHERE t.job = s.id AND t.fence = s.fence FOR UPDATE;
   IF NOT FOUND OR (s.ends_others AND r.lease_until >= isomesh_now() AND NOT EXISTS (
@@ -180,9 +187,11 @@ BEGIN
   IF s.state = {job.succeeded} THEN
     PERFORM pg_advisory_xact_lock(alike_lock(j.owner, j.result_key));
     IF EXISTS (SELECT 1 FROM jobs a WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued}
+                 AND a.version <= coalesce(s.newest, 1)
                  AND a.id NOT IN (SELECT t.id FROM jsonb_to_recordset(s.alike) AS t(id text))) THEN
       RETURN QUERY SELECT 'alike', a.id, a.record, a.accepted FROM jobs a
-        WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued} ORDER BY a.id;
+        WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued}
+          AND a.version <= coalesce(s.newest, 1) ORDER BY a.id;
       RETURN;
     END IF;
   END IF;

@@ -125,6 +125,7 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
       .put("request_digest", spec.request_digest)
       .put("record", to_record(job))
       .put("cost", found.cost_us)
+      .put("version", options_.job_version)
       .put("node", database_.node())
       .put("latest", made ? Text(made->job) : Text())
       .put("reuses", mesh != nullptr)
@@ -158,6 +159,10 @@ std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
                                              std::chrono::milliseconds lease) {
   Steady asked;
   while (const auto claimed = take_next(worker, lease, asked)) {
+    if (claimed->is_null(1)) {
+      adopt(*claimed);
+      continue;
+    }
     const auto job = readable_job(claimed->text(4), claimed->text(0));
     if (job) return begin_run(*claimed, *job, asked, lease);
     fail_damaged(claimed->text(0), static_cast<std::uint64_t>(claimed->integer(1)));
@@ -181,11 +186,27 @@ std::optional<Rows> PostgresJobStore::take_next(const std::string& worker,
     }
     rows = connection.query(
         "SELECT id, fence, attempts, owner, record, accepted, claimed, "
-        "pg_current_xact_id_if_assigned()::text::bigint FROM claim_job(?1::uuid, ?2, ?3)",
-        database_.node(), worker, microseconds(lease));
+        "pg_current_xact_id_if_assigned()::text::bigint FROM claim_job(?1::uuid, ?2, ?3, ?4::int)",
+        database_.node(), worker, microseconds(lease), options_.job_version);
     if (!rows->next()) rows.reset();
     return rows;
   });
+}
+
+void PostgresJobStore::adopt(const Rows& older) {
+  const std::string id = older.text(0);
+  std::optional<Asked> asked;
+  if (const auto job = readable_job(older.text(4), id)) {
+    JobSpec spec;
+    spec.owner = older.text(3);
+    spec.parameters = job->parameters;
+    asked = database_.read([&](SqlConnection& connection) { return look_up(connection, spec); });
+  }
+  const auto key = asked ? std::optional(asked->result_key) : std::nullopt;
+  database_.run(Change::kRepeatable,
+                "UPDATE jobs SET version = ?2, result_key = coalesce(?3, result_key) WHERE id = ?1 "
+                "AND state = {job.queued} AND version < ?2",
+                id, options_.job_version, key);
 }
 
 // Without this, the job would be claimed again and again.
@@ -319,7 +340,7 @@ std::size_t PostgresJobStore::reap() {
     const Row row = row_of(rows);
     Ending ending;
     ending.ends_others = true;
-    ending.cancelled = to_record(cancelled(row.job, row.accepted));
+    ending.cancelled = cancelled_record(row);
     if (end_run(row.job.id, row.fence, ending)) ++reaped;
   }
   return reaped;
@@ -356,7 +377,8 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
       .put("counts", ending.counts)
       .put("cancelled", ending.cancelled)
       .put("blobs", blobs_told(ending.mesh))
-      .put("alike", std::vector<Alike>());
+      .put("alike", std::vector<Alike>())
+      .put("newest", options_.job_version);
   while (true) {
     Rows rows = database_.ask([&](Connection& connection, bool was_interrupted) {
       if (was_interrupted) asked.put("is_again", true);
@@ -399,16 +421,15 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
 Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
   const Row row =
       database_.read([&](SqlConnection& connection) { return found(connection, viewer, id); });
-  if (row.is_damaged && is_final(row.job.state)) {
+  if (row.is_damaged && !row.is_newer && is_final(row.job.state)) {
     return database_.change(Change::kRepeatable, [&](SqlTransaction& transaction) {
       const Job repaired = repair_ended(transaction.connection(), row);
       transaction.commit();
       return repaired;
     });
   }
-  if (is_final(row.job.state)) return row.job;
-  const Job ended = cancelled(row.job, row.accepted);
-  Rows after = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_record(ended),
+  if (is_final(row.job.state)) return intact(row).job;
+  Rows after = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, cancelled_record(row),
                                database_.node());
   after.next();
   if (after.is_null(0)) return get(viewer, id);  // removed meanwhile
@@ -420,7 +441,18 @@ Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
     const auto run = live_.find(id);
     if (run != live_.end()) run->second.lease_until = {};
   }
+  if (row.is_damaged && row.is_newer) {  // its columns tell enough
+    Job job = row.job;
+    job.state = state;
+    job.error.reset();
+    return job;
+  }
   return get(viewer, id);
+}
+
+std::string PostgresJobStore::cancelled_record(const Row& row) const {
+  const Job job = cancelled(row.job, row.accepted);
+  return row.is_newer ? with_end_of(job, row.record) : to_record(job);
 }
 
 Job PostgresJobStore::cancelled(Job job, std::int64_t accepted) const {

@@ -16,7 +16,7 @@ PostgresJobStore::PostgresJobStore(Database& database, BlobStore& blobs, JobStor
     : SqlJobStore(database, blobs, std::move(options),
                   "SELECT j.record, j.owner, j.result_key, j.accepted, j.attempts, j.fence, "
                   "j.state, j.waiting_for, r.claimed, r.stage, r.progress, r.timings, "
-                  "j.id, j.state, j.volume, j.priority FROM jobs j "
+                  "j.id, j.state, j.volume, j.priority, j.version FROM jobs j "
                   "LEFT JOIN runs r ON r.job = j.id "),
       database_(database),
       feed_(database),
@@ -49,9 +49,10 @@ void PostgresJobStore::wake_workers() {
 
 std::optional<std::chrono::microseconds> PostgresJobStore::until_ready() const {
   Rows row = database_.query(
-      "SELECT min(not_before) - isomesh_now() FROM jobs j WHERE state = {job.queued} AND NOT "
-      "EXISTS (SELECT 1 "
-      "FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)");
+      "SELECT min(not_before) - isomesh_now() FROM jobs j WHERE state = {job.queued} AND "
+      "version <= ?1 AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.owner = j.owner AND "
+      "r.result_key = j.result_key)",
+      options_.job_version);
   row.next();
   if (row.is_null(0)) return std::nullopt;
   return std::chrono::microseconds(row.integer(0));
@@ -90,7 +91,7 @@ std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::str
 }
 
 PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
-  Row row = read_row(rows, 12);
+  Row row = read_row(rows, 12, rows.integer(16) > options_.job_version);
   row.job.state = static_cast<JobState>(rows.integer(6));
   if (!rows.is_null(7)) row.job.waiting_for = static_cast<WaitingFor>(rows.integer(7));
   if (row.job.state != JobState::kRunning || rows.is_null(8)) return row;

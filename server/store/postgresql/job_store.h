@@ -59,12 +59,16 @@ class PostgresJobStore : public SqlJobStore {
   // One attempt; empty if equal jobs changed meanwhile, so that the caller must retry.
   std::optional<Submission> try_to_submit(const JobSpec& spec, Job job);
   Job cancelled(Job job, std::int64_t accepted) const;
+  std::string cancelled_record(const Row& row) const;
   // Claims the next job in the database; empty if none is ready. Sets `asked` to the time of the
   // request.
   std::optional<Rows> take_next(const std::string& worker, std::chrono::milliseconds lease,
                                 Steady& asked);
   Lease begin_run(const Rows& claimed, const Job& job, Steady asked,
                   std::chrono::milliseconds lease);
+  // Makes a queued job of an older version one of this version, so that its mesh gets the key of
+  // the version that makes it. Takes a row of claim_job().
+  void adopt(const Rows& older);
   // Ends the run of a job whose record is damaged.
   void fail_damaged(const std::string& id, std::uint64_t fence);
   bool end_run(const std::string& id, std::uint64_t fence, const Ending& ending);

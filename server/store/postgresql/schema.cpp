@@ -245,6 +245,10 @@ CREATE TABLE tasks(                    -- that one process has at a time; see He
   folder text NOT NULL,                -- its data folder; a process that starts there is its successor
   held_until bigint NOT NULL
 ) WITH (fillfactor = 50);
+)sql",
+                                R"sql(
+ALTER TABLE jobs ADD COLUMN version int NOT NULL DEFAULT 1;  -- see JobStoreOptions::job_version
+DROP FUNCTION IF EXISTS claim_job(uuid, text, bigint);
 )sql"};
 
 constexpr std::int64_t kChained = 4;  // the first version whose audit trail has digests

@@ -8,18 +8,13 @@
 #include "server/store/sql/expiry.h"
 
 namespace isomesh::store {
-namespace {
-
-// Throws Error kInternal if the row's record is damaged.
-template <class Row>
-Row intact(Row row) {
-  if (row.is_damaged) throw_damaged_job();
-  return row;
-}
-
-}  // namespace
 
 // --- Queries
+
+SqlJobStore::Row SqlJobStore::intact(Row row) {
+  if (row.is_damaged) row.is_newer ? throw_newer_job() : throw_damaged_job();
+  return row;
+}
 
 Job SqlJobStore::get(const Viewer& viewer, const std::string& id) const {
   return records_.read([&](SqlConnection& connection) {
@@ -106,7 +101,7 @@ SqlJobStore::Row SqlJobStore::found(SqlConnection& connection, const Viewer& vie
   throw_no_job(has_expired(connection, viewer, id));
 }
 
-SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns) {
+SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns, bool is_newer) {
   Row row;
   row.owner = rows.text(1);
   row.result_key = rows.text(2);
@@ -118,7 +113,9 @@ SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns) {
                             .volume = rows.text(columns + 2),
                             .priority = static_cast<Priority>(rows.integer(columns + 3)),
                             .accepted_us = row.accepted};
-  auto job = readable_job(rows.text(0), known.id, known.volume);
+  row.is_newer = is_newer;
+  if (is_newer) row.record = rows.text(0);
+  auto job = readable_job(rows.text(0), known.id, known.volume, is_newer);
   row.is_damaged = !job;
   row.job = job ? *std::move(job) : damaged_job(known);
   return row;

@@ -39,6 +39,8 @@ class SqlJobStore : public JobStore {
   struct Row {
     Job job;
     bool is_damaged = false;  // the job is damaged_job()
+    bool is_newer = false;    // than this version, which may know only a part of `record`
+    std::string record;       // only of newer ones
     std::string owner;
     std::string result_key;
     std::int64_t accepted = 0;
@@ -88,7 +90,10 @@ class SqlJobStore : public JobStore {
   Row found(SqlConnection& connection, const Viewer& viewer, const std::string& id) const;
   // Reads the columns `record`, `owner`, `result_key`, `accepted`, `attempts` and `fence`, which
   // come first, and `id`, `state`, `volume` and `priority`, which begin at that number.
-  static Row read_row(const Rows& rows, int columns);
+  static Row read_row(const Rows& rows, int columns, bool is_newer = false);
+  // Throws Error kInternal if the row's record is damaged, and kUnavailable if only a newer version
+  // can read it.
+  static Row intact(Row row);
   // Cancels a job that has ended and whose record is damaged, so that its record is valid again.
   Job repair_ended(SqlConnection& connection, const Row& row) const;
   // Replaces recorded progress by newer progress of this process's own runs.

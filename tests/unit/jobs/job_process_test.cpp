@@ -345,6 +345,20 @@ TEST_F(JobProcessTest, AJobThatTakesMoreThanItMayIsToldSo) {
 
 #endif
 
+// As an upgrade of the package replaces it, while the daemon still runs.
+TEST_F(JobProcessTest, AProgramThatIsHeldOutlivesItsFile) {
+  const auto file = folder_ / "isomesh-job";
+  std::filesystem::copy_file(ISOMESH_JOB, file);
+  JobProgram program = job_program();
+  program.file = process::hold_program(file);
+  std::filesystem::remove(file);
+  std::filesystem::copy_file("/bin/false", file);
+  JobProcess process(program);
+  make(process, order_of(add_sphere(), 0.5));
+  EXPECT_FALSE(bytes_.at(0).empty());
+  EXPECT_EQ(started().size(), 1U) << "it shows its name";
+}
+
 TEST_F(JobProcessTest, ABackEndThatIsNotThereEndsTheOrder) {
   JobProgram program = job_program();
   program.setup.backend = "abacus";

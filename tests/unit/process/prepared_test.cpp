@@ -125,6 +125,21 @@ TEST(PreparedProcesses, AreOfANewProgramAfterRenewal) {
   EXPECT_NE(answer_of(prepared.take(soon()), "which"), first);
 }
 
+TEST(PreparedProcesses, OfAProgramThatIsHeldAreNeverOfAnotherOne) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path file = folder / "some-program";
+  std::filesystem::copy_file(COPIED_PROGRAM, file);
+  PreparedProcesses prepared(hold_program(file), 1);
+  std::filesystem::remove(file);
+  std::filesystem::copy_file("/bin/true", file);
+  for (int renewals = 0; renewals < 2; ++renewals) {
+    const Child child = prepared.take(soon());
+    EXPECT_EQ(test::program_of(child.pid()), "some-program");
+    EXPECT_EQ(answer_of(child), "questions 1, descriptors 4");
+    prepared.renew();
+  }
+}
+
 TEST(PreparedProcesses, AProgramThatIsNotThereIsAnErrorEachTime) {
   PreparedProcesses prepared("/nonexistent", 1);
   for (int run = 0; run < 2; ++run) EXPECT_THROW(prepared.take(at_once()), Error);

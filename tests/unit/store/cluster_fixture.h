@@ -53,7 +53,7 @@ struct Node {
 
   static JobStoreOptions for_tests(JobStoreOptions options) {
     options.retry_delay = milliseconds(0);
-    options.mesher_version = "test";
+    if (options.mesher_version.empty()) options.mesher_version = "test";
     return options;
   }
 
@@ -114,8 +114,9 @@ class ClusterTest : public testing::Test {
   void make_version_one() {
     ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
         "queued_owners; DROP TABLE turns; DROP TABLE tasks; DROP INDEX jobs_by_turn; ALTER TABLE "
-        "jobs DROP COLUMN cost; CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; "
-        "UPDATE isomesh_version SET version = 1");
+        "jobs DROP COLUMN cost, DROP COLUMN version; DROP FUNCTION claim_job; "
+        "CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; UPDATE isomesh_version "
+        "SET version = 1");
   }
   // As when their time is over.
   void end_leases() { ask("UPDATE runs SET lease_until = 0"); }
