@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/files.h"
@@ -10,6 +10,7 @@
 #include "proto/error.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/vti_document.h"
+#include "server/import/formats/vtk.h"
 
 namespace isomesh::import {
 namespace {
@@ -32,34 +33,11 @@ std::array<double, Count> numbers_of(const VtiAttributes& attributes, std::strin
                  " finite numbers.");
 }
 
-struct Extent {
-  std::array<std::int64_t, 3> first = {0, 0, 0};
-  std::array<std::uint32_t, 3> dims = {0, 0, 0};
-
-  bool operator==(const Extent&) const = default;
-};
-
-Extent extent_of(const VtiAttributes& attributes, std::string_view name) {
-  const auto parts = words(attribute_of(attributes, name));
-  constexpr std::int64_t kFarthest = std::numeric_limits<std::int32_t>::max();
-  Extent extent;
-  std::array<std::uint64_t, 3> sizes = {0, 0, 0};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto first = parts.size() == 6 ? parse_int64(parts[axis * 2]) : std::nullopt;
-    const auto last = parts.size() == 6 ? parse_int64(parts[axis * 2 + 1]) : std::nullopt;
-    if (!first || !last || std::abs(*first) > kFarthest || std::abs(*last) > kFarthest ||
-        *last < *first) {
-      throw_unusable("The VTK file's " + in_quotes(name) +
-                     " is not the first and last index along each of three axes.");
-    }
-    extent.first[axis] = *first;
-    sizes[axis] = static_cast<std::uint64_t>(*last - *first + 1);
-  }
-  extent.dims = volume_dims(sizes);
-  return extent;
+VtkExtent extent_of(const VtiAttributes& attributes, std::string_view name) {
+  return vtk_extent(attribute_of(attributes, name), name);
 }
 
-Geometry geometry_of_image(const VtiAttributes& image, const Extent& extent,
+Geometry geometry_of_image(const VtiAttributes& image, const VtkExtent& extent,
                            const Vector3& default_spacing) {
   Geometry geometry;
   geometry.spacing = numbers_of<3>(image, "Spacing", default_spacing);
@@ -94,37 +72,49 @@ StoredType type_of(const VtiArray& array) {
                  " is not supported. A sample must be one real number.");
 }
 
-// The array that is the scalars of points or cells, or the only one; null if there is none.
-const VtiArray* find_scalars(const VtiAttributes& data, const std::vector<VtiArray>& arrays) {
+bool has_one_component(const VtiArray& array) {
+  const std::string_view count = attribute_of(array.attributes, "NumberOfComponents");
+  return count.empty() || parse_uint64(count) == 1;
+}
+
+using Arrays = std::vector<const VtiArray*>;
+
+// The array that the file names as the scalars of points or cells. Without a name all that can be.
+Arrays find_scalars(const VtiAttributes& data, const std::vector<VtiArray>& arrays) {
   const std::string_view scalars = attribute_of(data, "Scalars");
-  const VtiArray* found = nullptr;
+  Arrays found;
   for (const VtiArray& array : arrays) {
-    if (!scalars.empty() && attribute_of(array.attributes, "Name") != scalars) continue;
-    if (found != nullptr) {
-      throw_unusable(
-          "The VTK file has several arrays of data, but does not say which one is its scalars.");
-    }
-    found = &array;
+    const std::string_view name = attribute_of(array.attributes, "Name");
+    const bool is_scalars =
+        scalars.empty() ? has_one_component(array) && !is_vtk_mask(name) : name == scalars;
+    if (is_scalars) found.push_back(&array);
   }
-  if (found != nullptr || scalars.empty()) return found;
+  if (!found.empty() || scalars.empty()) return found;
   throw_unusable("The VTK file has no array " + in_quotes(scalars) +
                  ", which it names as its scalars.");
 }
 
 struct Scalars {
-  const VtiArray& array;
+  Arrays arrays;  // not empty
   bool is_of_cells = false;
 };
 
-// Cells count only without any point data.
+// Cells count only without scalars of points.
 Scalars scalars_of(const VtiDocument& document) {
-  if (const VtiArray* found = find_scalars(document.point_data, document.point_arrays)) {
-    return {*found, false};
-  }
-  if (const VtiArray* found = find_scalars(document.cell_data, document.cell_arrays)) {
-    return {*found, true};
-  }
-  throw_unusable("The VTK file has neither point data nor cell data.");
+  Arrays found = find_scalars(document.point_data, document.point_arrays);
+  if (!found.empty()) return {std::move(found), false};
+  found = find_scalars(document.cell_data, document.cell_arrays);
+  if (!found.empty()) return {std::move(found), true};
+  throw_unusable("The VTK file has no array of single numbers, of points or of cells.");
+}
+
+const VtiArray& choose_array(const Arrays& arrays, const ImportOptions& options,
+                             SourceVolume& volume) {
+  const auto title = [&](std::uint64_t index) {
+    return vtk_array_title(attribute_of(arrays[index]->attributes, "Name"));
+  };
+  choose_volume(arrays.size(), {.what = "their array", .title = title}, options, volume);
+  return *arrays[std::exchange(volume.chosen, {}).index];
 }
 
 // The lattice of the cells' centres. An axis of one point has one cell without extent.
@@ -138,9 +128,9 @@ void move_to_cells(SourceVolume& volume) {
 }
 
 void check_components(const VtiArray& array) {
-  const std::string_view count = attribute_of(array.attributes, "NumberOfComponents");
-  if (count.empty() || parse_uint64(count) == 1) return;
-  throw_unusable("Each sample has " + in_quotes(count) +
+  if (has_one_component(array)) return;
+  throw_unusable("Each sample has " +
+                 in_quotes(attribute_of(array.attributes, "NumberOfComponents")) +
                  " components. A sample must be one real number.");
 }
 
@@ -262,19 +252,19 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   if (!attribute_of(document.image, "TimeValues").empty()) {
     throw_unusable("The VTK file holds a time series. Only single volumes are supported.");
   }
-  const Extent extent = extent_of(document.image, "WholeExtent");
+  const VtkExtent extent = extent_of(document.image, "WholeExtent");
   if (extent_of(document.piece, "Extent") != extent) {
     throw_unusable("The VTK file's piece does not fill its whole extent.");
   }
-  const auto [array, is_of_cells] = scalars_of(document);
-  check_components(array);
+  const auto [arrays, is_of_cells] = scalars_of(document);
   SourceVolume volume;
+  const VtiArray& array = choose_array(arrays, options, volume);
+  check_components(array);
   volume.dims = extent.dims;
   volume.assumes_spacing = attribute_of(document.image, "Spacing").empty();
   volume.geometry =
       geometry_of_image(document.image, extent, options.spacing.value_or(Vector3{1, 1, 1}));
   if (is_of_cells) move_to_cells(volume);
-  choose_volume(1, {}, options, volume);
   volume.layout.type = type_of(array);
   place_samples(file, document, array, volume);
   return volume;
@@ -283,7 +273,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
 MostBytes most_vti_bytes(const InputFile& beginning, const ImportTask& task) {
   // Per sample, in all arrays together: 32 numbers as text.
   constexpr std::uint64_t kMostPerSample = 1024;
-  const Extent extent = extent_of(read_vti_image(beginning), "WholeExtent");
+  const VtkExtent extent = extent_of(read_vti_image(beginning), "WholeExtent");
   const auto& dims = extent.dims;
   const std::uint64_t samples = std::uint64_t{dims[0]} * dims[1] * dims[2];
   const std::uint64_t most = task.limits.max_sample_bytes;

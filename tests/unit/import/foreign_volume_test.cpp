@@ -130,6 +130,11 @@ TEST_F(ForeignVolumes, StructuredPointsAreThoseOfVtk) {
   expect_same_file(
       "a.vtk",
       vtk_legacy(true, "CELL_DATA 12\n" + scalars + "1 2 3 4 5 6 7 8 9 10 11 12\n", "4 3 3"));
+  expect_same_file("a.vtk",
+                   "# vtk DataFile Version 3.0\ntitle\nascii\ndataset structured_points\n"
+                   "extent 2 5 -1 1 4 5\nspacing 1 2 3\norigin 10 20 30\npoint_data 24\n"
+                   "scalars s Short 1\nlookup_table default\n"
+                   "1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24\n");
 }
 
 TEST_F(ForeignVolumes, AfniIsThatOfNibabel) {
