@@ -12,6 +12,7 @@
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/kinds/describe.h"
 #include "server/import/dicom/kinds/object_kinds.h"
+#include "server/import/source/gzip.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/source.h"
 
@@ -59,7 +60,9 @@ Source describe_source(const NamedFile& from, const DicomFile& file) {
 
 bool begins_as_dicom(const std::filesystem::path& path) {
   const std::string head = InputFile(path).text(0, kSniffBytes);
-  return find_beginning(std::as_bytes(std::span(head))).has_value();
+  const auto bytes = std::as_bytes(std::span(head));
+  const std::string plain = is_gzip(bytes) ? inflate_head(bytes, kSniffBytes) : head;
+  return find_beginning(std::as_bytes(std::span(plain))).has_value();
 }
 
 class HeaderReader {
