@@ -89,6 +89,8 @@ const std::filesystem::path& companion(const std::string& name, const Companions
 struct DataFile {
   std::filesystem::path path;
   CompressedRange range;
+  // Not empty: the file's own layout, whose canonical type is the type of the volume's samples.
+  std::optional<SampleLayout> layout = {};
 };
 
 // The volume to read from a file. Volumes are consecutive, or take turns: `run` samples of the

@@ -157,13 +157,16 @@ TEST_F(ForeignVolumes, PagesOfTiffAreThoseOfPillow) {
                    {.spacing = std::array<double, 3>{1, 1, 1}});
 }
 
-// The file is a phantom's, with oblique slices of a real scanner; it comes with nibabel.
+// The files are a phantom's, with oblique slices of a real scanner; they come with nibabel.
 TEST_F(ForeignVolumes, ParRecIsThatOfNibabel) {
   const std::filesystem::path data = "/usr/lib/python3/dist-packages/nibabel/tests/data";
-  const std::string name = "phantom_EPI_asc_CLEAR_2_1";
-  const std::string upload = zip({{name + ".PAR", read_file(data / (name + ".PAR"))},
-                                  {name + ".REC", read_file(data / (name + ".REC"))}});
-  expect_same(import_bytes(upload, {}, {.volume = 1}), read_with_python(data / (name + ".PAR"), 1));
+  for (const std::string name : {"phantom_EPI_asc_CLEAR_2_1", "phantom_varscale"}) {
+    SCOPED_TRACE(name);
+    const std::string upload = zip({{name + ".PAR", read_file(data / (name + ".PAR"))},
+                                    {name + ".REC", read_file(data / (name + ".REC"))}});
+    expect_same(import_bytes(upload, {}, {.volume = 1}),
+                read_with_python(data / (name + ".PAR"), 1));
+  }
 }
 
 }  // namespace

@@ -434,6 +434,35 @@ TEST(ParRec, SlicesAreFoundByTheirPlace) {
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{1.5, 1.25, 3}));
 }
 
+TEST(ParRec, EachSliceHasItsOwnScale) {
+  const Outcome outcome = import_bytes(par_rec(
+      {{.slice = 1, .place = 1, .slope = 2}, {.slice = 2, .place = 0, .slope = 0.5}}, kSamples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(samples_of<float>(outcome)[0], 'm' * 2.0F);
+  EXPECT_EQ(samples_of<float>(outcome)[23], 'l' * 0.5F);
+}
+
+// They do not tell the weights of diffusion.
+TEST(ParRec, RepeatedSlicesOfVersion4AreVolumes) {
+  std::string header = par({{.slice = 1, .place = 0},
+                            {.slice = 2, .place = 1},
+                            {.slice = 1, .place = 2},
+                            {.slice = 2, .place = 3}});
+  const std::string second(kSamples.rbegin(), kSamples.rend());
+  const auto read = [&](const ImportOptions& options) {
+    return import_bytes(zip({{"a.PAR", header}, {"a.REC", kSamples + second}}), {}, options);
+  };
+  EXPECT_THAT(read({}).error, HasSubstr("there twice"));
+  const std::string later = " 1 1 7 0 0 0 0 1\n";  // the columns of 4.1 and 4.2
+  for (std::size_t at = header.find(later); at != header.npos; at = header.find(later)) {
+    header.replace(at, later.size(), "\n");
+  }
+  const Outcome refused = read({});
+  ASSERT_EQ(refused.remedy.choices.size(), 2);
+  EXPECT_EQ(refused.remedy.choices[1].title, "repetition 2");
+  EXPECT_EQ(read({.volume = 1}).sample_bytes(), second);
+}
+
 TEST(ParRec, AnInstantIsChosenAndMissingSlicesAreNamed) {
   const std::vector<ParImage> two = {{.slice = 1, .instant = 1, .place = 0},
                                      {.slice = 2, .instant = 1, .place = 1},
