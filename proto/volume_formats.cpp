@@ -23,11 +23,13 @@ constexpr VolumeFormat kVolumeFormats[] = {
     {.name = "vti",
      .title = "VTI",
      .suffixes = ".vti",
-     .content = "images of VTK's XML format with point data, or with cell data only"},
+     .content = "images of VTK's XML format with point data, or with cell data only; `volume=N` "
+                "chooses an array"},
     {.name = "vtk",
      .title = "VTK",
      .suffixes = ".vtk",
-     .content = "structured points in VTK's legacy format with point data, or with cell data only"},
+     .content = "structured points in VTK's legacy format with point data, or with cell data only; "
+                "`volume=N` chooses an array"},
     {.name = "mgh",
      .title = "MGH",
      .suffixes = ".mgh .mgz",

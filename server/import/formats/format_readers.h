@@ -69,8 +69,8 @@ bool is_vti(std::string_view head);
 bool may_hold_image(std::string_view head);
 // Reads the XML up to the samples. They are the scalars, of one component, in one piece that fills
 // the whole extent: of the point data, or, if there are none, of the cell data at the cells'
-// centres. VTK does not define its space's relation to the patient; LPS is assumed, as programs
-// based on ITK write it.
+// centres. Without named scalars, volumes are the arrays of one component. VTK does not define its
+// space's relation to the patient; LPS is assumed, as programs based on ITK write it.
 SourceVolume parse_vti(const InputFile& file, const Companions& companions,
                        const ImportOptions& options);
 // By the image's extent, with room for further arrays. Fails if the beginning does not have it.

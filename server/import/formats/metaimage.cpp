@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -82,10 +84,23 @@ bool flag(const HeaderTexts& fields, std::string_view name, bool otherwise) {
 
 bool is_detached(const HeaderTexts& fields) { return lower(value_of(fields, kLastKey)) != "local"; }
 
+// A pattern without its last number, or without any, counts the last axis, from 1.
+std::string whole_pattern(std::string_view said, const HeaderTexts& fields) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
+  const auto parts = words(said);
+  const auto sizes = words(value_of(fields, "DimSize"));
+  if (parts.size() > 2 || sizes.empty()) return std::string(said);
+  const auto first = parts.size() == 2 ? parse_uint64(parts[1]) : std::optional<std::uint64_t>(1);
+  const auto count = parse_uint64(sizes.back());
+  if (!first || !count || std::max(*first, *count) > kMost) return std::string(said);
+  return std::string(parts[0]) + ' ' + std::to_string(*first) + ' ' +
+         std::to_string(*first + *count - 1);
+}
+
 // The names of the data files. After "LIST" they follow the header, one per line.
 std::vector<std::string> data_names(const InputFile& file, const MetaHeader& header) {
   const std::string_view said = value_of(header.fields, kLastKey);
-  if (is_file_pattern(said)) return expand_file_pattern(said);
+  if (is_file_pattern(said)) return expand_file_pattern(whole_pattern(said, header.fields));
   if (!said.starts_with("LIST")) return {std::string(said)};
   const std::string text = file.text(header.bytes, kMostTextHeaderBytes);
   const auto names = lines(text);

@@ -36,9 +36,10 @@ void add_line(NrrdFields& fields, std::string_view line) {
   if (colon == std::string_view::npos) {
     throw_unusable("The NRRD header has a line that is not a field: " + in_quotes(line) + ".");
   }
-  // "key:=value" is private to a program; its key may equal a field's name.
-  if (line.substr(colon).starts_with(":=")) {
-    fields.emplace(own_key(line.substr(0, colon)), trimmed(line.substr(colon + 2)));
+  // "key:=value" is private to a program; its key may equal a field's name, or have colons.
+  const std::size_t equals = line.find(":=");
+  if (equals < line.find(": ")) {
+    fields.emplace(own_key(line.substr(0, equals)), trimmed(line.substr(equals + 2)));
     return;
   }
   const std::string name = field_name(line.substr(0, colon));

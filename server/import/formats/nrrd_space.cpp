@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -294,22 +295,23 @@ void turn_into_lps(Geometry& geometry, const Space& space) {
   }
 }
 
-// The unit of all axes; empty if the header has none.
-std::string unit_of(const NrrdFields& fields) {
+// The unit of all axes of the lattice; empty if the header has none. Components may have others.
+std::string unit_of(const NrrdFields& fields, const std::vector<std::string>& kinds) {
   const bool in_space = fields.contains("spaceunits");
   const std::string_view text = value_of(fields, in_space ? "spaceunits" : "units");
-  std::string unit;
-  for (std::size_t next = text.find('"'), axis = 0; next != text.npos && axis < 3; ++axis) {
+  std::vector<std::string_view> units;
+  for (std::size_t next = text.find('"'), axis = 0; next != text.npos && units.size() < 3; ++axis) {
     const std::size_t end = text.find('"', next + 1);
     if (end == text.npos) throw_unusable("The NRRD header's units are not in quotes.");
-    const std::string_view axis_unit = text.substr(next + 1, end - next - 1);
-    if (axis > 0 && axis_unit != unit) {
-      throw_unusable("The NRRD header has different units along its axes.");
+    if (in_space || axis >= kinds.size() || is_lattice_kind(kinds[axis])) {
+      units.push_back(text.substr(next + 1, end - next - 1));
     }
-    unit = axis_unit;
     next = text.find('"', end + 1);
   }
-  return unit;
+  if (std::ranges::adjacent_find(units, std::not_equal_to{}) != units.end()) {
+    throw_unusable("The NRRD header has different units along its axes.");
+  }
+  return units.empty() ? "" : std::string(units.front());
 }
 
 }  // namespace
@@ -423,7 +425,7 @@ Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t
   if (dimension == 0 && !axes.empty()) set_origin_from_mins(geometry, axes);
   if (const auto space = space_of(fields)) turn_into_lps(geometry, *space);
   if (is_unnamed_4d(fields, dimension)) place_as_slicer(fields, sizes, geometry, notes);
-  scale_to_millimetres(geometry, unit_of(fields), notes);
+  scale_to_millimetres(geometry, unit_of(fields, kinds), notes);
   return geometry;
 }
 

@@ -5,7 +5,9 @@
 #include <map>
 #include <numbers>
 #include <optional>
-#include <tuple>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
@@ -48,16 +50,17 @@ enum Column : std::size_t {
   kLabelType = 48,
 };
 
-// The images of a volume share these.
-using Key = std::array<double, 8>;
+// The images of a volume share these, and the repetition.
+using Key = std::array<double, 9>;
 constexpr std::array<std::size_t, 8> kKeyColumns = {kEcho,     kInstant,   kPhase,    kType,
                                                     kSequence, kDiffusion, kGradient, kLabelType};
-constexpr std::array<const char*, 8> kKeyNames = {"echo",     "instant", "phase",    "type",
-                                                  "sequence", "b value", "gradient", "label type"};
+constexpr std::array<const char*, 9> kKeyNames = {"echo",     "instant",    "phase",
+                                                  "type",     "sequence",   "b value",
+                                                  "gradient", "label type", "repetition"};
 
 Key key_of(const ImageRow& row) {
   Key key = {};
-  for (std::size_t at = 0; at < key.size(); ++at) {
+  for (std::size_t at = 0; at < kKeyColumns.size(); ++at) {
     if (kKeyColumns[at] < row.size()) key[at] = row[kKeyColumns[at]];
   }
   return key;
@@ -214,7 +217,13 @@ std::string title_of(const Volumes& volumes, std::uint64_t index) {
 
 Volumes volumes_of(const ParHeader& header) {
   Volumes volumes;
-  for (const ImageRow& row : header.rows) volumes[key_of(row)].push_back(&row);
+  std::map<std::pair<Key, double>, double> seen;
+  for (const ImageRow& row : header.rows) {
+    Key key = key_of(row);
+    // Version 4 has no columns for diffusion: only the order tells its weights apart.
+    if (row.size() == kColumnsOfV4) key.back() = ++seen[{key, row[kSlice]}];
+    volumes[key].push_back(&row);
+  }
   for (auto& [key, rows] : volumes) {
     std::ranges::sort(rows, {}, [](const ImageRow* row) { return (*row)[kSlice]; });
   }
@@ -232,10 +241,41 @@ void check_slices(const std::vector<const ImageRow*>& rows) {
   }
 }
 
+struct Slice {
+  std::uint64_t place = 0;  // in the REC, in images
+  SampleLayout layout;
+};
+
 struct Described {
   SourceVolume volume;
-  std::vector<std::uint64_t> places;  // of its slices in the REC, in images
+  std::vector<Slice> slices;
+
+  std::uint64_t slice_bytes() const {
+    return volume.sample_count() / volume.dims[2] * bytes_per_sample(slices.front().layout.type);
+  }
 };
+
+std::vector<Slice> slices_of(const std::vector<const ImageRow*>& rows) {
+  std::vector<Slice> slices;
+  for (const ImageRow* row : rows) {
+    const double bits = (*row)[kBits];
+    if (bits != 8 && bits != 16) {
+      throw_unusable("The images of the PAR header have " + to_text(bits) +
+                     " bits. 8 and 16 are supported.");
+    }
+    slices.push_back({.place = whole((*row)[kPlace], "index of an image"),
+                      .layout = {.type = bits == 8 ? StoredType::kUint8 : StoredType::kUint16,
+                                 .rescale = Rescale{(*row)[kSlope], (*row)[kIntercept]}}});
+  }
+  return slices;
+}
+
+// True if each slice has its own slope and intercept.
+bool differ(const std::vector<Slice>& slices) {
+  return std::ranges::any_of(slices, [&](const Slice& slice) {
+    return slice.layout.rescale != slices.front().layout.rescale;
+  });
+}
 
 Described describe(const ParHeader& header, const ImportOptions& options) {
   check_rows(header);
@@ -255,19 +295,10 @@ Described describe(const ParHeader& header, const ImportOptions& options) {
                                               whole(first[kHeight], "height of an image"),
                                               rows.size()};
   volume.dims = volume_dims(sizes);
-  if (first[kBits] != 8 && first[kBits] != 16) {
-    throw_unusable("The images of the PAR header have " + to_text(first[kBits]) +
-                   " bits. 8 and 16 are supported.");
-  }
-  volume.layout.type = first[kBits] == 8 ? StoredType::kUint8 : StoredType::kUint16;
-  const Rescale rescale = {first[kSlope], first[kIntercept]};
-  for (const ImageRow* row : rows) {
-    if ((*row)[kSlope] != rescale.slope || (*row)[kIntercept] != rescale.intercept) {
-      throw_unusable("The slices of the PAR header have different slopes and intercepts.");
-    }
-    result.places.push_back(whole((*row)[kPlace], "index of an image"));
-  }
-  if (rescale.slope != 1 || rescale.intercept != 0) volume.layout.rescale = rescale;
+  result.slices = slices_of(rows);
+  volume.layout = result.slices.front().layout;
+  if (volume.layout.rescale == Rescale{}) volume.layout.rescale.reset();
+  if (differ(result.slices)) volume.layout = {.type = StoredType::kFloat32, .rescale = {}};
   volume.geometry = geometry_of_header(header, volume);
   return result;
 }
@@ -291,16 +322,18 @@ bool is_par(std::string_view head) {
 SourceVolume parse_par(const InputFile& file, const Companions& companions,
                        const ImportOptions& options) {
   const std::filesystem::path path = companion(rec_name(companions), companions);
-  auto [volume, places] = describe(read_par_header(file.text(0, kMostParBytes)), options);
-  const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
+  Described described = describe(read_par_header(file.text(0, kMostParBytes)), options);
+  const std::uint64_t bytes = described.slice_bytes();
   const std::uint64_t size = InputFile(path).size();
-  for (const std::uint64_t place : places) {
-    if (size < slice || place > (size - slice) / slice) {
+  const bool is_converted = differ(described.slices);
+  for (const auto& [place, layout] : described.slices) {
+    if (size < bytes || place > (size - bytes) / bytes) {
       throw_unusable("The REC file is truncated: image " + std::to_string(place) + " is missing.");
     }
-    volume.data_files.push_back({path, {place * slice, slice}});
+    described.volume.data_files.push_back({path, {place * bytes, bytes}});
+    if (is_converted) described.volume.data_files.back().layout = layout;
   }
-  return volume;
+  return std::move(described.volume);
 }
 
 std::vector<std::string> par_data_names(const InputFile& /*file*/, const Companions& companions) {
@@ -309,15 +342,15 @@ std::vector<std::string> par_data_names(const InputFile& /*file*/, const Compani
 
 MostBytes most_par_bytes(const InputFile& beginning, const ImportTask& task) {
   const ParHeader header = read_par_header(beginning.text(0, kMostParBytes));
-  const SourceVolume volume = describe(header, task.options).volume;
-  check_limits(volume, task.limits);
-  const std::uint64_t slice = volume.volume_bytes() / volume.dims[2];
+  const Described described = describe(header, task.options);
+  check_limits(described.volume, task.limits);
   // The REC also has the images of the volumes that were not chosen.
   std::uint64_t most = 0;
   for (const ImageRow& row : header.rows) {
     most = std::max(most, whole(row[kPlace], "index of an image") + 1);
   }
-  return {.file = kMostParBytes + kHeadroomBytes, .data = most * slice + kHeadroomBytes};
+  return {.file = kMostParBytes + kHeadroomBytes,
+          .data = most * described.slice_bytes() + kHeadroomBytes};
 }
 
 }  // namespace isomesh::import

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/files.h"
@@ -10,6 +10,7 @@
 #include "proto/error.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/vti_document.h"
+#include "server/import/formats/vtk.h"
 #include "server/import/formats/vtk_arrays.h"
 
 namespace isomesh::import {
@@ -33,34 +34,11 @@ std::array<double, Count> numbers_of(const HeaderTexts& attributes, std::string_
                  " finite numbers.");
 }
 
-struct Extent {
-  std::array<std::int64_t, 3> first = {0, 0, 0};
-  std::array<std::uint32_t, 3> dims = {0, 0, 0};
-
-  bool operator==(const Extent&) const = default;
-};
-
-Extent extent_of(const HeaderTexts& attributes, std::string_view name) {
-  const auto parts = words(value_of(attributes, name));
-  constexpr std::int64_t kFarthest = std::numeric_limits<std::int32_t>::max();
-  Extent extent;
-  std::array<std::uint64_t, 3> sizes = {0, 0, 0};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto first = parts.size() == 6 ? parse_int64(parts[axis * 2]) : std::nullopt;
-    const auto last = parts.size() == 6 ? parse_int64(parts[axis * 2 + 1]) : std::nullopt;
-    if (!first || !last || std::abs(*first) > kFarthest || std::abs(*last) > kFarthest ||
-        *last < *first) {
-      throw_unusable("The VTK file's " + in_quotes(name) +
-                     " is not the first and last index along each of three axes.");
-    }
-    extent.first[axis] = *first;
-    sizes[axis] = static_cast<std::uint64_t>(*last - *first + 1);
-  }
-  extent.dims = volume_dims(sizes);
-  return extent;
+VtkExtent extent_of(const HeaderTexts& attributes, std::string_view name) {
+  return vtk_extent(value_of(attributes, name), name);
 }
 
-Geometry geometry_of_image(const HeaderTexts& image, const Extent& extent,
+Geometry geometry_of_image(const HeaderTexts& image, const VtkExtent& extent,
                            const Vector3& default_spacing) {
   Geometry geometry;
   geometry.spacing = numbers_of<3>(image, "Spacing", default_spacing);
@@ -95,37 +73,49 @@ StoredType type_of(const VtiArray& array) {
                  " is not supported. A sample must be one real number.");
 }
 
-// The array that is the scalars of points or cells, or the only one; null if there is none.
-const VtiArray* find_scalars(const HeaderTexts& data, const std::vector<VtiArray>& arrays) {
+bool has_one_component(const VtiArray& array) {
+  const std::string_view count = value_of(array.attributes, "NumberOfComponents");
+  return count.empty() || parse_uint64(count) == 1;
+}
+
+using Arrays = std::vector<const VtiArray*>;
+
+// The array that the file names as the scalars of points or cells. Without a name all that can be.
+Arrays find_scalars(const HeaderTexts& data, const std::vector<VtiArray>& arrays) {
   const std::string_view scalars = value_of(data, "Scalars");
-  const VtiArray* found = nullptr;
+  Arrays found;
   for (const VtiArray& array : arrays) {
-    if (!scalars.empty() && value_of(array.attributes, "Name") != scalars) continue;
-    if (found != nullptr) {
-      throw_unusable(
-          "The VTK file has several arrays of data, but does not say which one is its scalars.");
-    }
-    found = &array;
+    const std::string_view name = value_of(array.attributes, "Name");
+    const bool is_scalars =
+        scalars.empty() ? has_one_component(array) && !is_vtk_mask(name) : name == scalars;
+    if (is_scalars) found.push_back(&array);
   }
-  if (found != nullptr || scalars.empty()) return found;
+  if (!found.empty() || scalars.empty()) return found;
   throw_unusable("The VTK file has no array " + in_quotes(scalars) +
                  ", which it names as its scalars.");
 }
 
 struct Scalars {
-  const VtiArray& array;
+  Arrays arrays;  // not empty
   bool is_of_cells = false;
 };
 
-// Cells count only without any point data.
+// Cells count only without scalars of points.
 Scalars scalars_of(const VtiDocument& document) {
-  if (const VtiArray* found = find_scalars(document.point_data, document.point_arrays)) {
-    return {*found, false};
-  }
-  if (const VtiArray* found = find_scalars(document.cell_data, document.cell_arrays)) {
-    return {*found, true};
-  }
-  throw_unusable("The VTK file has neither point data nor cell data.");
+  Arrays found = find_scalars(document.point_data, document.point_arrays);
+  if (!found.empty()) return {std::move(found), false};
+  found = find_scalars(document.cell_data, document.cell_arrays);
+  if (!found.empty()) return {std::move(found), true};
+  throw_unusable("The VTK file has no array of single numbers, of points or of cells.");
+}
+
+const VtiArray& choose_array(const Arrays& arrays, const ImportOptions& options,
+                             SourceVolume& volume) {
+  const auto title = [&](std::uint64_t index) {
+    return vtk_array_title(value_of(arrays[index]->attributes, "Name"));
+  };
+  choose_volume(arrays.size(), {.what = "their array", .title = title}, options, volume);
+  return *arrays[std::exchange(volume.chosen, {}).index];
 }
 
 // The lattice of the cells' centres. An axis of one point has one cell without extent.
@@ -139,9 +129,8 @@ void move_to_cells(SourceVolume& volume) {
 }
 
 void check_components(const VtiArray& array) {
-  const std::string_view count = value_of(array.attributes, "NumberOfComponents");
-  if (count.empty() || parse_uint64(count) == 1) return;
-  throw_unusable("Each sample has " + in_quotes(count) +
+  if (has_one_component(array)) return;
+  throw_unusable("Each sample has " + in_quotes(value_of(array.attributes, "NumberOfComponents")) +
                  " components. A sample must be one real number.");
 }
 
@@ -263,19 +252,19 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   if (!value_of(document.image, "TimeValues").empty()) {
     throw_unusable("The VTK file holds a time series. Only single volumes are supported.");
   }
-  const Extent extent = extent_of(document.image, "WholeExtent");
+  const VtkExtent extent = extent_of(document.image, "WholeExtent");
   if (extent_of(document.piece, "Extent") != extent) {
     throw_unusable("The VTK file's piece does not fill its whole extent.");
   }
-  const auto [array, is_of_cells] = scalars_of(document);
-  check_components(array);
+  const auto [arrays, is_of_cells] = scalars_of(document);
   SourceVolume volume;
+  const VtiArray& array = choose_array(arrays, options, volume);
+  check_components(array);
   volume.dims = extent.dims;
   volume.assumes_spacing = value_of(document.image, "Spacing").empty();
   volume.geometry =
       geometry_of_image(document.image, extent, options.spacing.value_or(Vector3{1, 1, 1}));
   if (is_of_cells) move_to_cells(volume);
-  choose_volume(1, {}, options, volume);
   volume.layout.type = type_of(array);
   place_samples(file, document, array, volume);
   return volume;

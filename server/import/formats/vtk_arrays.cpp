@@ -73,14 +73,14 @@ std::vector<VtkArray> Scanner::arrays() {
   while (arrays_.size() < kMostArrays) {
     const auto parts = next_filled_line();
     if (!parts) return std::move(arrays_);
-    const std::string& keyword = parts->front();
-    if (keyword == "METADATA") {
+    const std::string keyword = lower(parts->front());
+    if (keyword == "metadata") {
       // Lines up to an empty one describe the array before it.
       for (auto line = next_line(); line && !line->empty();) line = next_line();
     } else if (parts->size() < 2) {
       throw_damaged_array();
-    } else if (keyword == "POINT_DATA" || keyword == "CELL_DATA") {
-      is_of_cells_ = keyword == "CELL_DATA";
+    } else if (keyword == "point_data" || keyword == "cell_data") {
+      is_of_cells_ = keyword == "cell_data";
       tuples_ = number((*parts)[1]);
     } else {
       read_attribute(*parts);
@@ -93,29 +93,29 @@ std::vector<VtkArray> Scanner::arrays() {
 }
 
 void Scanner::read_attribute(const std::vector<std::string>& parts) {
-  const std::string& keyword = parts[0];
-  if (keyword == "FIELD") {
+  const std::string keyword = lower(parts[0]);
+  if (keyword == "field") {
     if (parts.size() != 3) throw_damaged_array();
     return read_field(number(parts[2]));
   }
   if (parts.size() < 3) throw_damaged_array();
   VtkArray array{.name = parts[1], .type = parts[2], .tuples = tuples_};
-  if (keyword == "SCALARS") {
+  if (keyword == "scalars") {
     array.is_scalars = true;
     if (parts.size() > 3) array.components = number(parts[3]);
     // The table is named on a line of its own, which some writers leave out.
     const std::uint64_t here = next_;
     const auto table = next_filled_line();
-    if (!table || table->front() != "LOOKUP_TABLE") next_ = here;
-  } else if (keyword == "VECTORS" || keyword == "NORMALS") {
+    if (!table || lower(table->front()) != "lookup_table") next_ = here;
+  } else if (keyword == "vectors" || keyword == "normals") {
     array.components = 3;
-  } else if (keyword == "TENSORS") {
+  } else if (keyword == "tensors") {
     array.components = 9;
-  } else if (keyword == "TEXTURE_COORDINATES" && parts.size() == 4) {
+  } else if (keyword == "texture_coordinates" && parts.size() == 4) {
     array.components = number(parts[2]);
     array.type = parts[3];
-  } else if (keyword == "COLOR_SCALARS" || keyword == "LOOKUP_TABLE") {
-    const bool is_table = keyword == "LOOKUP_TABLE";
+  } else if (keyword == "color_scalars" || keyword == "lookup_table") {
+    const bool is_table = keyword == "lookup_table";
     array.components = is_table ? 4 : number(parts[2]);
     if (is_table) array.tuples = number(parts[2]);
     array.type = "unsigned_char";
@@ -129,7 +129,7 @@ void Scanner::read_attribute(const std::vector<std::string>& parts) {
 void Scanner::read_field(std::uint64_t count) {
   for (std::uint64_t at = 0; at < count; ++at) {
     auto parts = next_filled_line();
-    while (parts && parts->front() == "METADATA") {
+    while (parts && lower(parts->front()) == "metadata") {
       for (auto line = next_line(); line && !line->empty();) line = next_line();
       parts = next_filled_line();
     }
@@ -200,11 +200,12 @@ std::optional<StoredType> vtk_type(const std::string& name) {
       {"long", StoredType::kInt64},
       {"vtktypeint64", StoredType::kInt64},
       {"vtktypeuint64", StoredType::kUint64},
-      {"vtkIdType", StoredType::kInt32},
+      {"vtkidtype", StoredType::kInt32},
       {"float", StoredType::kFloat32},
       {"double", StoredType::kFloat64}};
+  const std::string word = lower(name);
   for (const auto& [known, type] : kTypes) {
-    if (known == name) return type;
+    if (known == word) return type;
   }
   return std::nullopt;
 }

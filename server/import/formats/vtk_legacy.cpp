@@ -5,10 +5,12 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
+#include "server/import/formats/vtk.h"
 #include "server/import/formats/vtk_arrays.h"
 
 namespace isomesh::import {
@@ -20,6 +22,7 @@ constexpr std::size_t kMostLegacyHeaderBytes = std::size_t{1} << 16;
 struct LegacyHeader {
   bool is_text = false;
   std::array<std::uint64_t, 3> points = {0, 0, 0};
+  std::array<std::int64_t, 3> first = {0, 0, 0};  // the index of the first point
   std::optional<Vector3> spacing;
   Vector3 origin = {0, 0, 0};
   std::uint64_t bytes = 0;  // up to the first line of data
@@ -48,14 +51,29 @@ std::array<std::uint64_t, 3> sizes_of(const std::vector<std::string_view>& parts
 }
 
 // The second of the five parts of the format is a title; the third and the fourth are keywords.
-void read_kind(std::string_view text, const std::vector<std::string_view>& parts,
+void read_kind(const std::string& text, const std::vector<std::string_view>& parts,
                LegacyHeader& header) {
-  if (text == "ASCII" || text == "BINARY") {
-    header.is_text = text == "ASCII";
-  } else if (parts[0] == "DATASET" && parts.size() > 1 && parts[1] != "STRUCTURED_POINTS") {
+  if (text == "ascii" || text == "binary") {
+    header.is_text = text == "ascii";
+  } else if (lower(parts[0]) == "dataset" && parts.size() > 1 &&
+             lower(parts[1]) != "structured_points") {
     throw_unusable("The VTK file holds " + in_quotes(parts[1]) +
                    ". Only STRUCTURED_POINTS are a volume.");
   }
+}
+
+void read_line(std::string_view line, const std::vector<std::string_view>& parts,
+               LegacyHeader& header) {
+  const std::string keyword = lower(parts[0]);
+  if (keyword == "dimensions") header.points = sizes_of(parts);
+  if (keyword == "extent") {
+    const VtkExtent extent = vtk_extent(line.substr(keyword.size()), parts[0]);
+    std::ranges::copy(extent.dims, header.points.begin());
+    header.first = extent.first;
+  }
+  if (keyword == "spacing" || keyword == "aspect_ratio") header.spacing = numbers_of(parts);
+  if (keyword == "origin") header.origin = numbers_of(parts);
+  read_kind(lower(line), parts, header);
 }
 
 LegacyHeader read_legacy_header(std::string_view text) {
@@ -67,30 +85,25 @@ LegacyHeader read_legacy_header(std::string_view text) {
     const std::string_view whole = trimmed(text.substr(next, end - next));
     const auto parts = words(whole);
     if (line >= 2 && !parts.empty()) {
-      if (parts[0] == "POINT_DATA" || parts[0] == "CELL_DATA") {
+      const std::string keyword = lower(parts[0]);
+      if (keyword == "point_data" || keyword == "cell_data") {
         header.bytes = next;
         return header;
       }
-      if (parts[0] == "DIMENSIONS") header.points = sizes_of(parts);
-      if (parts[0] == "SPACING" || parts[0] == "ASPECT_RATIO") header.spacing = numbers_of(parts);
-      if (parts[0] == "ORIGIN") header.origin = numbers_of(parts);
-      read_kind(whole, parts, header);
+      read_line(whole, parts, header);
     }
     next = end + 1;
   }
   throw_unusable("The VTK file has neither point data nor cell data.");
 }
 
-// The only array of one component of the points or the cells, or the one that is called scalars.
-const VtkArray* scalars_of(const std::vector<VtkArray>& arrays, bool is_of_cells) {
-  const VtkArray* found = nullptr;
+// The array of points or cells that is called scalars. Without one all that can be.
+std::vector<const VtkArray*> scalars_of(const std::vector<VtkArray>& arrays, bool is_of_cells) {
+  std::vector<const VtkArray*> found;
   for (const VtkArray& array : arrays) {
-    if (array.is_of_cells != is_of_cells || (array.components != 1 && !array.is_scalars)) continue;
-    if (array.is_scalars) return &array;
-    if (found != nullptr) {
-      throw_unusable("The VTK file has several arrays, but does not say which one is its scalars.");
-    }
-    found = &array;
+    if (array.is_of_cells != is_of_cells) continue;
+    if (array.is_scalars) return {&array};
+    if (array.components == 1 && !is_vtk_mask(array.name)) found.push_back(&array);
   }
   return found;
 }
@@ -110,8 +123,10 @@ void take(const VtkArray& array, const LegacyHeader& header, const ImportOptions
   volume.geometry.origin = header.origin;
   volume.assumes_spacing = !header.spacing;
   volume.geometry.spacing = header.spacing.value_or(options.spacing.value_or(Vector3{1, 1, 1}));
-  for (std::size_t axis = 0; array.is_of_cells && axis < 3; ++axis) {
-    if (sizes[axis] < 2) continue;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    volume.geometry.origin[axis] +=
+        volume.geometry.spacing[axis] * static_cast<double>(header.first[axis]);
+    if (!array.is_of_cells || sizes[axis] < 2) continue;
     --sizes[axis];
     volume.geometry.origin[axis] += volume.geometry.spacing[axis] / 2;
   }
@@ -129,7 +144,8 @@ void take(const VtkArray& array, const LegacyHeader& header, const ImportOptions
 std::uint64_t text_bytes(const InputFile& file, std::uint64_t offset) {
   for (std::uint64_t next = offset; next < file.size();) {
     const std::string piece = file.text(next, kPieceBytes);
-    const std::size_t letter = piece.find_first_of("ABCDFGHIJKLMOPQRSTUVWXYZ_");
+    // "nan" and "inf" are numbers. Each keyword has a letter that they and exponents do not have.
+    const std::size_t letter = piece.find_first_of("ABCDFGHIJKLMOPQRSTUVWXYZ_bcdghjklmopqrsuvwxz");
     if (letter != std::string::npos) {
       const std::size_t line = piece.find_last_of('\n', letter);
       return next + (line == std::string::npos ? letter : line) - offset;
@@ -144,21 +160,28 @@ std::uint64_t text_bytes(const InputFile& file, std::uint64_t offset) {
 bool is_vtk_legacy(std::string_view head) { return head.starts_with(kFirstLine); }
 
 bool may_hold_structured_points(std::string_view head) {
-  const std::size_t kind = head.find("DATASET");
-  return kind == std::string_view::npos ||
-         trimmed(head.substr(kind + 7, 64)).starts_with("STRUCTURED_POINTS");
+  // The title, in the second line, may have the keyword too.
+  const std::size_t title = head.find('\n');
+  const std::size_t behind = title == head.npos ? head.npos : head.find('\n', title + 1);
+  if (behind == head.npos) return true;
+  const std::string text = lower(head.substr(behind));
+  const std::size_t kind = text.find("dataset");
+  return kind == std::string::npos ||
+         trimmed(std::string_view(text).substr(kind + 7, 64)).starts_with("structured_points");
 }
 
 SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*companions*/,
                               const ImportOptions& options) {
   const LegacyHeader header = read_legacy_header(file.text(0, kMostLegacyHeaderBytes));
   const auto arrays = vtk_arrays(file, header.bytes, header.is_text);
-  const VtkArray* array = scalars_of(arrays, false);
-  if (array == nullptr) array = scalars_of(arrays, true);
-  if (array == nullptr) throw_unusable("The VTK file has no array of single numbers.");
+  std::vector<const VtkArray*> found = scalars_of(arrays, false);
+  if (found.empty()) found = scalars_of(arrays, true);
+  if (found.empty()) throw_unusable("The VTK file has no array of single numbers.");
   SourceVolume volume;
+  const auto title = [&](std::uint64_t index) { return vtk_array_title(found[index]->name); };
+  choose_volume(found.size(), {.what = "their array", .title = title}, options, volume);
+  const VtkArray* array = found[std::exchange(volume.chosen, {}).index];
   take(*array, header, options, volume);
-  choose_volume(1, {}, options, volume);
   volume.payload = {array->offset, file.size() - std::min(file.size(), array->offset)};
   volume.has_footer = true;
   if (header.is_text) {

@@ -222,6 +222,19 @@ void decode_hex(const Part& part, ScratchFile& scratch) {
   decoded.finish();
 }
 
+void convert_part(const Part& part, const SampleLayout& layout, ScratchFile& scratch) {
+  const std::size_t size = bytes_per_sample(part.type);
+  std::vector<std::byte> piece(kPieceBytes);
+  for (std::uint64_t done = 0; done < part.bytes;) {
+    const std::span<std::byte> samples =
+        std::span(piece).first(std::min<std::uint64_t>(piece.size(), part.bytes - done));
+    const std::uint64_t place = done / size * bytes_per_sample(layout.type);
+    read_samples(part.file, part.range.offset + place, layout, samples);
+    scratch.write(samples);
+    done += samples.size();
+  }
+}
+
 void decode_part(const SourceVolume& volume, const Part& part, const std::filesystem::path& folder,
                  ScratchFile& scratch) {
   switch (volume.encoding) {
@@ -290,7 +303,12 @@ void Payload::decode(const SourceVolume& volume, const std::filesystem::path& sc
   for (const DataFile& data : volume.data_files) {
     const InputFile part(data.path);
     const std::uint64_t share = volume.stored_bytes() / volume.data_files.size();
-    decode_part(volume, {part, data.range, share, volume.decoded_skip, type}, scratch, *scratch_);
+    const Part samples = {part, data.range, share, volume.decoded_skip, type};
+    if (data.layout) {
+      convert_part(samples, *data.layout, *scratch_);
+    } else {
+      decode_part(volume, samples, scratch, *scratch_);
+    }
   }
   decoded_.emplace(scratch_->path());
   offset_ = volume.decoded_skip.value_or(decoded_->size() - volume.stored_bytes());

@@ -95,6 +95,8 @@ std::optional<std::string> companion_with(std::initializer_list<std::string_view
 struct DataFile {
   std::filesystem::path path;
   CompressedRange range;
+  // Not empty: the file's own layout, whose canonical type is the type of the volume's samples.
+  std::optional<SampleLayout> layout = {};
 };
 
 // The volume to read from a file. Volumes are consecutive, or take turns: `run` samples of the

@@ -125,6 +125,11 @@ TEST(Archive, DataMayBeNamedByAPattern) {
   }
   expect_read({upper, lower, {"h.nhdr", nhdr("head-%02u.raw 8 10 2 2")}}, "nrrd");
   expect_read({{"1", lower.bytes}, {"2", upper.bytes}, {"h.mhd", mhd("%d 1 2")}}, "metaimage");
+  // MetaIO counts the last axis, from 1 or from the only number.
+  expect_read({{"1.raw", lower.bytes}, {"2.raw", upper.bytes}, {"h.mhd", mhd("%d.raw")}},
+              "metaimage");
+  expect_read({{"9.raw", lower.bytes}, {"10.raw", upper.bytes}, {"h.mhd", mhd("%d.raw 9")}},
+              "metaimage");
   // The other way round.
   expect_read({{"9.raw", upper.bytes}, {"10.raw", lower.bytes}, {"h.nhdr", nhdr("%d.raw 10 9 -1")}},
               "nrrd");
@@ -135,8 +140,11 @@ TEST(Archive, DataMayBeNamedByAPattern) {
 }
 
 TEST(Archive, PatternsOfOtherThingsAreRefused) {
-  for (const std::string said : {"a%02d.raw",
-                                 "a%02d.raw 1",
+  for (const std::string said : {"a%02d.raw", "a%02d.raw 1"}) {
+    expect_refused({{"h.nhdr", nhdr(said)}, {"a01.raw", kSamples}}, HasSubstr("not a pattern"));
+  }
+  for (const std::string said : {"a%02d.raw x",
+                                 "a%02d.raw 9223372036854775807",
                                  "a%02d.raw 1 2 0",
                                  "a%02d.raw 2 1",
                                  "a%02d.raw 2 1 5",

@@ -130,6 +130,11 @@ TEST_F(ForeignVolumes, StructuredPointsAreThoseOfVtk) {
   expect_same_file(
       "a.vtk",
       vtk_legacy(true, "CELL_DATA 12\n" + scalars + "1 2 3 4 5 6 7 8 9 10 11 12\n", "4 3 3"));
+  expect_same_file("a.vtk",
+                   "# vtk DataFile Version 3.0\ntitle\nascii\ndataset structured_points\n"
+                   "extent 2 5 -1 1 4 5\nspacing 1 2 3\norigin 10 20 30\npoint_data 24\n"
+                   "scalars s Short 1\nlookup_table default\n"
+                   "1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24\n");
 }
 
 TEST_F(ForeignVolumes, AfniIsThatOfNibabel) {
@@ -152,13 +157,16 @@ TEST_F(ForeignVolumes, PagesOfTiffAreThoseOfPillow) {
                    {.spacing = std::array<double, 3>{1, 1, 1}});
 }
 
-// The file is a phantom's, with oblique slices of a real scanner; it comes with nibabel.
+// The files are a phantom's, with oblique slices of a real scanner; they come with nibabel.
 TEST_F(ForeignVolumes, ParRecIsThatOfNibabel) {
   const std::filesystem::path data = "/usr/lib/python3/dist-packages/nibabel/tests/data";
-  const std::string name = "phantom_EPI_asc_CLEAR_2_1";
-  const std::string upload = zip({{name + ".PAR", read_file(data / (name + ".PAR"))},
-                                  {name + ".REC", read_file(data / (name + ".REC"))}});
-  expect_same(import_bytes(upload, {}, {.volume = 1}), read_with_python(data / (name + ".PAR"), 1));
+  for (const std::string name : {"phantom_EPI_asc_CLEAR_2_1", "phantom_varscale"}) {
+    SCOPED_TRACE(name);
+    const std::string upload = zip({{name + ".PAR", read_file(data / (name + ".PAR"))},
+                                    {name + ".REC", read_file(data / (name + ".REC"))}});
+    expect_same(import_bytes(upload, {}, {.volume = 1}),
+                read_with_python(data / (name + ".PAR"), 1));
+  }
 }
 
 }  // namespace

@@ -133,6 +133,16 @@ TEST(Nrrd, HonoursItsUnits) {
   EXPECT_THAT(import_with("space units", "\"mm\" \"um\" \"mm\"").error,
               HasSubstr("different units"));
   EXPECT_THAT(import_with("space units", "\"ell\" \"ell\" \"ell\"").error, HasSubstr("ell"));
+  Lines lines = with(with(small_nrrd(), "space", ""), "space directions", "");
+  lines = with(with(lines, "space origin", ""), "dimension", "4");
+  lines = with(with(lines, "sizes", "1 4 3 2"), "spacings", "nan 1 2 3");
+  for (const char* kind : {"list", "time"}) {
+    const std::string kinds = std::string(kind) + " domain domain domain";
+    const Outcome outcome =
+        import_nrrd(with(with(lines, "kinds", kinds), "units", "\"s\" \"um\" \"um\" \"um\""));
+    ASSERT_EQ(outcome.error, "") << kind;
+    EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{0.001, 0.002, 0.003}));
+  }
 }
 
 TEST(Nrrd, MinsAndMaxsMustFitTheSpacings) {
@@ -257,6 +267,14 @@ TEST(Nrrd, SkipsWhatItsHeaderSays) {
   EXPECT_FALSE(import_with("byte skip", "1").imported());
   EXPECT_FALSE(import_with("byte skip", "-2").imported());
   EXPECT_FALSE(import_with("byte skip", "9223372036854775807").imported());
+}
+
+TEST(Nrrd, KeysMayHaveColons) {
+  std::string file = nrrd(small_nrrd(), kSmallSamples);
+  file.insert(file.find("type"), "foo:bar:=1\nfoo:baz:=2\ncontent: a:=b\n");
+  EXPECT_EQ(import_bytes(file).error, "");
+  file.insert(file.find("content"), "content: c\n");
+  EXPECT_THAT(import_bytes(file).error, HasSubstr("\"content\" twice"));
 }
 
 TEST(Nrrd, RefusesHeadersThatContradictThemselves) {

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/text.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/other_writers.h"
@@ -227,6 +228,55 @@ TEST(VtkLegacy, ReadsPointsInTextAndBinary) {
   EXPECT_EQ(samples_of<std::uint8_t>(text)[23], 23);
 }
 
+TEST(VtkLegacy, KeywordsAndTypesMayBeInLowerCase) {
+  const std::string scalars = "SCALARS s UNSIGNED_CHAR\nLOOKUP_TABLE default\n";
+  const std::string expected =
+      import_bytes(vtk_legacy(true, "POINT_DATA 24\n" + scalars + counted(24))).canonical;
+  const std::string begin = "# vtk DataFile Version 3.0\nDATASET of a title\n";
+  for (const std::string behind : {"", "metadata\n", "vectors v float\n", "field f 0\n"}) {
+    const Outcome outcome =
+        import_bytes(begin +
+                     lower("ASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\nSPACING 1 2 3\n"
+                           "ORIGIN 10 20 30\nPOINT_DATA 24\n" +
+                           scalars) +
+                     counted(24) + behind);
+    ASSERT_EQ(outcome.error, "") << behind;
+    EXPECT_EQ(outcome.canonical, expected) << behind;
+  }
+  const Member surface = {"a.vtk", begin + "ascii\ndataset polydata\n"};
+  EXPECT_EQ(import_bytes(zip({surface, {"b.mha", metaimage(small_metaimage(), kSamples)}})).error,
+            "");
+}
+
+TEST(VtkLegacy, AnExtentBeginsBehindTheOrigin) {
+  std::string file = vtk_legacy(true, "POINT_DATA 24\nSCALARS s short\n" + counted(24));
+  const std::string points = "DIMENSIONS 4 3 2";
+  const auto with_extent = [&](const std::string& extent) {
+    return import_bytes(std::string(file).replace(file.find(points), points.size(), extent));
+  };
+  const Outcome outcome = with_extent("EXTENT 2 5 -1 1 0 1");
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.dims, (Dims{4, 3, 2}));
+  EXPECT_EQ(outcome.volume.geometry.origin, (Vector{12, 18, 30}));
+  EXPECT_THAT(with_extent("EXTENT 2 5 1 0 0 1").error, HasSubstr("the first and last index"));
+}
+
+TEST(VtkLegacy, OneOfSeveralArraysIsChosen) {
+  const auto array = [](const std::string& head) { return head + '\n' + counted(24); };
+  const std::string mask = array("vtkGhostType 1 24 unsigned_char");
+  const std::string density = array("density 1 24 short");
+  const Outcome outcome =
+      import_bytes(vtk_legacy(true, "POINT_DATA 24\nFIELD f 2\n" + mask + density));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kInt16);
+  const std::string two = vtk_legacy(
+      true, "POINT_DATA 24\nFIELD f 3\n" + mask + density + array("heat 1 24 unsigned_short"));
+  const Outcome refused = import_bytes(two);
+  ASSERT_EQ(refused.remedy.choices.size(), 2);
+  EXPECT_EQ(refused.remedy.choices[1].title, "array \"heat\"");
+  EXPECT_EQ(import_bytes(two, {}, {.volume = 1}).volume.type, SampleType::kUint16);
+}
+
 // vtkStructuredPointsWriter writes bytes so.
 TEST(VtkLegacy, ColoursInTextAreFractionsOf255) {
   const auto of = [](const std::string& last) {
@@ -382,6 +432,35 @@ TEST(ParRec, SlicesAreFoundByTheirPlace) {
   EXPECT_EQ(outcome.volume.format, "par");
   EXPECT_EQ(samples_of<float>(outcome)[0], 'm' * 2.0F);
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{1.5, 1.25, 3}));
+}
+
+TEST(ParRec, EachSliceHasItsOwnScale) {
+  const Outcome outcome = import_bytes(par_rec(
+      {{.slice = 1, .place = 1, .slope = 2}, {.slice = 2, .place = 0, .slope = 0.5}}, kSamples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(samples_of<float>(outcome)[0], 'm' * 2.0F);
+  EXPECT_EQ(samples_of<float>(outcome)[23], 'l' * 0.5F);
+}
+
+// They do not tell the weights of diffusion.
+TEST(ParRec, RepeatedSlicesOfVersion4AreVolumes) {
+  std::string header = par({{.slice = 1, .place = 0},
+                            {.slice = 2, .place = 1},
+                            {.slice = 1, .place = 2},
+                            {.slice = 2, .place = 3}});
+  const std::string second(kSamples.rbegin(), kSamples.rend());
+  const auto read = [&](const ImportOptions& options) {
+    return import_bytes(zip({{"a.PAR", header}, {"a.REC", kSamples + second}}), {}, options);
+  };
+  EXPECT_THAT(read({}).error, HasSubstr("there twice"));
+  const std::string later = " 1 1 7 0 0 0 0 1\n";  // the columns of 4.1 and 4.2
+  for (std::size_t at = header.find(later); at != header.npos; at = header.find(later)) {
+    header.replace(at, later.size(), "\n");
+  }
+  const Outcome refused = read({});
+  ASSERT_EQ(refused.remedy.choices.size(), 2);
+  EXPECT_EQ(refused.remedy.choices[1].title, "repetition 2");
+  EXPECT_EQ(read({.volume = 1}).sample_bytes(), second);
 }
 
 TEST(ParRec, AnInstantIsChosenAndMissingSlicesAreNamed) {

@@ -115,9 +115,31 @@ TEST(Vti, TakesTheScalarsAmongSeveralArrays) {
   const std::string other =
       "<DataArray Name=\"other\" type=\"UInt8\" format=\"appended\" offset=\"0\"/>\n";
   EXPECT_EQ(import_bytes(vti({.more = other}, kSmallSamples)).sample_bytes(), kSmallSamples);
-  EXPECT_THAT(import_bytes(vti({.scalars = "", .more = other}, kSmallSamples)).error,
-              HasSubstr("several arrays"));
   EXPECT_THAT(import_bytes(vti({.scalars = "absent"}, kSmallSamples)).error, HasSubstr("absent"));
+  const std::string unnamed = vti({.scalars = "", .more = other}, kSmallSamples);
+  const Outcome several = import_bytes(unnamed);
+  ASSERT_EQ(several.remedy.choices.size(), 2);
+  EXPECT_EQ(several.remedy.choices[0].title, "array \"other\"");
+  EXPECT_EQ(several.remedy.choices[1].title, "array \"samples\"");
+  const Outcome chosen = import_bytes(unnamed, {}, {.volume = 1});
+  ASSERT_EQ(chosen.error, "");
+  EXPECT_EQ(chosen.sample_bytes(), kSmallSamples);
+  EXPECT_THAT(codes_of(chosen), testing::ElementsAre("volume-chosen"));
+}
+
+TEST(Vti, ArraysThatCannotBeSamplesNeedNoChoice) {
+  std::string beside;
+  for (const std::string attributes :
+       {"Name=\"vtkGhostType\" type=\"UInt8\"", "Name=\"vtkValidPointMask\" type=\"Int8\"",
+        "Name=\"velocity\" type=\"Float32\" NumberOfComponents=\"3\""}) {
+    beside += "<DataArray " + attributes + " format=\"appended\" offset=\"0\"/>\n";
+  }
+  const Outcome outcome = import_bytes(vti({.scalars = "", .more = beside}, kSmallSamples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.sample_bytes(), kSmallSamples);
+  EXPECT_THAT(
+      import_bytes(vti({.components = "3", .scalars = "", .more = beside}, kSmallSamples)).error,
+      HasSubstr("no array of single numbers"));
 }
 
 TEST(Vti, RefusesWhatIsNoVolumeOfNumbers) {

@@ -11,6 +11,7 @@
 #include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/kinds/describe.h"
+#include "server/import/source/gzip.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/source.h"
 
@@ -56,13 +57,18 @@ Source describe_source(const NamedFile& from, const DicomFile& file) {
   return source;
 }
 
+bool begins_as_dicom(const std::filesystem::path& path) {
+  const std::string head = InputFile(path).text(0, kSniffBytes);
+  return find_beginning(is_gzip(head) ? inflate_head(head, kSniffBytes) : head).has_value();
+}
+
 class HeaderReader {
  public:
   HeaderReader(std::filesystem::path scratch, std::uint64_t most_sample_bytes)
       : scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
 
   void read(const NamedFile& from) {
-    if (!find_beginning(InputFile(from.path).text(0, kSniffBytes))) {
+    if (!begins_as_dicom(from.path)) {
       return ignore(upload_, from, "it is not a DICOM file");
     }
     const DicomFile file(from.path, scratch_, most_sample_bytes_);

@@ -22,13 +22,13 @@ std::size_t beginning_of(const InputFile& file) {
   return *beginning;
 }
 
-void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
+void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit, Wrapping wrapping,
              ScratchFile& scratch) {
   const std::uint64_t bytes = inflate_range(
       file, {offset, file.size() - offset}, limit,
-      [&](std::span<const std::byte> piece) { scratch.write(piece); }, Wrapping::kNone);
+      [&](std::span<const std::byte> piece) { scratch.write(piece); }, wrapping);
   if (bytes > limit) {
-    throw_unusable("The deflated file unpacks to more than the " + std::to_string(limit) +
+    throw_unusable("The compressed file unpacks to more than the " + std::to_string(limit) +
                    " bytes that its header allows.");
   }
 }
@@ -210,13 +210,35 @@ std::uint64_t most_file_bytes(const InputFile& beginning, const std::filesystem:
   }
 }
 
+namespace {
+
+// The file itself, or its inflated copy, which gets a place in `scratch`.
+InputFile plain_file(const std::filesystem::path& path, const std::filesystem::path& scratch,
+                     std::uint64_t most_sample_bytes, std::optional<ScratchFile>& copy) {
+  InputFile file(path);
+  std::string head = file.text(0, kSniffBytes);
+  if (!is_gzip(head)) return file;
+  head = file.text(0, kBeginningBytes);
+  ScratchFile beginning(scratch, ".beginning");
+  const std::string plain = inflate_head(head, kBeginningBytes);
+  beginning.write(std::as_bytes(std::span(plain)));
+  copy.emplace(scratch, ".plain");
+  inflate(file, 0, most_file_bytes(InputFile(beginning.path()), scratch, most_sample_bytes),
+          Wrapping::kZlibOrGzip, *copy);
+  return InputFile(copy->path());
+}
+
+}  // namespace
+
 DicomFile::DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,
                      std::uint64_t most_sample_bytes)
-    : file_(path), meta_(parse_meta_information(file_, beginning_of(file_))) {
+    : file_(plain_file(path, scratch, most_sample_bytes, plain_)),
+      meta_(parse_meta_information(file_, beginning_of(file_))) {
   std::uint64_t begin = meta_.end;
   if (transfer_syntax() == kDeflated) {
     scratch_.emplace(scratch, ".inflated");
-    inflate(file_, begin, most_file_bytes(file_, scratch, most_sample_bytes), *scratch_);
+    inflate(file_, begin, most_file_bytes(file_, scratch, most_sample_bytes), Wrapping::kNone,
+            *scratch_);
     inflated_.emplace(scratch_->path());
     begin = 0;
   }

@@ -103,9 +103,9 @@ std::uint64_t most_file_bytes(const InputFile& beginning, const std::filesystem:
 // One DICOM file. Immutable.
 class DicomFile {
  public:
-  // Reads up to the pixels. Inflates a deflated file into `scratch`, up to most_file_bytes of its
-  // beginning. Throws Error kUnusableVolume if the file is truncated or corrupt, or its transfer
-  // syntax is unknown.
+  // Reads up to the pixels. Inflates a gzipped or deflated file into `scratch`, up to
+  // most_file_bytes of its beginning. Throws Error kUnusableVolume if the file is truncated or
+  // corrupt, or its transfer syntax is unknown.
   DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,
             std::uint64_t most_sample_bytes);
 
@@ -117,6 +117,7 @@ class DicomFile {
   const std::optional<PixelElement>& pixels() const { return pixels_; }
 
  private:
+  std::optional<ScratchFile> plain_;  // of a gzipped file
   InputFile file_;
   std::optional<ScratchFile> scratch_;
   std::optional<InputFile> inflated_;

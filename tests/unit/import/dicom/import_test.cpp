@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "server/import/dicom/elements/tags.h"
+#include "tests/support/deflate.h"
+#include "tests/unit/import/archives.h"
 #include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::import::test {
@@ -96,6 +98,24 @@ TEST(DicomSeriesImport, ReadsMetaInformationWithoutPreamble) {
     });
     EXPECT_EQ(outcome.error, "") << syntax;
     EXPECT_EQ(outcome.canonical, expected) << syntax;
+  }
+}
+
+TEST(DicomSeriesImport, SlicesMayBeGzipped) {
+  const DicomSeries series;
+  const std::string expected = import_objects(series.files()).canonical;
+  for (const std::string_view syntax : {kExplicit, kDeflate}) {
+    bool is_gzipped = false;
+    std::vector<Member> members;
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      const std::string file = series.slice(k).file(syntax);
+      members.push_back({std::to_string(k), is_gzipped ? isomesh::test::gzip(file) : file});
+      is_gzipped = !is_gzipped;
+    }
+    const Outcome outcome = import_bytes(zip(members));
+    EXPECT_EQ(outcome.error, "") << syntax;
+    EXPECT_EQ(outcome.canonical, expected) << syntax;
+    EXPECT_TRUE(outcome.volume.ignored.empty()) << syntax;
   }
 }
 

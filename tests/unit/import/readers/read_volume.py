@@ -39,7 +39,8 @@ def of_vtk_image(image, of_cells=False):
     data = image.GetCellData() if of_cells else image.GetPointData()
     samples = vtk_to_numpy(data.GetScalars()).astype(numpy.float64).reshape(sizes, order="F")
     spacing = numpy.array(image.GetSpacing())
-    origin = numpy.array(image.GetOrigin()) + (spacing / 2 if of_cells else 0)
+    first = numpy.array(image.GetExtent()[::2])
+    origin = numpy.array(image.GetOrigin()) + spacing * (first + (0.5 if of_cells else 0))
     return samples, origin, numpy.diag(spacing)
 
 
