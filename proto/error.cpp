@@ -50,14 +50,16 @@ constexpr std::array kDescriptions = {
 }  // namespace
 
 const ErrorDescription& describe(ErrorCode code) {
-  const auto* found =
-      std::ranges::find(kDescriptions, code, [](const ErrorDescription& row) { return row.code; });
-  return *found;
+  return *std::ranges::find(kDescriptions, code, &ErrorDescription::code);
 }
 
 ErrorCode error_code_of(std::string_view name) {
-  const auto* found =
-      std::ranges::find(kDescriptions, name, [](const ErrorDescription& row) { return row.name; });
+  const auto* found = std::ranges::find(kDescriptions, name, &ErrorDescription::name);
+  return found == kDescriptions.end() ? ErrorCode::kInternal : found->code;
+}
+
+ErrorCode error_code_of_status(int status) {
+  const auto* found = std::ranges::find(kDescriptions, status, &ErrorDescription::status);
   return found == kDescriptions.end() ? ErrorCode::kInternal : found->code;
 }
 

@@ -22,6 +22,8 @@ const ErrorDescription& describe(ErrorCode code);
 
 // Returns kInternal for a name that this version does not know.
 ErrorCode error_code_of(std::string_view name);
+// The first code with that status; kInternal if there is none.
+ErrorCode error_code_of_status(int status);
 
 // RFC 9457 problem details: what an Error becomes on the wire.
 struct Problem {

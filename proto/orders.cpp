@@ -1,7 +1,5 @@
 #include "proto/orders.h"
 
-#include <array>
-
 #include <nlohmann/json.hpp>
 
 #include "base/text.h"
@@ -18,12 +16,6 @@ template <>
 constexpr bool kIsRequestObject<SendTarget> = true;
 
 namespace {
-
-constexpr std::array kStates = {
-    std::pair{OrderState::kWaiting, "waiting"},     std::pair{OrderState::kFetching, "fetching"},
-    std::pair{OrderState::kMeshing, "meshing"},     std::pair{OrderState::kSending, "sending"},
-    std::pair{OrderState::kSucceeded, "succeeded"}, std::pair{OrderState::kFailed, "failed"},
-    std::pair{OrderState::kCancelled, "cancelled"}};
 
 constexpr std::string_view kFormats = "formats";
 
@@ -68,21 +60,6 @@ bool is_final(OrderState state) {
 
 bool is_sendable(MeshFormat format) {
   return format == MeshFormat::kStl || format == MeshFormat::kObj;
-}
-
-std::string_view to_string(OrderState value) {
-  for (const auto& [state, name] : kStates) {
-    if (state == value) return name;
-  }
-  return "";
-}
-
-template <>
-std::optional<OrderState> from_string(std::string_view name) {
-  for (const auto& [state, known] : kStates) {
-    if (name == known) return state;
-  }
-  return std::nullopt;
 }
 
 bool is_uid(std::string_view text) {

@@ -26,8 +26,6 @@ enum class OrderState {
 bool is_final(OrderState state);
 
 std::string_view to_string(OrderState value);
-template <>
-std::optional<OrderState> from_string(std::string_view name);
 
 struct OrderSource {
   std::string pacs;

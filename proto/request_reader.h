@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <concepts>
 #include <map>
 #include <optional>
 #include <string>
@@ -82,14 +83,19 @@ class RequestReader {
            !(parameter.maximum && number > *parameter.maximum);
   }
 
-  template <class Whole>
-  void read_whole(const Json& json, const std::string& path, const Parameter& parameter,
-                  Whole& value) {
-    const double number = json.is_number() ? json.get<double>() : std::nan("");
-    if (std::floor(number) != number || !fits(parameter, number)) {
-      return add(path, must_be(parameter, true));
+  // Reads 1 to `most` values; `kind` says in words what they are.
+  template <class T>
+  void read_list(const Json& json, const std::string& path, const Parameter& parameter,
+                 std::size_t most, const std::string& kind, std::vector<T>& values) {
+    if (!json.is_array() || json.empty() || json.size() > most) {
+      return add(path, "must be a list of 1 to " + std::to_string(most) + ' ' + kind);
     }
-    value = static_cast<Whole>(number);
+    values.clear();
+    for (const Json& element : json) {
+      const std::size_t before = errors_.size();
+      read_member(element, path, parameter, values.emplace_back());
+      if (errors_.size() > before) return values.clear();
+    }
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
@@ -127,13 +133,12 @@ class RequestReader {
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   int& value) {
-    read_whole(json, path, parameter, value);
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::uint32_t& value) {
-    read_whole(json, path, parameter, value);
+                   std::integral auto& value) {
+    const double number = json.is_number() ? json.get<double>() : std::nan("");
+    if (std::floor(number) != number || !fits(parameter, number)) {
+      return add(path, must_be(parameter, true));
+    }
+    value = static_cast<std::remove_reference_t<decltype(value)>>(number);
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
@@ -164,39 +169,17 @@ class RequestReader {
     }
   }
 
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::int64_t& value) {
-    read_whole(json, path, parameter, value);
-  }
-
   // Sorts the values and removes repeated ones.
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::vector<std::int64_t>& values) {
-    if (!json.is_array() || json.empty() || json.size() > Volume::kMostLabels) {
-      return add(
-          path, "must be a list of 1 to " + std::to_string(Volume::kMostLabels) + " whole numbers");
-    }
-    for (const Json& element : json) {
-      const std::size_t before = errors_.size();
-      read_member(element, path, parameter, values.emplace_back());
-      if (errors_.size() > before) return values.clear();
-    }
+    read_list(json, path, parameter, Volume::kMostLabels, "whole numbers", values);
     std::ranges::sort(values);
     values.erase(std::unique(values.begin(), values.end()), values.end());
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::vector<double>& values) {
-    if (!json.is_array() || json.empty() || json.size() > MeshParameters::kMostLods) {
-      return add(
-          path, "must be a list of 1 to " + std::to_string(MeshParameters::kMostLods) + " numbers");
-    }
-    values.clear();
-    for (const Json& element : json) {
-      const std::size_t before = errors_.size();
-      read_member(element, path, parameter, values.emplace_back());
-      if (errors_.size() > before) return values.clear();
-    }
+    read_list(json, path, parameter, MeshParameters::kMostLods, "numbers", values);
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
@@ -212,15 +195,7 @@ class RequestReader {
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::vector<std::array<double, 3>>& places) {
-    if (!json.is_array() || json.empty() || json.size() > ComponentFilter::kMostPlaces) {
-      return add(path, "must be a list of 1 to " + std::to_string(ComponentFilter::kMostPlaces) +
-                           " points");
-    }
-    for (const Json& element : json) {
-      const std::size_t before = errors_.size();
-      read_member(element, path, parameter, places.emplace_back());
-      if (errors_.size() > before) return places.clear();
-    }
+    read_list(json, path, parameter, ComponentFilter::kMostPlaces, "points", places);
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "proto/orders.h"
 #include "proto/samples.h"
 #include "proto/stages.h"
 
@@ -91,6 +92,15 @@ struct Names<JobState> {
       std::pair{JobState::kQueued, "queued"}, std::pair{JobState::kRunning, "running"},
       std::pair{JobState::kSucceeded, "succeeded"}, std::pair{JobState::kFailed, "failed"},
       std::pair{JobState::kCancelled, "cancelled"}};
+};
+
+template <>
+struct Names<OrderState> {
+  static constexpr std::array kTable = {
+      std::pair{OrderState::kWaiting, "waiting"},     std::pair{OrderState::kFetching, "fetching"},
+      std::pair{OrderState::kMeshing, "meshing"},     std::pair{OrderState::kSending, "sending"},
+      std::pair{OrderState::kSucceeded, "succeeded"}, std::pair{OrderState::kFailed, "failed"},
+      std::pair{OrderState::kCancelled, "cancelled"}};
 };
 
 template <>
@@ -206,6 +216,7 @@ std::string_view to_string(GlbCodec value) { return name_of(value); }
 std::string_view to_string(Space value) { return name_of(value); }
 std::string_view to_string(Priority value) { return name_of(value); }
 std::string_view to_string(JobState value) { return name_of(value); }
+std::string_view to_string(OrderState value) { return name_of(value); }
 std::string_view to_string(Stage value) { return name_of(value); }
 std::string_view to_string(WaitingFor value) { return name_of(value); }
 std::string_view to_string(Simplification::Bound value) { return name_of(value); }
@@ -228,6 +239,7 @@ template std::optional<GlbCodec> from_string(std::string_view);
 template std::optional<Space> from_string(std::string_view);
 template std::optional<Priority> from_string(std::string_view);
 template std::optional<JobState> from_string(std::string_view);
+template std::optional<OrderState> from_string(std::string_view);
 template std::optional<Stage> from_string(std::string_view);
 template std::optional<WaitingFor> from_string(std::string_view);
 template std::optional<Simplification::Bound> from_string(std::string_view);

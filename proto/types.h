@@ -403,47 +403,22 @@ std::string_view to_string(Stage value);
 std::string_view to_string(WaitingFor value);
 std::string_view to_string(Simplification::Bound value);
 
-// The inverse; empty for an unknown name.
+// The inverse; empty for an unknown name. types.cpp instantiates these templates.
 template <class Enum>
 std::optional<Enum> from_string(std::string_view name);
-
-extern template std::optional<SampleType> from_string(std::string_view);
-extern template std::optional<NiftiForm> from_string(std::string_view);
-extern template std::optional<Interpolation> from_string(std::string_view);
-extern template std::optional<Smoothing> from_string(std::string_view);
-extern template std::optional<MeshFormat> from_string(std::string_view);
-extern template std::optional<GlbCodec> from_string(std::string_view);
-extern template std::optional<Space> from_string(std::string_view);
-extern template std::optional<Priority> from_string(std::string_view);
-extern template std::optional<JobState> from_string(std::string_view);
-extern template std::optional<Stage> from_string(std::string_view);
-extern template std::optional<WaitingFor> from_string(std::string_view);
-extern template std::optional<Simplification::Bound> from_string(std::string_view);
 
 template <class Enum>
 std::vector<Enum> values_of();
 
-extern template std::vector<NiftiForm> values_of();
-extern template std::vector<Interpolation> values_of();
-extern template std::vector<Smoothing> values_of();
-extern template std::vector<MeshFormat> values_of();
-extern template std::vector<GlbCodec> values_of();
-extern template std::vector<Space> values_of();
-extern template std::vector<Priority> values_of();
+template <class Enum>
+std::vector<std::string> name_list() {
+  std::vector<std::string> names;
+  for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
+  return names;
+}
 
 // All names of an enumeration as prose: `"stat", "routine" or "bulk"`.
 template <class Enum>
 std::string names_of();
-
-extern template std::string names_of<NiftiForm>();
-extern template std::string names_of<SampleType>();
-extern template std::string names_of<Interpolation>();
-extern template std::string names_of<Smoothing>();
-extern template std::string names_of<MeshFormat>();
-extern template std::string names_of<GlbCodec>();
-extern template std::string names_of<Space>();
-extern template std::string names_of<Priority>();
-extern template std::string names_of<JobState>();
-extern template std::string names_of<WaitingFor>();
 
 }  // namespace isomesh

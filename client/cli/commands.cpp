@@ -20,11 +20,6 @@
 namespace isomesh::cli {
 namespace {
 
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-      .count();
-}
-
 int upload(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);

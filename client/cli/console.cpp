@@ -55,8 +55,7 @@ std::string folded(const std::string& name) {
 }
 
 std::string files_in_words(const std::vector<PackedFile>& files) {
-  return grouped(static_cast<std::int64_t>(files.size())) +
-         (files.size() == 1 ? " file" : " files");
+  return grouped(files.size()) + (files.size() == 1 ? " file" : " files");
 }
 
 // The folder's content may differ from its name.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <stop_token>
@@ -13,6 +14,11 @@
 #include "client/isomesh/client.h"
 
 namespace isomesh::cli {
+
+inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
 
 Client client_of(const Options& options, const std::stop_token& stop);
 

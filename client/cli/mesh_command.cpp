@@ -26,17 +26,6 @@ namespace {
 
 constexpr std::size_t kKeyBytes = 16;
 
-class Stopwatch {
- public:
-  double milliseconds() const {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_)
-        .count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 // For the last requests, also after an interrupt. The time limits are short, because the user
 // waits.
 Client parting_client(const Options& options) {
@@ -121,10 +110,10 @@ class Run {
     std::vector<std::filesystem::path> files = input.files;
     const auto copy = standard_input_as_file(files, how, stop_);
     if (is_stored_volume(files.front())) return stored(files.front().string(), input);
-    const Stopwatch uploading;
+    const auto uploading = std::chrono::steady_clock::now();
     const std::vector<UploadedVolume> volumes =
         upload_all(client_, options_, files, how, bar_, subject_of(input));
-    seen_.upload = uploading.milliseconds();
+    seen_.upload = milliseconds_since(uploading);
     if (options_.dry_run) leftovers_.add(volumes);
     if (volumes.size() == 1 && volumes.front().volume) {
       return mesh(*volumes.front().volume, input.name, subject_of(input));
@@ -185,11 +174,11 @@ class Run {
       if (options_.json) print(job_json(*job, {}, seen_) + '\n');
       return status_of(*job, options_, subject);
     }
-    const Stopwatch downloading;
+    const auto downloading = std::chrono::steady_clock::now();
     resumable(job->id, [&] {
       for (const Output& output : outputs) fetch(client_, job->id, output, bar_);
     });
-    seen_.download = downloading.milliseconds();
+    seen_.download = milliseconds_since(downloading);
     report(*job, outputs);
     return status_of(*job, options_, subject, volume.range);
   }

@@ -73,13 +73,6 @@ Enum name_from(const std::string& option, const std::string& text) {
   return *value;
 }
 
-template <class Enum>
-std::vector<std::string> names_from() {
-  std::vector<std::string> names;
-  for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
-  return names;
-}
-
 // `--option VALUE` that calls `take(VALUE)`.
 inline CLI::Option* add(CLI::App& app, const std::string& name, const std::string& value,
                         const std::string& help,
@@ -103,7 +96,7 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, const std::strin
 template <class Enum>
 std::string type_of_names() {
   std::string type;
-  for (const std::string& name : names_from<Enum>()) type += (type.empty() ? "" : "|") + name;
+  for (const std::string& name : name_list<Enum>()) type += (type.empty() ? "" : "|") + name;
   return type;
 }
 

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 std::string suffixes() {
   std::vector<std::string> all;
-  for (const std::string& name : names_from<MeshFormat>()) all.push_back('.' + name);
+  for (const std::string& name : name_list<MeshFormat>()) all.push_back('.' + name);
   return listed(all);
 }
 

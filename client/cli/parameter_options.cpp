@@ -45,7 +45,7 @@ std::string default_of(const Parameter& parameter, const T& standard) {
 template <class T>
 std::string words_of() {
   if constexpr (Enumeration<T>) {
-    return listed(names_from<T>());
+    return listed(name_list<T>());
   } else {
     return "";
   }

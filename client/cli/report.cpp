@@ -72,7 +72,7 @@ std::string topology_of(const MeshQuality& quality) {
 }
 
 std::string size_of(const MeshFile& file) {
-  const std::string exact = grouped(static_cast<std::int64_t>(file.bytes)) + " B";
+  const std::string exact = grouped(file.bytes) + " B";
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
 }
 
@@ -111,10 +111,8 @@ std::string bound_of(const Simplification& simplified) {
 
 void tell_error(const MeshSummary& mesh, const Units& in, Rows& rows) {
   if (mesh.simplified) {
-    rows.push_back(
-        {"simplified", "from " +
-                           grouped(static_cast<std::int64_t>(mesh.simplified->triangles_before)) +
-                           " triangles, bound by the " + bound_of(*mesh.simplified)});
+    rows.push_back({"simplified", "from " + grouped(mesh.simplified->triangles_before) +
+                                      " triangles, bound by the " + bound_of(*mesh.simplified)});
   }
   if (!mesh.certificate) return;
   const MeshCertificate& certificate = *mesh.certificate;
@@ -143,9 +141,8 @@ std::string labels_report(const std::vector<LabelSummary>& labels, const Units& 
     std::string topology = label.closed ? "closed" : "open";
     if (!label.manifold) topology += ", not manifold";
     if (!label.oriented) topology += ", not oriented";
-    rows.push_back({std::to_string(label.label), label.name.value_or(""),
-                    grouped(static_cast<std::int64_t>(label.triangles)), fixed(label.volume_mm3, 1),
-                    fixed(label.voxels_mm3, 1), topology});
+    rows.push_back({std::to_string(label.label), label.name.value_or(""), grouped(label.triangles),
+                    fixed(label.volume_mm3, 1), fixed(label.voxels_mm3, 1), topology});
   }
   return in_columns(
       {Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight, Align::kLeft},
@@ -171,15 +168,14 @@ std::string timing_report(const Timing& timing, const ClientTiming& client) {
 
 std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
   const Units in(unit);
-  const auto count = [](auto value) { return grouped(static_cast<std::int64_t>(value)); };
   Rows rows;
   tell_iso(mesh, rows);
   const Rows sizes = {
-      {"triangles", count(mesh.triangles)},
-      {"vertices", count(mesh.vertices)},
-      {"boundary edges", count(mesh.boundary_edges)},
-      {"components", count(mesh.components)},
-      {"Euler number", count(mesh.euler)},
+      {"triangles", grouped(mesh.triangles)},
+      {"vertices", grouped(mesh.vertices)},
+      {"boundary edges", grouped(mesh.boundary_edges)},
+      {"components", grouped(mesh.components)},
+      {"Euler number", grouped(mesh.euler)},
       {"area", in.area(mesh.area_extracted_mm2) + " extracted"},
       {"", in.area(mesh.area_mm2) + (mesh.simplified ? " simplified" : " smoothed")}};
   rows.insert(rows.end(), sizes.begin(), sizes.end());
@@ -192,13 +188,13 @@ std::string mesh_report(const MeshSummary& mesh, const LengthUnit& unit) {
   rows.insert(rows.end(), places.begin(), places.end());
   tell_error(mesh, in, rows);
   if (mesh.dropped.components > 0) {
-    rows.push_back({"dropped", count(mesh.dropped.components) + " components of " +
-                                   count(mesh.dropped.triangles) + " triangles"});
+    rows.push_back({"dropped", grouped(mesh.dropped.components) + " components of " +
+                                   grouped(mesh.dropped.triangles) + " triangles"});
   }
   const MeshQuality& quality = mesh.quality;
   rows.push_back({"topology", topology_of(quality)});
   if (const auto& found = quality.self_intersections) {
-    const std::string pairs = count(found->pairs) + " pairs of triangles";
+    const std::string pairs = grouped(found->pairs) + " pairs of triangles";
     rows.push_back({"self-intersections", found->pairs == 0 ? "none" : pairs});
   }
   rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
@@ -272,12 +268,11 @@ std::string histogram_report(const Histogram& histogram) {
 }
 
 std::string estimate_report(const Estimate& estimate) {
-  Rows rows = {{"triangles", grouped(static_cast<std::int64_t>(estimate.triangles))},
-               {"vertices", grouped(static_cast<std::int64_t>(estimate.vertices))}};
+  Rows rows = {{"triangles", grouped(estimate.triangles)},
+               {"vertices", grouped(estimate.vertices)}};
   if (estimate.simplified_triangles) {
-    rows.push_back({"simplified",
-                    "about " + grouped(static_cast<std::int64_t>(*estimate.simplified_triangles)) +
-                        " triangles"});
+    rows.push_back(
+        {"simplified", "about " + grouped(*estimate.simplified_triangles) + " triangles"});
   }
   for (const auto& [format, bytes] : estimate.bytes) {
     rows.push_back({std::string(to_string(format)), "about " + human_bytes(bytes)});
@@ -347,8 +342,8 @@ std::string volume_list(const std::vector<Volume>& volumes) {
 std::string label_list(const VolumeLabels& labels) {
   Rows rows = {{"label", "voxels", "mm3", "color", "name"}};
   for (const VolumeLabel& label : labels.labels) {
-    rows.push_back({std::to_string(label.label), grouped(static_cast<std::int64_t>(label.voxels)),
-                    fixed(label.volume_mm3, 1), label.color.value_or(""), label.name.value_or("")});
+    rows.push_back({std::to_string(label.label), grouped(label.voxels), fixed(label.volume_mm3, 1),
+                    label.color.value_or(""), label.name.value_or("")});
   }
   return in_columns({Align::kRight, Align::kRight, Align::kRight, Align::kLeft, Align::kLeft},
                     rows);

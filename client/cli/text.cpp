@@ -17,12 +17,6 @@ std::string printed(const char* format, int precision, double value) {
   return text.data();
 }
 
-std::string with_commas(std::string digits) {
-  const std::size_t first = digits.starts_with('-') ? 1 : 0;
-  for (std::size_t end = digits.size(); end > first + 3; end -= 3) digits.insert(end - 3, ",");
-  return digits;
-}
-
 // Counts characters instead of bytes, because UTF-8 takes several bytes for one.
 std::size_t width_of(std::string_view text) {
   const auto starts = [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; };
@@ -31,7 +25,11 @@ std::size_t width_of(std::string_view text) {
 
 }  // namespace
 
-std::string grouped(std::int64_t value) { return with_commas(std::to_string(value)); }
+std::string with_commas(std::string digits) {
+  const std::size_t first = digits.starts_with('-') ? 1 : 0;
+  for (std::size_t end = digits.size(); end > first + 3; end -= 3) digits.insert(end - 3, ",");
+  return digits;
+}
 
 std::string fixed(double value, int decimals) {
   std::string text = printed("%.*f", decimals, value);

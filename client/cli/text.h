@@ -1,6 +1,7 @@
 // Numbers for people, and columns. Pure functions.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -8,7 +9,10 @@
 
 namespace isomesh::cli {
 
-std::string grouped(std::int64_t value);          // 1,234,567
+std::string with_commas(std::string digits);
+std::string grouped(std::integral auto value) {  // 1,234,567
+  return with_commas(std::to_string(value));
+}
 std::string fixed(double value, int decimals);    // grouped before the point
 std::string human_bytes(std::uint64_t bytes);     // 512 B, 3.5 MB: powers of 1000
 std::string human_duration(double milliseconds);  // 12.3 ms, 4.56 s, 2 min 03 s

@@ -1,7 +1,6 @@
 #include "client/isomesh/client.h"
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 
 #include "base/base64.h"
@@ -32,8 +31,6 @@ std::string joined(const std::array<double, N>& values) {
   for (const double value : values) text += (text.empty() ? "" : ",") + to_text(value);
   return text;
 }
-
-using Query = std::vector<std::pair<std::string, std::string>>;
 
 void add_raw(const RawDescription& raw, Query& pairs) {
   const auto& [x, y, z] = raw.dims;
@@ -136,19 +133,7 @@ Volume Client::volume(const std::string& id) {
   return volume_from_json(impl_->repeat({.target = volume_path(id)}));
 }
 
-std::vector<Volume> Client::volumes() {
-  std::vector<Volume> all;
-  std::string cursor;
-  do {
-    Query query;
-    if (!cursor.empty()) query.emplace_back("cursor", cursor);
-    const std::string body = impl_->repeat({.target = "/v1/volumes" + query_string(query)});
-    std::vector<Volume> page = volumes_from_json(body);
-    cursor = page.empty() ? "" : next_from_json(body);
-    std::ranges::move(page, std::back_inserter(all));
-  } while (!cursor.empty());
-  return all;
-}
+std::vector<Volume> Client::volumes() { return impl_->all_pages("/v1/volumes", volumes_from_json); }
 
 Volume Client::rename_volume(const std::string& id, const std::optional<std::string>& name) {
   return volume_from_json(impl_->send({.method = "PATCH",
@@ -170,17 +155,13 @@ Histogram Client::histogram(const std::string& id, std::uint32_t bins) {
 
 VolumeLabels Client::labels(const std::string& id, std::int64_t background) {
   VolumeLabels all;
-  std::optional<std::string> cursor;
-  do {
-    Query query = {{"background", std::to_string(background)}};
-    if (cursor) query.emplace_back("cursor", *cursor);
-    VolumeLabels page = volume_labels_from_json(
-        impl_->repeat({.target = volume_path(id) + "/labels" + query_string(query)}));
-    all.volume = page.volume;
-    all.background = page.background;
-    std::ranges::move(page.labels, std::back_inserter(all.labels));
-    cursor = page.labels.empty() ? std::nullopt : page.next;
-  } while (cursor);
+  const auto parse = [&](const std::string& body) {
+    all = volume_labels_from_json(body);
+    return std::move(all.labels);
+  };
+  all.labels = impl_->all_pages(volume_path(id) + "/labels", parse,
+                                {{"background", std::to_string(background)}});
+  all.next.reset();
   return all;
 }
 
@@ -266,18 +247,7 @@ Job Client::follow(const std::string& id, const JobListener& listener) {
 }
 
 std::vector<LabelSummary> Client::job_labels(const std::string& id) {
-  std::vector<LabelSummary> labels;
-  std::string cursor;
-  do {
-    Query query;
-    if (!cursor.empty()) query.emplace_back("cursor", cursor);
-    const std::string body =
-        impl_->repeat({.target = job_path(id) + "/labels" + query_string(query)});
-    const std::vector<LabelSummary> page = labels_from_json(body);
-    labels.insert(labels.end(), page.begin(), page.end());
-    cursor = page.empty() ? "" : next_from_json(body);
-  } while (!cursor.empty());
-  return labels;
+  return impl_->all_pages(job_path(id) + "/labels", labels_from_json);
 }
 
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,

@@ -43,49 +43,8 @@ TransportOptions parting_options(ClientOptions&& options) {
 
 // For errors of intermediaries, which do not send our problem documents.
 ErrorCode code_of_status(int status) {
-  switch (status) {
-    case 400:
-      return ErrorCode::kInvalidParameter;
-    case 401:
-      return ErrorCode::kUnauthorized;
-    case 403:
-      return ErrorCode::kForbidden;
-    case 404:
-      return ErrorCode::kNotFound;
-    case 405:
-      return ErrorCode::kMethodNotAllowed;
-    case 409:
-      return ErrorCode::kNotReady;
-    case 410:
-      return ErrorCode::kGone;
-    case 408:
-      return ErrorCode::kRequestTimeout;
-    case 411:
-      return ErrorCode::kLengthRequired;
-    case 412:
-      return ErrorCode::kPreconditionFailed;
-    case 413:
-      return ErrorCode::kTooLarge;
-    case 414:
-      return ErrorCode::kUriTooLong;
-    case 415:
-      return ErrorCode::kUnsupportedMedia;
-    case 422:
-      return ErrorCode::kUnusableVolume;
-    case 429:
-      return ErrorCode::kTooManyRequests;
-    case 431:
-      return ErrorCode::kHeadersTooLarge;
-    case 502:
-    case 504:
-      return ErrorCode::kUnreachable;
-    case 503:
-      return ErrorCode::kUnavailable;
-    case 507:
-      return ErrorCode::kOutOfSpace;
-    default:
-      return ErrorCode::kInternal;
-  }
+  const bool is_gateway = status == 502 || status == 504;
+  return is_gateway ? ErrorCode::kUnreachable : error_code_of_status(status);
 }
 
 }  // namespace

@@ -1,14 +1,20 @@
 // Sends a Client's requests. Private to this folder.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <functional>
+#include <iterator>
 #include <stop_token>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "client/isomesh/client.h"
 #include "client/isomesh/transport.h"
+#include "client/isomesh/url.h"
+#include "proto/json.h"
 
 namespace isomesh {
 
@@ -17,6 +23,8 @@ inline constexpr std::chrono::seconds kLongestWait{30};
 // The minimum interval between polls, for a server that answers long polls immediately.
 inline constexpr std::chrono::milliseconds kShortestLook{200};
 inline constexpr std::size_t kKeyBytes = 16;
+
+using Query = std::vector<std::pair<std::string, std::string>>;
 
 inline bool is_success(const HttpResponse& response) {
   return response.status >= 200 && response.status < 300;
@@ -43,6 +51,22 @@ class Client::Impl {
   HttpResponse repeated(const HttpRequest& request, const std::function<void()>& before = {}) const;
   std::string repeat(const HttpRequest& request, const std::function<void()>& before = {}) const {
     return repeated(request, before).body;
+  }
+
+  // All items of a list that comes in pages. `parse` reads those of one page.
+  template <class Parse>
+  auto all_pages(const std::string& path, const Parse& parse, const Query& query = {}) const {
+    decltype(parse(path)) all;
+    std::string cursor;
+    do {
+      Query asked = query;
+      if (!cursor.empty()) asked.emplace_back("cursor", cursor);
+      const std::string body = repeat({.target = path + query_string(asked)});
+      auto page = parse(body);
+      cursor = page.empty() ? "" : next_from_json(body);
+      std::ranges::move(page, std::back_inserter(all));
+    } while (!cursor.empty());
+    return all;
   }
 
   // Sends a request with a source, and resumes it after a broken connection. Works as exchange()

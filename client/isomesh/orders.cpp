@@ -57,7 +57,7 @@ Order Client::wait_for_order(const std::string& id, const OrderProgress& progres
 
 OrderPage Client::orders(std::optional<OrderState> state, const std::string& rule,
                          const std::string& cursor) {
-  std::vector<std::pair<std::string, std::string>> query;
+  Query query;
   if (state) query.emplace_back("state", to_string(*state));
   if (!rule.empty()) query.emplace_back("rule", rule);
   if (!cursor.empty()) query.emplace_back("cursor", cursor);

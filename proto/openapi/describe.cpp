@@ -37,13 +37,6 @@ constexpr bool kIsChoice = Enumeration<T>;
 template <class T>
 constexpr bool kIsOfLabels = std::is_same_v<T, LabelTexts> || std::is_same_v<T, LabelValues>;
 
-template <class Enum>
-std::vector<std::string> value_names() {
-  std::vector<std::string> names;
-  for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
-  return names;
-}
-
 template <class T>
 std::string name_of(const T& value) {
   return std::string(to_string(value));
@@ -137,7 +130,7 @@ void write_cases(Yaml& yaml, const Parameter& parameter) {
 
 template <class Enum>
 void write_choice(Yaml& yaml, const Parameter& parameter) {
-  const std::vector<std::string> names = value_names<Enum>();
+  const std::vector<std::string> names = name_list<Enum>();
   yaml.line("enum: " + in_brackets(names));
   if (parameter.values.front() == nullptr) return;
   yaml.under("x-enumDescriptions", [&] {
@@ -386,7 +379,7 @@ std::string formats() {
         "package. `zip` is for labels. It holds one file per label in each other requested format "
         "except `glb`, `3mf`, `usda` and `usdz`. If there is none, the files are STL.");
     yaml.line("type: string");
-    yaml.line("enum: " + in_brackets(value_names<MeshFormat>()));
+    yaml.line("enum: " + in_brackets(name_list<MeshFormat>()));
     std::vector<std::string> whole;
     for (const MeshFormat format : values_of<MeshFormat>()) {
       if (holds_all_labels(format)) whole.push_back(name_of(format));
