@@ -20,7 +20,13 @@ constexpr std::size_t kMostValues = kMostLabels + 1;  // with the background
 
 void add_run(LabelVoxels& label, std::uint32_t begin, std::uint32_t end, std::uint32_t y,
              std::uint32_t z) {
-  add_voxels({.voxels = end - begin, .low = {begin, y, z}, .high = {end - 1, y, z}}, label);
+  const std::array<std::uint32_t, 3> first = {begin, y, z};
+  const std::array<std::uint32_t, 3> last = {end - 1, y, z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    label.low[axis] = label.voxels == 0 ? first[axis] : std::min(label.low[axis], first[axis]);
+    label.high[axis] = std::max(label.high[axis], last[axis]);
+  }
+  label.voxels += end - begin;
 }
 
 // The labels that have been met, by value.
