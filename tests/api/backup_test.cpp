@@ -1,7 +1,6 @@
 // `isomeshd backup` beside a daemon at work, and `isomeshd restore`.
 #include <atomic>
 #include <filesystem>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -130,7 +129,7 @@ TEST(Backup, ARestoreThatFailsLeavesNothing) {
   EXPECT_EQ(isomeshd("restore", folder / "backup", folder / "empty").status, 0);
   // As one that was killed leaves it.
   write_file(folder / "empty/restoring", "");
-  const Finished refused = run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "empty"});
+  const Finished refused = refused_start(folder / "empty");
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.errors, HasSubstr("restore again"));
   const Finished again = isomeshd("restore", folder / "backup", folder / "empty");

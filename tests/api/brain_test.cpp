@@ -1,6 +1,5 @@
 // The numbers that the project is judged by, through the real command.
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 

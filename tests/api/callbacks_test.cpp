@@ -9,6 +9,7 @@
 #include "proto/json.h"
 #include "tests/api/daemon.h"
 #include "tests/api/problems.h"
+#include "tests/support/enumerators.h"
 #include "tests/support/receiver.h"
 
 namespace isomesh {
@@ -37,7 +38,7 @@ std::string hmac_by_openssl(const TemporaryFolder& folder, const std::string& co
   const Finished result = run({"sh", "-c",
                                "openssl dgst -sha256 -hmac '" + kSecret + "' -binary " +
                                    std::string(folder / "content") + " | base64"});
-  return result.output.substr(0, result.output.find('\n'));
+  return result.line();
 }
 
 class CallbacksTest : public testing::Test {
@@ -62,9 +63,8 @@ TEST_F(CallbacksTest, TellTheJobsEndAndAreSigned) {
 
 TEST_F(CallbacksTest, TellOfJobsThatFailOrAreCancelled) {
   const Receiver receiver;
-  auto options = options_for(folder_, receiver);
-  options.insert(options.end(), {"--job-memory", "1"});
-  const Daemon daemon(folder_ / "data", "127.0.0.1:0", options);
+  const Daemon daemon(folder_ / "data", "127.0.0.1:0",
+                      with(options_for(folder_, receiver), {"--job-memory", "1"}));
   const Job failed = submit(daemon, upload(daemon, sphere_upload()), 100, callback_to(receiver));
   ASSERT_TRUE(receiver.gets(1));
   EXPECT_EQ(job_from_json(receiver.received().at(0).body).state, JobState::kFailed);
@@ -73,9 +73,8 @@ TEST_F(CallbacksTest, TellOfJobsThatFailOrAreCancelled) {
 
 TEST_F(CallbacksTest, OfACancelledJobComesToo) {
   const Receiver receiver;
-  auto options = options_for(folder_, receiver);
-  options.insert(options.end(), {"--workers", "1"});
-  const Daemon daemon(folder_ / "data", "127.0.0.1:0", options);
+  const Daemon daemon(folder_ / "data", "127.0.0.1:0",
+                      with(options_for(folder_, receiver), {"--workers", "1"}));
   const Job busy = long_job(daemon);
   const Volume volume = daemon.client().volume(busy.parameters.volume);
   const Job waiting = submit(daemon, volume, 51, callback_to(receiver));
@@ -124,9 +123,7 @@ TEST_F(CallbacksTest, GoToListedAddressesAlone) {
   for (const Daemon* each : {&daemon, &none}) {
     const Volume volume = upload(*each, sphere_upload());
     const auto answer_to = [&](const std::string& callback) {
-      return each->send(
-          "POST", "/v1/jobs",
-          R"({"volume": ")" + volume.id + R"(", "iso": 100, "callback": )" + callback + "}");
+      return each->send("POST", "/v1/jobs", job_body(volume.id, 100, R"("callback": )" + callback));
     };
     for (const std::string& url :
          {receiver.url() + "/other", std::string("http://localhost:1/hooks"),
@@ -155,13 +152,10 @@ TEST_F(CallbacksTest, TheCommandAsksForThem) {
 TEST_F(CallbacksTest, AuthoritiesThatCannotBeUsedAreRefusedAtTheStartAndByTheCheck) {
   write_file(folder_ / "none.pem", "no certificate");
   for (const std::string name : {"none.pem", "absent.pem"}) {
-    const std::vector<std::string> options = {"--data", folder_ / "data", "--callback-ca",
-                                              folder_ / name};
-    for (const std::vector<std::string>& begin : std::vector<std::vector<std::string>>{
-             {ISOMESHD, "--listen", "127.0.0.1:0"}, {ISOMESHD, "check"}}) {
-      std::vector<std::string> command = begin;
-      command.insert(command.end(), options.begin(), options.end());
-      const Finished told = run(command);
+    for (const std::vector<std::string>& verb :
+         std::vector<std::vector<std::string>>{{}, {"check"}}) {
+      const Finished told =
+          refused_start(folder_ / "data", with({"--callback-ca", folder_ / name}, verb));
       EXPECT_EQ(told.status, 1) << name;
       EXPECT_THAT(told.output + told.errors, HasSubstr("callback-ca")) << name;
       EXPECT_THAT(told.output + told.errors, HasSubstr("cannot be read")) << name;
@@ -176,14 +170,81 @@ TEST_F(CallbacksTest, NeedASecretAndAnAddress) {
            {"--callback-allow", "ris.example.org", "--callback-secret-file", folder_ / "secret"},
            {"--callback-allow", "https://ris.example.org/", "--callback-secret-file",
             folder_ / "absent"}}) {
-    std::vector<std::string> command = {ISOMESHD, "--data", folder_ / "data", "--listen",
-                                        "127.0.0.1:0"};
-    command.insert(command.end(), wrong.begin(), wrong.end());
-    const Finished result = run(command);
+    const Finished result = refused_start(folder_ / "data", wrong);
     EXPECT_EQ(result.status, 1);
     EXPECT_THAT(result.errors, HasSubstr("callback"));
     EXPECT_THAT(result.errors, Not(HasSubstr(kSecret)));
   }
+}
+
+// --- Secrets in addresses
+
+// A callback's address may hold a secret. It is its job's alone: no mesh and no line of the log has
+// it.
+const std::string kKeyInUrl = "c9a1f0e2-not-for-others";
+
+class CallbackSecret : public testing::Test {
+ protected:
+  // All of a surface; a ZIP is for labels.
+  static std::vector<std::string> formats() {
+    std::vector<std::string> all = names<MeshFormat>();
+    std::erase(all, "zip");
+    return all;
+  }
+
+  // A mesh in every format, with everything that it may carry.
+  static std::string everything() {
+    return R"("normals": true, "formats": )" + json(formats()).dump();
+  }
+
+  std::string callback() const {
+    return R"("callback": {"url": ")" + receiver_.url() + "/hooks/iso?key=" + kKeyInUrl + "\"}";
+  }
+
+  void expect_clean_meshes(const Job& job) const {
+    ASSERT_TRUE(job.mesh);
+    EXPECT_EQ(job.mesh->files.size(), formats().size());
+    for (const auto& [format, file] : job.mesh->files) {
+      const std::string bytes = daemon_.get(file.href).body;
+      EXPECT_EQ(bytes.size(), file.bytes);
+      for (const std::string& word : {kKeyInUrl, receiver_.url(), std::string("callback")}) {
+        EXPECT_EQ(bytes.find(word), std::string::npos) << to_string(format) << " holds " << word;
+      }
+    }
+  }
+
+  TemporaryFolder folder_;
+  const Receiver receiver_{{503, 204}};  // the first attempt fails, which is logged as well
+  Daemon daemon_{folder_ / "data", "127.0.0.1:0", options_for(folder_, receiver_)};
+};
+
+TEST_F(CallbackSecret, StandsInNoMeshAlsoWhenAnotherJobTakesIt) {
+  const Job asked = finished_job(daemon_, callback() + ", " + everything());
+  ASSERT_TRUE(asked.parameters.callback);
+  expect_clean_meshes(asked);
+  const Volume volume = daemon_.client().volume(asked.parameters.volume);
+  const Job other =
+      daemon_.client().wait(submit(daemon_, volume, *asked.parameters.iso, everything()).id);
+  EXPECT_TRUE(other.reused);
+  EXPECT_FALSE(other.parameters.callback);
+  expect_clean_meshes(other);
+}
+
+TEST_F(CallbackSecret, StandsInNoLineOfTheLog) {
+  const Job job = finished_job(daemon_, callback());
+  ASSERT_TRUE(receiver_.gets(2));
+  // Refused: an address that nobody has listed, and a request that has no callbacks.
+  const std::string elsewhere = "http://elsewhere.example/?key=" + kKeyInUrl;
+  for (const std::string& url : {elsewhere, "nonsense " + kKeyInUrl}) {
+    const json body = {
+        {"volume", job.parameters.volume}, {"iso", 100}, {"callback", {{"url", url}}}};
+    EXPECT_EQ(daemon_.send("POST", "/v1/jobs", body.dump()).status, 400);
+  }
+  EXPECT_EQ(daemon_.send("POST", "/v1/mesh?iso=1&callback=" + kKeyInUrl, "x").status, 400);
+  EXPECT_EQ(daemon_.get("/v1/estimate?iso=1&callback=" + kKeyInUrl).status, 400);
+  EXPECT_EQ(daemon_.stop(), 0);
+  EXPECT_THAT(daemon_.errors(), HasSubstr("callback"));
+  EXPECT_THAT(daemon_.errors(), Not(HasSubstr(kKeyInUrl)));
 }
 
 }  // namespace

@@ -27,9 +27,8 @@ class CommandReachTest : public testing::Test {
   CommandReachTest() { write_file(folder_ / "sphere.raw", sphere_.bytes); }
 
   // `words` and the options that describe the sphere.
-  std::vector<std::string> raw(std::vector<std::string> words) {
-    words.insert(words.end(), sphere_.options.begin(), sphere_.options.end());
-    return words;
+  std::vector<std::string> raw(const std::vector<std::string>& words) {
+    return with(words, sphere_.options);
   }
 
   Daemon daemon_;
@@ -106,11 +105,9 @@ TEST_F(CommandReachTest, NotesNameTheirInputAndTheOption) {
     bytes.replace(2 * kSlab, kSlab, kSlab, name[0]);
     write_file(folder_ / name, bytes);
   }
-  const std::vector<std::string> how = {"--dims", "32,32,32", "--type", "uint8", "--iso", "2"};
-  std::vector<std::string> words = {"mesh", folder_ / "a.raw", folder_ / "b.raw", "-o",
-                                    folder_ / "{name}.stl"};
-  words.insert(words.end(), how.begin(), how.end());
-  const Finished both = daemon_.command(words);
+  const Finished both =
+      daemon_.command({"mesh", folder_ / "a.raw", folder_ / "b.raw", "-o", folder_ / "{name}.stl",
+                       "--dims", "32,32,32", "--type", "uint8", "--iso", "2"});
   EXPECT_EQ(both.status, 0) << both.errors;
   EXPECT_THAT(both.errors, HasSubstr("isomesh: a: note: "));
   EXPECT_THAT(both.errors, HasSubstr("isomesh: b: note: "));
@@ -127,12 +124,6 @@ TEST_F(CommandReachTest, AnIsoValueBeyondTheSamplesIsExplained) {
               HasSubstr("no surface at the iso-value 9999; its samples range from 0 to "));
   const std::string job = daemon_.client().jobs().jobs.at(0).id;
   EXPECT_THAT(daemon_.command({"wait", job}).errors, HasSubstr("its samples range from 0 to "));
-}
-
-TEST(CommandWithoutAServer, SaysWhatToDo) {
-  const Finished result = run({ISOMESH, "--server", "unix:/no/such/socket", "list"});
-  EXPECT_EQ(result.status, 3);
-  EXPECT_THAT(result.errors, HasSubstr("start isomeshd, or use `isomesh local`"));
 }
 
 // A shell ends its loop if the command has died by SIGINT, and goes on if it has exited.

@@ -10,10 +10,7 @@ namespace {
 std::vector<std::string> command_line(const std::filesystem::path& data, const std::string& listen,
                                       const std::vector<std::string>& arguments,
                                       const std::vector<std::string>& prefix = {}) {
-  std::vector<std::string> command = prefix;
-  command.insert(command.end(), {ISOMESHD, "--listen", listen, "--data", data});
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  return command;
+  return with(with(prefix, {ISOMESHD, "--listen", listen, "--data", data}), arguments);
 }
 
 std::string numbers(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -23,24 +20,15 @@ std::string numbers(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
 }  // namespace
 
 Daemon::Daemon(const std::vector<std::string>& arguments)
-    : data_(folder_ / "data"), process_(command_line(data_, "127.0.0.1:0", arguments)) {
-  begin();
-}
+    : data_(folder_ / "data"),
+      process_(command_line(data_, "127.0.0.1:0", arguments)),
+      url_(url_of(process_)) {}
 
 Daemon::Daemon(const std::filesystem::path& data, const std::string& listen,
                const std::vector<std::string>& arguments, const std::vector<std::string>& prefix)
-    : data_(data), process_(command_line(data, listen, arguments, prefix)) {
-  begin();
-}
-
-void Daemon::begin() {
-  constexpr std::string_view kWords = "listening on ";
-  const std::string line = process_.first_line();
-  if (!line.starts_with(kWords)) {
-    throw std::runtime_error("the daemon does not listen: " + line + process_.errors());
-  }
-  url_ = line.substr(kWords.size());
-}
+    : data_(data),
+      process_(command_line(data, listen, arguments, prefix)),
+      url_(url_of(process_)) {}
 
 int Daemon::stop() {
   terminate();
@@ -53,9 +41,12 @@ Answer Daemon::send(const std::string& method, const std::string& target, const 
 }
 
 Finished Daemon::command(const std::vector<std::string>& arguments) const {
-  std::vector<std::string> words = {ISOMESH, "--server", url_};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  return run(words);
+  return run(with({ISOMESH, "--server", url_}, arguments));
+}
+
+Finished refused_start(const std::filesystem::path& data,
+                       const std::vector<std::string>& arguments) {
+  return run(command_line(data, "127.0.0.1:0", arguments));
 }
 
 RawUpload raw_upload(const SampleVolume<std::uint8_t>& volume) {
@@ -84,10 +75,13 @@ Volume upload(const Daemon& daemon, const RawUpload& raw) {
   return volume_from_json(answer.body);
 }
 
+std::string job_body(const std::string& volume, double iso, const std::string& members) {
+  return "{\"volume\": \"" + volume + "\", \"iso\": " + std::to_string(iso) +
+         (members.empty() ? "" : ", " + members) + "}";
+}
+
 Job submit(const Daemon& daemon, const Volume& volume, double iso, const std::string& members) {
-  const std::string body = "{\"volume\": \"" + volume.id + "\", \"iso\": " + std::to_string(iso) +
-                           (members.empty() ? "" : ", " + members) + "}";
-  const Answer answer = daemon.send("POST", "/v1/jobs", body);
+  const Answer answer = daemon.send("POST", "/v1/jobs", job_body(volume.id, iso, members));
   if (answer.status != 202) throw std::runtime_error(answer.body);
   return job_from_json(answer.body);
 }
@@ -99,15 +93,29 @@ Job finished_job(const Daemon& daemon, const std::string& members) {
   return ended;
 }
 
-Job long_job(const Daemon& daemon) {
-  const Job job = submit(daemon, upload(daemon, rough_upload()), 50, slow_smoothing(1000));
+Job begun_job(const Daemon& daemon, int passes, double iso) {
+  const std::string id =
+      submit(daemon, upload(daemon, rough_upload()), iso, slow_smoothing(passes)).id;
   Job seen;
-  const bool runs = eventually([&] {
-    seen = daemon.client().job(job.id);
+  const bool is_begun = eventually([&] {
+    seen = daemon.client().job(id);
     return seen.stage == Stage::kSmooth || is_final(seen.state);
   });
-  if (!runs || seen.state != JobState::kRunning) throw std::runtime_error(to_json(seen));
+  if (!is_begun) throw std::runtime_error(to_json(seen));
   return seen;
+}
+
+Job long_job(const Daemon& daemon) {
+  const Job begun = begun_job(daemon, 1000);
+  if (begun.state != JobState::kRunning) throw std::runtime_error(to_json(begun));
+  return begun;
+}
+
+bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt) {
+  for (int passes = 12; passes <= 1000; passes *= 2) {
+    if (attempt(passes)) return true;
+  }
+  return false;
 }
 
 }  // namespace isomesh::test

@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,6 @@ class Daemon {
   pid_t pid() const { return process_.pid(); }
   void terminate() { process_.send_signal(SIGTERM); }
   int wait() { return process_.wait(); }
-  pid_t process_id() const { return process_.id(); }
   // Everything written to standard error so far.
   std::string errors() const { return process_.errors(); }
   bool ends_within(std::chrono::seconds longest) { return process_.ends_within(longest); }
@@ -54,13 +54,15 @@ class Daemon {
   Finished command(const std::vector<std::string>& arguments) const;
 
  private:
-  void begin();
-
   TemporaryFolder folder_;
   std::filesystem::path data_;
   Process process_;
   std::string url_;
 };
+
+// Runs an isomeshd on that folder and a free port until it ends, as one that must not start does.
+Finished refused_start(const std::filesystem::path& data,
+                       const std::vector<std::string>& arguments = {});
 
 // Samples of uint8 and the query that describes them.
 struct RawUpload {
@@ -87,13 +89,23 @@ RawUpload long_upload();
 // Uploads it; throws std::runtime_error when it is refused.
 Volume upload(const Daemon& daemon, const RawUpload& raw);
 
+// The body of a request for a job with further members such as `"passes": 3`.
+std::string job_body(const std::string& volume, double iso, const std::string& members = {});
+
 // Submits a job with further members such as `"passes": 3`.
 Job submit(const Daemon& daemon, const Volume& volume, double iso, const std::string& members = {});
 
 // A sphere's job that has succeeded.
 Job finished_job(const Daemon& daemon, const std::string& members = {});
 
+// A job of so many passes as it is when it has begun to smooth, or has ended before that was seen.
+Job begun_job(const Daemon& daemon, int passes, double iso = 50);
+
 // A job that runs for longer than any test waits for, and has begun to.
 Job long_job(const Daemon& daemon);
+
+// Calls attempt(passes) with ever longer jobs until it is true. How long a job takes on a busy
+// machine is not known, and one that ends too soon, or too late, shows nothing.
+bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt);
 
 }  // namespace isomesh::test

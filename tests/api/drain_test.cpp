@@ -1,6 +1,5 @@
 // Ending: what runs is finished or put back, and nothing new is accepted.
 #include <csignal>
-#include <functional>
 #include <string>
 #include <thread>
 
@@ -20,11 +19,9 @@ using testing::HasSubstr;
 
 TEST(Drain, AnIdleDaemonEndsAtOnceOnEitherSignal) {
   for (const int signal : {SIGTERM, SIGINT}) {
-    const TemporaryFolder folder;
-    Process process({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "data"});
-    process.first_line();
-    process.send_signal(signal);
-    EXPECT_EQ(process.wait(), 0);
+    Daemon daemon;
+    daemon.send_signal(signal);
+    EXPECT_EQ(daemon.wait(), 0);
   }
 }
 
@@ -36,23 +33,10 @@ bool ended_while_draining(const Daemon& daemon, const std::string& job) {
          log.find(job) > draining;
 }
 
-// Calls attempt(volume) with ever larger volumes until it is true. How long a job takes on a busy
-// machine is not known, and one that ends before the draining begins, or does not end while its
-// client waits, shows nothing.
-bool with_a_job_that_is_long_enough(const std::function<bool(const RawUpload& volume)>& attempt) {
-  for (std::uint32_t size = 12; size <= 150; size += size / 2) {
-    if (attempt(raw_upload(test::noise<std::uint8_t>({0, 100}, {size, size, size}, 11))))
-      return true;
-  }
-  return false;
-}
-
 TEST(Drain, LetsARunningJobFinish) {
-  EXPECT_TRUE(with_a_job_that_is_long_enough([](const RawUpload& volume) {
+  EXPECT_TRUE(with_a_job_that_is_long_enough([](int passes) {
     Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
-    const Job job =
-        submit(daemon, upload(daemon, volume), 50, R"("draco": {"speed": 10}, "passes": 200)");
-    EXPECT_TRUE(eventually([&] { return daemon.client().job(job.id).state != JobState::kQueued; }));
+    const Job job = begun_job(daemon, passes);
     const Connection waiter(daemon.url());
     waiter.send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
     daemon.terminate();
@@ -61,19 +45,6 @@ TEST(Drain, LetsARunningJobFinish) {
     return ended_while_draining(daemon, job.id) && answer.status == 200 &&
            job_from_json(answer.body).state == JobState::kSucceeded;
   }));
-}
-
-TEST(Drain, AJobThatTakesTooLongIsPutBack) {
-  const TemporaryFolder folder;
-  Job job;
-  {
-    Daemon daemon(folder / "data", "127.0.0.1:0", {"--drain-seconds", "0"});
-    job = long_job(daemon);
-    EXPECT_EQ(daemon.stop(), 0);
-  }
-  const Daemon next(folder / "data", "127.0.0.1:0");
-  EXPECT_TRUE(eventually([&] { return next.client().job(job.id).state == JobState::kRunning; }));
-  next.client().cancel(job.id);
 }
 
 // Ctrl-C in a terminal is for the whole process group of the daemon.
@@ -100,21 +71,22 @@ TEST(Drain, IsNotReadyAndAcceptsNothing) {
   ASSERT_TRUE(eventually([&] { return daemon.get("/readyz").status == 503; }));
   EXPECT_EQ(daemon.get("/livez").status, 200);
   // Nobody would run it any more.
-  EXPECT_TRUE(
-      is_problem(daemon.send("POST", "/v1/jobs",
-                             "{\"volume\": \"" + job.parameters.volume + "\", \"iso\": 50}"),
-                 ErrorCode::kUnavailable));
+  EXPECT_TRUE(is_problem(daemon.send("POST", "/v1/jobs", job_body(job.parameters.volume, 50)),
+                         ErrorCode::kUnavailable));
   EXPECT_EQ(daemon.get("/v1/jobs/" + job.id).status, 200);
   daemon.client().cancel(job.id);
   EXPECT_EQ(daemon.wait(), 0);
 }
 
 TEST(Drain, FinishesTheMeshOfOneRequest) {
-  EXPECT_TRUE(with_a_job_that_is_long_enough([](const RawUpload& volume) {
+  EXPECT_TRUE(with_a_job_that_is_long_enough([](int passes) {
     Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
+    const RawUpload rough = rough_upload();
     const Connection client(daemon.url());
-    client.send(
-        request("POST", "/v1/mesh?iso=50&speed=10&passes=200&" + volume.query, volume.bytes));
+    client.send(request("POST",
+                        "/v1/mesh?iso=50&smoothing=optimize&speed=10&passes=" +
+                            std::to_string(passes) + '&' + rough.query,
+                        rough.bytes));
     std::string job;
     EXPECT_TRUE(eventually([&] {
       const auto jobs = daemon.client().jobs().jobs;

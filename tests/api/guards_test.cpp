@@ -1,6 +1,5 @@
 // Requests that no honest client sends, and the guards that httplib needs against them. Whatever is
 // sent, the daemon answers the next request.
-#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <string>

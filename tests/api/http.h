@@ -11,6 +11,11 @@ namespace isomesh::test {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
+inline Headers with(Headers headers, const Headers& more) {
+  headers.insert(headers.end(), more.begin(), more.end());
+  return headers;
+}
+
 struct Answer {
   int status = 0;
   std::multimap<std::string, std::string> headers;  // names in lower case

@@ -19,11 +19,6 @@ constexpr std::string_view kHeader =
     "ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\n"
     "ElementSpacing = 1 2 3\nElementDataFile = head.raw\n";
 
-std::string trimmed(std::string text) {
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  return text;
-}
-
 TEST(Import, AFolderAndAHeaderArePackedOnTheWay) {
   const Daemon daemon;
   const TemporaryFolder folder;
@@ -36,7 +31,7 @@ TEST(Import, AFolderAndAHeaderArePackedOnTheWay) {
   const Finished of_header = daemon.command({"upload", folder / "volume/head.mhd"});
   EXPECT_EQ(of_header.status, 0) << of_header.errors;
   EXPECT_EQ(of_folder.output, of_header.output);
-  const Volume volume = daemon.client().volume(trimmed(of_folder.output));
+  const Volume volume = daemon.client().volume(of_folder.line());
   EXPECT_EQ(volume.format, "metaimage");
   EXPECT_EQ(volume.geometry.spacing, (std::array<double, 3>{1, 2, 3}));
   const Finished meshed =

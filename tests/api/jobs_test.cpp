@@ -25,9 +25,7 @@ class JobsTest : public testing::Test {
     return daemon_.send("POST", "/v1/jobs", body, headers);
   }
   Answer post_with(const std::string& members, const Headers& headers = {}) {
-    return post("{\"volume\": \"" + volume_.id + "\", \"iso\": 100" +
-                    (members.empty() ? "" : ", " + members) + "}",
-                headers);
+    return post(job_body(volume_.id, 100, members), headers);
   }
 
   Daemon daemon_;
@@ -124,6 +122,8 @@ TEST_F(JobsTest, ARunningJobStopsWhenItIsCancelled) {
   const Job ended = job_from_json(daemon_.get(path + "?wait=30").body);
   EXPECT_EQ(ended.state, JobState::kCancelled);
   EXPECT_FALSE(ended.mesh || ended.error);
+  EXPECT_EQ(blobs_below(daemon_.data()).size(), 2U) << "the two volumes and nothing else";
+  EXPECT_TRUE(files_below(daemon_.data() / "scratch").empty());
   EXPECT_TRUE(is_problem(daemon_.get(path + "/mesh.drc"), ErrorCode::kCancelled));
 }
 
@@ -183,24 +183,6 @@ TEST_F(JobsTest, ABodyThatIsTooLargeIsRefused) {
                          ErrorCode::kTooLarge));
 }
 
-TEST_F(JobsTest, ListsByStateInPages) {
-  for (int n = 0; n < 105; ++n) ASSERT_EQ(post_with("\"passes\": 0").status, 202);
-  std::set<std::string> seen;
-  Client client = daemon_.client();
-  JobPage page = client.jobs();
-  EXPECT_EQ(page.jobs.size(), 100U);
-  for (const Job& job : page.jobs) seen.insert(job.id);
-  page = client.jobs(std::nullopt, page.next);
-  EXPECT_EQ(page.jobs.size(), 5U);
-  EXPECT_TRUE(page.next.empty());
-  for (const Job& job : page.jobs) seen.insert(job.id);
-  EXPECT_EQ(seen.size(), 105U);
-  client.wait(*seen.begin());
-  EXPECT_FALSE(client.jobs(JobState::kSucceeded).jobs.empty());
-  EXPECT_TRUE(client.jobs(JobState::kFailed).jobs.empty());
-  EXPECT_TRUE(blames(daemon_.get("/v1/jobs?state=melted"), "state"));
-}
-
 TEST_F(JobsTest, UnknownParametersAreRefusedEverywhere) {
   const std::string job = "/v1/jobs/" + finished_job(daemon_).id;
   const std::string volume = "/v1/volumes/" + volume_.id;
@@ -240,8 +222,7 @@ TEST(FullQueue, AnswersLater) {
   Volume volume;
   volume.id = running.parameters.volume;
   const Job queued = submit(daemon, volume, 50);
-  const Answer answer =
-      daemon.send("POST", "/v1/jobs", "{\"volume\": \"" + volume.id + "\", \"iso\": 50}");
+  const Answer answer = daemon.send("POST", "/v1/jobs", job_body(volume.id, 50));
   EXPECT_TRUE(is_problem(answer, ErrorCode::kUnavailable));
   EXPECT_FALSE(answer.header("retry-after").empty());
   EXPECT_TRUE(is_problem(daemon.get("/readyz"), ErrorCode::kUnavailable));
@@ -350,7 +331,7 @@ TEST_F(JobsTest, ListsComeInPages) {
 // Sent as it is made, unlike a list of the usual length.
 TEST_F(JobsTest, ALongListComesInPieces) {
   const Job first = finished_job(daemon_);
-  const std::string body = R"({"volume": ")" + first.parameters.volume + R"(", "iso": 100})";
+  const std::string body = job_body(first.parameters.volume, 100);
   std::vector<std::string> ids = {first.id};
   while (ids.size() < 250) {
     ids.push_back(job_from_json(daemon_.send("POST", "/v1/jobs?wait=30", body).body).id);
@@ -373,6 +354,11 @@ TEST_F(JobsTest, ALongListComesInPieces) {
   EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=220" + next), 220, 250), "");
   EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=1000"), 0, 250), "");
   EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=1000&state=succeeded"), 0, 250), "");
+  EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?state=failed"), 0, 0), "");
+  EXPECT_TRUE(blames(daemon_.get("/v1/jobs?state=melted"), "state"));
+  EXPECT_NE(expect_page(daemon_.get("/v1/jobs"), 0, 100), "") << "a page of the usual length";
+  Client client = daemon_.client();
+  EXPECT_EQ(client.jobs(JobState::kSucceeded, client.jobs().next).jobs.front().id, ids[100]);
   const Answer old = answer_to(daemon_.url(), "GET /v1/jobs?limit=1000 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(expect_page(old, 0, 250), "");
   const Answer plain = daemon_.get("/v1/jobs?limit=1000", {{"Accept-Encoding", "gzip, br"}});

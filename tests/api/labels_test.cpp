@@ -293,26 +293,23 @@ TEST_F(LabelsTest, FewAreAPageToo) {
 TEST_F(LabelsTest, TheCommandWritesThem) {
   const TemporaryFolder folder;
   write_file(folder / "balls.raw", balls_.bytes);
-  std::vector<std::string> words = {"mesh", folder / "balls.raw"};
-  words.insert(words.end(), balls_.options.begin(), balls_.options.end());
-  const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), words.begin(), words.end());
-    return daemon_.command(more);
+  const auto mesh_with = [&](const std::vector<std::string>& more) {
+    return daemon_.command(with(with({"mesh", folder / "balls.raw"}, balls_.options), more));
   };
-  const Finished all = with({"--labels", "all", "--label-name", "3=Left lung", "-o",
-                             folder / "body.glb", "-o", folder / "body.zip"});
+  const Finished all = mesh_with({"--labels", "all", "--label-name", "3=Left lung", "-o",
+                                  folder / "body.glb", "-o", folder / "body.zip"});
   EXPECT_EQ(all.status, 0) << all.errors;
   EXPECT_THAT(all.output, HasSubstr("Left lung"));
   EXPECT_EQ(read_file(folder / "body.zip").substr(0, 2), "PK");
   EXPECT_THAT(read_file(folder / "body.zip"), HasSubstr("Left lung.stl"));
-  const Finished one = with({"--labels", "7", "-o", folder / "right.stl"});
+  const Finished one = mesh_with({"--labels", "7", "-o", folder / "right.stl"});
   EXPECT_EQ(one.status, 0) << one.errors;
   EXPECT_EQ(read_file(folder / "right.stl").substr(0, 7), "isomesh");
-  EXPECT_EQ(with({"--labels", "all", "-o", folder / "all.stl"}).status, 2);
-  EXPECT_EQ(with({"--iso", "3", "-o", folder / "all.zip"}).status, 2);
-  EXPECT_EQ(with({"--iso", "3", "--labels", "all", "-o", folder / "all.glb"}).status, 2);
-  EXPECT_EQ(with({"-o", folder / "all.glb"}).status, 2);
-  const Finished missing = with({"--labels", "5", "-o", folder / "five.glb"});
+  EXPECT_EQ(mesh_with({"--labels", "all", "-o", folder / "all.stl"}).status, 2);
+  EXPECT_EQ(mesh_with({"--iso", "3", "-o", folder / "all.zip"}).status, 2);
+  EXPECT_EQ(mesh_with({"--iso", "3", "--labels", "all", "-o", folder / "all.glb"}).status, 2);
+  EXPECT_EQ(mesh_with({"-o", folder / "all.glb"}).status, 2);
+  const Finished missing = mesh_with({"--labels", "5", "-o", folder / "five.glb"});
   EXPECT_EQ(missing.status, 1);
   EXPECT_THAT(missing.errors, HasSubstr("5"));
 }

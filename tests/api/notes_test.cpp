@@ -1,6 +1,5 @@
 // Tests of notes about how a volume was read, and of the options that errors offer, from file to
 // mesh.
-#include <functional>
 #include <map>
 
 #include <gmock/gmock.h>
@@ -79,23 +78,18 @@ std::string not_finite() {
 
 // One slice of a CT of 4 x 4 samples.
 std::string slice(int index, const std::string& frame_of_reference) {
-  const std::string uid = "1.2.826.0.1.3680043.9.1." + std::to_string(index);
-  const std::string meta = element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-                           element(2, 3, "UI", uid) + element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-  std::string length(4, '\0');
-  put(length, 0, static_cast<std::uint32_t>(meta.size()));
-  return std::string(128, '\0') + "DICM" + element(2, 0, "UL", length) + meta +
-         element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + element(8, 0x18, "UI", uid) +
-         element(8, 0x60, "CS", "CT") + element(0x20, 0xd, "UI", "1.2.3") +
-         element(0x20, 0xe, "UI", "1.2.3.4") +
-         element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(index)) +
-         element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
-         element(0x20, 0x52, "UI", frame_of_reference) + number(0x28, 2, 1) +
-         element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 4) + number(0x28, 0x11, 4) +
-         element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 16) + number(0x28, 0x101, 16) +
-         number(0x28, 0x102, 15) + number(0x28, 0x103, 0) +
-         element(0x7fe0, 0x10, "OW",
-                 std::string(16, static_cast<char>(index)) + std::string(16, 'a'));
+  return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+               element(8, 0x18, "UI", "1.2.826.0.1.3680043.9.1." + std::to_string(index)) +
+               element(8, 0x60, "CS", "CT") + element(0x20, 0xd, "UI", "1.2.3") +
+               element(0x20, 0xe, "UI", "1.2.3.4") +
+               element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(index)) +
+               element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
+               element(0x20, 0x52, "UI", frame_of_reference) + number(0x28, 2, 1) +
+               element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 4) +
+               number(0x28, 0x11, 4) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 16) +
+               number(0x28, 0x101, 16) + number(0x28, 0x102, 15) + number(0x28, 0x103, 0) +
+               element(0x7fe0, 0x10, "OW",
+                       std::string(16, static_cast<char>(index)) + std::string(16, 'a')));
 }
 
 // 8 x 8 samples of 8 bits.
@@ -103,6 +97,13 @@ std::string square_image() {
   return number(0x28, 2, 1) + element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 8) +
          number(0x28, 0x11, 8) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 8) +
          number(0x28, 0x101, 8) + number(0x28, 0x102, 7) + number(0x28, 0x103, 0);
+}
+
+// What the frames of a segmentation have in common.
+std::string shared_geometry() {
+  return sequence(0x5200, 0x9229,
+                  {sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
+                   sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")})});
 }
 
 std::string halves(std::size_t samples) {
@@ -116,13 +117,10 @@ std::string sparse_segmentation() {
     frames.push_back(
         sequence(0x20, 0x9113, {element(0x20, 0x32, "DS", "0\\0\\" + std::string(z))}));
   }
-  const std::string shared =
-      sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
-      sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")});
   return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.7") +
                element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
                element(0x28, 8, "IS", "3") + square_image() + element(0x62, 1, "CS", "LABELMAP") +
-               sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, frames) +
+               shared_geometry() + sequence(0x5200, 0x9230, frames) +
                element(0x7fe0, 0x10, "OW", halves(3 * 64)));
 }
 
@@ -134,14 +132,11 @@ std::string fractional_segmentation() {
         sequence(0x20, 0x9113, {element(0x20, 0x32, "DS", "0\\0\\" + std::string(z))}) +
         sequence(0x62, 0xa, {number(0x62, 0xb, 1)}));
   }
-  const std::string shared =
-      sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
-      sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")});
   return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.4") +
                element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
                element(0x28, 8, "IS", "2") + square_image() + element(0x62, 1, "CS", "FRACTIONAL") +
-               number(0x62, 0xe, 255) + sequence(0x5200, 0x9229, {shared}) +
-               sequence(0x5200, 0x9230, frames) + element(0x7fe0, 0x10, "OW", halves(2 * 64)));
+               number(0x62, 0xe, 255) + shared_geometry() + sequence(0x5200, 0x9230, frames) +
+               element(0x7fe0, 0x10, "OW", halves(2 * 64)));
 }
 
 std::string csa_field(std::string name, const std::vector<std::string>& values) {
@@ -255,10 +250,9 @@ class NotesTest : public testing::Test {
     std::filesystem::create_directories(folder_ / folder);
     for (const auto& [name, bytes] : what.files) write_file(folder_ / folder / name, bytes);
     const auto path = folder_ / folder;
-    std::vector<std::string> arguments = {
-        "--json", "upload", what.files.size() == 1 ? path / what.files.begin()->first : path};
-    arguments.insert(arguments.end(), what.options.begin(), what.options.end());
-    return daemon_.command(arguments);
+    return daemon_.command(
+        with({"--json", "upload", what.files.size() == 1 ? path / what.files.begin()->first : path},
+             what.options));
   }
 
   const Daemon daemon_;
@@ -282,7 +276,7 @@ TEST_F(NotesTest, EveryCodeIsShownByAFileAndCarriedToTheEnd) {
     const Finished meshed =
         daemon_.command({"submit", volume.id, "--iso", "otsu", "--format", "glb"});
     ASSERT_EQ(meshed.status, 0) << meshed.errors;
-    const std::string job = meshed.output.substr(0, meshed.output.find('\n'));
+    const std::string job = meshed.line();
     ASSERT_EQ(daemon_.client().wait(job).state, JobState::kSucceeded);
     daemon_.client().fetch(job, MeshFormat::kGlb, mesh);
     const std::string in_mesh = "{\"code\":\"" + code + "\"";

@@ -117,11 +117,10 @@ void probe_uploads(Statuses& statuses, const Daemon& daemon) {
     return daemon.send("POST", "/v1/volumes" + query, {}, begin).header("location");
   };
   const auto part = [](bool is_last, const Headers& more = {}) {
-    Headers headers = {{"Content-Type", "application/partial-upload"},
-                       {"Upload-Offset", "0"},
-                       {"Upload-Complete", is_last ? "?1" : "?0"}};
-    headers.insert(headers.end(), more.begin(), more.end());
-    return headers;
+    return with({{"Content-Type", "application/partial-upload"},
+                 {"Upload-Offset", "0"},
+                 {"Upload-Complete", is_last ? "?1" : "?0"}},
+                more);
   };
   const std::string patch = "PATCH /v1/uploads/{id}";
   const RawUpload sphere = sphere_upload();
@@ -149,7 +148,7 @@ void probe_uploads(Statuses& statuses, const Daemon& daemon) {
 
 void probe_jobs(Statuses& statuses, const Job& job) {
   const std::string post = "POST /v1/jobs";
-  const std::string body = "{\"volume\": \"" + job.parameters.volume + "\", \"iso\": 100}";
+  const std::string body = job_body(job.parameters.volume, 100);
   const Headers key = {{"Idempotency-Key", "k"}};
   statuses.probe(post, "/v1/jobs", body, key);
   statuses.probe(post, "/v1/jobs", body + ' ', key);

@@ -1,7 +1,6 @@
 // The public description against the running server, both ways.
 #include "tests/api/openapi.h"
 
-#include <algorithm>
 #include <cctype>
 #include <map>
 #include <set>

@@ -32,11 +32,6 @@ Headers part(std::size_t offset, bool is_last) {
           {"Upload-Complete", is_last ? "?1" : "?0"}};
 }
 
-Headers with(Headers headers, const Headers& more) {
-  headers.insert(headers.end(), more.begin(), more.end());
-  return headers;
-}
-
 std::vector<std::string> files_of_uploads(const std::filesystem::path& data) {
   std::vector<std::string> files = files_below(data);
   std::erase_if(files, [](const std::string& file) { return !file.starts_with("uploads/"); });
@@ -447,9 +442,8 @@ TEST_F(ResumeTest, WhatAnotherStartOfTheMachineLeftIsNotBelieved) {
 TEST_F(ResumeTest, BelongsToItsOwnerAlone) {
   const std::string file = folder_ / "tokens";
   const auto bearer = [&](const std::string& name) {
-    const std::string token =
-        run({ISOMESHD, "token", "add", name, "--role", "user", "--into", file}).output;
-    return Headers{{"Authorization", "Bearer " + token.substr(0, token.find('\n'))}};
+    const Finished added = run({ISOMESHD, "token", "add", name, "--role", "user", "--into", file});
+    return Headers{{"Authorization", "Bearer " + added.line()}};
   };
   const Headers ct = bearer("ct");
   const Headers mr = bearer("mr");

@@ -36,11 +36,10 @@ class TlsTest : public testing::Test {
 
   // A GET with that version of TLS and no other; the status is curl's.
   Finished curl(const Daemon& daemon, const std::vector<std::string>& arguments) const {
-    std::vector<std::string> command = {"curl", "--silent", "--show-error",      "--max-time",
-                                        "30",   "--cacert", folder_ / "cert.pem"};
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    command.push_back(daemon.url() + "/livez");
-    return run(command);
+    return run(with(with({"curl", "--silent", "--show-error", "--max-time", "30", "--cacert",
+                          folder_ / "cert.pem"},
+                         arguments),
+                    {daemon.url() + "/livez"}));
   }
 
   std::string subject_seen(const Daemon& daemon) const {
@@ -55,17 +54,14 @@ TEST_F(TlsTest, EverythingGoesThroughIt) {
   const Daemon daemon(folder_ / "data", "127.0.0.1:0", options());
   EXPECT_THAT(daemon.url(), StartsWith("https://127.0.0.1:"));
   const auto command = [&](const std::vector<std::string>& arguments) {
-    std::vector<std::string> all = {"--ca", folder_ / "cert.pem"};
-    all.insert(all.end(), arguments.begin(), arguments.end());
-    return daemon.command(all);
+    return daemon.command(with({"--ca", folder_ / "cert.pem"}, arguments));
   };
   // More than fits into one record or the sockets' buffers.
   const RawUpload noise = raw_upload(test::noise<std::uint8_t>({0, 100}, {64, 64, 64}, 3));
   write_file(folder_ / "volume.raw", noise.bytes);
-  std::vector<std::string> mesh = {"mesh", folder_ / "volume.raw", "--iso", "50", "--passes", "1",
-                                   "-o",   folder_ / "mesh.stl"};
-  mesh.insert(mesh.end(), noise.options.begin(), noise.options.end());
-  const Finished result = command(mesh);
+  const Finished result = command(with(
+      {"mesh", folder_ / "volume.raw", "--iso", "50", "--passes", "1", "-o", folder_ / "mesh.stl"},
+      noise.options));
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_GT(std::filesystem::file_size(folder_ / "mesh.stl"), 10'000'000U);
   EXPECT_EQ(command({"list"}).status, 0);
@@ -126,10 +122,7 @@ TEST_F(TlsTest, FilesThatDoNotFitAreRefused) {
                                              {"--tls-cert", none, "--tls-key", none},
                                              {"--tls-cert", cert, "--tls-key", none},
                                              {"--tls-cert", cert, "--tls-key", cert}}) {
-    std::vector<std::string> command = {ISOMESHD, "--data", folder_ / "data", "--listen",
-                                        "127.0.0.1:0"};
-    command.insert(command.end(), wrong.begin(), wrong.end());
-    const Finished result = run(command);
+    const Finished result = refused_start(folder_ / "data", wrong);
     EXPECT_NE(result.status, 0);
     EXPECT_THAT(result.output + result.errors, HasSubstr("tls-"));
   }
@@ -142,8 +135,7 @@ TEST_F(TlsTest, AWeakKeyIsRefusedAsSuch) {
                  "/CN=localhost", "-keyout", key, "-out", cert})
                 .status,
             0);
-  const Finished result = run({ISOMESHD, "--data", folder_ / "data", "--listen", "127.0.0.1:0",
-                               "--tls-cert", cert, "--tls-key", key});
+  const Finished result = refused_start(folder_ / "data", {"--tls-cert", cert, "--tls-key", key});
   EXPECT_NE(result.status, 0);
   EXPECT_THAT(result.output + result.errors, HasSubstr("too weak"));
 }

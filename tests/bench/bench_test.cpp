@@ -1,9 +1,7 @@
 // The parts of isomesh-bench that its figures rest on.
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>

@@ -14,7 +14,11 @@ namespace isomesh::bench {
 class Daemon {
  public:
   // Throws std::runtime_error when it does not listen.
-  Daemon(const std::filesystem::path& program, const std::vector<std::string>& arguments);
+  Daemon(const std::filesystem::path& program, const std::vector<std::string>& arguments)
+      : process_(test::with({program.string(), "--listen", "127.0.0.1:0", "--data",
+                             folder_ / "data", "--log-level", "warn"},
+                            arguments)),
+        url_(test::url_of(process_)) {}
 
   const std::string& url() const { return url_; }
 

@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include <vtkCellArray.h>
 #include <vtkDecimatePro.h>
 #include <vtkFloatArray.h>

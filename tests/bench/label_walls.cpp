@@ -1,7 +1,6 @@
 #include "tests/bench/label_walls.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <type_traits>
 

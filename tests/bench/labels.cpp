@@ -1,8 +1,6 @@
 #include "tests/bench/labels.h"
 
-#include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "tests/bench/label_body.h"
 #include "tests/bench/label_stages.h"

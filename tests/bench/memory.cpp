@@ -2,9 +2,7 @@
 
 #include <cstdio>
 #include <fstream>
-#include <functional>
 #include <iostream>
-#include <map>
 #include <sstream>
 
 #include <spawn.h>

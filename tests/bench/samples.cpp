@@ -1,7 +1,6 @@
 #include "tests/bench/samples.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <numbers>

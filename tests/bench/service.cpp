@@ -1,9 +1,7 @@
 #include "tests/bench/service.h"
 
 #include <chrono>
-#include <cmath>
 #include <functional>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>

@@ -1,5 +1,4 @@
 // The real daemon with its files elsewhere: in S3 that fails, and in a folder of their own.
-#include <thread>
 
 #include "tests/faults/fixture.h"
 #include "tests/support/s3_peer.h"
@@ -22,10 +21,7 @@ class BlobsInS3 : public FaultTest {
   }
 
   void start_with_peer(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"--blobs", peer_->url(), "--blob-credentials",
-                                          folder_ / "keys"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    start(arguments);
+    start(with({"--blobs", peer_->url(), "--blob-credentials", folder_ / "keys"}, more));
   }
 
   int readiness() { return daemon().get("/readyz").status; }

@@ -8,14 +8,12 @@
 #include <iostream>
 #include <memory>
 #include <random>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
 
-#include "base/clock.h"
 #include "base/sha256.h"
 #include "proto/json.h"
 #include "tests/api/daemon.h"
@@ -32,6 +30,20 @@ using testing::HasSubstr;
 constexpr std::size_t kNodes = 3;
 constexpr seconds kLease{2};
 
+// Asks every node until one answers: any may be dead, and so may the database.
+template <class Act>
+auto insist(const Act& act) {
+  const auto deadline = std::chrono::steady_clock::now() + kLongest;
+  while (true) {
+    try {
+      return act();
+    } catch (const std::exception&) {
+      if (std::chrono::steady_clock::now() >= deadline) throw;
+    }
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+}
+
 class Cluster : public testing::Test {
  protected:
   void SetUp() override {
@@ -42,12 +54,13 @@ class Cluster : public testing::Test {
   }
 
   // Each has a data folder of its own.
-  void start(std::size_t node, std::vector<std::string> arguments = {}) {
+  void start(std::size_t node, const std::vector<std::string>& arguments = {}) {
     const std::filesystem::path data = folder_ / ("node" + std::to_string(node));
-    arguments.insert(arguments.begin(),
-                     {"--store", store_, "--blobs", (folder_ / "shared").string(),
-                      "--lease-seconds", std::to_string(kLease.count())});
-    nodes_[node] = std::make_unique<Daemon>(data, "127.0.0.1:0", arguments);
+    nodes_[node] =
+        std::make_unique<Daemon>(data, "127.0.0.1:0",
+                                 with({"--store", store_, "--blobs", folder_ / "shared",
+                                       "--lease-seconds", std::to_string(kLease.count())},
+                                      arguments));
   }
   void start_all() {
     for (std::size_t node = 0; node < kNodes; ++node) start(node, {"--workers", "1"});
@@ -67,6 +80,19 @@ class Cluster : public testing::Test {
     return false;
   }
 
+  // The id of a job that one of the nodes has accepted; `number` tells it from all others. The key
+  // makes a second try the same job.
+  std::string submit_to_one(const Volume& volume, std::size_t number) {
+    const std::string body = job_body(volume.id, 60 + 0.1 * static_cast<double>(number));
+    return insist([&] {
+      const Answer answer =
+          node(number % kNodes)
+              .send("POST", "/v1/jobs", body, {{"Idempotency-Key", std::to_string(number)}});
+      if (answer.status != 202 && answer.status != 200) throw std::runtime_error(answer.body);
+      return job_from_json(answer.body).id;
+    });
+  }
+
   // A job that runs for longer than anybody waits.
   Job endless_job(std::size_t node) {
     Daemon& daemon = this->node(node);
@@ -84,40 +110,25 @@ class Cluster : public testing::Test {
   int endless_ = 0;
 };
 
-// Asks every node until one answers: any may be dead, and so may the database.
-template <class Act>
-auto insist(const Act& act) {
-  const auto deadline = std::chrono::steady_clock::now() + kLongest;
-  while (true) {
-    try {
-      return act();
-    } catch (const std::exception&) {
-      if (std::chrono::steady_clock::now() >= deadline) throw;
-    }
-    std::this_thread::sleep_for(milliseconds(20));
-  }
-}
-
 TEST_F(Cluster, AStartThatTheDatabaseRejectsSaysWhyWithoutThePassword) {
   ask("CREATE ROLE guarded LOGIN PASSWORD 'the-right-word'");
   const std::filesystem::path passwords = folder_ / "pgpass";
   write_file(passwords, "*:*:*:*:a-wrong-word\n");
   std::filesystem::permissions(passwords, std::filesystem::perms::owner_read);
   const auto start_on = [&](std::string url) {
-    return run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder_ / "data", "--store",
-                url + "&passfile=" + passwords.string()});
+    return refused_start(folder_ / "data", {"--store", url + "&passfile=" + passwords.string()});
   };
-  const auto with = [&](const std::string& part, const std::string& instead) {
+  const auto url_with = [&](const std::string& part, const std::string& instead) {
     std::string url = store_;
     return url.replace(url.find(part), part.size(), instead);
   };
-  const Finished stranger = start_on(with("user=isomesh", "user=guarded"));
+  const Finished stranger = start_on(url_with("user=isomesh", "user=guarded"));
   EXPECT_EQ(stranger.status, 1);
   EXPECT_THAT(stranger.errors,
               testing::StartsWith("isomeshd: the database of --store cannot be used: "));
   EXPECT_THAT(stranger.errors, HasSubstr("password authentication failed for user \"guarded\""));
   EXPECT_THAT(stranger.errors, testing::Not(HasSubstr("a-wrong-word")));
-  const Finished elsewhere = start_on(with("/postgres?", "/nowhere?"));
+  const Finished elsewhere = start_on(url_with("/postgres?", "/nowhere?"));
   EXPECT_EQ(elsewhere.status, 1);
   EXPECT_THAT(elsewhere.errors, HasSubstr("database \"nowhere\" does not exist"));
 }
@@ -134,16 +145,7 @@ TEST_F(Cluster, NothingIsLostOrDoneTwiceWhenNodesAndTheDatabaseDie) {
   std::vector<std::string> accepted;
   const auto submit_some = [&](int count) {
     for (int n = 0; n < count; ++n) {
-      const std::size_t to = accepted.size() % kNodes;
-      const std::string iso = std::to_string(60 + 0.1 * static_cast<double>(accepted.size()));
-      const std::string body = "{\"volume\": \"" + volume.id + "\", \"iso\": " + iso + "}";
-      // The key makes a second try the same job.
-      accepted.push_back(insist([&] {
-        const Answer answer = node(to).send("POST", "/v1/jobs", body,
-                                            {{"Idempotency-Key", std::to_string(accepted.size())}});
-        if (answer.status != 202 && answer.status != 200) throw std::runtime_error(answer.body);
-        return job_from_json(answer.body).id;
-      }));
+      accepted.push_back(submit_to_one(volume, accepted.size()));
     }
   };
   for (int round = 0; round < rounds; ++round) {
@@ -191,16 +193,7 @@ TEST_F(Cluster, AStandbyThatTakesOverHasEveryAcceptedJob) {
   for (int round = 0; round < rounds; ++round) {
     std::jthread submitter([&] {
       for (int n = 0; n < kJobsOfARound; ++n) {
-        const int number = round * kJobsOfARound + n;
-        const std::string body = "{\"volume\": \"" + volume.id +
-                                 "\", \"iso\": " + std::to_string(60 + 0.1 * number) + "}";
-        accepted.push_back(insist([&] {
-          const Answer answer =
-              node(static_cast<std::size_t>(number) % kNodes)
-                  .send("POST", "/v1/jobs", body, {{"Idempotency-Key", std::to_string(number)}});
-          if (answer.status != 202 && answer.status != 200) throw std::runtime_error(answer.body);
-          return job_from_json(answer.body).id;
-        }));
+        accepted.push_back(submit_to_one(volume, accepted.size()));
       }
     });
     std::this_thread::sleep_for(milliseconds(std::uniform_int_distribution(0, 200)(random)));
@@ -226,8 +219,7 @@ TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   // Who waits at one node is told of the end at another, long before the wait is over.
   const auto began = std::chrono::steady_clock::now();
   const Answer answer =
-      node(0).send("POST", "/v1/jobs", "{\"volume\": \"" + volume.id + "\", \"iso\": 90}",
-                   {{"Prefer", "wait=60"}});
+      node(0).send("POST", "/v1/jobs", job_body(volume.id, 90), {{"Prefer", "wait=60"}});
   EXPECT_EQ(job_from_json(answer.body).state, JobState::kSucceeded) << answer.body;
   EXPECT_LT(std::chrono::steady_clock::now() - began, seconds(50));
   // By itself it would go on for longer than anybody waits.
@@ -287,8 +279,8 @@ TEST_F(Cluster, OneDaemonProcessesOrdersAlsoAfterARestartOfTheDatabase) {
   postgres_->start();
   ASSERT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
   const Finished second =
-      run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder_ / "second", "--store", store_,
-           "--blobs", folder_ / "shared", "--hospital", hospital});
+      refused_start(folder_ / "second",
+                    {"--store", store_, "--blobs", folder_ / "shared", "--hospital", hospital});
   EXPECT_EQ(second.status, 1);
   EXPECT_THAT(second.errors, HasSubstr("only one daemon may have --hospital"));
   EXPECT_TRUE(is_paused(0, "0"));
@@ -365,10 +357,7 @@ TEST_F(Cluster, AFolderIsMovedWithAllThatItHolds) {
   const std::string backup = folder_ / "backup";
   for (const std::vector<std::string>& old :
        {std::vector<std::string>{"backup", backup}, {"audit"}, {"audit", "--verify"}}) {
-    std::vector<std::string> command = {ISOMESHD};
-    command.insert(command.end(), old.begin(), old.end());
-    command.insert(command.end(), {"--data", data.string()});
-    const Finished refused = run(command);
+    const Finished refused = run(with(with({ISOMESHD}, old), {"--data", data}));
     EXPECT_EQ(refused.status, 1) << old.front();
     EXPECT_THAT(refused.errors, HasSubstr("--store")) << old.front();
   }

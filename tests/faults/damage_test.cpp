@@ -13,17 +13,6 @@ using testing::HasSubstr;
 
 class Damage : public FaultTest {
  protected:
-  std::filesystem::path file_of(const std::string& key) {
-    return daemon().data() / "blobs" / key.substr(0, 2) / key;
-  }
-
-  // Changes one byte in the middle.
-  void spoil(const std::string& key) {
-    std::string bytes = read_file(file_of(key));
-    bytes[bytes.size() / 2] ^= 1;
-    write_file(file_of(key), bytes);
-  }
-
   static const MeshFile& mesh(const Job& job) { return job.mesh->files.at(MeshFormat::kDrc); }
 };
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <csignal>
-#include <functional>
 #include <optional>
 #include <set>
 #include <string>
@@ -36,35 +35,7 @@ class FaultTest : public testing::Test {
 
   Volume small_volume() { return upload(daemon(), sphere_upload()); }
 
-  // A job of so many passes as it is when it has begun to smooth, or has ended before that was
-  // seen.
-  Job begun_job(int passes, double iso = 50) {
-    const std::string id =
-        submit(daemon(), upload(daemon(), rough_upload()), iso, slow_smoothing(passes)).id;
-    Job seen;
-    const bool is_begun = eventually([&] {
-      seen = job(id);
-      return seen.stage == Stage::kSmooth || is_final(seen.state);
-    });
-    if (!is_begun) throw std::runtime_error(to_json(seen));
-    return seen;
-  }
-
-  // One that runs for longer than any test waits for.
-  Job endless_job() {
-    const Job begun = begun_job(1000);
-    if (begun.state != JobState::kRunning) throw std::runtime_error(to_json(begun));
-    return begun;
-  }
-
-  // Calls attempt(passes) with ever longer jobs until it is true. How long a job takes on a busy
-  // machine is not known, and one that ends too soon shows nothing.
-  static bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt) {
-    for (int passes = 12; passes <= 1000; passes *= 2) {
-      if (attempt(passes)) return true;
-    }
-    return false;
-  }
+  Job begun_job(int passes, double iso = 50) { return test::begun_job(daemon(), passes, iso); }
 
   static constexpr const char* kJobProgram = "isomesh-job";
 
@@ -88,6 +59,17 @@ class FaultTest : public testing::Test {
     EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), take, &answer, nullptr), SQLITE_OK);
     sqlite3_close(handle);
     return answer;
+  }
+
+  std::filesystem::path file_of(const std::string& key) {
+    return daemon().data() / "blobs" / key.substr(0, 2) / key;
+  }
+
+  // Changes one byte in the middle of a blob.
+  void spoil(const std::string& key) {
+    std::string bytes = read_file(file_of(key));
+    bytes[bytes.size() / 2] ^= 1;
+    write_file(file_of(key), bytes);
   }
 
   std::string mesh_of(const Job& job) {

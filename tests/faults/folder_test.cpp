@@ -1,6 +1,5 @@
 // Data folders of other versions, and what expires.
 #include <string>
-#include <thread>
 
 #include "base/sha256.h"
 #include "tests/api/problems.h"
@@ -20,9 +19,10 @@ TEST_F(Folder, OfANewerVersionIsRefusedAndLeftAsItIs) {
   EXPECT_EQ(daemon().stop(), 0);
   const std::string version = run_sql("PRAGMA user_version");
   run_sql("PRAGMA user_version=99");
-  const Finished refused = run({ISOMESHD, "--data", folder_ / "data", "--listen", "127.0.0.1:0"});
+  const Finished refused = refused_start(folder_ / "data");
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.errors, HasSubstr("newer isomeshd"));
+  EXPECT_THAT(refused.errors, HasSubstr("99"));
   run_sql("PRAGMA user_version=" + version);
   start();
   EXPECT_EQ(daemon().client().volumes().size(), 1U);
@@ -106,9 +106,7 @@ TEST_F(Folder, WithoutItsDatabaseIsRefusedUnlessAdopted) {
   const std::size_t blobs = blob_count();
   std::filesystem::create_directory(folder_ / "away");
   std::filesystem::rename(folder_ / "data/isomesh.sqlite", folder_ / "away/isomesh.sqlite");
-  std::vector<std::string> command = {ISOMESHD, "--data", folder_ / "data", "--listen",
-                                      "127.0.0.1:0"};
-  const Finished refused = run(command);
+  const Finished refused = refused_start(folder_ / "data");
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.errors, HasSubstr("--adopt"));
   EXPECT_EQ(blob_count(), blobs);
@@ -120,7 +118,7 @@ TEST_F(Folder, WithoutItsDatabaseIsRefusedUnlessAdopted) {
   // The right one is found after all, and the files with it.
   std::filesystem::remove(folder_ / "data/isomesh.sqlite");
   std::filesystem::rename(folder_ / "away/isomesh.sqlite", folder_ / "data/isomesh.sqlite");
-  EXPECT_EQ(run(command).status, 1);
+  EXPECT_EQ(refused_start(folder_ / "data").status, 1);
   start({"--adopt"});
   EXPECT_EQ(daemon().get(job.mesh->files.at(MeshFormat::kDrc).href).status, 200);
 }

@@ -30,6 +30,11 @@ struct Submitted {
   std::string body;
 };
 
+RawUpload ball(int size) {
+  return raw_upload(sample<std::uint8_t>(scaled(sphere({8.2, 7.7, 8.1}, 4.0 + 0.4 * size), 12, 100),
+                                         {17, 16, 18}));
+}
+
 class Kill : public FaultTest {
  protected:
   static int rounds() {
@@ -76,13 +81,11 @@ class Kill : public FaultTest {
     const std::string me = std::to_string(client);
     for (int n = 0; !stop_; ++n) {
       const std::string key = me + '-' + std::to_string(n);
-      const RawUpload raw = raw_upload(sample<std::uint8_t>(
-          scaled(sphere({8.2, 7.7, 8.1}, 4.0 + 0.4 * (n / 20 % kVolumes)), 12, 100), {17, 16, 18}));
+      const RawUpload raw = ball(n / 20 % kVolumes);
       const Answer uploaded = insist("POST", "/v1/volumes?" + raw.query, raw.bytes, {});
       ASSERT_TRUE(uploaded.status == 200 || uploaded.status == 201) << uploaded.body;
-      const std::string body = "{\"volume\": \"" + volume_from_json(uploaded.body).id +
-                               "\", \"iso\": " + std::to_string(70 + 0.01 * (client + 4 * n)) +
-                               ", \"passes\": 3}";
+      const std::string body = job_body(volume_from_json(uploaded.body).id,
+                                        70 + 0.01 * (client + 4 * n), R"("passes": 3)");
       const Headers headers = {{"Idempotency-Key", key}};
       const Answer accepted = insist("POST", "/v1/jobs", body, headers);
       ASSERT_EQ(accepted.status, 202) << accepted.body;
@@ -113,19 +116,6 @@ class Kill : public FaultTest {
     std::this_thread::sleep_for(age);
   }
 
-  void check_database() {
-    sqlite3* handle = nullptr;
-    ASSERT_EQ(sqlite3_open((folder_ / "data/isomesh.sqlite").c_str(), &handle), SQLITE_OK);
-    std::string verdict;
-    const auto take = [](void* text, int, char** columns, char**) {
-      *static_cast<std::string*>(text) += columns[0];
-      return 0;
-    };
-    sqlite3_exec(handle, "PRAGMA integrity_check", take, &verdict, nullptr);
-    sqlite3_close(handle);
-    EXPECT_EQ(verdict, "ok");
-  }
-
   void check_blobs() {
     for (const std::string& file : blobs_below(folder_ / "data")) {
       const std::string name = std::filesystem::path(file).filename();
@@ -137,11 +127,7 @@ class Kill : public FaultTest {
   // never killed.
   void check_jobs() {
     const Daemon reference;
-    for (int size = 0; size < kVolumes; ++size) {
-      upload(reference,
-             raw_upload(sample<std::uint8_t>(
-                 scaled(sphere({8.2, 7.7, 8.1}, 4.0 + 0.4 * size), 12, 100), {17, 16, 18})));
-    }
+    for (int size = 0; size < kVolumes; ++size) upload(reference, ball(size));
     for (const auto& [key, one] : submitted_) {
       const Job job = ended(one.id);
       ASSERT_EQ(job.state, JobState::kSucceeded) << to_json(job);
@@ -197,7 +183,7 @@ TEST_F(Kill, NothingAcceptedIsLostOrDoneTwice) {
   ASSERT_FALSE(submitted_.empty());
   check_jobs();
   kill();
-  check_database();
+  EXPECT_EQ(run_sql("PRAGMA integrity_check"), "ok");
   check_blobs();
   live();
   EXPECT_EQ(scratch_count(), 0U);

@@ -49,7 +49,7 @@ TEST_F(Leases, KilledInTheMiddleOfAJobItRunsAgainAndGivesOneResult) {
 
 TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
   start({"--lease-seconds", "1", "--workers", "1"});
-  const Job before = endless_job();
+  const Job before = long_job(daemon());
   daemon().send_signal(SIGSTOP);
   std::this_thread::sleep_for(std::chrono::milliseconds(1500));
   daemon().send_signal(SIGCONT);
@@ -67,7 +67,7 @@ TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
 // Nobody knows what ended it, and a job could have ended only its own process.
 TEST_F(Leases, ADaemonsDeathIsChargedToNoJob) {
   start({"--workers", "2"});
-  const Job first = endless_job();
+  const Job first = long_job(daemon());
   const Job second = begun_job(1000, 49);
   for (int death = 1; death <= 5; ++death) {
     for (const Job& job : {first, second}) {
@@ -86,7 +86,7 @@ TEST_F(Leases, ADaemonsDeathIsChargedToNoJob) {
 
 TEST_F(Leases, AJobsProcessDiesWithItsDaemon) {
   start();
-  endless_job();
+  long_job(daemon());
   const std::set<pid_t> processes = job_processes();
   ASSERT_FALSE(processes.empty());
   kill();
@@ -97,7 +97,7 @@ TEST_F(Leases, AJobsProcessDiesWithItsDaemon) {
 
 TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
   start({"--workers", "2"});
-  const Job neighbour = endless_job();
+  const Job neighbour = long_job(daemon());
   const std::set<pid_t> others = job_processes();
   ASSERT_EQ(others.size(), 1U);
   const Job deadly = begun_job(1000, 49);
@@ -130,7 +130,7 @@ TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
 TEST_F(Leases, AVolumeThatIsCutUnderARunningJobEndsThatJobAlone) {
   start({"--workers", "1"});
   const Volume volume = upload(daemon(), long_upload());
-  const auto file = daemon().data() / "blobs" / volume.id.substr(0, 2) / volume.id;
+  const std::filesystem::path file = file_of(volume.id);
   const std::string bytes = read_file(file);
   Job job;
   // One that has been read whole by then is none the worse for it.
@@ -169,7 +169,7 @@ TEST_F(Leases, AJobStopsInTheMiddleOfAStream) {
 // Whoever ends a daemon in an orderly way may do so as often as he likes.
 TEST_F(Leases, AnOrderlyEndCountsNoAttempt) {
   start({"--drain-seconds", "0"});
-  const Job endless = endless_job();
+  const Job endless = long_job(daemon());
   for (int end = 1; end <= 4; ++end) {
     ASSERT_TRUE(comes_to(endless.id, JobState::kRunning)) << end;
     EXPECT_EQ(daemon().stop(), 0);
@@ -222,20 +222,6 @@ TEST_F(Leases, KilledBetweenResultAndFinishItRunsAgainToTheSameBytes) {
   EXPECT_NE(after.started, before.started);
   EXPECT_EQ(after.state, JobState::kSucceeded);
   EXPECT_EQ(blobs_below(folder_ / "data"), stored);
-}
-
-TEST_F(Leases, ACancelledJobStopsAndPublishesNothing) {
-  start({"--workers", "1"});
-  const Job running = endless_job();
-  const std::string queued = submit(daemon(), small_volume(), 100).id;
-  daemon().client().cancel(queued);
-  daemon().client().cancel(running.id);
-  // By itself it would go on for longer than this waits.
-  ASSERT_TRUE(comes_to(running.id, JobState::kCancelled));
-  EXPECT_EQ(job(queued).state, JobState::kCancelled);
-  EXPECT_FALSE(job(queued).started);
-  EXPECT_EQ(blob_count(), 2U) << "the two volumes and nothing else";
-  EXPECT_EQ(scratch_count(), 0U);
 }
 
 }  // namespace

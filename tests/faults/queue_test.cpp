@@ -1,7 +1,5 @@
 // Tests of requests: many at once, repeated or cut short, with a full queue or a full disk.
 #include <atomic>
-#include <mutex>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,10 +16,6 @@ using namespace test;
 
 class Queue : public FaultTest {
  protected:
-  static std::string body_of(const Volume& volume, double iso, const std::string& members = {}) {
-    return "{\"volume\": \"" + volume.id + "\", \"iso\": " + std::to_string(iso) + members + "}";
-  }
-
   Answer post(const std::string& body, const std::string& key = {}) {
     const Headers headers = key.empty() ? Headers{} : Headers{{"Idempotency-Key", key}};
     return daemon().send("POST", "/v1/jobs", body, headers);
@@ -30,7 +24,7 @@ class Queue : public FaultTest {
 
 TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
   start({"--workers", "1", "--max-queue", "2000"});
-  const Job running = endless_job();
+  const Job running = long_job(daemon());
   const Volume volume = small_volume();
   constexpr int kRoutine = 1000;
   std::atomic<int> next = 0;
@@ -38,12 +32,12 @@ TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
   for (int client = 0; client < 8; ++client) {
     clients.emplace_back([&] {
       for (int n = next++; n < kRoutine; n = next++) {
-        EXPECT_EQ(post(body_of(volume, 10 + 0.1 * n)).status, 202);
+        EXPECT_EQ(post(job_body(volume.id, 10 + 0.1 * n)).status, 202);
       }
     });
   }
   clients.clear();
-  const Job stat = job_from_json(post(body_of(volume, 5, ", \"priority\": \"stat\"")).body);
+  const Job stat = job_from_json(post(job_body(volume.id, 5, R"("priority": "stat")")).body);
   daemon().client().cancel(running.id);
   ASSERT_TRUE(eventually([&] { return job(stat.id).started.has_value(); }));
   // One worker: whatever began before it has ended, and whatever ended has a time of its end.
@@ -53,17 +47,10 @@ TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
   EXPECT_EQ(ended(stat.id).state, JobState::kSucceeded);
 }
 
-TEST_F(Queue, AnUploadThatIsCutLeavesNothing) {
+TEST_F(Queue, AnUploadThatIsCutByTheDaemonsEndLeavesNothing) {
   start();
   const RawUpload raw = long_upload();
   const std::string whole = request("POST", "/v1/volumes?" + raw.query, raw.bytes);
-  {
-    const Connection connection(daemon().url());
-    connection.send(whole.substr(0, whole.size() / 2));
-    ASSERT_TRUE(eventually([&] { return scratch_count() > 0; }));
-  }
-  EXPECT_TRUE(eventually([&] { return scratch_count() == 0; }));
-  // The same with the daemon's end instead of the client's.
   {
     const Connection connection(daemon().url());
     connection.send(whole.substr(0, whole.size() / 2));
@@ -79,10 +66,7 @@ TEST_F(Queue, AnUploadThatIsCutLeavesNothing) {
 TEST_F(Queue, SpoiltSamplesGiveNoMesh) {
   start();
   const Volume volume = small_volume();
-  const auto file = daemon().data() / "blobs" / volume.id.substr(0, 2) / volume.id;
-  std::string bytes = read_file(file);
-  bytes[bytes.size() / 2] ^= 1;
-  write_file(file, bytes);
+  spoil(volume.id);
   const Job failed = ended(submit(daemon(), volume, 100).id);
   EXPECT_EQ(failed.state, JobState::kFailed);
   EXPECT_EQ(failed.error->status, 422);
@@ -97,14 +81,14 @@ TEST_F(Queue, SpoiltSamplesGiveNoMesh) {
 TEST_F(Queue, AFullDiskIsToldAndAcceptedJobsStay) {
   start({"--workers", "1"});
   const Volume volume = small_volume();
-  const Job running = endless_job();
+  const Job running = long_job(daemon());
   const std::string queued = submit(daemon(), volume, 100).id;
   const auto limit = [&](rlim_t bytes) {
     const rlimit value = {bytes, RLIM_INFINITY};
-    return ::prlimit(daemon().process_id(), RLIMIT_FSIZE, &value, nullptr);
+    return ::prlimit(daemon().pid(), RLIMIT_FSIZE, &value, nullptr);
   };
   ASSERT_EQ(limit(1), 0);
-  EXPECT_TRUE(is_problem(post(body_of(volume, 90), "kept"), ErrorCode::kOutOfSpace));
+  EXPECT_TRUE(is_problem(post(job_body(volume.id, 90), "kept"), ErrorCode::kOutOfSpace));
   EXPECT_TRUE(is_problem(
       daemon().send("POST", "/v1/volumes?" + sphere_upload().query, sphere_upload().bytes),
       ErrorCode::kOutOfSpace));
@@ -112,7 +96,7 @@ TEST_F(Queue, AFullDiskIsToldAndAcceptedJobsStay) {
   EXPECT_EQ(job(queued).state, JobState::kQueued);
   EXPECT_EQ(daemon().client().volumes().size(), 2U);
   ASSERT_EQ(limit(RLIM_INFINITY), 0);
-  EXPECT_EQ(post(body_of(volume, 90), "kept").status, 202);
+  EXPECT_EQ(post(job_body(volume.id, 90), "kept").status, 202);
   daemon().client().cancel(running.id);
   EXPECT_EQ(ended(queued).state, JobState::kSucceeded);
   EXPECT_TRUE(eventually([&] { return scratch_count() == 0; }));
@@ -141,13 +125,13 @@ TEST_F(Queue, AJobThatFindsTheDiskFullWaitsForRoom) {
   start({"--workers", "1"});
   const Volume volume = upload(daemon(), long_upload());
   const rlimit small = {20'000'000, RLIM_INFINITY};  // the database fits, the mesh does not
-  ASSERT_EQ(::prlimit(daemon().process_id(), RLIMIT_FSIZE, &small, nullptr), 0);
+  ASSERT_EQ(::prlimit(daemon().pid(), RLIMIT_FSIZE, &small, nullptr), 0);
   const std::string id = submit(daemon(), volume, 50, R"("formats": ["stl"], "passes": 0)").id;
   ASSERT_TRUE(
       eventually([&] { return daemon().errors().find("no space left") != std::string::npos; }));
   ASSERT_TRUE(comes_to(id, JobState::kQueued));
   const rlimit none = {RLIM_INFINITY, RLIM_INFINITY};
-  ASSERT_EQ(::prlimit(daemon().process_id(), RLIMIT_FSIZE, &none, nullptr), 0);
+  ASSERT_EQ(::prlimit(daemon().pid(), RLIMIT_FSIZE, &none, nullptr), 0);
   EXPECT_EQ(ended(id).state, JobState::kSucceeded);
 }
 

@@ -17,12 +17,12 @@ SmallDisk::SmallDisk(std::uint64_t bytes) {
 }
 
 std::vector<std::string> SmallDisk::prefix() const {
-  return {"nsenter",  "--preserve-credentials",     "--user", "--mount",
-          "--target", std::to_string(holder_->id())};
+  return {"nsenter",  "--preserve-credentials",      "--user", "--mount",
+          "--target", std::to_string(holder_->pid())};
 }
 
 std::filesystem::path SmallDisk::outside() const {
-  return "/proc/" + std::to_string(holder_->id()) + "/root" + folder_.path().string();
+  return "/proc/" + std::to_string(holder_->pid()) + "/root" + folder_.path().string();
 }
 
 void SmallDisk::fill(const std::string& name, std::uint64_t leave) const {

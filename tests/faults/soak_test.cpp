@@ -47,7 +47,7 @@ class Soak : public FaultTest {
   Sample look() {
     Sample sample;
     std::set<pid_t> processes = job_processes();
-    processes.insert(daemon().process_id());
+    processes.insert(daemon().pid());
     for (const pid_t process : processes) add("/proc/" + std::to_string(process), sample);
     std::error_code gone;
     for (std::filesystem::recursive_directory_iterator entry(folder_ / "data", gone), end;
@@ -84,9 +84,7 @@ class Soak : public FaultTest {
     const Answer uploaded = daemon().send("POST", "/v1/volumes?" + raw.query, raw.bytes);
     if (uploaded.status != 201 && uploaded.status != 200) return;
     const Volume volume = volume_from_json(uploaded.body);
-    const std::string iso = std::to_string(80 + one_of(40));
-    const Answer answer = daemon().send(
-        "POST", "/v1/jobs", "{\"volume\": \"" + volume.id + "\", \"iso\": " + iso + "}");
+    const Answer answer = daemon().send("POST", "/v1/jobs", job_body(volume.id, 80 + one_of(40)));
     if (answer.status != 202) return;
     const std::string path = "/v1/jobs/" + job_from_json(answer.body).id;
     switch (one_of(5)) {

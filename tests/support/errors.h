@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -22,10 +23,10 @@ inline std::optional<Error> thrown_by(const std::function<void()>& action) {
   return std::nullopt;
 }
 
-// The Error that `action` throws, which it has to.
-inline Error error_of(const std::function<void()>& action) {
+// The Error that `action` throws, which it has to; `row` tells one of many in a failure.
+inline Error error_of(const std::function<void()>& action, std::string_view row = {}) {
   const auto error = thrown_by(action);
-  if (!error) ADD_FAILURE() << "nothing was thrown";
+  if (!error) ADD_FAILURE() << "nothing was thrown: " << row;
   return error.value_or(Error(ErrorCode::kInternal, "nothing was thrown"));
 }
 

@@ -1,7 +1,6 @@
 // Tests of the checks themselves: they must detect errors.
 #include "tests/support/mesh_checks.h"
 
-#include <cmath>
 #include <limits>
 
 #include <gmock/gmock.h>

@@ -3,7 +3,6 @@
 #include <cstring>
 #include <memory>
 #include <stdexcept>
-#include <string>
 
 #include <zlib.h>
 

@@ -1,7 +1,6 @@
 #include "tests/support/postgres.h"
 
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 

@@ -108,6 +108,15 @@ bool Process::has_ended() {
   return true;
 }
 
+std::string url_of(Process& daemon) {
+  constexpr std::string_view kWords = "listening on ";
+  const std::string line = daemon.first_line();
+  if (!line.starts_with(kWords)) {
+    throw std::runtime_error("the daemon does not listen: " + line + daemon.errors());
+  }
+  return line.substr(kWords.size());
+}
+
 std::vector<std::string> with(std::vector<std::string> words,
                               const std::vector<std::string>& more) {
   words.insert(words.end(), more.begin(), more.end());

@@ -31,8 +31,6 @@ class Process {
   // Throws std::runtime_error after kLongest.
   std::string first_line();
 
-  pid_t id() const { return pid_; }
-
   void send_signal(int number) const;
   pid_t pid() const { return pid_; }
 
@@ -53,10 +51,17 @@ class Process {
   std::optional<int> status_;
 };
 
+// Where an isomeshd listens, as its first line says: http://127.0.0.1:PORT or unix:PATH. Throws
+// std::runtime_error if it does not listen.
+std::string url_of(Process& daemon);
+
 struct Finished {
   int status = -1;
   std::string output;
   std::string errors;
+
+  // The first line of its output, without its end.
+  std::string line() const { return output.substr(0, output.find('\n')); }
 };
 
 // The words of a command and more of them.

@@ -1,7 +1,6 @@
 #include "tests/support/reference.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <utility>

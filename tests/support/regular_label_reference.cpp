@@ -1,7 +1,6 @@
 #include "tests/support/regular_label_reference.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
 #include <utility>

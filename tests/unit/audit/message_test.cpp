@@ -92,9 +92,8 @@ TEST(AuditMessage, EveryEventHasOne) {
 
 TEST(AuditMessage, WhatIsNoEntryIsADefect) {
   for (const char* text : {"", "{}", "[1]", R"({"event":"1","outcome":"success","at":""})"}) {
-    const auto error = test::thrown_by([&] { audit_message(text, kSource); });
-    ASSERT_TRUE(error) << text;
-    EXPECT_EQ(error->code(), ErrorCode::kInternal);
+    const Error error = test::error_of([&] { audit_message(text, kSource); }, text);
+    EXPECT_EQ(error.code(), ErrorCode::kInternal);
   }
 }
 

@@ -1,5 +1,4 @@
 // Bytes as text, and their digests.
-#include <algorithm>
 #include <array>
 #include <span>
 #include <string>

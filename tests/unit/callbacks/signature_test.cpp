@@ -49,10 +49,9 @@ TEST_F(SecretsTest, EachKeySigns) {
 TEST_F(SecretsTest, AWrongFileIsRefusedWithoutItsText) {
   for (const std::string text :
        {"", "\n\n", "too-short-a-key", "whsec_notbase64!", "whsec_", "whsec_c2hvcnQ="}) {
-    const auto error = test::thrown_by([&] { read_callback_secrets(file(text)); });
-    ASSERT_TRUE(error) << text;
-    EXPECT_THAT(error->what(), HasSubstr("callback-secret-file"));
-    EXPECT_THAT(error->what(), Not(HasSubstr("too-short-a")));
+    const Error error = test::error_of([&] { read_callback_secrets(file(text)); }, text);
+    EXPECT_THAT(error.what(), HasSubstr("callback-secret-file"));
+    EXPECT_THAT(error.what(), Not(HasSubstr("too-short-a")));
   }
   EXPECT_TRUE(test::thrown_by([&] { read_callback_secrets(folder_ / "absent"); }));
 }

@@ -14,8 +14,8 @@ namespace isomesh::http {
 namespace {
 
 using test::code_thrown_by;
+using test::error_of;
 using test::fields_of;
-using test::thrown_by;
 using test::with_query;
 using testing::ElementsAre;
 using testing::UnorderedElementsAre;
@@ -44,17 +44,16 @@ TEST(RawDescription, WhatIsMalformedIsRefusedByName) {
     Pairs query = {{"dims", "3,4,5"}, {"type", "uint8"}};
     std::erase_if(query, [&, name = name](const auto& pair) { return pair.first == name; });
     query.emplace_back(name, value);
-    const auto error = thrown_by([&] { raw_description_of(with_query(query)); });
-    ASSERT_TRUE(error) << name << '=' << value;
-    EXPECT_THAT(fields_of(*error), ElementsAre(name)) << value;
+    const Error error =
+        error_of([&] { raw_description_of(with_query(query)); }, name + '=' + value);
+    EXPECT_THAT(fields_of(error), ElementsAre(name)) << value;
   }
 }
 
 TEST(RawDescription, PartsOfItWithoutDimsAreRefused) {
   for (const std::string name : {"type", "origin", "direction", "byte_order"}) {
-    const auto error = thrown_by([&] { raw_description_of(with_query({{name, "1"}})); });
-    ASSERT_TRUE(error) << name;
-    EXPECT_THAT(fields_of(*error), ElementsAre("dims"));
+    const Error error = error_of([&] { raw_description_of(with_query({{name, "1"}})); }, name);
+    EXPECT_THAT(fields_of(error), ElementsAre("dims"));
   }
 }
 
@@ -74,9 +73,12 @@ TEST(ImportOptionsOf, TakesASeries) {
 TEST(ImportOptionsOf, RefusesASeriesThatIsNoUid) {
   for (const std::string& series : {std::string(), std::string("1.2.x"), std::string("../1"),
                                     std::string("1.2 "), std::string(65, '1')}) {
-    const auto error = thrown_by([&] { import_options_of(with_query({{"series", series}})); });
-    ASSERT_TRUE(error) << series;
-    EXPECT_THAT(fields_of(*error), ElementsAre("series"));
+    const Error error = error_of(
+        [&] {
+          import_options_of(with_query({{"series", series}}));
+        },
+        series);
+    EXPECT_THAT(fields_of(error), ElementsAre("series"));
   }
 }
 
@@ -87,9 +89,8 @@ TEST(ImportOptionsOf, RawSamplesHaveNothingToChoose) {
                                          {"accept", "frame-of-reference"},
                                          {"nifti_form", "sform"}}) {
     const Pairs query = {{"dims", "3,4,5"}, {"type", "int16"}, {name, value}};
-    const auto error = thrown_by([&] { import_options_of(with_query(query)); });
-    ASSERT_TRUE(error) << name;
-    EXPECT_THAT(fields_of(*error), ElementsAre(name));
+    const Error error = error_of([&] { import_options_of(with_query(query)); }, name);
+    EXPECT_THAT(fields_of(error), ElementsAre(name));
   }
 }
 
@@ -127,9 +128,9 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
                                 {"spacing", "1,1,0"},
                                 {"spacing", "1,1,nan"},
                                 {"nifti_form", "both"}}) {
-    const auto error = thrown_by([&] { import_options_of(with_query({pair})); });
-    ASSERT_TRUE(error) << pair.first << '=' << pair.second;
-    EXPECT_THAT(fields_of(*error), ElementsAre(pair.first)) << pair.second;
+    const Error error =
+        error_of([&] { import_options_of(with_query({pair})); }, pair.first + '=' + pair.second);
+    EXPECT_THAT(fields_of(error), ElementsAre(pair.first)) << pair.second;
   }
 }
 

@@ -1,8 +1,6 @@
 // Who is greedy, thinks long or goes away costs the others nothing.
-#include <chrono>
 #include <set>
 #include <string>
-#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

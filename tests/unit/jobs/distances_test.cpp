@@ -1,5 +1,4 @@
 // Jobs whose GLB holds the vertices' distances.
-#include <algorithm>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -11,16 +10,13 @@
 namespace isomesh::jobs {
 namespace {
 
-class DistanceJobs : public test::JobsFixture {
+class DistanceJobs : public test::PipelineFixture {
  protected:
   std::string glb_of(const Volume& volume, const JobParameters& parameters) {
-    const PipelineResult result =
-        run_pipeline(volume, parameters, {}, blobs_, process_, {}, kQuiet);
-    EXPECT_FALSE(result.mesh.certificate);
-    return blob(result.mesh.files.at(MeshFormat::kGlb).sha256);
+    const MeshSummary mesh = run(volume, parameters).mesh;
+    EXPECT_FALSE(mesh.certificate);
+    return blob(mesh.files.at(MeshFormat::kGlb).sha256);
   }
-
-  JobProcess process_{job_program()};
 };
 
 bool has_distances(const std::string& glb) { return glb.find("_DISTANCE_MM") != std::string::npos; }

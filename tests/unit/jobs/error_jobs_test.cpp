@@ -17,8 +17,6 @@
 namespace isomesh::jobs {
 namespace {
 
-const Report kSilent = [](Stage, double, const Timing&) {};
-
 // Two balls and a hollow, in samples of half a millimetre.
 test::SampleVolume<float> hollow() {
   const test::Field large = test::sphere({10, 10, 10}, 8.1);
@@ -38,11 +36,10 @@ struct Soup {
   mesh::SurfaceView view() const { return {positions, triangles}; }
 };
 
-class ErrorJobsTest : public test::JobsFixture {
+class ErrorJobsTest : public test::PipelineFixture {
  protected:
-  MeshSummary run(const JobParameters& parameters) {
-    return run_pipeline(volume_, parameters, {}, blobs_, process_, {}, kSilent).mesh;
-  }
+  using PipelineFixture::run;
+  MeshSummary run(const JobParameters& parameters) { return run(volume_, parameters).mesh; }
 
   // Decodes a file whose format rounds coordinates.
   codec::DecodedSurface decoded(const MeshSummary& mesh, MeshFormat format) {
@@ -78,7 +75,6 @@ class ErrorJobsTest : public test::JobsFixture {
   }
 
   Volume volume_ = add(hollow(), SampleType::kFloat32);
-  JobProcess process_{job_program()};
 };
 
 TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
@@ -208,7 +204,7 @@ TEST_F(ErrorJobsTest, TellTheStagesApart) {
   const Report note = [&](Stage stage, double, const Timing&) {
     if (stages.empty() || stages.back() != stage) stages.push_back(stage);
   };
-  const Timing timing = run_pipeline(volume_, parameters, {}, blobs_, process_, {}, note).timing;
+  const Timing timing = run(volume_, parameters, note).timing;
   EXPECT_THAT(stages,
               testing::ElementsAre(Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kSimplify,
                                    Stage::kEncode, Stage::kCertify, Stage::kEncode));
@@ -295,7 +291,7 @@ TEST_F(ErrorJobsTest, OfLabelsAreWithinTheErrorInEveryFile) {
   parameters.space = Space::kRas;
   parameters.max_error_mm = 0.2;
   parameters.certify = true;
-  const MeshSummary mesh = run_pipeline(labels, parameters, {}, blobs_, process_, {}, kSilent).mesh;
+  const MeshSummary mesh = run(labels, parameters).mesh;
   EXPECT_LE(mesh.certificate->found_mm, 0.2);
   EXPECT_GT(mesh.certificate->found_mm, 0);
   EXPECT_LT(mesh.triangles, mesh.simplified->triangles_before / 2);
@@ -318,9 +314,7 @@ TEST_F(ErrorJobsTest, OfLabelsMeasureDracoInTheZip) {
   parameters.passes = 0;
   parameters.draco.position_bits = 8;  // so that it is far
   parameters.certify = true;
-  const auto certified = [&] {
-    return *run_pipeline(labels, parameters, {}, blobs_, process_, {}, kSilent).mesh.certificate;
-  };
+  const auto certified = [&] { return *run(labels, parameters).mesh.certificate; };
   const MeshCertificate rounded = certified();
   EXPECT_EQ(rounded.file, MeshFormat::kDrc);
   parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
@@ -340,15 +334,12 @@ TEST_F(ErrorJobsTest, AreCancelledAndRefusedAsOthersAre) {
     const Report stop_there = [&](Stage stage, double, const Timing&) {
       if (stage == at) stop.request_stop();
     };
-    EXPECT_EQ(test::code_thrown_by([&] {
-                run_pipeline(volume_, parameters, {}, blobs_, process_, stop.get_token(),
-                             stop_there);
-              }),
+    EXPECT_EQ(test::code_thrown_by([&] { run(volume_, parameters, stop_there, stop.get_token()); }),
               ErrorCode::kCancelled);
   }
   const PipelineLimits few = {.memory_bytes = 3'000'000};
   EXPECT_EQ(test::code_thrown_by(
-                [&] { run_pipeline(volume_, parameters, few, blobs_, process_, {}, kSilent); }),
+                [&] { run_pipeline(volume_, parameters, few, blobs_, process_, {}, kQuiet); }),
             ErrorCode::kTooLarge);
 }
 

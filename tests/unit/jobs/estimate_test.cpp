@@ -13,7 +13,7 @@
 #include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/workers.h"
 #include "tests/support/errors.h"
-#include "tests/support/jobs.h"
+#include "tests/support/stores.h"
 #include "tests/unit/jobs/faulty_job.h"
 #include "tests/unit/jobs/fixture.h"
 
@@ -188,10 +188,9 @@ TEST_F(EstimateTest, SamplesThatAreCutMeanwhileAreDamaged) {
 TEST_F(EstimateTest, AProcessThatDiesIsToldAndReplaced) {
   const Volume volume = add_sphere();
   Estimator faulty(volumes_, blobs_, jobs_, {}, job_program(FAULTY_JOB));
-  const auto error =
-      test::thrown_by([&] { faulty.estimate("", parameters_of(volume, test::kKilled)); });
-  ASSERT_TRUE(error);
-  EXPECT_THAT(error->what(), testing::HasSubstr("with signal 9 (killed)"));
+  const Error error =
+      test::error_of([&] { faulty.estimate("", parameters_of(volume, test::kKilled)); });
+  EXPECT_THAT(error.what(), testing::HasSubstr("with signal 9 (killed)"));
   EXPECT_EQ(faulty.estimate("", parameters_of(volume, test::kAnswers)).triangles, 0U);
 }
 

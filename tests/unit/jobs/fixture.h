@@ -9,6 +9,7 @@
 
 #include "server/jobs/library/volume_library.h"
 #include "server/jobs/queue/job_process.h"
+#include "server/jobs/queue/pipeline.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"
@@ -52,6 +53,10 @@ class JobsFixture : public testing::Test {
 
   static JobParameters parameters_of(const Volume& volume, double iso);
 
+  static jobs::RunnerOptions imports() {
+    return {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT};
+  }
+
   std::size_t blob_count() const { return files_below(data_.blobs()).size(); }
   std::size_t scratch_count() const { return files_below(data_.scratch()).size(); }
   std::string blob(const std::string& key) const { return read_file(blobs_.path_of(key)); }
@@ -63,13 +68,21 @@ class JobsFixture : public testing::Test {
   store::SqlVolumeStore volumes_{database_};
   store::SqliteJobStore jobs_{database_, blobs_, options()};
   store::Retention retention_{jobs_, volumes_, blobs_, data_.scratch(), store::RetentionOptions{}};
-  jobs::VolumeLibrary library_{
-      data_,
-      blobs_,
-      volumes_,
-      retention_,
-      volume::SizeLimits{},
-      jobs::RunnerOptions{.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT}};
+  jobs::VolumeLibrary library_{data_,    blobs_, volumes_, retention_, volume::SizeLimits{},
+                               imports()};
+};
+
+// Jobs in a process of their own.
+class PipelineFixture : public JobsFixture {
+ protected:
+  jobs::PipelineResult run(
+      const Volume& volume, const JobParameters& parameters,
+      const jobs::Report& report = [](Stage, double, const Timing&) {},
+      const std::stop_token& stop = {}) {
+    return run_pipeline(volume, parameters, {}, blobs_, process_, stop, report);
+  }
+
+  jobs::JobProcess process_{job_program()};
 };
 
 // Blobs of which one is cut right after it was found intact.

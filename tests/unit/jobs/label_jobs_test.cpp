@@ -1,9 +1,6 @@
 // Jobs by labels, from stored samples to stored files.
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
-#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,7 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class LabelJobsTest : public test::JobsFixture {
+class LabelJobsTest : public test::PipelineFixture {
  protected:
   // Two balls, 3 and 7, that touch, and a cube, 9, apart; spacing 0.5, 1, 2.
   Volume add_labels() {
@@ -50,12 +47,7 @@ class LabelJobsTest : public test::JobsFixture {
     return complete_labels(std::move(parameters), "", volume, lists_);
   }
 
-  PipelineResult run(const Volume& volume, const JobParameters& parameters) {
-    return run_pipeline(volume, parameters, {}, blobs_, process_, {}, kQuiet);
-  }
-
   LabelLists lists_{blobs_};
-  JobProcess process_{job_program()};
 };
 
 TEST_F(LabelJobsTest, MakeEveryLabelsClosedSurface) {
@@ -207,9 +199,8 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   // The process finds the same for itself.
   JobParameters unsettled = label_parameters({{4}});
   unsettled.volume = volume.id;
-  const auto error = test::thrown_by([&] { run(volume, unsettled); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
+  const Error error = test::error_of([&] { run(volume, unsettled); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnusableVolume);
 }
 
 TEST_F(LabelJobsTest, MayBeThousands) {
@@ -242,20 +233,18 @@ TEST_F(LabelJobsTest, MayBeThousands) {
 
 TEST_F(LabelJobsTest, OfASingleSliceAreRefused) {
   const Volume slice = add(test::constant<std::uint8_t>(1, {10, 10, 1}), SampleType::kUint8);
-  const auto error = test::thrown_by([&] { settled(slice, label_parameters({})); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
-  EXPECT_THAT(error->what(), HasSubstr("10 x 10 x 1"));
+  const Error error = test::error_of([&] { settled(slice, label_parameters({})); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnusableVolume);
+  EXPECT_THAT(error.what(), HasSubstr("10 x 10 x 1"));
 }
 
 TEST_F(LabelJobsTest, TakeNoMoreMemoryThanTheyMay) {
   const Volume volume = add_labels();
-  const auto error = test::thrown_by([&] {
+  const Error error = test::error_of([&] {
     run_pipeline(volume, settled(volume, label_parameters({})), {.memory_bytes = 100'000}, blobs_,
                  process_, {}, kQuiet);
   });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kTooLarge);
+  EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
 }
 
 }  // namespace

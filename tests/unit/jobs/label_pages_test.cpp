@@ -1,7 +1,6 @@
 // Labels of a job in pages: from its record, and from a file that may be damaged.
 #include "server/jobs/library/label_pages.h"
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -10,6 +9,7 @@
 #include "proto/json.h"
 #include "tests/support/errors.h"
 #include "tests/support/step.h"
+#include "tests/support/stores.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -42,9 +42,7 @@ std::string file_of(const std::vector<LabelSummary>& labels) {
 class LabelPagesTest : public test::JobsFixture {
  protected:
   Job job_with(const std::string& file, std::size_t count) {
-    const auto writer = blobs_.begin("");
-    writer->write(std::as_bytes(std::span(file)));
-    const store::Blob blob = writer->commit();
+    const store::Blob blob = test::put(blobs_, file);
     Job job;
     job.id = "x";
     job.mesh.emplace().labels_count = count;

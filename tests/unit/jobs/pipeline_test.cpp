@@ -1,7 +1,6 @@
 #include "server/jobs/queue/pipeline.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <memory>
 #include <mutex>
@@ -23,19 +22,12 @@
 namespace isomesh::jobs {
 namespace {
 
-class PipelineTest : public test::JobsFixture {
+class PipelineTest : public test::PipelineFixture {
  protected:
-  PipelineResult run(const Volume& volume, const JobParameters& parameters,
-                     const Report& report = kQuiet, std::stop_token stop = {}) {
-    return run_pipeline(volume, parameters, {}, blobs_, process_, std::move(stop), report);
-  }
-
   // The bytes of the one format that was asked for.
   std::string mesh_bytes(const PipelineResult& result) {
     return blob(result.mesh.files.begin()->second.sha256);
   }
-
-  JobProcess process_{job_program()};
 };
 
 TEST_F(PipelineTest, MakesAMeshOfASphere) {
@@ -373,13 +365,12 @@ TEST_F(PipelineTest, AVolumeWhoseSamplesAreCutBeforeTheyAreReadIsUnusable) {
 
 TEST_F(PipelineTest, RefusesAJobThatWouldTakeTooMuchMemory) {
   const Volume volume = add_much();
-  const auto error = test::thrown_by([&] {
+  const Error error = test::error_of([&] {
     run_pipeline(volume, parameters_of(volume, 50), {.memory_bytes = 1 << 20}, blobs_, process_, {},
                  kQuiet);
   });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kTooLarge);
-  EXPECT_THAT(error->what(), testing::HasSubstr("1 MiB are allowed"));
+  EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
+  EXPECT_THAT(error.what(), testing::HasSubstr("1 MiB are allowed"));
 }
 
 TEST(Workspace, GivesBackWhatIsBeyondItsBudget) {

@@ -14,7 +14,7 @@ namespace {
 
 const std::vector<std::uint32_t> kTargets = {4, 5, 6, 7, 8, 9, 10, 11, 13, 16, 20, 33, 50, 77, 100};
 
-class SmallTargetsTest : public test::JobsFixture {
+class SmallTargetsTest : public test::PipelineFixture {
  protected:
   using Corner = std::array<std::uint32_t, 3>;
 
@@ -32,10 +32,6 @@ class SmallTargetsTest : public test::JobsFixture {
     fill(samples, 1, from, {from[0] + 3, from[1] + 3, from[2] + 3});
     fill(samples, 1, {5, 5, 5}, {9, 9, 9});
     return add(samples, SampleType::kUint8);
-  }
-
-  MeshSummary run(const Volume& volume, const JobParameters& parameters) {
-    return run_pipeline(volume, parameters, {}, blobs_, process_, {}, kQuiet).mesh;
   }
 
   // Whatever was certified, no file leaves that its own decoder refuses.
@@ -58,8 +54,6 @@ class SmallTargetsTest : public test::JobsFixture {
       EXPECT_EQ(triangles_in(blob(mesh.files.at(format).sha256), format), mesh.triangles);
     }
   }
-
-  JobProcess process_{job_program()};
 };
 
 TEST_F(SmallTargetsTest, OfTwoCubesAreMetDownToTwoTetrahedra) {
@@ -74,7 +68,7 @@ TEST_F(SmallTargetsTest, OfTwoCubesAreMetDownToTwoTetrahedra) {
       SCOPED_TRACE(asked);
       parameters.triangles = asked;
       parameters.certify = asked % 2 == 0;
-      const MeshSummary mesh = run(volume, parameters);
+      const MeshSummary mesh = run(volume, parameters).mesh;
       expect_met_or_told(mesh, asked);
       EXPECT_LE(mesh.triangles, std::max(asked, 8U));
       EXPECT_EQ(mesh.components, 2U);
@@ -95,7 +89,7 @@ TEST_F(SmallTargetsTest, OfSurfacesAtTheBorderAreMetOrTold) {
       SCOPED_TRACE(asked);
       parameters.triangles = asked;
       parameters.certify = asked % 2 != 0;
-      const MeshSummary mesh = run(volume, parameters);
+      const MeshSummary mesh = run(volume, parameters).mesh;
       expect_met_or_told(mesh, asked);
       EXPECT_EQ(mesh.quality.closed, close);
       EXPECT_EQ(mesh.components, 2U);
@@ -119,7 +113,7 @@ TEST_F(SmallTargetsTest, OfLabelsAreMetOrTold) {
       SCOPED_TRACE(asked);
       parameters.triangles = asked;
       parameters.certify = asked % 2 == 0;
-      const MeshSummary mesh = run(volume, parameters);
+      const MeshSummary mesh = run(volume, parameters).mesh;
       expect_met_or_told(mesh, asked);
       const std::string zip = blob(mesh.files.at(MeshFormat::kZip).sha256);
       std::size_t all = 0;
@@ -143,7 +137,7 @@ TEST_F(SmallTargetsTest, NameTheErrorWhereItIsWhatBinds) {
   parameters.triangles = 5;
   parameters.max_error_mm = 0.01;
   parameters.certify = true;
-  const MeshSummary mesh = run(volume, parameters);
+  const MeshSummary mesh = run(volume, parameters).mesh;
   EXPECT_GT(mesh.triangles, 8U);
   EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kError);
 }

@@ -99,8 +99,7 @@ TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
   jobs_.submit({"", parameters_of(theirs, 100), "", ""});  // so that it does not expire
   store::Retention full(jobs_, volumes_, blobs_, data_.scratch(),
                         {.max_bytes = volumes_.named_bytes()});
-  VolumeLibrary library(data_, blobs_, volumes_, full, {},
-                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  VolumeLibrary library(data_, blobs_, volumes_, full, {}, imports());
   const auto add_as = [&](const std::string& owner, const std::string& bytes) {
     test::write_file(folder_ / "upload", bytes);
     return code_thrown_by([&] { library.add(owner, folder_ / "upload", raw()); });
@@ -122,8 +121,7 @@ TEST_F(VolumeLibraryTest, AnUploadMakesRoomAsDataOfItsOwner) {
   add_as(library_, "", '4');
   store::Retention full(jobs_, volumes_, blobs_, data_.scratch(),
                         {.max_bytes = blobs_.bytes(), .grace = std::chrono::hours(-1)});
-  VolumeLibrary library(data_, blobs_, volumes_, full, {},
-                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  VolumeLibrary library(data_, blobs_, volumes_, full, {}, imports());
   add_as(library, "", '5');
   EXPECT_TRUE(volumes_.contains("other", oldest));
   EXPECT_FALSE(volumes_.contains("", first));
@@ -183,8 +181,7 @@ class SlowBlobs : public store::FileBlobStore {
 TEST_F(VolumeLibraryTest, ErasingDoesNotWaitForBytesThatAreBeingStored) {
   const Volume volume = add_bytes(bytes_).first;
   SlowBlobs slow(data_);
-  VolumeLibrary library(data_, slow, volumes_, retention_, {},
-                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  VolumeLibrary library(data_, slow, volumes_, retention_, {}, imports());
   test::write_file(folder_ / "upload", std::string(bytes_.rbegin(), bytes_.rend()));
   std::jthread adding([&] { library.add("", folder_ / "upload", raw()); });
   ASSERT_TRUE(test::eventually([&] { return slow.has_begun.load(); }));
@@ -205,8 +202,7 @@ TEST_F(VolumeLibraryTest, StoringBytesCanBeStopped) {
   test::write_file(folder_ / "upload", bytes_);
   for (const bool is_end : {false, true}) {
     SlowBlobs slow(data_);
-    VolumeLibrary library(data_, slow, volumes_, retention_, {},
-                          {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+    VolumeLibrary library(data_, slow, volumes_, retention_, {}, imports());
     std::stop_source cancel;
     const std::jthread stopping([&] {
       EXPECT_TRUE(test::eventually([&] { return slow.has_begun.load(); }));
@@ -234,8 +230,7 @@ TEST_F(VolumeLibraryTest, BytesThatAStoppedStoreHasNeverthelessAreErased) {
     }
   };
   Late late(data_);
-  VolumeLibrary library(data_, late, volumes_, retention_, {},
-                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  VolumeLibrary library(data_, late, volumes_, retention_, {}, imports());
   test::write_file(folder_ / "upload", bytes_);
   EXPECT_EQ(code_thrown_by([&] { library.add("", folder_ / "upload", raw()); }),
             ErrorCode::kCancelled);
@@ -257,8 +252,7 @@ TEST_F(VolumeLibraryTest, VolumesAreErasedConcurrently) {
     std::atomic<int> begun_ = 0;
   };
   Counting volumes(database_);
-  VolumeLibrary library(data_, blobs_, volumes, retention_, {},
-                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  VolumeLibrary library(data_, blobs_, volumes, retention_, {}, imports());
   const std::jthread one([&] { library.erase("", "one"); });
   library.erase("", "two");
 }

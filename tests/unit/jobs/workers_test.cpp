@@ -13,8 +13,8 @@
 #include "base/log.h"
 #include "proto/error.h"
 #include "server/mesh/parallel.h"
-#include "tests/support/jobs.h"
 #include "tests/support/process.h"
+#include "tests/support/stores.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -149,10 +149,7 @@ TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
   std::filesystem::create_directory(folder_ / "shared");
   store::FileBlobStore shared(store::shared_blob_folders(folder_ / "shared"), data_.reserve());
   shared.set_mark("ours 1\n");
-  const std::string bytes = blob(volume.id);
-  const auto writer = shared.begin("");
-  writer->write(test::as_span(bytes));
-  writer->commit();
+  test::put(shared, blob(volume.id));
   std::filesystem::rename(folder_ / "shared", folder_ / "elsewhere");
   const std::string id = submit(parameters_of(volume, 0));
   const Workers workers(threads(1), jobs_, volumes_, shared);

@@ -42,10 +42,9 @@ TEST(ParseAddress, RefusesTheRest) {
         std::string("127.0.0.1:99999999999"), std::string("127.0.0.1:80 "),
         std::string("127.0.0.1:8080/"), std::string("[]:80"), std::string("unix:"),
         "unix:/" + std::string(107, 'x')}) {
-    const auto error = test::thrown_by([&] { parse_address(text); });
-    ASSERT_TRUE(error) << text;
-    EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
-    EXPECT_THAT(test::fields_of(*error), ElementsAre("listen"));
+    const Error error = test::error_of([&] { parse_address(text); }, text);
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+    EXPECT_THAT(test::fields_of(error), ElementsAre("listen"));
   }
 }
 

@@ -23,6 +23,7 @@
 #include "tests/api/dicom_bytes.h"
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
+#include "tests/support/stores.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::orders {
@@ -393,21 +394,15 @@ class OrdersTest : public test::JobsFixture {
     last_parameters_ = lease->parameters;
     std::string stl(84 + std::size_t{50} * triangles, '\0');
     stl[80] = 1;
-    const auto writer = blobs_.begin("");
-    writer->write(std::as_bytes(std::span(stl)));
-    const store::Blob blob = writer->commit();
+    const store::Blob blob = test::put(blobs_, stl);
     store::Outcome outcome;
     outcome.mesh.emplace().triangles = triangles;
     if (triangles == 0) outcome.mesh->iso = 1000;
     outcome.mesh->labels_count = labels_of_mesh_;
     outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
     if (bytes_of_obj_ > 0) {
-      const auto obj_writer = blobs_.begin("");
-      const std::string obj(bytes_of_obj_, '#');
-      obj_writer->write(std::as_bytes(std::span(obj)));
-      const store::Blob obj_blob = obj_writer->commit();
-      outcome.mesh->files[MeshFormat::kObj] = {
-          .bytes = obj_blob.bytes, .sha256 = obj_blob.key, .href = "/y"};
+      const store::Blob obj = test::put(blobs_, std::string(bytes_of_obj_, '#'));
+      outcome.mesh->files[MeshFormat::kObj] = {.bytes = obj.bytes, .sha256 = obj.key, .href = "/y"};
     }
     const bool is_done = jobs_.finish(*lease, outcome);
     before_told(lease->id);

@@ -235,10 +235,7 @@ class ReceivedOrdersTest : public OrdersTest {
                const std::string& patient = "PAT-1") {
     const auto receiving = received_.begin_receiving();
     for (int slice = from; slice < to; ++slice) {
-      const std::string file = slice_file(slice, patient);
-      const auto writer = blobs_.begin("");
-      writer->write(std::as_bytes(std::span(file)));
-      const store::Blob blob = writer->commit();
+      const store::Blob blob = test::put(blobs_, slice_file(slice, patient));
       received_.add({title, kStudy, kSeries}, {instance_of(slice), blob.key, blob.bytes});
       blobs_.mark_named(blob.key);
     }

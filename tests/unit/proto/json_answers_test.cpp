@@ -1,6 +1,5 @@
 // Answers of the server: written by it, read by clients.
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 

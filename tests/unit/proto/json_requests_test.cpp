@@ -14,6 +14,7 @@ namespace isomesh {
 namespace {
 
 using test::code_thrown_by;
+using test::error_of;
 using test::fields_of;
 using test::thrown_by;
 using testing::ElementsAre;
@@ -362,19 +363,17 @@ TEST(JobBody, LongNamesAndValuesDoNotComeBackWhole) {
   const std::string longest(64 * 1024, 'x');
   for (const std::string& body :
        {body_with('"' + longest + "\": 1"), body_with("\"interpolation\": \"" + longest + '"')}) {
-    const auto error = thrown_by([&] { parse_job_parameters(body); });
-    ASSERT_TRUE(error);
-    EXPECT_LT(std::string(error->what()).size(), 1000U);
+    const Error error = error_of([&] { parse_job_parameters(body); });
+    EXPECT_LT(std::string(error.what()).size(), 1000U);
   }
 }
 
 TEST(JobBody, ManyUnknownMembersDoNotComeBackAll) {
   std::string body = R"({"volume": "a", "iso": 1)";
   for (int n = 0; n < 5000; ++n) body += ", \"m" + std::to_string(n) + "\": 1";
-  const auto error = thrown_by([&] { parse_job_parameters(body + "}"); });
-  ASSERT_TRUE(error);
-  EXPECT_GE(error->fields().size(), 10U);
-  EXPECT_LE(error->fields().size(), 100U);
+  const Error error = error_of([&] { parse_job_parameters(body + "}"); });
+  EXPECT_GE(error.fields().size(), 10U);
+  EXPECT_LE(error.fields().size(), 100U);
 }
 
 TEST(JobBody, ALongVolumeIsAnIdThatNothingHas) {
@@ -393,16 +392,14 @@ TEST(JobBody, AMemberGivenTwiceIsRefused) {
 }
 
 TEST(JobBody, ControlCharactersOfNamesAreShown) {
-  const auto error =
-      thrown_by([] { parse_job_parameters(R"({"volume": "a", "iso": 1, "a\u0000b": 1})"); });
-  ASSERT_TRUE(error);
-  EXPECT_STREQ(error->what(), "a\uFFFDb: is not a known member");
+  const Error error =
+      error_of([] { parse_job_parameters(R"({"volume": "a", "iso": 1, "a\u0000b": 1})"); });
+  EXPECT_STREQ(error.what(), "a\uFFFDb: is not a known member");
 }
 
 TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
-  const auto error = thrown_by([] { parsed("\"\\ud800\": 1"); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
+  const Error error = error_of([] { parsed("\"\\ud800\": 1"); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
 }
 
 // The parser says no more of it than that the body is not JSON.
@@ -442,9 +439,8 @@ TEST(JobBody, NamesANumberThatIsTooLarge) {
   EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1e400})"), ElementsAre("iso"));
   EXPECT_THAT(faults_in(R"({"volume": "a", "labels": "all", "label_values": {"1": [-1e999]}})"),
               ElementsAre("label_values.1"));
-  const auto error = thrown_by([] { parse_job_parameters("[1e400]"); });
-  ASSERT_TRUE(error);
-  EXPECT_THAT(error->what(), HasSubstr("one JSON object"));
+  const Error error = error_of([] { parse_job_parameters("[1e400]"); });
+  EXPECT_THAT(error.what(), HasSubstr("one JSON object"));
 }
 
 TEST(JobBody, TakesAWholeNumberWithAPoint) {
@@ -466,9 +462,8 @@ TEST(JobBody, RefusesALabelThatIsSpelledTwice) {
 }
 
 TEST(VolumeNameBody, RefusesAMemberThatIsGivenTwice) {
-  const auto error = thrown_by([] { parse_volume_name(R"({"name": "a", "name": "b"})"); });
-  ASSERT_TRUE(error);
-  EXPECT_THAT(fields_of(*error), ElementsAre("name"));
+  const Error error = error_of([] { parse_volume_name(R"({"name": "a", "name": "b"})"); });
+  EXPECT_THAT(fields_of(error), ElementsAre("name"));
 }
 
 }  // namespace

@@ -170,10 +170,9 @@ TEST(OrderParameters, AreTheRulesUnlessTheOrderSaysOtherwise) {
 }
 
 TEST(OrderParameters, NameWhatIsWrongByItsPlace) {
-  const auto error = test::thrown_by(
-      [] { parse_order_parameters("", R"({"iso": "x"})", "rules[0].parameters."); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->fields().front().field, "rules[0].parameters.iso");
+  const Error error =
+      test::error_of([] { parse_order_parameters("", R"({"iso": "x"})", "rules[0].parameters."); });
+  EXPECT_EQ(error.fields().front().field, "rules[0].parameters.iso");
   for (const char* own : {R"({"volume": "x", "iso": 1})", R"({"callback": {}, "iso": 1})",
                           R"({"space": "ras", "iso": 1})"}) {
     EXPECT_EQ(test::code_thrown_by([&] { parse_order_parameters("", own, ""); }),

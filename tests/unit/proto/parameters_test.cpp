@@ -141,9 +141,8 @@ TEST(Parameters, CasesAreThoseOfTheTable) {
         body[path] = *entry.maximum;
         EXPECT_NO_THROW(parse_job_parameters(body.dump())) << path;
         body[path] = *entry.maximum + 1e-6;
-        const auto error = test::thrown_by([&] { parse_job_parameters(body.dump()); });
-        ASSERT_TRUE(error) << path;
-        EXPECT_THAT(error->what(), HasSubstr("must be at most " + number_text(*entry.maximum)));
+        const Error error = test::error_of([&] { parse_job_parameters(body.dump()); }, path);
+        EXPECT_THAT(error.what(), HasSubstr("must be at most " + number_text(*entry.maximum)));
       }
     }
   });

@@ -12,6 +12,7 @@
 namespace isomesh {
 namespace {
 
+using test::error_of;
 using test::fields_of;
 using test::thrown_by;
 using testing::ElementsAre;
@@ -63,11 +64,10 @@ TEST(JobQuery, TakesNumbersThatJsonWouldNot) {
 }
 
 TEST(JobQuery, CallsParametersSo) {
-  const auto error = thrown_by([] {
+  const Error error = error_of([] {
     parse_job_parameters(Query{{"iso", "1"}, {"isovalue", "1"}}, VolumeIn::kBody);
   });
-  ASSERT_TRUE(error);
-  EXPECT_STREQ(error->what(), "isovalue: is not a parameter of this request");
+  EXPECT_STREQ(error.what(), "isovalue: is not a parameter of this request");
 }
 
 TEST(JobQuery, RefusesAParameterGivenTwice) {

@@ -14,6 +14,7 @@
 #include "server/store/sqlite/identity.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/stores.h"
 
 namespace isomesh::store {
 namespace {
@@ -29,10 +30,10 @@ class BackupOfAHospitalTest : public testing::Test {
     const DataFolder data(root());
     Database database(data);
     FileBlobStore blobs(data);
-    image_ = put(blobs, "an image");
+    image_ = test::put(blobs, "an image").key;
     SqlReceivedStore(database).add({"BONE", "1.2", "1.3"},
                                    {.instance = "1.3.1", .blob = image_, .bytes = 8});
-    object_ = put(blobs, "an object");
+    object_ = test::put(blobs, "an object").key;
     SqlOrderStore orders(database);
     OrderSpec spec;
     spec.record.order.id = order_;
@@ -45,11 +46,6 @@ class BackupOfAHospitalTest : public testing::Test {
     EXPECT_TRUE(orders.save(spec.record, {}));
   }
 
-  static std::string put(BlobStore& blobs, const std::string& text) {
-    const auto writer = blobs.begin("");
-    writer->write(test::as_span(text));
-    return writer->commit().key;
-  }
   std::filesystem::path root() const { return folder_ / "data"; }
   std::filesystem::path blob(const std::string& in, const std::string& key) const {
     return folder_ / in / "blobs" / key.substr(0, 2) / key;
@@ -77,10 +73,9 @@ TEST_F(BackupOfAHospitalTest, OfRecordsThatWereMovedIsRefused) {
     Database database(data);
     mark_as_moved(database, "of the blobs");
   }
-  const auto error = test::thrown_by([&] { back_up(root(), folder_ / "backup"); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
-  EXPECT_THAT(error->what(), HasSubstr("--store"));
+  const Error error = test::error_of([&] { back_up(root(), folder_ / "backup"); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error.what(), HasSubstr("--store"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "backup"));
 }
 

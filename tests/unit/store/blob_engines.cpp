@@ -11,7 +11,26 @@
 namespace isomesh::test {
 namespace {
 
-class FolderEngine : public BlobEngine {
+class EngineOfFolders : public BlobEngine {
+ public:
+  std::string write_file(std::string_view bytes) override {
+    const auto file = datas_.back()->scratch() / random_hex(4);
+    test::write_file(file, bytes);
+    return file;
+  }
+
+ protected:
+  // That of another daemon.
+  store::DataFolder& next_data() {
+    return *datas_.emplace_back(
+        std::make_unique<store::DataFolder>(folder_ / std::to_string(datas_.size())));
+  }
+
+  TemporaryFolder folder_;
+  std::vector<std::unique_ptr<store::DataFolder>> datas_;
+};
+
+class FolderEngine : public EngineOfFolders {
  public:
   std::unique_ptr<store::BlobStore> open() override {
     return std::make_unique<store::FileBlobStore>(data_);
@@ -19,50 +38,33 @@ class FolderEngine : public BlobEngine {
   void spoil(const std::string& key, std::string_view bytes) override {
     test::write_file(data_.blobs() / key.substr(0, 2) / key, bytes);
   }
-  std::string write_file(std::string_view bytes) override {
-    const auto file = data_.scratch() / random_hex(4);
-    test::write_file(file, bytes);
-    return file;
-  }
   std::vector<std::string> leftovers() override { return files_below(data_.scratch()); }
 
  private:
-  TemporaryFolder folder_;
-  store::DataFolder data_{folder_ / "data"};
+  store::DataFolder& data_ = next_data();
 };
 
 // Each store is that of a daemon with a data folder of its own.
-class SharedFolderEngine : public BlobEngine {
+class SharedFolderEngine : public EngineOfFolders {
  public:
   SharedFolderEngine() { std::filesystem::create_directory(folder_ / "shared"); }
 
   std::unique_ptr<store::BlobStore> open() override {
-    store::DataFolder& data = *datas_.emplace_back(
-        std::make_unique<store::DataFolder>(folder_ / std::to_string(datas_.size())));
     return std::make_unique<store::FileBlobStore>(store::shared_blob_folders(folder_ / "shared"),
-                                                  data.reserve());
+                                                  next_data().reserve());
   }
   void spoil(const std::string& key, std::string_view bytes) override {
     test::write_file(folder_ / ("shared/blobs/" + key.substr(0, 2) + '/' + key), bytes);
-  }
-  std::string write_file(std::string_view bytes) override {
-    const auto file = datas_.back()->scratch() / random_hex(4);
-    test::write_file(file, bytes);
-    return file;
   }
   std::vector<std::string> leftovers() override {
     std::vector<std::string> left = files_below(folder_ / "shared/drafts");
     for (const std::string& hold : files_below(folder_ / "shared/holds")) left.push_back(hold);
     return left;
   }
-
- private:
-  TemporaryFolder folder_;
-  std::vector<std::unique_ptr<store::DataFolder>> datas_;
 };
 
 // Each store is that of a daemon with a data folder of its own.
-class S3Engine : public BlobEngine {
+class S3Engine : public EngineOfFolders {
  public:
   S3Engine(const std::string& url, const std::string& credentials) {
     test::write_file(folder_ / "credentials", credentials);
@@ -73,9 +75,7 @@ class S3Engine : public BlobEngine {
   }
 
   std::unique_ptr<store::BlobStore> open() override {
-    store::DataFolder& data = *datas_.emplace_back(
-        std::make_unique<store::DataFolder>(folder_ / std::to_string(datas_.size())));
-    return std::make_unique<store::S3BlobStore>(data, options_);
+    return std::make_unique<store::S3BlobStore>(next_data(), options_);
   }
 
   // There, and in the copies.
@@ -86,12 +86,6 @@ class S3Engine : public BlobEngine {
           folder_ / (std::to_string(n) + "/cache/blobs/" + key.substr(0, 2) + '/' + key);
       if (std::filesystem::exists(copy)) test::write_file(copy, bytes);
     }
-  }
-
-  std::string write_file(std::string_view bytes) override {
-    const auto file = datas_.back()->scratch() / random_hex(4);
-    test::write_file(file, bytes);
-    return file;
   }
 
   std::vector<std::string> leftovers() override {
@@ -106,10 +100,8 @@ class S3Engine : public BlobEngine {
   }
 
  private:
-  TemporaryFolder folder_;
   store::S3Options options_;
   std::unique_ptr<store::S3Client> service_;
-  std::vector<std::unique_ptr<store::DataFolder>> datas_;
 };
 
 // Our own small one, which takes longer to start than any of the tests.

@@ -19,6 +19,7 @@
 #include "server/store/sql/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/support/postgres.h"
+#include "tests/support/stores.h"
 
 namespace isomesh::store::postgresql {
 
@@ -93,17 +94,11 @@ class ClusterTest : public testing::Test {
   Outcome mesh() {
     Outcome outcome;
     MeshFile& file = outcome.mesh.emplace().files[MeshFormat::kDrc];
-    const Blob blob = put("mesh");
+    const Blob blob = test::put(blobs_, "mesh");
     file.sha256 = blob.key;
     file.bytes = blob.bytes;
     return outcome;
   }
-  Blob put(const std::string& text) {
-    const auto writer = blobs_.begin("");
-    writer->write(test::as_span(text));
-    return writer->commit();
-  }
-
   // As when the network fails or the server restarts.
   void cut_connections() {
     Postgres::ask(url_,

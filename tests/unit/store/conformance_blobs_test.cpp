@@ -11,6 +11,7 @@
 
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/stores.h"
 #include "tests/unit/store/blob_engines.h"
 
 namespace isomesh::store {
@@ -37,12 +38,7 @@ class Blobs : public testing::TestWithParam<NamedBlobEngine> {
     blobs_ = engine_->open();
   }
 
-  static Blob put(BlobStore& blobs, std::string_view text) {
-    const auto writer = blobs.begin("");
-    writer->write(as_span(text));
-    return writer->commit();
-  }
-  Blob put(std::string_view text) { return put(*blobs_, text); }
+  Blob put(std::string_view text) { return test::put(*blobs_, text); }
 
   // One that a record names.
   Blob put_named(std::string_view text) {
@@ -51,13 +47,7 @@ class Blobs : public testing::TestWithParam<NamedBlobEngine> {
     return blob;
   }
 
-  static std::string get(const BlobStore& blobs, const std::string& key) {
-    const auto blob = blobs.open(key);
-    std::string text(blob->size(), '\0');
-    blob->read_at(0, std::as_writable_bytes(std::span(text)));
-    return text;
-  }
-  std::string get(const std::string& key) { return get(*blobs_, key); }
+  std::string get(const std::string& key) { return test::get(*blobs_, key); }
 
   static bool nothing(const std::string& /*key*/) { return false; }
   static Steady in(std::chrono::seconds time) { return Steady::clock::now() + time; }
@@ -338,7 +328,7 @@ class SharedBlobs : public Blobs {
 
 TEST_P(SharedBlobs, WhatOneStoresTheOtherHas) {
   put("hello");
-  EXPECT_EQ(get(*other_, kHelloKey), "hello");
+  EXPECT_EQ(test::get(*other_, kHelloKey), "hello");
   EXPECT_TRUE(other_->is_intact(kHelloKey, {}));
   other_->erase(kHelloKey);
   EXPECT_EQ(blobs_->size(kHelloKey), std::nullopt);
@@ -361,7 +351,7 @@ TEST_P(SharedBlobs, WhatIsStoredAgainUnderQuarantineStays) {
   put("hello");
   EXPECT_EQ(other_->sweep(in(-kAWhile), nothing).quarantined, 0U);
   other_->empty_quarantine(at(kAWhile), nothing);
-  EXPECT_EQ(get(*engine_->open(), kHelloKey), "hello");
+  EXPECT_EQ(test::get(*engine_->open(), kHelloKey), "hello");
 }
 
 TEST_P(SharedBlobs, TheLimitKnowsWhatOthersHaveStoredAfterASweep) {
@@ -393,7 +383,7 @@ TEST_P(SharedBlobs, TwoSweepersAndASlowWriterLoseNothing) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1500);
     int rounds = 0;
     for (; rounds < kLeastRounds || std::chrono::steady_clock::now() < end; ++rounds) {
-      put(*third, "hello");
+      test::put(*third, "hello");
       std::this_thread::sleep_for(std::chrono::milliseconds(rounds % 7));
       named = kHelloKey;
       third->mark_named(kHelloKey);

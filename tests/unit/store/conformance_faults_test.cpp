@@ -121,13 +121,6 @@ TEST_P(FaultConformance, ALostWorkerForgivesNoFailure) {
   EXPECT_EQ(jobs().get("", id).state, JobState::kFailed);
 }
 
-TEST_P(FaultConformance, APutBackCountsNoAttempt) {
-  const std::string id = submit().id;
-  for (int n = 0; n < 5; ++n) jobs().put_back(claimed(), milliseconds(0));
-  EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
-  EXPECT_EQ(claimed().attempt, 1);
-}
-
 TEST_P(FaultConformance, ACancelledJobWhoseLeaseRunsOutEndsCancelled) {
   const std::string id = submit().id;
   expired();

@@ -47,13 +47,6 @@ class OrderConformance : public test::EngineTest {
     for (const OrderRecord& record : orders().due(now, kMany)) ids.push_back(record.order.id);
     return ids;
   }
-  bool end(OrderRecord record, OrderState state, Time finished = now()) {
-    record.order.state = state;
-    record.order.finished = timestamp_of(finished);
-    return orders().save(record, finished);
-  }
-
-  static Time now() { return std::chrono::system_clock::now(); }
 };
 
 INSTANTIATE_TEST_SUITE_P(Engines, OrderConformance, testing::ValuesIn(test::all_engines()),

@@ -30,8 +30,6 @@ class OutboxConformance : public test::EngineTest {
     for (const Delivery& delivery : outbox().due(now(), per_receiver)) jobs.push_back(delivery.job);
     return jobs;
   }
-
-  static Time now() { return std::chrono::system_clock::now(); }
 };
 
 INSTANTIATE_TEST_SUITE_P(Engines, OutboxConformance, testing::ValuesIn(test::all_engines()),

@@ -1,9 +1,9 @@
 // Tests of what every engine has written to disk when it returns, and what it may lose.
-#include <span>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "tests/support/stores.h"
 #include "tests/unit/store/engine.h"
 
 namespace isomesh::store {
@@ -12,12 +12,6 @@ namespace {
 class PowerConformance : public test::EngineTest {
  protected:
   PowerConformance() { make({.may_lose_power = true}); }
-
-  std::string bytes_of(const std::string& key) {
-    std::string bytes(blobs().size(key).value_or(0), '\0');
-    blobs().open(key)->read_at(0, std::as_writable_bytes(std::span(bytes)));
-    return bytes;
-  }
 };
 
 INSTANTIATE_TEST_SUITE_P(Engines, PowerConformance, testing::ValuesIn(test::all_engines()),
@@ -30,7 +24,7 @@ TEST_P(PowerConformance, WhatIsAcceptedStays) {
   const JobSpec spec = {"", parameters(), "key", "digest"};
   const Job second = job_of(jobs().submit(spec));
   lose_power();
-  EXPECT_EQ(bytes_of(key), "volume");
+  EXPECT_EQ(test::get(blobs(), key), "volume");
   EXPECT_TRUE(volumes().names(key));
   EXPECT_EQ(jobs().get("", first.id), first);
   EXPECT_EQ(jobs().submit(spec).kind, Submission::Kind::kExisting);
@@ -44,7 +38,7 @@ TEST_P(PowerConformance, WhatHasSucceededHasItsBytes) {
   ASSERT_EQ(job.state, JobState::kSucceeded);
   lose_power();
   EXPECT_EQ(jobs().get("", id), job);
-  EXPECT_EQ(bytes_of(job.mesh->files.at(MeshFormat::kDrc).sha256), "mesh");
+  EXPECT_EQ(test::get(blobs(), job.mesh->files.at(MeshFormat::kDrc).sha256), "mesh");
 }
 
 TEST_P(PowerConformance, EveryOtherEndStays) {

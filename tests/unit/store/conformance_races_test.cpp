@@ -8,8 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/errors.h"
-#include "tests/support/jobs.h"
+#include "tests/support/stores.h"
 #include "tests/unit/store/engine.h"
 
 namespace isomesh::store {

@@ -38,17 +38,16 @@ class ReceivedConformance : public test::EngineTest {
     record.work.begun = record.order.created;
     return record;
   }
-  ReceivedFate submit(const OrderRecord& record, std::uint32_t instances, Time last = now()) {
-    return orders().submit_received(
-        {.record = record, .idempotency_key = "", .request_digest = ""},
-        {.rule = "bone", .study = "1.2", .series = "1.3", .instances = instances}, last, 100);
+  ReceivedFate submit(const OrderRecord& record, std::uint32_t instances, Time last = now(),
+                      const std::vector<std::string>& contents = {}, std::size_t most_open = 100) {
+    return orders().submit_received({.record = record, .idempotency_key = "", .request_digest = ""},
+                                    {.rule = "bone",
+                                     .study = "1.2",
+                                     .series = "1.3",
+                                     .instances = instances,
+                                     .contents = contents},
+                                    last, most_open);
   }
-  bool end(OrderRecord record, OrderState state, Time finished = now()) {
-    record.order.state = state;
-    record.order.finished = timestamp_of(finished);
-    return orders().save(record, finished);
-  }
-  static Time now() { return std::chrono::system_clock::now(); }
 };
 
 INSTANTIATE_TEST_SUITE_P(Engines, ReceivedConformance, testing::ValuesIn(test::all_engines()),
@@ -131,14 +130,9 @@ TEST_P(ReceivedConformance, ASeriesGetsOneOrderThatSucceeds) {
 }
 
 TEST_P(ReceivedConformance, OtherContentsGetAnotherOrder) {
-  const auto submit_with = [&](const OrderRecord& record, std::vector<std::string> contents) {
-    return orders().submit_received({.record = record, .idempotency_key = "", .request_digest = ""},
-                                    {.rule = "bone",
-                                     .study = "1.2",
-                                     .series = "1.3",
-                                     .instances = 2,
-                                     .contents = std::move(contents)},
-                                    now() - hours(1), 100);
+  const auto submit_with = [&](const OrderRecord& record,
+                               const std::vector<std::string>& contents) {
+    return submit(record, 2, now() - hours(1), contents);
   };
   OrderRecord first = record();
   ASSERT_EQ(submit_with(first, {"1.3.1 a", "1.3.2 b"}), ReceivedFate::kNew);
@@ -159,10 +153,7 @@ TEST_P(ReceivedConformance, AfterAFailureWhatComesLaterGetsAnother) {
 }
 
 TEST_P(ReceivedConformance, WithoutAPlaceForItASeriesWaits) {
-  EXPECT_EQ(orders().submit_received(
-                {.record = record(), .idempotency_key = "", .request_digest = ""},
-                {.rule = "bone", .study = "1.2", .series = "1.3", .instances = 1}, now(), 0),
-            ReceivedFate::kOpen);
+  EXPECT_EQ(submit(record(), 1, now(), {}, 0), ReceivedFate::kOpen);
 }
 
 }  // namespace

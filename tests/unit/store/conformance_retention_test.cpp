@@ -10,6 +10,7 @@
 #include "server/store/retention.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/stores.h"
 #include "tests/unit/store/engine.h"
 
 namespace isomesh::store {
@@ -27,11 +28,7 @@ class RetentionConformance : public test::EngineTest {
     for (const std::string owner : {"", "other"}) volumes().erase(owner, kVolume);
   }
 
-  Blob put(const std::string& text) {
-    const auto writer = blobs().begin("");
-    writer->write(test::as_span(text));
-    return writer->commit();
-  }
+  Blob put(const std::string& text) { return test::put(blobs(), text); }
 
   // A volume of so many bytes.
   std::string add_volume(char letter, std::size_t bytes, const std::string& owner = "") {
@@ -394,19 +391,6 @@ TEST_P(RetentionConformance, OldEventsAreForgotten) {
   EXPECT_THAT(jobs().events("", id, 0, milliseconds(0)), IsEmpty());
 }
 
-TEST_P(RetentionConformance, SweepingAsksWhichOldBlobsToKeep) {
-  const Blob kept = put("kept");
-  const Blob other = put("other");
-  const auto now = Steady::clock::now();
-  const auto nothing = [](const std::string&) { return false; };
-  const auto only_kept = [&](const std::string& key) { return key == kept.key; };
-  EXPECT_EQ(blobs().sweep(now - std::chrono::hours(1), nothing).quarantined, 0U);
-  EXPECT_EQ(blobs().sweep(now + std::chrono::hours(1), only_kept).quarantined, 1U);
-  EXPECT_EQ(blobs().empty_quarantine(soon() + std::chrono::hours(1), only_kept), 1U);
-  EXPECT_EQ(blobs().size(kept.key), kept.bytes);
-  EXPECT_EQ(blobs().size(other.key), std::nullopt);
-}
-
 // The records know nothing of them: they are more likely wrong than all those files.
 TEST_P(RetentionConformance, FilesThatTheRecordsDoNotKnowStay) {
   for (int n = 0; n < 100; ++n) put(std::to_string(n));
@@ -417,22 +401,6 @@ TEST_P(RetentionConformance, FilesThatTheRecordsDoNotKnowStay) {
   const auto again = retention.enforce();
   EXPECT_EQ(again.quarantined, 0U) << "somebody has time to look";
   EXPECT_EQ(blob_count() + gone.quarantined, 100U);
-}
-
-// The clock is set 40 days ahead, and back.
-TEST_P(RetentionConformance, NothingExpiresByAClockThatIsNotBelieved) {
-  const std::string volume = add_volume('v', 100);
-  const std::string job = finish(volume, "mesh");
-  auto wall = std::chrono::system_clock::now();
-  BelievedClock clock(wall, {.wall = [&wall] { return wall; }});
-  RetentionOptions options;
-  options.now = [&clock] { return clock.now(); };
-  wall += std::chrono::days(40);
-  EXPECT_EQ(retention(options).enforce().jobs, 0U);
-  EXPECT_TRUE(is_job(job));
-  wall -= std::chrono::days(40);
-  EXPECT_EQ(retention(options).enforce().jobs, 0U);
-  EXPECT_TRUE(volumes().contains("", volume));
 }
 
 }  // namespace

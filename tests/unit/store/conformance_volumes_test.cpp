@@ -1,4 +1,4 @@
-// Tests of volumes and blobs on every engine.
+// Tests of volumes on every engine.
 #include <atomic>
 #include <string>
 #include <thread>

@@ -88,10 +88,9 @@ TEST(DataFolder, KeepsWhatIsFinishedAndEmptiesScratch) {
 TEST(DataFolder, ThatCannotBeMadeIsRefusedWithoutItsPath) {
   const TemporaryFolder parent;
   test::write_file(parent / "file", "not a folder");
-  const auto error = test::thrown_by([&] { DataFolder folder(parent.path() / "file" / "data"); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kInternal);
-  EXPECT_EQ(std::string(error->what()).find(parent.path()), std::string::npos);
+  const Error error = test::error_of([&] { DataFolder folder(parent.path() / "file" / "data"); });
+  EXPECT_EQ(error.code(), ErrorCode::kInternal);
+  EXPECT_EQ(std::string(error.what()).find(parent.path()), std::string::npos);
 }
 
 // As left by root, who started the daemon once.

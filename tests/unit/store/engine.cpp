@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "base/clock.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/files/files.h"
 #include "server/store/postgresql/database.h"
@@ -16,6 +17,7 @@
 #include "server/store/sqlite/job_store.h"
 #include "tests/support/files.h"
 #include "tests/support/postgres.h"
+#include "tests/support/stores.h"
 #include "tests/unit/store/power_cut.h"
 
 namespace isomesh::test {
@@ -206,11 +208,7 @@ store::Lease EngineTest::claimed(std::chrono::milliseconds lease) {
   return jobs().claim("worker", lease).value();
 }
 
-std::string EngineTest::put_blob(const std::string& text) {
-  const auto writer = blobs().begin("");
-  writer->write(as_span(text));
-  return writer->commit().key;
-}
+std::string EngineTest::put_blob(const std::string& text) { return put(blobs(), text).key; }
 
 store::Outcome EngineTest::mesh_of(const std::vector<store::Blob>& blobs) {
   store::Outcome outcome;
@@ -230,6 +228,12 @@ store::Outcome EngineTest::failure(bool may_retry) {
   outcome.error = to_problem(Error(ErrorCode::kTooLarge, "too large"), "/v1/jobs/x");
   outcome.may_retry = may_retry;
   return outcome;
+}
+
+bool EngineTest::end(store::OrderRecord record, OrderState state, store::Time finished) {
+  record.order.state = state;
+  record.order.finished = timestamp_of(finished);
+  return orders().save(record, finished);
 }
 
 }  // namespace isomesh::test

@@ -97,6 +97,9 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::Outcome some_mesh();
   static store::Outcome failure(bool may_retry = false);
 
+  static store::Time now() { return std::chrono::system_clock::now(); }
+  bool end(store::OrderRecord record, OrderState state, store::Time finished = now());
+
   store::JobStore& jobs() { return engine_->jobs(); }
   store::VolumeStore& volumes() { return engine_->volumes(); }
   store::BlobStore& blobs() { return engine_->blobs(); }

@@ -1,5 +1,4 @@
 #include <functional>
-#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -14,6 +13,7 @@
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
+#include "tests/support/stores.h"
 #include "tests/unit/store/power_cut.h"
 
 namespace isomesh::store {
@@ -28,18 +28,8 @@ constexpr const char* kHello = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e
 // Tests specific to the file store; conformance_blobs_test.cpp has those of every blob store.
 class FileBlobStoreTest : public testing::Test {
  protected:
-  Blob put(std::string_view text) {
-    const auto writer = blobs_.begin("");
-    writer->write(as_span(text));
-    return writer->commit();
-  }
-
-  std::string get(const std::string& key) {
-    const auto blob = blobs_.open(key);
-    std::string text(blob->size(), '\0');
-    blob->read_at(0, std::as_writable_bytes(std::span(text)));
-    return text;
-  }
+  Blob put(std::string_view text) { return test::put(blobs_, text); }
+  std::string get(const std::string& key) { return test::get(blobs_, key); }
 
   std::size_t blob_files() { return test::files_below(data_.blobs()).size(); }
 
@@ -56,9 +46,7 @@ TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
   sync_folder(outer.path());
   FileBlobStore blobs(data);
   std::filesystem::create_directory(blobs.path_of(kHello).parent_path());
-  const auto writer = blobs.begin("");
-  writer->write(as_span("hello"));
-  writer->commit();
+  test::put(blobs, "hello");
   power.leave(folder_ / "left");
   EXPECT_EQ(test::read_file(folder_ / "left/data/blobs/2c" / kHello), "hello");
 }
@@ -176,12 +164,6 @@ TEST_F(Sweeping, WhatAnEarlierProcessLeftIsNotYoung) {
   EXPECT_EQ(next.sweep(in(std::chrono::hours(-1)), nothing).quarantined, 1U);
 }
 
-TEST_F(Sweeping, LeavesFilesThatAreNoBlobs) {
-  test::write_file(data_.blobs() / "identity", "the folder's");
-  sweep();
-  EXPECT_EQ(test::read_file(data_.blobs() / "identity"), "the folder's");
-}
-
 // A folder that several daemons share.
 class SharedFolder : public testing::Test {
  protected:
@@ -224,9 +206,7 @@ class MovedAway : public SharedFolder, public testing::WithParamInterface<const 
   }
 
   std::string store_hello(FileBlobStore& blobs) {
-    const auto writer = blobs.begin("");
-    writer->write(as_span("hello"));
-    std::string key = writer->commit().key;
+    std::string key = test::put(blobs, "hello").key;
     blobs.mark_named(key);
     return key;
   }
@@ -281,9 +261,7 @@ TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
 
 TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {
   FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
-  const auto writer = blobs.begin("");
-  writer->write(as_span("hello"));
-  writer->commit();
+  test::put(blobs, "hello");
   blobs.mark_named(kHello);
   const auto hold = folder_ / ("shared/holds/" + std::string(kHello) + ".0123");
   test::write_file(hold, "");

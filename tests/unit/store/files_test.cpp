@@ -1,12 +1,8 @@
 #include "server/store/files/files.h"
 
-#include <algorithm>
 #include <csignal>
 #include <functional>
-#include <mutex>
-#include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -99,9 +95,8 @@ TEST(Messages, HoldNoPaths) {
       [&] { move_to(folder / "absent", folder / "to"); },
       [&] { sync_folder(folder / "absent"); }};
   for (const auto& failure : failures) {
-    const auto error = test::thrown_by(failure);
-    ASSERT_TRUE(error);
-    EXPECT_EQ(std::string(error->what()).find(folder.path()), std::string::npos) << error->what();
+    const Error error = test::error_of(failure);
+    EXPECT_EQ(std::string(error.what()).find(folder.path()), std::string::npos) << error.what();
   }
 }
 

@@ -6,9 +6,7 @@
 #include <functional>
 #include <latch>
 #include <mutex>
-#include <optional>
 #include <set>
-#include <string>
 #include <thread>
 #include <vector>
 

@@ -1,6 +1,5 @@
 #include "server/store/sqlite/identity.h"
 
-#include <optional>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -10,6 +9,7 @@
 #include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/stores.h"
 
 namespace isomesh::store {
 namespace {
@@ -25,10 +25,8 @@ class IdentityTest : public testing::Test {
     FileBlobStore blobs(data);
     Identity identity(database, blobs, overrides, {});
     if (!bytes.empty()) {
-      const auto writer = blobs.begin("");
-      writer->write(test::as_span(bytes));
       Volume volume;
-      volume.id = writer->commit().key;
+      volume.id = test::put(blobs, bytes).key;
       volume.created = "2024-01-02T03:04:05.678Z";
       SqlVolumeStore(database).add("", volume);
     }
@@ -197,9 +195,8 @@ TEST_F(IdentityTest, ASharedStoreIsOneDatabasesFromTheBeginning) {
   };
   start("one", {});
   start("one", {});
-  const auto error = test::thrown_by([&] { start("two", {}); });
-  ASSERT_TRUE(error);
-  EXPECT_THAT(error->what(), HasSubstr("another database"));
+  const Error error = test::error_of([&] { start("two", {}); });
+  EXPECT_THAT(error.what(), HasSubstr("another database"));
   start("two", {.adopt = true});
 }
 

@@ -14,12 +14,14 @@
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/s3_peer.h"
+#include "tests/support/stores.h"
 
 namespace isomesh::store {
 namespace {
 
 using test::as_span;
 using test::code_thrown_by;
+using test::error_of;
 using test::S3Peer;
 using test::thrown_by;
 using testing::Contains;
@@ -56,9 +58,7 @@ class S3Blobs : public testing::Test {
   }
 
   std::string put(std::string_view text) {
-    const auto writer = blobs_->begin("");
-    writer->write(as_span(text));
-    std::string key = writer->commit().key;
+    std::string key = test::put(*blobs_, text).key;
     blobs_->mark_named(key);
     return key;
   }
@@ -86,12 +86,7 @@ class S3Blobs : public testing::Test {
     return folder_ / ("data/cache/blobs/" + key.substr(0, 2) + '/' + key);
   }
 
-  std::string get(const std::string& key) {
-    const auto blob = blobs_->open(key);
-    std::string text(blob->size(), '\0');
-    blob->read_at(0, std::as_writable_bytes(std::span(text)));
-    return text;
-  }
+  std::string get(const std::string& key) { return test::get(*blobs_, key); }
 
   std::string text_of(std::size_t bytes) {
     std::string text;
@@ -298,10 +293,9 @@ TEST_F(InParts, AnUploadCanBeStopped) {
 
 TEST_F(S3Blobs, AWrongKeyIsRefusedAndNotTold) {
   test::write_file(folder_ / "credentials", S3Peer::credentials(false));
-  const auto error = thrown_by([&] { put("hello"); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
-  EXPECT_THAT(error->what(), Not(HasSubstr("another")));
+  const Error error = error_of([&] { put("hello"); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error.what(), Not(HasSubstr("another")));
   EXPECT_FALSE(blobs_->responds());
   test::write_file(folder_ / "credentials", S3Peer::credentials());
   EXPECT_EQ(get(put("hello")), "hello") << "the file is read again";
@@ -483,10 +477,9 @@ TEST(S3Credentials, ComeFromTheDefaultSectionOfAFile) {
 TEST(S3Credentials, AreNeverRepeated) {
   const test::TemporaryFolder folder;
   test::write_file(folder / "keys", "aws_secret_access_key = geheim\n");
-  const auto error = thrown_by([&] { read_s3_credentials(folder / "keys"); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(test::fields_of(*error), std::vector<std::string>{"blob-credentials"});
-  EXPECT_THAT(error->what(), Not(HasSubstr("geheim")));
+  const Error error = error_of([&] { read_s3_credentials(folder / "keys"); });
+  EXPECT_EQ(test::fields_of(error), std::vector<std::string>{"blob-credentials"});
+  EXPECT_THAT(error.what(), Not(HasSubstr("geheim")));
   EXPECT_EQ(code_thrown_by([&] { read_s3_credentials(folder / "absent"); }),
             ErrorCode::kInvalidParameter);
 }

@@ -2,7 +2,7 @@
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { titleOf } from '../openapi';
-import { ballNrrd, ballsNrrd, hues, madeJob, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
+import { ballNrrd, ballsNrrd, boxOf, hues, madeJob, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
 
 const at = setup();
 let ball: string;
@@ -76,8 +76,7 @@ describe('distances', () => {
     expect(Number(largest.at(-2))).toBeLessThan(1.1 * certified);
     await still(page);
 
-    const box = await view.boundingBox();
-    if (!box) throw new Error('there is no view');
+    const box = await boxOf(view);
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await expect.poll(() => page.locator('.legend-value').innerText()).toMatch(/^[<\d. ]+ mm here$/);
     const here = parseFloat((await page.locator('.legend-value').innerText()).replace('<', ''));
@@ -140,13 +139,10 @@ describe('a surface that is not what was meant', () => {
     await openJob(page, job);
     await page.keyboard.press('a');
     await still(page);
-    const box = await page.locator('.viewport canvas').boundingBox();
-    if (!box) throw new Error('there is no view');
+    const box = await boxOf(page.locator('.viewport canvas'));
     await page.mouse.click(box.x + 4, box.y + box.height / 2);
     await expect.poll(() => page.locator('.picked-part').isVisible()).toBe(false);
     // From the front the patient's left, where x grows, is on the right: the smaller ball.
-    const disc = await page.locator('.viewport').boundingBox();
-    if (!disc) throw new Error('there is no view');
     const seen = await silhouette(page, page.locator('.viewport'));
     await page.mouse.click(box.x + box.width * (0.5 + 0.4 * seen.width), box.y + box.height / 2);
     await page.getByText('One of 2 connected components').waitFor();
@@ -166,8 +162,7 @@ describe('a surface that is not what was meant', () => {
     await openJob(page, job);
     await page.keyboard.press('a');
     await still(page);
-    const box = await page.locator('.viewport canvas').boundingBox();
-    if (!box) throw new Error('there is no view');
+    const box = await boxOf(page.locator('.viewport canvas'));
     const seen = await silhouette(page, page.locator('.viewport'));
     await page.mouse.click(box.x + box.width * (0.5 + 0.4 * seen.width), box.y + box.height / 2);
     await expect.poll(() => page.locator('.picked-part').innerText()).toMatch(/volume [\d.]+ mm³, area [\d.]+ mm², .* triangles/);

@@ -1,7 +1,7 @@
 // Slices that are enlarged, and a box that a job is cropped to.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, ballsNrrd, contourPixels, madeJob, noted, settled, setup, silhouette } from './support';
+import { ballNrrd, ballsNrrd, boxOf, contourPixels, drag, madeJob, noted, settled, setup, silhouette } from './support';
 
 const at = setup();
 const size = 48;
@@ -16,8 +16,7 @@ async function open(page: Page, query: string): Promise<{ x: number; y: number; 
   await page.goto(`${at.daemon.url}/#/volumes/${ball}?${query}`);
   await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);
   await expect.poll(() => page.locator('.live[data-size] .live-picture[data-still]').count()).toBe(1);
-  const box = await page.locator('[data-plane=axial] canvas').boundingBox();
-  if (!box) throw new Error('there is no slice');
+  const box = await boxOf(page.locator('[data-plane=axial] canvas'));
   return box;
 }
 
@@ -42,10 +41,7 @@ describe('a slice', () => {
     const place = await settled(() => noted(page, 'at'));
 
     await page.keyboard.down('Shift');
-    await page.mouse.move(middle.x, middle.y);
-    await page.mouse.down();
-    await page.mouse.move(middle.x - 3 * 7.389 * side, middle.y, { steps: 3 });
-    await page.mouse.up();
+    await drag(page, [middle.x, middle.y], [middle.x - 3 * 7.389 * side, middle.y]);
     await page.keyboard.up('Shift');
     // Moving is neither a click nor another window.
     expect(await settled(() => noted(page, 'at'))).toBe(place);
@@ -74,10 +70,7 @@ describe('a crop', () => {
     const side = (Math.min(box.width, box.height) - 28) / size;
     const place = (sample: number): number => (sample + 0.5 - size / 2) * side;
     const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
-    await page.mouse.move(middle.x + place(40), middle.y);
-    await page.mouse.down();
-    await page.mouse.move(middle.x + place(24), middle.y, { steps: 4 });
-    await page.mouse.up();
+    await drag(page, [middle.x + place(40), middle.y], [middle.x + place(24), middle.y]);
     await expect.poll(() => noted(page, 'crop')).toMatch(/^7,7,7,2[345],40,40$/);
     await page.getByLabel('Last sample along x').fill('23');
     await page.getByLabel('Last sample along x').press('Enter');

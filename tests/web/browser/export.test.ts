@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, madeJob, setup, surfaceLoaded } from './support';
+import { ballNrrd, madeJob, openSurface, setup } from './support';
 
 const at = setup();
 
@@ -38,8 +38,7 @@ describe('a surface', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(32, 10));
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     const { name, bytes } = await saved(page, /^USDZ for/);
     expect(name).toMatch(/iso-100\.usdz$/);
     // A ZIP whose files are stored as they are.

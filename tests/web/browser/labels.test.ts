@@ -3,7 +3,7 @@ import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { hues, labelsNrrd, openedJob, setup, still, surfaceLoaded, type Hues, type JobAnswer } from './support';
+import { boxOf, hues, labelsNrrd, openedJob, openSurface, setup, still, surfaceLoaded, type Hues, type JobAnswer } from './support';
 
 const at = setup();
 let volume: string;
@@ -73,8 +73,7 @@ describe('the labels of a volume', () => {
       return red + green + blue;
     };
     await expect.poll(preview).toBeGreaterThan(2000);
-    const box = await axial.locator('canvas').boundingBox();
-    if (!box) throw new Error('there is no slice');
+    const box = await boxOf(axial.locator('canvas'));
     await page.mouse.move(box.x + 0.42 * box.width, box.y + box.height / 2);
     await expect.poll(() => axial.locator('.slice-value').innerText()).toContain('label 1');
     await page.mouse.move(box.x + 0.58 * box.width, box.y + box.height / 2);
@@ -85,9 +84,8 @@ describe('the labels of a volume', () => {
   });
 
   it('have the colours of their surfaces beside these and in their cut, also when a person chooses others', async () => {
-    const { page, daemon } = at;
-    await page.goto(`${daemon.url}/#/jobs/${made.id}?slices=on`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, `${made.id}?slices=on`);
     const seen = async (): Promise<Hues> => hues(page, page.locator('[data-plane=axial] canvas'));
     await expect.poll(async () => (await seen()).red).toBeGreaterThan(300);
     await expect.poll(async () => (await seen()).blue).toBeGreaterThan(300);
@@ -238,10 +236,9 @@ describe('a segmentation that names its labels', () => {
 
 describe('the surfaces of labels', () => {
   async function open(): Promise<Locator> {
-    const { page, daemon } = at;
+    const { page } = at;
     await page.goto('about:blank');
-    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, made.id);
     await page.keyboard.press('a');
     await still(page);
     return page.locator('.viewport');
@@ -287,8 +284,7 @@ describe('the surfaces of labels', () => {
   it('say what they are when they are clicked, and obey keys', async () => {
     const { page } = at;
     const view = await open();
-    const place = await view.boundingBox();
-    if (!place) throw new Error('there is no viewport');
+    const place = await boxOf(view);
     // From the front the patient's right is on the left.
     await page.mouse.click(place.x + 0.45 * place.width, place.y + 0.5 * place.height);
     const picked = page.locator('.picked-label');

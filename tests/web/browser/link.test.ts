@@ -1,7 +1,7 @@
 // The address keeps how a surface is looked at; changes are taken back; notes of jobs; the list of volumes.
 import { describe, expect, it } from 'vitest';
 import { smallNrrd } from './files';
-import { ballNrrd, Daemon, noiseNrrd, noted, openPage, settled, setup, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, boxOf, Daemon, noiseNrrd, noted, openPage, openSurface, settled, setup, silhouette, still, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -10,10 +10,8 @@ describe('a link to a surface', () => {
     const { page, daemon, browser } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
-    const box = await page.locator('.viewport canvas').boundingBox();
-    if (!box) throw new Error('there is no canvas');
+    await openSurface(at, id);
+    const box = await boxOf(page.locator('.viewport canvas'));
     await page.keyboard.press('a');
     await page.keyboard.press('m');
     const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
@@ -86,8 +84,7 @@ describe('a drag of the iso-value', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(32, 12));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
-    const line = await page.locator('.histogram .bars').boundingBox();
-    if (!line) throw new Error('the histogram is not shown');
+    const line = await boxOf(page.locator('.histogram .bars'));
     await page.mouse.move(line.x + 0.5 * line.width, line.y + 30);
     await page.mouse.down();
     for (let step = 1; step <= 5; step += 1) {

@@ -1,7 +1,7 @@
 // The surface beside the slices, which follows the iso-value.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, contourPixels, labelsNrrd, noted, setup, silhouette } from './support';
+import { ballNrrd, boxOf, contourPixels, drag, labelsNrrd, noted, setup, silhouette } from './support';
 
 const at = setup();
 let ball: string;
@@ -41,8 +41,7 @@ describe('the surface beside the slices', () => {
     const large = await area(page);
     expect(large).toBeGreaterThan(0.05);
     page.on('request', (request) => asked.push(new URL(request.url()).pathname));
-    const line = await page.locator('.histogram').boundingBox();
-    if (!line) throw new Error('the histogram is not shown');
+    const line = await boxOf(page.locator('.histogram'));
     const before = await pictures(page);
     await page.mouse.move(line.x + 0.3 * line.width, line.y + 30);
     await page.mouse.down();
@@ -118,8 +117,7 @@ describe('the surface beside the slices', () => {
     const { page } = at;
     await open(page, 'iso=100&at=2,3,4');
     const canvas = page.locator('.live canvas');
-    const box = await canvas.boundingBox();
-    if (!box) throw new Error('there is no canvas');
+    const box = await boxOf(canvas);
     await canvas.click({ position: { x: box.width / 2, y: box.height / 2 } });
     await expect.poll(() => noted(page, 'at')).not.toBe('2,3,4');
     const place = noted(page, 'at').split(',').map(Number);
@@ -131,10 +129,7 @@ describe('the surface beside the slices', () => {
     await canvas.press('ArrowRight');
     await expect.poll(() => pictures(page)).toBeGreaterThan(before);
     await rested(page);
-    await page.mouse.move(box.x + 100, box.y + 100);
-    await page.mouse.down();
-    await page.mouse.move(box.x + 160, box.y + 100, { steps: 3 });
-    await page.mouse.up();
+    await drag(page, [box.x + 100, box.y + 100], [box.x + 160, box.y + 100]);
     await rested(page);
     // Seen from another side by now.
     await canvas.click({ position: { x: box.width / 2, y: box.height / 2 } });

@@ -1,7 +1,7 @@
 // How a surface comes: its progress, and what can be done with it meanwhile.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, labelsNrrd, setup, surfaceLoaded } from './support';
+import { ballNrrd, labelsNrrd, openSurface, setup, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -28,8 +28,7 @@ describe('a surface that is loading', () => {
     await listen(page);
     const volume = await daemon.upload(labelsNrrd(24));
     const { id, mesh } = await daemon.submit({ volume, labels: 'all', formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     const counts = (await page.evaluate(() => window.said))
       .map((text) => /^(.+) of (.+) triangles$/.exec(text.replaceAll('\u202f', '')))
       .map((match) => [Number(match?.[1] ?? 0), Number(match?.[2] ?? 0)] as const);

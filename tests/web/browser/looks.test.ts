@@ -1,7 +1,7 @@
 // Looks through a volume, and slices beside a surface.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, ballsNrrd, contourPixels, noted, setup, settled, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
+import { ballNrrd, ballsNrrd, boxOf, contourPixels, noted, openSurface, settled, setup, silhouette, still, type JobAnswer } from './support';
 
 const at = setup();
 const size = 48;
@@ -45,8 +45,7 @@ describe('a look through the volume', () => {
 describe('slices beside a surface', () => {
   async function open(page: Page, query = ''): Promise<void> {
     await page.goto('about:blank');
-    await page.goto(`${at.daemon.url}/#/jobs/${made.id}${query}`);
-    await surfaceLoaded(page);
+    await openSurface(at, `${made.id}${query}`);
   }
 
   it('go to where the surface is clicked, and its cross to where they are clicked', async () => {
@@ -56,8 +55,7 @@ describe('slices beside a surface', () => {
     await page.getByRole('button', { name: 'Slices' }).click();
     await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);
     expect(noted(page, 'at')).toBe('24,24,24');
-    const canvas = await page.locator('.viewport canvas').boundingBox();
-    if (!canvas) throw new Error('there is no canvas');
+    const canvas = await boxOf(page.locator('.viewport canvas'));
     await still(page);
     await page.mouse.click(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
     // From the front the middle of the ball is its foremost point.
@@ -66,8 +64,7 @@ describe('slices beside a surface', () => {
 
     await still(page);
     const before = await page.locator('.viewport').screenshot();
-    const slice = await page.locator('[data-plane=axial] canvas').boundingBox();
-    if (!slice) throw new Error('there is no slice');
+    const slice = await boxOf(page.locator('[data-plane=axial] canvas'));
     await page.mouse.click(slice.x + 0.6 * slice.width, slice.y + 0.7 * slice.height);
     await expect.poll(() => Number(noted(page, 'at').split(',')[1])).toBeGreaterThan(25);
     await still(page);
@@ -89,8 +86,7 @@ describe('slices beside a surface', () => {
     const volume = await daemon.upload(ballsNrrd(24));
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
     await fetch(`${daemon.url}/v1/volumes/${volume}`, { method: 'DELETE' });
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     await expect.poll(() => page.getByRole('button', { name: 'Slices' }).count()).toBe(0);
     await expect.poll(() => page.getByRole('button', { name: 'Measure' }).count()).toBe(1);
   });

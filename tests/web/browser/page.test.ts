@@ -4,17 +4,21 @@ import { readFileSync } from 'node:fs';
 import { beforeAll, describe, expect, it } from 'vitest';
 import {
   ballNrrd,
+  boxOf,
   brain,
   brainHull,
   chordOfBall,
   contourPixels,
   Daemon,
-  setup,
+  drag,
   drop,
   noiseNrrd,
+  noted,
   openedJob,
   openPage,
+  openSurface,
   settled,
+  setup,
   silhouette,
   still,
   surfaceLoaded,
@@ -22,10 +26,6 @@ import {
 } from './support';
 
 const at = setup();
-
-function query(): URLSearchParams {
-  return new URLSearchParams(new URL(at.page.url()).hash.split('?')[1] ?? '');
-}
 
 describe('a real volume', () => {
   it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async () => {
@@ -42,16 +42,12 @@ describe('a real volume', () => {
     await page.keyboard.press('Shift+ArrowRight');
     await page.keyboard.press('Shift+ArrowRight');
     await expect.poll(() => contourPixels(page, 'axial')).not.toBe(before);
-    const byKeys = Number(await settled(() => query().get('iso')));
-    const box = await line.boundingBox();
-    if (!box) throw new Error('the histogram is not shown');
-    await page.mouse.move(box.x + box.width * 0.5, box.y + 30);
-    await page.mouse.down();
-    await page.mouse.move(box.x + box.width * 0.25, box.y + 30, { steps: 4 });
-    await page.mouse.up();
-    await expect.poll(() => Number(query().get('iso'))).toBeLessThan(byKeys);
+    const byKeys = Number(await settled(() => noted(page, 'iso')));
+    const box = await boxOf(line);
+    await drag(page, [box.x + box.width * 0.5, box.y + 30], [box.x + box.width * 0.25, box.y + 30]);
+    await expect.poll(() => Number(noted(page, 'iso'))).toBeLessThan(byKeys);
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill(String(brainHull));
-    await expect.poll(() => query().get('iso')).toBe(String(brainHull));
+    await expect.poll(() => noted(page, 'iso')).toBe(String(brainHull));
     await expect.poll(() => page.locator('.estimate:not(.stale)').count()).toBe(1);
     const estimated = Number(/Triangles\s+([\d\u202f]+)/.exec(await page.locator('.estimate').innerText())?.[1]?.replaceAll('\u202f', ''));
 
@@ -69,8 +65,7 @@ describe('a real volume', () => {
     expect(front.part).toBeGreaterThan(0.1);
     expect(front.colours).toBeGreaterThan(50);
     const [low, high] = mesh.bounds;
-    const view = await page.locator('.viewport').boundingBox();
-    if (!view) throw new Error('there is no viewport');
+    const view = await boxOf(page.locator('.viewport'));
     const seen = (front.width * view.width) / (front.height * view.height);
     const real = (high[0] - low[0]) / (high[2] - low[2]);
     // Perspective shows what is nearer larger, and the depths of its edges differ.
@@ -78,12 +73,12 @@ describe('a real volume', () => {
     expect(seen / real).toBeLessThan(1.15);
 
     // Turning it changes the picture, and the address keeps the place.
-    await expect.poll(() => query().get('cam') ?? '').not.toBe('');
-    const fromFront = query().get('cam');
+    await expect.poll(() => noted(page, 'cam')).not.toBe('');
+    const fromFront = noted(page, 'cam');
     await page.locator('.viewport canvas').focus();
     for (let i = 0; i < 6; i += 1) await page.keyboard.press('ArrowRight');
-    await expect.poll(() => query().get('cam')).not.toBe(fromFront);
-    const camera = await settled(() => query().get('cam'));
+    await expect.poll(() => noted(page, 'cam')).not.toBe(fromFront);
+    const camera = await settled(() => noted(page, 'cam'));
 
     const download = page.waitForEvent('download');
     await page.locator('[data-format=glb]').click();
@@ -93,12 +88,12 @@ describe('a real volume', () => {
 
     await page.reload();
     await surfaceLoaded(page);
-    expect(query().get('cam')).toBe(camera);
+    expect(noted(page, 'cam')).toBe(camera);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
     await page.goBack();
     await page.waitForURL(/#\/volumes\//);
     await expect.poll(() => contourPixels(page, 'sagittal')).toBeGreaterThan(200);
-    expect(query().get('iso')).toBe(String(brainHull));
+    expect(noted(page, 'iso')).toBe(String(brainHull));
   });
 });
 
@@ -112,9 +107,8 @@ describe('a surface', () => {
   });
 
   it('of a ball is a disc from every side', async () => {
-    const { daemon, page } = at;
-    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, made.id);
     for (const key of ['a', 'l', 's']) {
       await page.keyboard.press(key);
       await still(page);
@@ -125,9 +119,8 @@ describe('a surface', () => {
   });
 
   it('is cut in half by the plane, which shows the slice', async () => {
-    const { daemon, page } = at;
-    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, made.id);
     await page.keyboard.press('a');
     await still(page);
     const whole = await silhouette(page, page.locator('.viewport'));
@@ -144,8 +137,7 @@ describe('a surface', () => {
     // The slice can be measured as well: across the volume, of which the ball is only a part.
     const seen = await silhouette(page, page.locator('.viewport'));
     await page.keyboard.press('m');
-    const view = await page.locator('.viewport').boundingBox();
-    if (!view) throw new Error('there is no viewport');
+    const view = await boxOf(page.locator('.viewport'));
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
     const half = (seen.width * view.width) / 2;
     await page.mouse.click(middle.x - 0.9 * half, middle.y);
@@ -158,15 +150,13 @@ describe('a surface', () => {
   });
 
   it('is measured in millimetres', async () => {
-    const { daemon, page } = at;
-    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, made.id);
     await page.keyboard.press('a');
     await still(page);
-    const view = await page.locator('.viewport').boundingBox();
-    if (!view) throw new Error('there is no viewport');
+    const view = await boxOf(page.locator('.viewport'));
     const disc = await silhouette(page, page.locator('.viewport'));
-    const [x = 0, y = 0, z = 0] = (await settled(() => query().get('cam') ?? '')).split(',').map(Number);
+    const [x = 0, y = 0, z = 0] = (await settled(() => noted(page, 'cam'))).split(',').map(Number);
     await page.keyboard.press('m');
     const radius = (disc.height * view.height) / 2;
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
@@ -185,24 +175,18 @@ describe('a surface', () => {
   it('made as Draco alone is shown as well', async () => {
     const { daemon, page } = at;
     const draco = await daemon.submit({ volume: ball, iso: 100, formats: ['drc'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${draco.id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, draco.id);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
   });
 
   it('comes to rest where frames are too quick for its coarse copy', async () => {
-    const { daemon, page } = at;
+    const { page } = at;
     const before = page.viewportSize() ?? { width: 1280, height: 800 };
     try {
       await page.setViewportSize({ width: 360, height: 300 });
-      await page.goto(`${daemon.url}/#/jobs/${made.id}`);
-      await surfaceLoaded(page);
-      const canvas = await page.locator('.viewport canvas').boundingBox();
-      if (!canvas) throw new Error('there is no canvas');
-      await page.mouse.move(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
-      await page.mouse.down();
-      await page.mouse.move(canvas.x + canvas.width / 2 + 30, canvas.y + canvas.height / 2, { steps: 2 });
-      await page.mouse.up();
+      await openSurface(at, made.id);
+      const canvas = await boxOf(page.locator('.viewport canvas'));
+      await drag(page, [canvas.x + canvas.width / 2, canvas.y + canvas.height / 2], [canvas.x + canvas.width / 2 + 30, canvas.y + canvas.height / 2], 2);
       await still(page);
     } finally {
       await page.setViewportSize(before);
@@ -219,12 +203,8 @@ describe('a surface', () => {
     expect(titles).toEqual(['iso 100, 0 passes', 'iso 100, 5 passes', 'iso 100, 10 passes']);
     const third = page.locator('.cell .viewport').nth(2);
     const before = await third.screenshot();
-    const first = await page.locator('.cell .viewport canvas').first().boundingBox();
-    if (!first) throw new Error('there is no canvas');
-    await page.mouse.move(first.x + 150, first.y + 200);
-    await page.mouse.down();
-    await page.mouse.move(first.x + 230, first.y + 220, { steps: 4 });
-    await page.mouse.up();
+    const first = await boxOf(page.locator('.cell .viewport canvas').first());
+    await drag(page, [first.x + 150, first.y + 200], [first.x + 230, first.y + 220]);
     await still(page);
     expect(before.equals(await third.screenshot())).toBe(false);
     for (const cell of await page.locator('.cell .viewport').all()) {
@@ -233,7 +213,7 @@ describe('a surface', () => {
     // Their style is in the address as well.
     const flat = page.getByRole('toolbar', { name: 'View of all surfaces' }).getByRole('button', { name: 'Flat' });
     await flat.click();
-    await expect.poll(() => query().get('style')).toBe('flat');
+    await expect.poll(() => noted(page, 'style')).toBe('flat');
     await page.reload();
     await expect.poll(() => page.locator('.cell [data-tool=flat][aria-pressed=true]').count()).toBe(3);
     expect(await flat.getAttribute('aria-pressed')).toBe('true');

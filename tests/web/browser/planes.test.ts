@@ -2,7 +2,7 @@
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { insertNrrd, whitePixels } from './bright';
-import { ballNrrd, contourPixels, noted, setup, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, boxOf, contourPixels, drag, noted, openSurface, setup, silhouette, still, surfaceLoaded } from './support';
 
 const at = setup();
 let ball: string;
@@ -39,8 +39,7 @@ describe('an oblique plane', () => {
     expect(await picture.getAttribute('data-angles')).toBe('30,0');
     await expect.poll(() => filled(picture)).toBeGreaterThan(0.9 * disc);
     const canvas = page.locator('[data-plane=axial] canvas');
-    const box = await canvas.boundingBox();
-    if (!box) throw new Error('there is no slice');
+    const box = await boxOf(canvas);
     // The handle is in the colour of the line, on a slice of grey; it lies a third of the volume from its middle.
     const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
     const handle = await canvas.evaluate((one: HTMLCanvasElement) => {
@@ -60,10 +59,7 @@ describe('an oblique plane', () => {
       }
       return { x: (best.x / width) * one.clientWidth, y: (best.y / height) * one.clientHeight };
     });
-    await page.mouse.move(box.x + handle.x, box.y + handle.y);
-    await page.mouse.down();
-    await page.mouse.move(middle.x + 80, middle.y + 80, { steps: 4 });
-    await page.mouse.up();
+    await drag(page, [box.x + handle.x, box.y + handle.y], [middle.x + 80, middle.y + 80]);
     await expect.poll(() => picture.getAttribute('data-angles')).toBe('45,0');
     // The slices stay where they are.
     expect(noted(page, 'at')).toBe('32,32,32');
@@ -117,8 +113,7 @@ describe('a free cut', () => {
   it('is parallel to the screen, is moved, and is in the address', async () => {
     const { page, daemon } = at;
     const { id } = await daemon.submit({ volume: ball, iso: 100, formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     const view = page.locator('.viewport');
     await page.getByRole('button', { name: 'Cut', exact: true }).click();
     await page.getByLabel('Direction of the cut').selectOption('Free');

@@ -1,7 +1,7 @@
 // What is around the views: notes, titles, keys, contrast, the token.
 import { readFileSync } from 'node:fs';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, noted, openPage, pixelsOf, setup, settled, still, surfaceLoaded, withTokens } from './support';
+import { ballNrrd, boxOf, noted, openPage, openSurface, pixelsOf, settled, setup, still, withTokens } from './support';
 
 const at = setup();
 let ball: string;
@@ -84,18 +84,16 @@ describe('the page', () => {
 
 describe('a surface', () => {
   it('has its keys also while a slider has the focus', async () => {
-    const { page, daemon } = at;
-    await page.goto(`${daemon.url}/#/jobs/${job}`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, job);
     await page.getByLabel('Opacity').and(page.locator('input')).focus();
     await page.keyboard.press('a');
     await expect.poll(async () => Math.abs(Number((await settled(() => noted(page, 'cam'))).split(',')[0]))).toBeLessThan(1);
   });
 
   it('is turned when a cut would be seen edge-on', async () => {
-    const { page, daemon } = at;
-    await page.goto(`${daemon.url}/#/jobs/${job}`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, job);
     await page.keyboard.press('a');
     const slice = page.waitForResponse(/slice\.png/);
     await page.keyboard.press('c');
@@ -108,14 +106,12 @@ describe('a surface', () => {
   });
 
   it('has its distances in its picture', async () => {
-    const { page, daemon } = at;
-    await page.goto(`${daemon.url}/#/jobs/${job}`);
-    await surfaceLoaded(page);
+    const { page } = at;
+    await openSurface(at, job);
     await page.keyboard.press('a');
     await still(page);
     await page.keyboard.press('m');
-    const view = await page.locator('.viewport').boundingBox();
-    if (!view) throw new Error('there is no viewport');
+    const view = await boxOf(page.locator('.viewport'));
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
     await page.mouse.click(middle.x - 60, middle.y);
     await page.mouse.click(middle.x + 60, middle.y);

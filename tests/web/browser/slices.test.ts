@@ -2,7 +2,7 @@
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { insertNrrd, whitePixels } from './bright';
-import { ballNrrd, contourPixels, noted, openedJob, settled, setup, tiltedNrrd } from './support';
+import { ballNrrd, boxOf, contourPixels, noted, openedJob, settled, setup, tiltedNrrd } from './support';
 
 const at = setup();
 let ball: string;
@@ -84,8 +84,7 @@ describe('a slice', () => {
     const { page } = at;
     await open(page, '&at=24,24,24');
     const canvas = page.locator('[data-plane=axial] canvas');
-    const box = await canvas.boundingBox();
-    if (!box) throw new Error('there is no slice');
+    const box = await boxOf(canvas);
     // A ball of 18 mm with 100 on its surface, 8 more for each millimetre inwards; 48 mm fill the cell's height.
     const scale = (Math.min(box.width, box.height) - 28) / 48;
     const position = { x: box.width / 2 + 13.5 * scale, y: box.height / 2 - 0.5 * scale };
@@ -254,8 +253,7 @@ describe('slices before there is a mesh', () => {
     await open(page);
     await page.getByRole('radio', { name: 'Length' }).check({ force: true });
     const canvas = page.locator('[data-plane=axial] canvas');
-    const box = await canvas.boundingBox();
-    if (!box) throw new Error('there is no slice');
+    const box = await boxOf(canvas);
     const place = noted(page, 'at');
     // Samples of a millimetre, 48 across what the letters leave.
     const scale = (Math.min(box.width, box.height) - 28) / 48;

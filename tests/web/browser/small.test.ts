@@ -1,7 +1,7 @@
 // A phone: 375 by 667, with fingers.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, contourPixels, labelsNrrd, noted, setup, settled, surfaceLoaded } from './support';
+import { ballNrrd, boxOf, contourPixels, labelsNrrd, noted, openSurface, settled, setup, surfaceLoaded } from './support';
 
 const at = setup({ viewport: { width: 375, height: 667 }, hasTouch: true, isMobile: true });
 
@@ -31,8 +31,7 @@ describe('on a phone', () => {
     expect(noted(page, 'window')).toBe(window);
     await page.evaluate(() => document.querySelector('main')?.scrollTo(0, 0));
     // The histogram is seen together with the slices, and dragging it scrolls nothing.
-    const line = await page.locator('.histogram').boundingBox();
-    if (!line) throw new Error('there is no histogram');
+    const line = await boxOf(page.locator('.histogram'));
     expect(line.y + line.height).toBeLessThan(667 - 60);
     for (const plane of ['axial', 'coronal', 'sagittal']) {
       const slice = await page.locator(`[data-plane=${plane}]`).boundingBox();
@@ -86,8 +85,7 @@ describe('on a phone', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(labelsNrrd(24));
     const { id } = await daemon.submit({ volume, labels: 'all', formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     await page.locator('.viewport canvas').tap();
     await expect.poll(() => page.locator('.labels [aria-current]').count()).toBe(1);
     expect(await page.locator('.picked-label').isVisible()).toBe(true);
@@ -148,8 +146,7 @@ describe('on a phone', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     await page.getByRole('button', { name: 'Cut' }).tap();
     for (const element of await page.locator('.cut-controls > *').all()) {
       const box = await element.boundingBox();

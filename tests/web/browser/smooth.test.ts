@@ -1,7 +1,7 @@
 // The page never waits for its shaders: a program is asked for only after a fence behind its linking has passed. A page that
 // asks sooner stands still until it is made, 0.2 s and more where software draws.
 import { expect, it } from 'vitest';
-import { ballNrrd, setup, still, surfaceLoaded } from './support';
+import { ballNrrd, openSurface, setup, still } from './support';
 
 const at = setup();
 
@@ -49,8 +49,7 @@ it('the page does not wait for shaders while a surface comes and is looked at', 
     };
   });
   const watched = (): Promise<Watched> => page.evaluate(() => (window as unknown as { watched: Watched }).watched);
-  await page.goto(`${daemon.url}/#/jobs/${job.id}`);
-  await surfaceLoaded(page);
+  await openSurface(at, job.id);
   expect(await watched()).toMatchObject({ linked: expect.any(Number) as number, tooSoon: 0 });
   expect((await watched()).linked).toBeGreaterThan(2);
   for (const key of ['t', 't', 'w', 'w']) {

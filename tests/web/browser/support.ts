@@ -201,71 +201,55 @@ export function chordOfBall(radius: number, distance: number, part: number): num
   return 2 * slope * depth;
 }
 
-// A ball of that radius in a cube of samples, as NRRD: 100 on its surface, more inside.
+// A cube of samples of those values, as NRRD.
+function cubeNrrd(size: number, value: (x: number, y: number, z: number) => number, fields: string[] = []): Buffer {
+  const samples = Buffer.alloc(size ** 3);
+  for (let at = 0; at < samples.length; at += 1) {
+    samples[at] = value(at % size, Math.floor(at / size) % size, Math.floor(at / size ** 2));
+  }
+  return Buffer.concat([Buffer.from(nrrdHeader(size, fields)), samples]);
+}
+
+// The sample at that depth below a surface at 100.
+function sampleAt(depth: number): number {
+  return Math.max(0, Math.min(255, 100 + 8 * depth));
+}
+
+// A ball of that radius: 100 on its surface, more inside. The first sample tells it from others like it.
 export function ballNrrd(size: number, radius: number, seed = 0): Buffer {
   const middle = (size - 1) / 2;
-  const samples = Buffer.alloc(size ** 3);
-  let at = 0;
-  for (let z = 0; z < size; z += 1) {
-    for (let y = 0; y < size; y += 1) {
-      for (let x = 0; x < size; x += 1) {
-        const distance = Math.hypot(x - middle, y - middle, z - middle);
-        samples[at] = Math.max(0, Math.min(255, 100 + 8 * (radius - distance)));
-        at += 1;
-      }
-    }
-  }
-  samples[0] = seed;
-  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+  return cubeNrrd(size, (x, y, z) => (x + y + z === 0 ? seed : sampleAt(radius - Math.hypot(x - middle, y - middle, z - middle))));
 }
 
 // A ball and a smaller one on its left side, which do not touch.
 export function ballsNrrd(size: number): Buffer {
-  const samples = Buffer.alloc(size ** 3);
   const middle = (size - 1) / 2;
-  let at = 0;
-  for (let z = 0; z < size; z += 1) {
-    for (let y = 0; y < size; y += 1) {
-      for (let x = 0; x < size; x += 1) {
-        const inside = ([centre, radius]: readonly [number, number]): number =>
-          radius * size - Math.hypot(x - centre * size, y - middle, z - middle);
-        const depth = Math.max(inside([0.3, 0.2]), inside([0.78, 0.12]));
-        samples[at] = Math.max(0, Math.min(255, 100 + 8 * depth));
-        at += 1;
-      }
-    }
-  }
-  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+  return cubeNrrd(size, (x, y, z) => {
+    const inside = ([centre, radius]: readonly [number, number]): number =>
+      radius * size - Math.hypot(x - centre * size, y - middle, z - middle);
+    return sampleAt(Math.max(inside([0.3, 0.2]), inside([0.78, 0.12])));
+  });
 }
 
 // A ball cut into two labels, 1 towards the patient's right and 2 towards the left, and a block of label 5
 // above it.
 export function labelsNrrd(size: number, fields: string[] = []): Buffer {
   const middle = (size - 1) / 2;
-  const samples = Buffer.alloc(size ** 3);
-  let at = 0;
-  for (let z = 0; z < size; z += 1) {
-    for (let y = 0; y < size; y += 1) {
-      for (let x = 0; x < size; x += 1) {
-        const isInBall = Math.hypot(x - middle, y - middle, z - middle + 2) < size / 3;
-        const isInBlock = z >= size - 4 && z < size - 2 && Math.abs(x - middle) < 5 && Math.abs(y - middle) < 5;
-        samples[at] = isInBall ? (x < middle ? 1 : 2) : isInBlock ? 5 : 0;
-        at += 1;
-      }
-    }
-  }
-  return Buffer.concat([Buffer.from(nrrdHeader(size, fields)), samples]);
+  const value = (x: number, y: number, z: number): number => {
+    const isInBall = Math.hypot(x - middle, y - middle, z - middle + 2) < size / 3;
+    const isInBlock = z >= size - 4 && z < size - 2 && Math.abs(x - middle) < 5 && Math.abs(y - middle) < 5;
+    return isInBall ? (x < middle ? 1 : 2) : isInBlock ? 5 : 0;
+  };
+  return cubeNrrd(size, value, fields);
 }
 
 // Noise, whose surface takes long to smooth.
 export function noiseNrrd(size: number): Buffer {
-  const samples = Buffer.alloc(size ** 3);
   let state = 1;
-  for (let i = 0; i < samples.length; i += 1) {
+  return cubeNrrd(size, () => {
     state = (Math.imul(state, 1_103_515_245) + 12_345) >>> 0;
-    samples[i] = state >>> 24;
-  }
-  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+    return state >>> 24;
+  });
 }
 
 // A cube of samples that grow along z, in slices that each lie farther back: a gantry tilted by that angle.
@@ -358,9 +342,13 @@ export function pixelsOf(page: Page, picture: Buffer): Promise<JSHandle<ImageDat
 
 // The pixels of a view, without the tools over it.
 async function pixelsOfView(page: Page, element: Locator): Promise<JSHandle<ImageData>> {
-  await showTools(page, false);
+  const showTools = (visibility: string): Promise<void> =>
+    page.locator('.tools, .legend').evaluateAll((all, value) => {
+      for (const tools of all as HTMLElement[]) tools.style.visibility = value;
+    }, visibility);
+  await showTools('hidden');
   const picture = await element.screenshot();
-  await showTools(page, true);
+  await showTools('');
   return pixelsOf(page, picture);
 }
 
@@ -378,14 +366,6 @@ export async function hues(page: Page, element: Locator): Promise<Hues> {
     }
     return count;
   });
-}
-
-function showTools(page: Page, isShown: boolean): Promise<void> {
-  return page.evaluate((visibility) => {
-    for (const tools of document.querySelectorAll<HTMLElement>('.tools, .legend')) {
-      tools.style.visibility = visibility;
-    }
-  }, isShown ? '' : 'hidden');
 }
 
 // What stands out in a picture of a view, without the tools over it.
@@ -430,6 +410,26 @@ export async function silhouette(page: Page, element: Locator, tolerance = 24): 
 export async function surfaceLoaded(page: Page, count = 1): Promise<void> {
   await expect.poll(() => page.locator('.pane[data-loaded]').count(), { timeout: 2 * slowest }).toBe(count);
   await still(page);
+}
+
+// The surface of that job, whose address may go on with a query.
+export async function openSurface({ page, daemon }: Setup, job: string): Promise<void> {
+  await page.goto(`${daemon.url}/#/jobs/${job}`);
+  await surfaceLoaded(page);
+}
+
+// The place of an element that is shown.
+export async function boxOf(element: Locator): Promise<{ x: number; y: number; width: number; height: number }> {
+  const box = await element.boundingBox();
+  if (!box) throw new Error('the element is not shown');
+  return box;
+}
+
+export async function drag(page: Page, from: readonly [number, number], to: readonly [number, number], steps = 4): Promise<void> {
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move(...to, { steps });
+  await page.mouse.up();
 }
 
 // Waits until the surfaces are drawn as they are to be seen.

@@ -1,7 +1,7 @@
 // The page under fingers, as on a tablet.
 import type { CDPSession, Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, chordOfBall, contourPixels, noted, setup, settled, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, boxOf, chordOfBall, contourPixels, noted, openSurface, settled, setup, silhouette, still } from './support';
 
 const at = setup({ viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
 
@@ -30,8 +30,7 @@ async function fingers(page: Page, ways: { from: Point; to: Point }[]): Promise<
 }
 
 async function middleOf(page: Page, selector: string): Promise<Point & { width: number; height: number }> {
-  const box = await page.locator(selector).boundingBox();
-  if (!box) throw new Error(`${selector} is not shown`);
+  const box = await boxOf(page.locator(selector));
   return { x: box.x + box.width / 2, y: box.y + box.height / 2, width: box.width, height: box.height };
 }
 
@@ -47,8 +46,7 @@ describe('fingers', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     await page.getByRole('button', { name: /^Anterior/ }).tap();
     await still(page);
     const { x, y } = await middleOf(page, '.viewport');

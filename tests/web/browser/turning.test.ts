@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import type { Locator, Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { brain, brainHull, setup, still, surfaceLoaded } from './support';
+import { boxOf, brain, brainHull, openSurface, setup, still } from './support';
 
 const at = setup();
 
@@ -44,13 +44,11 @@ describe('a large surface', () => {
     await countTriangles(page);
     const volume = await daemon.upload(readFileSync(brain));
     const { id, mesh } = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 120);
-    await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await surfaceLoaded(page);
+    await openSurface(at, id);
     const all = mesh?.triangles ?? Infinity;
     const canvas = page.locator('.viewport canvas');
     const pixels = await pixelsOf(canvas);
-    const box = await canvas.boundingBox();
-    if (!box) throw new Error('there is no canvas');
+    const box = await boxOf(canvas);
     const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
     await page.mouse.move(x, y);
     await page.mouse.down();

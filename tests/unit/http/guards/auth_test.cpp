@@ -60,10 +60,9 @@ TEST_F(TokensTest, OneNameMayHaveSeveralTokensButOneRole) {
   const std::string first = token_line("ct", Role::kUser, ct_) + '\n';
   const Tokens both(file(first + token_line("ct", Role::kUser, admin_)));
   EXPECT_EQ(both.find(ct_), both.find(admin_));
-  const auto error =
-      test::thrown_by([&] { Tokens(file(first + token_line("ct", Role::kAdmin, admin_))); });
-  ASSERT_TRUE(error);
-  EXPECT_THAT(error->what(), HasSubstr("line 2"));
+  const Error error =
+      test::error_of([&] { Tokens(file(first + token_line("ct", Role::kAdmin, admin_))); });
+  EXPECT_THAT(error.what(), HasSubstr("line 2"));
 }
 
 TEST_F(TokensTest, AWrongFileIsRefusedByItsLineAndNotItsText) {
@@ -72,12 +71,10 @@ TEST_F(TokensTest, AWrongFileIsRefusedByItsLineAndNotItsText) {
        {std::string("ct user"), std::string("ct user 00ff"),
         std::string("ct root") + good.substr(7), "c t" + good.substr(2), "c/t" + good.substr(2),
         good + " more", good + "0", std::string(65, 'n') + good.substr(2), "ct user " + ct_}) {
-    const auto error = test::thrown_by([&] { Tokens(file(good + '\n' + wrong + '\n')); });
-    ASSERT_TRUE(error) << wrong;
-    EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
-    EXPECT_THAT(error->what(), HasSubstr("line 2"));
-    EXPECT_THAT(error->what(), testing::Not(HasSubstr(ct_)))
-        << "tells a token put there by mistake";
+    const Error error = test::error_of([&] { Tokens(file(good + '\n' + wrong + '\n')); }, wrong);
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+    EXPECT_THAT(error.what(), HasSubstr("line 2"));
+    EXPECT_THAT(error.what(), testing::Not(HasSubstr(ct_))) << "tells a token put there by mistake";
   }
   EXPECT_TRUE(test::thrown_by([&] { Tokens(file("# nobody\n")); }));
   EXPECT_TRUE(test::thrown_by([&] { Tokens(folder_ / "absent"); }));
@@ -100,9 +97,8 @@ TEST_F(TokensTest, AFileThatOthersMayWriteToIsRefused) {
   const fs::path path = file(token_line("ct", Role::kUser, ct_));
   for (const fs::perms extra : {fs::perms::group_write, fs::perms::others_write}) {
     fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write | extra);
-    const auto error = test::thrown_by([&] { Tokens{path}; });
-    ASSERT_TRUE(error);
-    EXPECT_THAT(error->what(), HasSubstr("write"));
+    const Error error = test::error_of([&] { Tokens{path}; });
+    EXPECT_THAT(error.what(), HasSubstr("write"));
   }
 }
 

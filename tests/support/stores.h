@@ -1,12 +1,30 @@
+// What tests of many components do with stores.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
+#include "server/store/blob_store.h"
 #include "server/store/job_store.h"
+#include "tests/support/files.h"
 #include "tests/support/process.h"
 
 namespace isomesh::test {
+
+inline store::Blob put(store::BlobStore& blobs, std::string_view text,
+                       const std::string& owner = "") {
+  const auto writer = blobs.begin(owner);
+  writer->write(as_span(text));
+  return writer->commit();
+}
+
+inline std::string get(const store::BlobStore& blobs, const std::string& key) {
+  const auto blob = blobs.open(key);
+  std::string text(blob->size(), '\0');
+  blob->read_at(0, std::as_writable_bytes(std::span(text)));
+  return text;
+}
 
 // The job in its final state, or after kLongest without an event.
 inline Job end_of(const store::JobStore& jobs, const store::Viewer& viewer, const std::string& id) {
