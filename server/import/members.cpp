@@ -217,27 +217,21 @@ void add_stack(const std::string& name, const Pictures& pictures, std::vector<St
   stacks.push_back(std::move(stack));
 }
 
-// A folder's pictures of one format. Those whose names differ in numbers only are a volume, and if
-// there are none, all of them together.
+// A folder's pictures of one format.
 void add_stacks(const std::string& pattern, const Pictures& pictures, Contents& contents) {
-  std::map<std::string, Pictures> by_name;
+  std::vector<std::string> names;
   for (const FoundVolume* picture : pictures) {
-    by_name[lower(name_pattern(picture->member.name))].push_back(picture);
+    names.emplace_back(base_of(picture->member.name));
   }
-  const auto numbered =
-      std::ranges::count_if(by_name, [](const auto& named) { return named.second.size() > 1; });
-  if (numbered == 0) {
-    add_stack(pattern, pictures, contents.stacks);
-    return;
+  const NameGroups groups = groups_of(names);
+  for (const std::vector<std::size_t>& volume : groups.volumes) {
+    Pictures slices;
+    for (const std::size_t at : volume) slices.push_back(pictures[at]);
+    const std::string folder(folder_of(slices.front()->member.name));
+    add_stack(groups.volumes.size() == 1 ? pattern : folder + name_pattern(names[volume.front()]),
+              slices, contents.stacks);
   }
-  for (const auto& [name, group] : by_name) {
-    if (group.size() == 1) {
-      contents.unnumbered.push_back(group.front()->member);
-    } else {
-      add_stack(numbered == 1 ? pattern : name_pattern(group.front()->member.name), group,
-                contents.stacks);
-    }
-  }
+  for (const std::size_t at : groups.others) contents.unnumbered.push_back(pictures[at]->member);
 }
 
 void add_stacks(const std::vector<FoundVolume>& pages, Contents& contents) {

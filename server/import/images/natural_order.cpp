@@ -1,11 +1,15 @@
 #include "server/import/images/natural_order.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
+#include <map>
 #include <numeric>
 #include <optional>
+#include <set>
+#include <system_error>
 
 #include "base/text.h"
 #include "server/import/source/names.h"
@@ -62,9 +66,9 @@ struct NameNumber {
   std::size_t begin = 0;
   std::size_t end = 0;
   bool has_minus = false;
-  bool has_fraction = false;
-  bool may_be_negative = false;  // the minus does not separate the number from a letter
-  double value = 0;              // without the minus
+  bool may_be_negative = false;    // the minus does not separate the number from a letter
+  double value = 0;                // without the minus
+  std::string_view fraction = {};  // the digits behind the dot
 };
 
 // Digits with more than one dot are no decimal number.
@@ -88,13 +92,14 @@ std::vector<NameNumber> numbers_in(std::string_view name) {
   for (std::size_t at = 0; at < name.size(); ++at) {
     if (!is_digit(name[at])) continue;
     NameNumber number = {.begin = at, .end = end_of_number(name, at)};
-    number.value = parse_double(name.substr(at, number.end - at)).value_or(0);
-    number.has_fraction = name.substr(at, number.end - at).find('.') != std::string_view::npos;
+    const std::string_view digits = name.substr(at, number.end - at);
+    number.value = parse_double(digits).value_or(0);
+    number.fraction = digits.substr(std::min(digits.find('.'), digits.size() - 1) + 1);
     number.has_minus = at > 0 && name[at - 1] == '-' && (at < 2 || !is_digit(name[at - 2]));
     if (number.has_minus) {
       --number.begin;
-      const char before = at < 2 ? '/' : lower(name.substr(at - 2, 1))[0];
-      number.may_be_negative = before < 'a' || before > 'z';
+      const char before = at < 2 ? '_' : lower(name.substr(at - 2, 1))[0];
+      number.may_be_negative = static_cast<unsigned char>(before) < 'a';  // letters of any script
     }
     at = number.end - 1;
     numbers.push_back(number);
@@ -126,12 +131,11 @@ std::vector<NumberColumn> varying_columns(const std::vector<std::string>& names)
   return columns;
 }
 
-// With their signs: all may be negative, or only some have a minus.
+bool has_fraction(const NameNumber& number) { return !number.fraction.empty(); }
+
+// A minus is a sign beside numbers without one. In front of all numbers it separates, as in "s-1".
 std::vector<double> signed_values(const NumberColumn& column) {
-  const auto minus = std::ranges::count_if(column, &NameNumber::has_minus);
-  const bool all_may_be_negative = std::ranges::all_of(
-      column, [](const NameNumber& number) { return !number.has_minus || number.may_be_negative; });
-  const bool are_signs = minus > 0 && (minus < std::ssize(column) || all_may_be_negative);
+  const bool are_signs = !std::ranges::all_of(column, &NameNumber::has_minus);
   std::vector<double> values;
   for (const NameNumber& number : column) {
     values.push_back(number.has_minus && are_signs ? -number.value : number.value);
@@ -139,11 +143,11 @@ std::vector<double> signed_values(const NumberColumn& column) {
   return values;
 }
 
-Order order_of(const std::vector<double>& values) {
-  Order order(values.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, {}, [&](std::size_t at) { return values[at]; });
-  return order;
+// Equal ones stay in their natural order.
+template <typename Value>
+Order order_of(const std::vector<Value>& values, Order natural) {
+  std::ranges::stable_sort(natural, {}, [&](std::size_t at) { return values[at]; });
+  return natural;
 }
 
 // The first place in the order behind which the distance is larger than between others; 0 if all
@@ -183,38 +187,159 @@ void check_missing(const std::vector<std::string>& names, const Order& order) {
   throw_unusable("An image is missing between the others: " + printable(missing) + ".");
 }
 
-[[noreturn]] void throw_gap(const std::string& before, const std::string& behind) {
-  throw_unusable("An image is missing between " + printable(before) + " and " + printable(behind) +
-                 ".");
+// The positions of slices may lie anywhere, whole numbers count them.
+void check_signed(const std::vector<std::string>& names, const NumberColumn& column,
+                  const std::vector<double>& values, const Order& order) {
+  const auto equal =
+      std::ranges::adjacent_find(order, {}, [&](std::size_t at) { return values[at]; });
+  if (equal != order.end()) throw_several_orders(names[*equal], names[*std::next(equal)]);
+  if (std::ranges::any_of(column, has_fraction)) return;
+  const std::size_t gap = gap_in(values, order);
+  if (gap == 0) return;
+  throw_unusable("An image is missing between " + printable(names[order[gap - 1]]) + " and " +
+                 printable(names[order[gap]]) + ".");
 }
 
-// Names that differ in one number only. With a constant whole part, the digits behind a dot may
-// also be a number of their own: "1.9" before "1.10". Even distances then tell which it is.
+// Decimals of several lengths do not end in zeros, as "1.10" beside "1.9".
+bool has_long_zero(const NumberColumn& column) {
+  const auto size = [](const NameNumber& number) { return number.fraction.size(); };
+  const std::size_t least = size(*std::ranges::min_element(column, {}, size));
+  return std::ranges::any_of(column, [&](const NameNumber& number) {
+    return size(number) > std::max<std::size_t>(least, 1) && number.fraction.back() == '0';
+  });
+}
+
+// True if the digits behind a dot are a number of their own, with another order than decimals have:
+// "1.9" before "1.10". Even distances tell which it is.
+bool counts_behind_dot(const std::vector<std::string>& names, const NumberColumn& column,
+                       const Order& natural, const Order& order) {
+  if (has_long_zero(column)) return true;
+  const std::vector<double> values = signed_values(column);
+  const bool counts = are_in_one_unit(values) && missing_in(names, natural).empty();
+  const bool is_decimal = gap_in(values, order) == 0;
+  if (counts == is_decimal) {
+    const auto [one, other] = std::ranges::mismatch(natural, order);
+    throw_several_orders(names[*one], names[*other]);
+  }
+  return counts;
+}
+
+// Names that are in the order of one number.
 Order order_of_column(const std::vector<std::string>& names, const Order& natural,
                       const NumberColumn& column) {
   const std::vector<double> values = signed_values(column);
-  const bool is_signed = std::ranges::any_of(values, [](double value) { return value < 0; });
-  if (!is_signed && std::ranges::none_of(column, &NameNumber::has_fraction)) {
-    check_missing(names, natural);
-    return natural;
+  const Order order = order_of(values, natural);
+  if (std::ranges::any_of(values, [](double value) { return value < 0; })) {
+    check_signed(names, column, values, order);
+    return order;
   }
-  const Order order = order_of(values);
-  const auto equal =
-      std::ranges::adjacent_find(order, {}, [&](std::size_t at) { return values[at]; });
-  if (equal != order.end()) {
-    if (is_signed) throw_several_orders(names[*equal], names[*std::next(equal)]);
-    check_missing(names, natural);
-    return natural;
+  if (std::ranges::any_of(column, has_fraction)) {
+    if (std::ranges::all_of(column, &NameNumber::may_be_negative)) {
+      throw_several_orders(names[natural[0]], names[natural[1]]);
+    }
+    if (order != natural && !counts_behind_dot(names, column, natural, order)) return order;
   }
-  const std::size_t gap = gap_in(values, order);
-  const bool may_be_whole = !is_signed && order != natural && are_in_one_unit(values);
-  if (may_be_whole) {
-    const bool is_even = missing_in(names, natural).empty();
-    if (is_even == (gap == 0)) throw_several_orders(names[natural[0]], names[natural[1]]);
-    return is_even ? natural : order;
+  check_missing(names, natural);
+  return natural;
+}
+
+// Each value of the first number comes with the same others, as channels with slices.
+bool form_grid(const std::vector<std::vector<double>>& rows) {
+  std::map<double, std::set<std::vector<double>>> others;
+  for (const std::vector<double>& row : rows) others[row[0]].insert({row.begin() + 1, row.end()});
+  const auto& first = others.begin()->second;
+  return first.size() > 1 &&
+         std::ranges::all_of(others, [&](const auto& each) { return each.second == first; });
+}
+
+// Names of several numbers, the first of which repeats values.
+Order order_of_rows(const std::vector<std::string>& names, const Order& natural,
+                    const std::vector<NumberColumn>& columns) {
+  std::vector<std::vector<double>> rows(names.size());
+  for (const NumberColumn& column : columns) {
+    const std::vector<double> values = signed_values(column);
+    for (std::size_t at = 0; at < rows.size(); ++at) rows[at].push_back(values[at]);
   }
-  if (gap > 0) throw_gap(names[order[gap - 1]], names[order[gap]]);
-  return order;
+  const bool is_grid = form_grid(rows);
+  const Order order =
+      is_grid ? order_of(signed_values(columns[1]), natural) : order_of(rows, natural);
+  const auto [one, other] = std::ranges::mismatch(natural, order);
+  if (one != natural.end()) throw_several_orders(names[*one], names[*other]);
+  return natural;
+}
+
+bool are_distinct(const NumberColumn& column) {
+  const std::vector<double> values = signed_values(column);
+  return std::set<double>(values.begin(), values.end()).size() == values.size();
+}
+
+// A name in small letters, without the suffix of an image.
+std::string stem_of(std::string_view name) {
+  std::string stem = lower(name);
+  for (const std::string_view suffix : {".gz", ".tif", ".tiff", ".btf", ".tf8", ".png", ".bmp"}) {
+    if (stem.ends_with(suffix)) stem.resize(stem.size() - suffix.size());
+  }
+  return stem;
+}
+
+std::vector<std::string> stems_of(const std::vector<std::string>& names) {
+  std::vector<std::string> stems;
+  for (const std::string& name : names) stems.push_back(stem_of(name));
+  return stems;
+}
+
+// True if the names differ in hexadecimal numbers of one length, of which none is missing.
+bool are_hexadecimal(std::vector<std::string> stems) {
+  std::ranges::sort(stems);
+  const std::string& first = stems.front();
+  std::size_t begin = first.size();
+  std::size_t end = 0;
+  for (const std::string& stem : stems) {
+    if (stem.size() != first.size()) return false;
+    for (std::size_t at = 0; at < first.size(); ++at) {
+      if (stem[at] == first[at]) continue;
+      begin = std::min(begin, at);
+      end = std::max(end, at + 1);
+    }
+  }
+  if (begin >= end) return false;
+  std::vector<std::uint64_t> numbers;
+  bool has_letters = false;
+  for (const std::string& stem : stems) {
+    std::uint64_t number = 0;
+    const char* last = stem.data() + end;
+    const auto [stop, error] = std::from_chars(stem.data() + begin, last, number, 16);
+    if (error != std::errc() || stop != last) return false;
+    has_letters = has_letters || !std::all_of(stem.data() + begin, last, is_digit);
+    numbers.push_back(number);
+  }
+  for (std::size_t at = 1; at < numbers.size(); ++at) {
+    if (numbers[at] - numbers[at - 1] != numbers[1] - numbers[0]) return false;
+  }
+  return has_letters;
+}
+
+// The values of the first number that differs.
+std::set<double> numbers_of(const std::vector<std::string>& stems, const Order& group) {
+  std::vector<std::string> names;
+  for (const std::size_t at : group) names.push_back(stems[at]);
+  const std::vector<NumberColumn> columns = varying_columns(names);
+  if (columns.empty()) return {};
+  const std::vector<double> values = signed_values(columns.front());
+  return {values.begin(), values.end()};
+}
+
+bool share_numbers(const std::vector<std::string>& stems, const Order& one, const Order& other) {
+  const std::set<double> numbers = numbers_of(stems, other);
+  return std::ranges::any_of(numbers_of(stems, one),
+                             [&](double number) { return numbers.contains(number); });
+}
+
+// True for the pattern of a name that lacks the number of the slices, and is not their first, as
+// "s" may be beside "s_2".
+bool is_beside(const std::string& pattern, const std::string& slices) {
+  return std::ranges::count(pattern, '*') < std::ranges::count(slices, '*') &&
+         !slices.starts_with(pattern);
 }
 
 }  // namespace
@@ -273,20 +398,46 @@ std::string name_pattern(std::string_view name) {
 }
 
 Order slice_order(const std::vector<std::string>& names) {
+  const std::vector<std::string> stems = stems_of(names);
   Order natural(names.size());
   std::iota(natural.begin(), natural.end(), 0);
-  std::ranges::stable_sort(natural, comes_before, [&](std::size_t at) { return lower(names[at]); });
-  const std::vector<NumberColumn> columns = varying_columns(names);
-  if (columns.size() == 1) return order_of_column(names, natural, columns.front());
-  for (const NumberColumn& column : columns) {
-    const std::vector<double> values = signed_values(column);
-    for (std::size_t at = 1; at < natural.size(); ++at) {
-      if (values[natural[at]] >= values[natural[at - 1]]) continue;
-      throw_several_orders(names[natural[at - 1]], names[natural[at]]);
+  if (are_hexadecimal(stems)) return order_of(stems, natural);
+  std::ranges::stable_sort(natural, comes_before, [&](std::size_t at) { return stems[at]; });
+  const std::vector<NumberColumn> columns = varying_columns(stems);
+  if (columns.empty()) {
+    check_missing(names, natural);
+    return natural;
+  }
+  return columns.size() == 1 || are_distinct(columns.front())
+             ? order_of_column(names, natural, columns.front())
+             : order_of_rows(names, natural, columns);
+}
+
+NameGroups groups_of(const std::vector<std::string>& names) {
+  NameGroups all;
+  all.volumes.emplace_back(names.size());
+  std::iota(all.volumes[0].begin(), all.volumes[0].end(), 0);
+  const std::vector<std::string> stems = stems_of(names);
+  if (are_hexadecimal(stems)) return all;
+  std::map<std::string, Order> by_pattern;
+  for (std::size_t at = 0; at < stems.size(); ++at) {
+    by_pattern[name_pattern(stems[at])].push_back(at);
+  }
+  const auto& [largest, most] = *std::ranges::max_element(
+      by_pattern, {}, [](const auto& named) { return named.second.size(); });
+  NameGroups groups;
+  for (const auto& [pattern, group] : by_pattern) {
+    if (group.size() > 1) {
+      if (pattern != largest && !share_numbers(stems, group, most)) return all;
+      groups.volumes.push_back(group);
+    } else {
+      if (!is_beside(pattern, largest)) return all;
+      groups.others.push_back(group[0]);
     }
   }
-  check_missing(names, natural);
-  return natural;
+  constexpr std::size_t kLeastNumbered = 3;  // for each other
+  const std::size_t numbered = names.size() - groups.others.size();
+  return groups.others.size() * kLeastNumbered > numbered ? all : groups;
 }
 
 }  // namespace isomesh::import

@@ -20,7 +20,17 @@ std::string missing_between(const std::vector<std::string>& sorted);
 std::string name_pattern(std::string_view name);
 
 // The indexes of the names of slices from the first slice to the last. Throws Error kUnusableVolume
-// if a number is missing, or the numbers allow several orders.
+// if a whole number is missing, or the numbers allow several orders.
 std::vector<std::size_t> slice_order(const std::vector<std::string>& names);
+
+// The names of a folder's images as indexes.
+struct NameGroups {
+  std::vector<std::vector<std::size_t>> volumes;
+  std::vector<std::size_t> others;  // without the number that the slices have
+};
+
+// Names that differ in more than their numbers are those of several volumes if each has numbers of
+// the largest. In doubt all are one volume.
+NameGroups groups_of(const std::vector<std::string>& names);
 
 }  // namespace isomesh::import

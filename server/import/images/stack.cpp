@@ -167,9 +167,10 @@ std::vector<ImageFile> in_order(const std::vector<ImageFile>& files) {
   return sorted;
 }
 
-// Files of one page may tell of all channels and times.
+// Files of one page may tell of all channels and times. Those of a part of the slices are one
+// channel.
 void check_files(const TiffMeaning& meaning, std::size_t files) {
-  if (meaning.channels * meaning.times == 1 || meaning.slices == files) return;
+  if (meaning.channels * meaning.times == 1 || files <= meaning.slices) return;
   throw_unusable("The descriptions of the TIFF files tell of " + counts_of(meaning) +
                  ", but there are " + std::to_string(files) +
                  " files. Put the images of each channel and time into a folder of their own.");

@@ -66,23 +66,55 @@ TEST(NaturalOrder, DecimalAndNegativeNumbersAreOrderedByValue) {
   EXPECT_EQ(sorted({"z_0.75", "z_0.25", "z_0.5"}), "z_0.25 z_0.5 z_0.75 ");
   EXPECT_EQ(sorted({"z_1.5", "z_1", "z_2"}), "z_1 z_1.5 z_2 ");
   EXPECT_EQ(sorted({"s0", "s1", "s-1", "s-2"}), "s-2 s-1 s0 s1 ");
-  EXPECT_EQ(sorted({"s_-5.5.png", "s_-8.0.png", "s_-10.5.png"}),
-            "s_-10.5.png s_-8.0.png s_-5.5.png ");
-  EXPECT_EQ(sorted({"s_-5", "s_-10", "s_-0"}), "s_-10 s_-5 s_-0 ");
-  EXPECT_EQ(sorted({"s-2", "s-10", "s-6"}), "s-2 s-6 s-10 ");  // the minus separates
+  EXPECT_EQ(sorted({"s_2.5", "s_-2.5", "s_0.0"}), "s_-2.5 s_0.0 s_2.5 ");
   EXPECT_EQ(sorted({"s1.9", "s1.10", "s1.11"}), "s1.9 s1.10 s1.11 ");
   EXPECT_THAT(sorted({"s1.2", "s1.10", "s1.1"}), HasSubstr("missing"));
   EXPECT_EQ(sorted({"a.0.1.8", "a.0.1.10", "a.0.1.9"}), "a.0.1.8 a.0.1.9 a.0.1.10 ");
 }
 
+TEST(NaturalOrder, ClearOrdersAreKept) {
+  using Names = std::vector<std::string>;
+  for (const Names& names :
+       {// The minus separates.
+        Names{"\u5934\u90e8-001.png", "\u5934\u90e8-002.png", "\u5934\u90e8-003.png"},
+        {"Thorax (2)-001", "Thorax (2)-002", "Thorax (2)-003"},
+        {"scan--001", "scan--002", "scan--003"},
+        {"CT -001", "CT -002", "CT -003"},
+        {"CT_-001", "CT_-002", "CT_-003"},
+        {"[a]-01", "[a]-02", "[a]-03"},
+        {"ct.-01", "ct.-02", "ct.-03"},
+        {"s_-0", "s_-5", "s_-10"},
+        {"s-2", "s-6", "s-10"},
+        {"study-1.1", "study-1.2", "study-1.3"},
+        // The first number orders them, or all together.
+        {"scan_12-05-58", "scan_12-05-59", "scan_12-06-00", "scan_12-06-01"},
+        {"IMG_20240105_235959_001", "IMG_20240106_000000_002"},
+        {"IM000_z100.0", "IM001_z99.5", "IM002_z99.0"},
+        {"slice_000_8f3a", "slice_001_1b2c", "slice_002_0031", "slice_005_7e1d"},
+        {"slice_0_83", "slice_1_12", "slice_2_31"},
+        {"s1_0.25mm", "s2_0.50mm"},
+        // Decimals are rounded, or count within a unit.
+        {"z0.0", "z0.2", "z0.5", "z0.8", "z1.0"},
+        {"1.1", "1.2", "1.3", "2.1", "2.2", "2.3"},
+        {"1.8", "1.9", "1.10", "2.1", "2.2"},
+        {"1", "2", "3", "4", "5", "10.0"},
+        // No numbers, or hexadecimal ones.
+        {"a", "b", "c"},
+        {"0e", "0f", "10", "11"},
+        {"S1.png", "s2.PNG", "S10.png"},
+        {"s.png", "s_2.png", "s_10.png"}}) {
+    std::string expected;
+    for (const std::string& name : names) expected += name + " ";
+    EXPECT_EQ(sorted({names.rbegin(), names.rend()}), expected);
+  }
+}
+
 TEST(NaturalOrder, UnclearOrdersAndGapsAreRefused) {
   EXPECT_THAT(sorted({"z_0.5", "z_0.25"}), HasSubstr("is not clear"));
-  EXPECT_THAT(sorted({"z_0.25", "z_0.5", "z_1.0"}), HasSubstr("missing between z_0.5 and z_1.0"));
+  EXPECT_THAT(sorted({"z_0.25", "z_0.5", "z_1.0"}), HasSubstr("is not clear"));
+  EXPECT_THAT(sorted({"s_-5.5.png", "s_-8.0.png", "s_-10.5.png"}), HasSubstr("is not clear"));
   EXPECT_THAT(sorted({"s-2", "s-1", "s1"}), HasSubstr("missing between s-1 and s1"));
   EXPECT_THAT(sorted({"c1_z1", "c1_z2", "c2_z1", "c2_z2"}), HasSubstr("c1_z2 and c2_z1"));
-  EXPECT_EQ(sorted({"s2_0.50mm", "s1_0.25mm"}), "s1_0.25mm s2_0.50mm ");
-  EXPECT_EQ(sorted({"b", "a", "c"}), "a b c ");
-  EXPECT_EQ(sorted({"s2.PNG", "S10.png", "S1.png"}), "S1.png s2.PNG S10.png ");
 }
 
 TEST(TiffMeaning, PagesAreOrderedAsOmeSays) {
@@ -228,38 +260,74 @@ TEST(Images, MissingAndDifferentOnesAreNamed) {
               HasSubstr("colours"));
 }
 
+Outcome import_pictures(const std::vector<std::string>& names, const std::string& member = {}) {
+  std::vector<Member> members;
+  char letter = 'a';
+  for (const std::string& name : names) {
+    const std::string samples(12, letter++);
+    members.push_back(
+        {name, name.find(".tif") != std::string::npos ? tiff({samples}) : grey_png(4, samples)});
+  }
+  ImportOptions options = kSpaced;
+  options.member = member;
+  return import_bytes(zip(members), {}, options);
+}
+
 TEST(Images, OfOtherNamesAreOtherVolumes) {
-  const auto of = [](const std::vector<std::string>& names, const ImportOptions& options) {
-    std::vector<Member> members;
-    char letter = 'a';
-    for (const std::string& name : names) {
-      members.push_back({name, grey_png(4, std::string(12, letter++))});
-    }
-    return import_bytes(zip(members), {}, options);
-  };
-  const std::vector<std::string> two = {"img_001.png", "img_002.png", "mask_001.png",
-                                        "mask_002.png", "legend.png"};
-  const Outcome unchosen = of(two, kSpaced);
+  const std::vector<std::string> two = {"1/img_001.png", "1/img_002.png", "1/mask_001.png",
+                                        "1/mask_002.png", "1/legend.png"};
+  const Outcome unchosen = import_pictures(two);
   ASSERT_EQ(unchosen.remedy.choices.size(), 2);
-  EXPECT_EQ(unchosen.remedy.choices[1].value, "mask_*.png");
-  ImportOptions masks = kSpaced;
-  masks.member = "mask_*.png";
-  const Outcome chosen = of(two, masks);
+  EXPECT_EQ(unchosen.remedy.choices[1].value, "1/mask_*.png");
+  const Outcome chosen = import_pictures(two, "1/mask_*.png");
   ASSERT_EQ(chosen.error, "");
   EXPECT_EQ(chosen.sample_bytes(), std::string(12, 'c') + std::string(12, 'd'));
   ASSERT_EQ(chosen.volume.ignored.size(), 1);
   EXPECT_EQ(chosen.volume.ignored[0].name, "legend.png");
   // A missing one is noticed in each group, and beside a picture without a number.
-  ImportOptions images = kSpaced;
-  images.member = "img_*.png";
-  EXPECT_THAT(of({"img_1.png", "img_2.png", "img_4.png", "mask_1.png", "mask_2.png"}, images).error,
+  EXPECT_THAT(import_pictures({"img_1.png", "img_2.png", "img_4.png", "mask_1.png", "mask_2.png"},
+                              "img_*.png")
+                  .error,
               HasSubstr("img_3.png"));
-  EXPECT_THAT(of({"s1.png", "s2.png", "s4.png", "mip.png"}, kSpaced).error, HasSubstr("s3.png"));
-  const Outcome preview = of({"X3_rec_spr.png", "X3_rec0001.png", "X3_rec0002.png"}, kSpaced);
+  EXPECT_THAT(import_pictures({"s1.png", "s2.png", "s4.png", "mip.png"}).error,
+              HasSubstr("s3.png"));
+  const Outcome preview =
+      import_pictures({"X3_rec_spr.png", "X3_rec01.png", "X3_rec02.png", "X3_rec03.png"});
   ASSERT_EQ(preview.error, "");
-  EXPECT_EQ(preview.volume.dims, (Dims{4, 3, 2}));
+  EXPECT_EQ(preview.volume.dims, (Dims{4, 3, 3}));
   EXPECT_THAT(preview.volume.ignored[0].reason, HasSubstr("numbered images"));
-  EXPECT_EQ(of({"top.png", "bottom.png"}, kSpaced).volume.dims, (Dims{4, 3, 2}));
+}
+
+TEST(Images, OfOneFolderAreOneVolumeInDoubt) {
+  using Names = std::vector<std::string>;
+  Names hexadecimal;
+  for (const char sixteens : {'0', '1'}) {
+    for (const char ones : std::string("0123456789abcdef")) {
+      hexadecimal.push_back(std::string({sixteens, ones}) + ".png");
+    }
+  }
+  for (const Names& names :
+       {Names(hexadecimal.begin(), hexadecimal.begin() + 11),
+        hexadecimal,
+        {"0.png", "1.png", "2.png", "3.png", "4.png", "5.png", "6.png", "7.png", "8.png", "9.png",
+         "a.png", "b.png", "c.png", "d.png", "e.png", "f.png"},
+        {"q1.png", "q2.png", "w.png", "x.png", "y.png", "z.png"},
+        {"Scan-001 (copy).png", "Scan-002.png", "Scan-003.png"},
+        {"Scan-001 (copy).png", "Scan-002.png", "Scan-003.png", "Scan-004.png", "Scan-005.png"},
+        {"img_001.tif", "img_002.tif", "img_003.tiff", "img_004.tif"},
+        {"post_001.png", "post_002.png", "pre_003.png", "pre_004.png"},
+        {"s.png", "s_2.png", "s_3.png", "s_4.png"},
+        {"slice_0_8f.png", "slice_1_1b.png", "slice_2_7f.png", "slice_3_2b.png"},
+        {"bottom.png", "top.png"}}) {
+    const Outcome outcome = import_pictures(names);
+    ASSERT_EQ(outcome.error, "") << names.front();
+    std::string expected;
+    for (std::size_t at = 0; at < names.size(); ++at) {
+      expected += std::string(12, static_cast<char>('a' + at));
+    }
+    EXPECT_EQ(outcome.sample_bytes(), expected) << names.front();
+    EXPECT_TRUE(outcome.volume.ignored.empty());
+  }
 }
 
 TEST(Images, OfOneChannelMakeAVolume) {
@@ -273,6 +341,9 @@ TEST(Images, OfOneChannelMakeAVolume) {
   EXPECT_THAT(of({"1.tif", "2.tif", "3.tif", "4.tif"}, ome),
               HasSubstr("2 slices, 2 channels and 1 times, but there are 4 files"));
   EXPECT_EQ(of({"1.tif", "2.tif"}, ome), "");
+  const std::string range =
+      "<OME><Image><Pixels DimensionOrder='XYZCT' SizeZ='9' SizeC='2'/></Image></OME>";
+  EXPECT_EQ(of({"3.tif", "4.tif"}, range), "");
   EXPECT_THAT(of({"z0_c0.tif", "z0_c1.tif", "z1_c0.tif", "z1_c1.tif"}, ""),
               HasSubstr("a folder of their own"));
 }
