@@ -1,8 +1,13 @@
 // The meaning of a TIFF's pages: which slice, channel or time each is, and where its rows begin.
+#include "server/import/images/tiff.h"
+
+#include <ctime>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/import/images/tiff_meaning.h"
+#include "tests/support/errors.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/other_writers.h"
@@ -178,6 +183,29 @@ TEST(ScifioTiff, AxesSeparateVolumes) {
       tiff_meaning(axes + "scales=1.0,1.0,1.0,1.0\nunits=null,null,null,null\n", {}, 6).spacing);
   EXPECT_THAT(slices_of("abcdef", "SCIFIO=1\naxes=X,Y,Lifetime,Z\nlengths=4,3,2,3\n"),
               HasSubstr("does not say which of them counts slices"));
+}
+
+TEST(Tiff, PagesMayBeReadInAnyOrder) {
+  constexpr std::uint64_t kPages = 1000;
+  std::vector<std::string> pages;
+  for (std::uint64_t at = 0; at < kPages; ++at) pages.emplace_back(12, static_cast<char>(at));
+  const Folder folder;
+  const InputFile input(folder.write("a.tif", test::tiff(pages)));
+  TiffFile file(input);
+  ASSERT_EQ(file.pages(), kPages);
+  const auto time_of = [&](const auto& page_at) {
+    const std::clock_t began = std::clock();
+    for (std::uint64_t at = 0; at < kPages; ++at) {
+      file.read(
+          page_at(at), [](const PageLayout&) {},
+          [&](std::span<const std::byte> samples) {
+            EXPECT_EQ(static_cast<char>(samples[0]), static_cast<char>(page_at(at)));
+          });
+    }
+    return std::clock() - began;
+  };
+  const std::clock_t ascending = time_of([](std::uint64_t at) { return at; });
+  EXPECT_LT(time_of([](std::uint64_t at) { return kPages - 1 - at; }), 20 * ascending);
 }
 
 TEST(Tiff, PagesBeginAtTheirTopLeft) {
