@@ -166,8 +166,10 @@ TEST(TifffileTiff, NamesOfAxesSeparateVolumes) {
 TEST(TifffileTiff, OnlyAShapeOfThreeAxesIsClear) {
   EXPECT_EQ(slices_of("abcdef", R"({"shape": [6, 3, 4]})"), "abcdef");
   EXPECT_EQ(slices_of("abcdef", R"({"shape": [1, 6, 3, 4]})"), "abcdef");
-  EXPECT_EQ(slices_of("abcdef", R"({"shape": [3, 4]})"), "abcdef");  // written one by one
+  EXPECT_EQ(slices_of("abcdef", R"({"shape": [3, 4]})"), "abcdef");     // written one by one
+  EXPECT_EQ(slices_of("abcdef", R"({"shape": [2, 3, 4]})"), "abcdef");  // written in three parts
   EXPECT_EQ(slices_of("abcdef", R"({"name": "a scan"})"), "abcdef");
+  EXPECT_EQ(tiff_meaning("{" + std::string(1 << 20, '['), {}, 6).slices, 6);
   EXPECT_THAT(slices_of("abcdef", R"({"shape": [2, 3, 3, 4]})"),
               HasSubstr("does not say which of them counts slices"));
   EXPECT_THAT(slices_of("abcdef", R"({"shape": [2, 3, 3, 4], "axes": "QZYX"})"),
