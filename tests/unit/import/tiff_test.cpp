@@ -113,6 +113,67 @@ TEST(OmeTiff, SeveralImagesAreRefused) {
   EXPECT_THAT(slices_of("ab", "<OME><Pixels>"), HasSubstr("description is damaged"));
 }
 
+TEST(OmeTiff, ImagesMayBeInOtherFiles) {
+  const auto image = [](const std::string& file) {
+    const std::string uuid = "<UUID>" + file + "</UUID>";
+    return "<Image><Pixels DimensionOrder='XYZCT' SizeZ='2'><TiffData IFD='1'>" + uuid +
+           "</TiffData><TiffData IFD='0' FirstZ='1'>" + uuid + "</TiffData></Pixels></Image>";
+  };
+  const std::string both = image("A") + image("B") + "</OME>";
+  EXPECT_EQ(slices_of("ab", "<OME UUID='A'>" + both), "ba");
+  EXPECT_EQ(slices_of("ab", "<OME UUID='B'>" + both), "ba");
+  EXPECT_EQ(slices_of("ab", "<OME>" + both), "ba");
+  EXPECT_THAT(slices_of("abc", "<OME>" + both), HasSubstr("they are in other files"));
+  EXPECT_THAT(slices_of("ab", "<OME>" + image("A") + image("A") + "</OME>"),
+              HasSubstr("holds several images"));
+}
+
+TEST(OmeTiff, TheFirstOfImagesWithoutTiffDataMayHaveAllPages) {
+  const std::string images =
+      "<OME><Image><Pixels DimensionOrder='XYZCT' SizeZ='3'/></Image>"
+      "<Image><Pixels DimensionOrder='XYZCT' SizeZ='1'/></Image></OME>";
+  EXPECT_EQ(slices_of("abc", images), "abc");
+  EXPECT_THAT(slices_of("abcd", images), HasSubstr("holds several images"));
+}
+
+TEST(OmeTiff, FaultsBesideTheImageTakeNothingFromIt) {
+  const std::string data = "<TiffData IFD='1'/><TiffData IFD='0' FirstZ='1'/>";
+  const std::string pixels =
+      "<Pixels DimensionOrder='XYZCT' SizeZ='2'>" + data + "</Pixels></Image>";
+  const std::string element = "<OME><Image>" + pixels + "</OME>";
+  for (const std::string& description :
+       {"\xef\xbb\xbf<?xml version='1.0' encoding='utf-8'?>" + element,
+        "written by a program <?xml version='1.0'?>" + element,
+        "<?xml version='1.0' encoding='UTF-16'?>\n<!-- OME-XML -->\n" + element,
+        "<?xml version='1.0' encoding='windows-1252'?>" + element, element + "\n</OME> text",
+        "<OME><Image Name='a & b &amp; c'>" + pixels + "</OME>",
+        "<OME><Image Name='a&b;\x01&#x1;'>" + pixels + "</OME>",
+        "<OME><Image>" + pixels + "<Note><</Note></OME>"}) {
+    EXPECT_EQ(slices_of("ab", description), "ba") << description;
+  }
+  const std::string unit =
+      "SizeZ='2' PhysicalSizeX='1000' PhysicalSizeY='1000' PhysicalSizeZ='1000' Note='a & b' "
+      "PhysicalSizeXUnit='\xc2\xb5m' PhysicalSizeYUnit='&#xB5;m'";
+  EXPECT_EQ(tiff_meaning(ome(unit, data), {}, 2).spacing, (Vector{1, 1, 1}));
+  EXPECT_THAT(slices_of("abcd", "<OME><Image>" + pixels + "<Image Name='<'>" + pixels + "</OME>"),
+              HasSubstr("description is damaged"));
+}
+
+TEST(OmeTiff, ManyImagesAreRefusedAtTheSecond) {
+  const auto time_of = [](int count) {
+    std::string images;
+    for (int image = 0; image < count; ++image) {
+      images += "<Pixels DimensionOrder='XYZCT' SizeZ='1000000'><TiffData/></Pixels>";
+    }
+    const std::clock_t began = std::clock();
+    EXPECT_TRUE(
+        isomesh::test::thrown_by([&] { tiff_meaning("<OME>" + images + "</OME>", {}, 20'000); }));
+    return std::clock() - began;
+  };
+  const std::clock_t two = time_of(2);
+  EXPECT_LT(time_of(200), 20 * two);
+}
+
 TEST(OmeTiff, UnitsMayBeEncodedInAnyWay) {
   for (const char* unit : {"&#181;m", "&#xB5;m", "\xc2\xb5m", "\xb5m"}) {
     const std::string attributes =
