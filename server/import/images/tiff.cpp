@@ -212,9 +212,7 @@ void read_tiles(TIFF* tiff, const PageLayout& layout, const Corner& corner, cons
 
 class TiffFile::Library {
  public:
-  explicit Library(const InputFile& file) : position_{file}, tiff_(open(position_)) {
-    if (is_reduced()) step();
-  }
+  explicit Library(const InputFile& file) : position_{file}, tiff_(open(position_)) {}
   ~Library() { TIFFClose(tiff_); }
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;
@@ -233,28 +231,34 @@ class TiffFile::Library {
     first_corner_ = corner;
   }
 
-  void go_to(std::uint64_t page) {
-    if (page < page_) rewind();
-    while (page_ < page) {
-      if (!step()) throw_damaged_tiff();
-      ++page_;
-    }
+  // Before anything else.
+  void count() {
+    std::uint64_t offset = 0;
+    do {
+      offset = TIFFCurrentDirOffset(tiff_);
+      if (is_reduced()) continue;
+      if (offsets_.size() == kMostPages) {
+        throw_unusable("The TIFF file has more than a million pages.");
+      }
+      offsets_.push_back(offset);
+    } while (TIFFReadDirectory(tiff_) == 1);
+    if (offsets_.empty()) offsets_.push_back(offset);
+    page_ = offsets_.size();
+    go_to(0);
+    if (offsets_.size() == 1) planes_ = planes_behind();
   }
 
-  std::uint64_t count() {
-    rewind();
-    std::uint64_t pages = 1;
-    while (step()) {
-      if (++pages > kMostPages) throw_unusable("The TIFF file has more than a million pages.");
-    }
-    rewind();
-    if (pages == 1) planes_ = planes_behind();
-    return std::max(pages, planes_);
+  void go_to(std::uint64_t page) {
+    if (page == page_) return;
+    if (TIFFSetSubDirectory(tiff_, offsets_.at(page)) != 1) throw_damaged_tiff();
+    page_ = page;
   }
+
+  std::uint64_t pages() const { return std::max<std::uint64_t>(offsets_.size(), planes_); }
 
   bool has_planes() const { return planes_ > 1; }
 
-  // `page` is below the last count().
+  // `page` is below pages().
   void read_plane(std::uint64_t page, const PageLayout& layout, const PageSink& sink) const {
     std::vector<std::byte> piece(std::min<std::uint64_t>(kPieceBytes, layout.bytes()));
     const std::uint64_t begin = TIFFGetStrileOffset(tiff_, 0) + page * layout.bytes();
@@ -288,24 +292,11 @@ class TiffFile::Library {
     return (field<std::uint32_t>(tiff_, TIFFTAG_SUBFILETYPE) & FILETYPE_REDUCEDIMAGE) != 0;
   }
 
-  // The next page that is no reduced copy.
-  bool step() {
-    while (TIFFReadDirectory(tiff_) == 1) {
-      if (!is_reduced()) return true;
-    }
-    return false;
-  }
-
-  void rewind() {
-    if (TIFFSetDirectory(tiff_, 0) != 1) throw_damaged_tiff();
-    if (is_reduced()) step();
-    page_ = 0;
-  }
-
   TiffPosition position_;
   TIFF* tiff_;
   std::uint64_t page_ = 0;
-  std::uint64_t planes_ = 0;  // behind each other with one page only; 0 without them
+  std::vector<std::uint64_t> offsets_;  // of the pages' directories
+  std::uint64_t planes_ = 0;            // behind each other with one page only; 0 without them
   std::optional<Corner> first_corner_;
 };
 
@@ -314,16 +305,18 @@ bool is_tiff(std::string_view head) {
          head.starts_with("II+\0\x08\0"sv) || head.starts_with("MM\0+\0\x08"sv);
 }
 
-TiffFile::TiffFile(const InputFile& file) : library_(std::make_unique<Library>(file)) {}
+TiffFile::TiffFile(const InputFile& file) : library_(std::make_unique<Library>(file)) {
+  library_->count();
+}
 TiffFile::~TiffFile() = default;
 
-std::uint64_t TiffFile::pages() { return library_->count(); }
+std::uint64_t TiffFile::pages() { return library_->pages(); }
 
 TiffMeaning TiffFile::meaning() {
-  const std::uint64_t count = pages();
+  library_->go_to(0);
   const TiffResolution resolution = {field<float>(library_->tiff(), TIFFTAG_XRESOLUTION),
                                      field<float>(library_->tiff(), TIFFTAG_YRESOLUTION)};
-  return tiff_meaning(library_->description(), resolution, count);
+  return tiff_meaning(library_->description(), resolution, pages());
 }
 
 void TiffFile::read(std::uint64_t page, const PageCheck& check, const PageSink& sink) {

@@ -17,21 +17,21 @@ bool is_tiff(std::string_view head);
 
 class TiffFile {
  public:
-  // Throws Error kUnusableVolume if the file is damaged.
+  // Throws Error kUnusableVolume if the file is damaged or has more than a million pages.
   explicit TiffFile(const InputFile& file);
   ~TiffFile();
   TiffFile(const TiffFile&) = delete;
   TiffFile& operator=(const TiffFile&) = delete;
 
   // The number of pages, without reduced copies of others, or of ImageJ's planes behind a single
-  // page. Throws Error kUnusableVolume if there are more than a million pages.
+  // page.
   std::uint64_t pages();
 
   // The meaning of these pages.
   TiffMeaning meaning();
 
-  // Reads a page below pages(), from its top left. Fast for pages in ascending order. Throws Error
-  // kUnusableVolume, also for colours, palettes and lossy compression.
+  // Reads a page below pages(), from its top left. Throws Error kUnusableVolume, also for
+  // colours, palettes and lossy compression.
   void read(std::uint64_t page, const PageCheck& check, const PageSink& sink);
 
  private:

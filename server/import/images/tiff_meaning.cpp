@@ -95,22 +95,25 @@ struct PageAxis {
   std::uint64_t size = 1;
 };
 
-// Of the axes beyond x and y, the fastest first. A single one without a name counts slices.
+// Of the axes beyond x and y, the fastest first. With a single one without a name, all pages are
+// slices: tifffile may have written more of them after the description.
 TiffMeaning meaning_of(std::vector<PageAxis> axes, std::uint64_t pages) {
   std::erase_if(axes, [](const PageAxis& axis) { return axis.size == 1; });
   TiffMeaning meaning;
+  if (axes.size() == 1 && axes[0].name == '?') axes[0] = {'Z', pages};
   meaning.slices = axes.empty() ? pages : 1;
   meaning.order = "XY";
   for (const PageAxis& axis : axes) {
-    const char name = axes.size() == 1 && axis.name == '?' ? 'Z' : axis.name;
-    if (name == '?' || meaning.order.find(name) != std::string::npos) {
+    if (axis.name == '?' || meaning.order.find(axis.name) != std::string::npos) {
       throw_unusable(
           "The TIFF's pages have " + std::to_string(axes.size()) +
           " axes, and its description does not say which of them counts slices, channels and "
           "times. Save it with the names of its axes, as in ZCYX, or with one volume per file.");
     }
-    meaning.order += name;
-    (name == 'Z' ? meaning.slices : name == 'C' ? meaning.channels : meaning.times) = axis.size;
+    meaning.order += axis.name;
+    (axis.name == 'Z'   ? meaning.slices
+     : axis.name == 'C' ? meaning.channels
+                        : meaning.times) = axis.size;
   }
   for (const char name : std::string_view("ZCT")) {
     if (meaning.order.find(name) == std::string::npos) meaning.order += name;
@@ -155,6 +158,8 @@ std::optional<TiffMeaning> scifio_meaning(std::string_view description, std::uin
 
 // From the shape of an array, which ends in y and x, and the names of its axes, if they are known.
 std::optional<TiffMeaning> tifffile_meaning(std::string_view description, std::uint64_t pages) {
+  constexpr std::size_t kLongest = std::size_t{1} << 20;  // tifffile's are below 1 kB
+  if (description.size() > kLongest) return std::nullopt;
   const auto document = nlohmann::json::parse(description, nullptr, false);
   if (!document.is_object() || !document.contains("shape")) return std::nullopt;
   std::vector<std::uint64_t> shape;
@@ -184,10 +189,16 @@ std::optional<TiffMeaning> tifffile_meaning(std::string_view description, std::u
 TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
                          std::uint64_t pages) {
   description = trimmed(description);
-  std::optional<TiffMeaning> meaning = ome_meaning(description, pages);
-  if (description.starts_with("ImageJ=")) meaning = imagej_meaning(description, resolution, pages);
-  if (description.starts_with("SCIFIO=")) meaning = scifio_meaning(description, pages);
-  if (description.starts_with('{')) meaning = tifffile_meaning(description, pages);
+  std::optional<TiffMeaning> meaning;
+  if (description.starts_with("ImageJ=")) {
+    meaning = imagej_meaning(description, resolution, pages);
+  } else if (description.starts_with("SCIFIO=")) {
+    meaning = scifio_meaning(description, pages);
+  } else if (description.starts_with('{')) {
+    meaning = tifffile_meaning(description, pages);
+  } else {
+    meaning = ome_meaning(description, pages);
+  }
   return meaning.value_or(TiffMeaning{.slices = pages});
 }
 

@@ -1,8 +1,13 @@
 // The meaning of a TIFF's pages: which slice, channel or time each is, and where its rows begin.
+#include "server/import/images/tiff.h"
+
+#include <ctime>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/import/images/tiff_meaning.h"
+#include "tests/support/errors.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/other_writers.h"
@@ -108,6 +113,67 @@ TEST(OmeTiff, SeveralImagesAreRefused) {
   EXPECT_THAT(slices_of("ab", "<OME><Pixels>"), HasSubstr("description is damaged"));
 }
 
+TEST(OmeTiff, ImagesMayBeInOtherFiles) {
+  const auto image = [](const std::string& file) {
+    const std::string uuid = "<UUID>" + file + "</UUID>";
+    return "<Image><Pixels DimensionOrder='XYZCT' SizeZ='2'><TiffData IFD='1'>" + uuid +
+           "</TiffData><TiffData IFD='0' FirstZ='1'>" + uuid + "</TiffData></Pixels></Image>";
+  };
+  const std::string both = image("A") + image("B") + "</OME>";
+  EXPECT_EQ(slices_of("ab", "<OME UUID='A'>" + both), "ba");
+  EXPECT_EQ(slices_of("ab", "<OME UUID='B'>" + both), "ba");
+  EXPECT_EQ(slices_of("ab", "<OME>" + both), "ba");
+  EXPECT_THAT(slices_of("abc", "<OME>" + both), HasSubstr("they are in other files"));
+  EXPECT_THAT(slices_of("ab", "<OME>" + image("A") + image("A") + "</OME>"),
+              HasSubstr("holds several images"));
+}
+
+TEST(OmeTiff, TheFirstOfImagesWithoutTiffDataMayHaveAllPages) {
+  const std::string images =
+      "<OME><Image><Pixels DimensionOrder='XYZCT' SizeZ='3'/></Image>"
+      "<Image><Pixels DimensionOrder='XYZCT' SizeZ='1'/></Image></OME>";
+  EXPECT_EQ(slices_of("abc", images), "abc");
+  EXPECT_THAT(slices_of("abcd", images), HasSubstr("holds several images"));
+}
+
+TEST(OmeTiff, FaultsBesideTheImageTakeNothingFromIt) {
+  const std::string data = "<TiffData IFD='1'/><TiffData IFD='0' FirstZ='1'/>";
+  const std::string pixels =
+      "<Pixels DimensionOrder='XYZCT' SizeZ='2'>" + data + "</Pixels></Image>";
+  const std::string element = "<OME><Image>" + pixels + "</OME>";
+  for (const std::string& description :
+       {"\xef\xbb\xbf<?xml version='1.0' encoding='utf-8'?>" + element,
+        "written by a program <?xml version='1.0'?>" + element,
+        "<?xml version='1.0' encoding='UTF-16'?>\n<!-- OME-XML -->\n" + element,
+        "<?xml version='1.0' encoding='windows-1252'?>" + element, element + "\n</OME> text",
+        "<OME><Image Name='a & b &amp; c'>" + pixels + "</OME>",
+        "<OME><Image Name='a&b;\x01&#x1;'>" + pixels + "</OME>",
+        "<OME><Image>" + pixels + "<Note><</Note></OME>"}) {
+    EXPECT_EQ(slices_of("ab", description), "ba") << description;
+  }
+  const std::string unit =
+      "SizeZ='2' PhysicalSizeX='1000' PhysicalSizeY='1000' PhysicalSizeZ='1000' Note='a & b' "
+      "PhysicalSizeXUnit='\xc2\xb5m' PhysicalSizeYUnit='&#xB5;m'";
+  EXPECT_EQ(tiff_meaning(ome(unit, data), {}, 2).spacing, (Vector{1, 1, 1}));
+  EXPECT_THAT(slices_of("abcd", "<OME><Image>" + pixels + "<Image Name='<'>" + pixels + "</OME>"),
+              HasSubstr("description is damaged"));
+}
+
+TEST(OmeTiff, ManyImagesAreRefusedAtTheSecond) {
+  const auto time_of = [](int count) {
+    std::string images;
+    for (int image = 0; image < count; ++image) {
+      images += "<Pixels DimensionOrder='XYZCT' SizeZ='1000000'><TiffData/></Pixels>";
+    }
+    const std::clock_t began = std::clock();
+    EXPECT_TRUE(
+        isomesh::test::thrown_by([&] { tiff_meaning("<OME>" + images + "</OME>", {}, 20'000); }));
+    return std::clock() - began;
+  };
+  const std::clock_t two = time_of(2);
+  EXPECT_LT(time_of(200), 20 * two);
+}
+
 TEST(OmeTiff, UnitsMayBeEncodedInAnyWay) {
   for (const char* unit : {"&#181;m", "&#xB5;m", "\xc2\xb5m", "\xb5m"}) {
     const std::string attributes =
@@ -161,8 +227,10 @@ TEST(TifffileTiff, NamesOfAxesSeparateVolumes) {
 TEST(TifffileTiff, OnlyAShapeOfThreeAxesIsClear) {
   EXPECT_EQ(slices_of("abcdef", R"({"shape": [6, 3, 4]})"), "abcdef");
   EXPECT_EQ(slices_of("abcdef", R"({"shape": [1, 6, 3, 4]})"), "abcdef");
-  EXPECT_EQ(slices_of("abcdef", R"({"shape": [3, 4]})"), "abcdef");  // written one by one
+  EXPECT_EQ(slices_of("abcdef", R"({"shape": [3, 4]})"), "abcdef");     // written one by one
+  EXPECT_EQ(slices_of("abcdef", R"({"shape": [2, 3, 4]})"), "abcdef");  // written in three parts
   EXPECT_EQ(slices_of("abcdef", R"({"name": "a scan"})"), "abcdef");
+  EXPECT_EQ(tiff_meaning("{" + std::string(1 << 20, '['), {}, 6).slices, 6);
   EXPECT_THAT(slices_of("abcdef", R"({"shape": [2, 3, 3, 4]})"),
               HasSubstr("does not say which of them counts slices"));
   EXPECT_THAT(slices_of("abcdef", R"({"shape": [2, 3, 3, 4], "axes": "QZYX"})"),
@@ -178,6 +246,29 @@ TEST(ScifioTiff, AxesSeparateVolumes) {
       tiff_meaning(axes + "scales=1.0,1.0,1.0,1.0\nunits=null,null,null,null\n", {}, 6).spacing);
   EXPECT_THAT(slices_of("abcdef", "SCIFIO=1\naxes=X,Y,Lifetime,Z\nlengths=4,3,2,3\n"),
               HasSubstr("does not say which of them counts slices"));
+}
+
+TEST(Tiff, PagesMayBeReadInAnyOrder) {
+  constexpr std::uint64_t kPages = 1000;
+  std::vector<std::string> pages;
+  for (std::uint64_t at = 0; at < kPages; ++at) pages.emplace_back(12, static_cast<char>(at));
+  const Folder folder;
+  const InputFile input(folder.write("a.tif", test::tiff(pages)));
+  TiffFile file(input);
+  ASSERT_EQ(file.pages(), kPages);
+  const auto time_of = [&](const auto& page_at) {
+    const std::clock_t began = std::clock();
+    for (std::uint64_t at = 0; at < kPages; ++at) {
+      file.read(
+          page_at(at), [](const PageLayout&) {},
+          [&](std::span<const std::byte> samples) {
+            EXPECT_EQ(static_cast<char>(samples[0]), static_cast<char>(page_at(at)));
+          });
+    }
+    return std::clock() - began;
+  };
+  const std::clock_t ascending = time_of([](std::uint64_t at) { return at; });
+  EXPECT_LT(time_of([](std::uint64_t at) { return kPages - 1 - at; }), 20 * ascending);
 }
 
 TEST(Tiff, PagesBeginAtTheirTopLeft) {
