@@ -157,19 +157,16 @@ TEST(OmeTiff, FaultsBesideTheImageTakeNothingFromIt) {
               HasSubstr("description is damaged"));
 }
 
+// Maps of the pages of all of them would need gigabytes.
 TEST(OmeTiff, ManyImagesAreRefusedAtTheSecond) {
-  const auto time_of = [](int count) {
-    std::string images;
-    for (int image = 0; image < count; ++image) {
-      images += "<Pixels DimensionOrder='XYZCT' SizeZ='1000000'><TiffData/></Pixels>";
-    }
-    const std::clock_t began = std::clock();
-    EXPECT_TRUE(
-        isomesh::test::thrown_by([&] { tiff_meaning("<OME>" + images + "</OME>", {}, 20'000); }));
-    return std::clock() - began;
-  };
-  const std::clock_t two = time_of(2);
-  EXPECT_LT(time_of(200), 20 * two);
+  std::string images;
+  for (int image = 0; image < 2000; ++image) {
+    images += "<Pixels DimensionOrder='XYZCT' SizeZ='1000000'><TiffData/></Pixels>";
+  }
+  const auto error =
+      isomesh::test::thrown_by([&] { tiff_meaning("<OME>" + images + "</OME>", {}, 20'000); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(error->what(), HasSubstr("several images"));
 }
 
 TEST(OmeTiff, UnitsMayBeEncodedInAnyWay) {
