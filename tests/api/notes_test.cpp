@@ -99,7 +99,7 @@ std::string square_image() {
          number(0x28, 0x101, 8) + number(0x28, 0x102, 7) + number(0x28, 0x103, 0);
 }
 
-// What the frames of a segmentation have in common.
+// The part that the frames of a segmentation share.
 std::string shared_geometry() {
   return sequence(0x5200, 0x9229,
                   {sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +

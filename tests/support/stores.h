@@ -1,4 +1,4 @@
-// What tests of many components do with stores.
+// Steps with stores that tests of many components share.
 #pragma once
 
 #include <cstdint>

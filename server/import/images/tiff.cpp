@@ -124,7 +124,7 @@ void check_block(std::uint64_t bytes) {
   throw_unusable("The TIFF image's strips or rows of tiles are larger than 256 MiB.");
 }
 
-// Where the first row and column are.
+// The corner with the first row and column.
 struct Corner {
   bool is_bottom = false;
   bool is_right = false;

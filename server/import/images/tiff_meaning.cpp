@@ -95,8 +95,8 @@ struct PageAxis {
   std::uint64_t size = 1;
 };
 
-// Of the axes beyond x and y, the fastest first. With a single one without a name, all pages are
-// slices: tifffile may have written more of them after the description.
+// The meaning of the axes beyond x and y, the fastest first. With a single one without a name, all
+// pages are slices: tifffile may have written more of them after the description.
 TiffMeaning meaning_of(std::vector<PageAxis> axes, std::uint64_t pages) {
   std::erase_if(axes, [](const PageAxis& axis) { return axis.size == 1; });
   TiffMeaning meaning;

@@ -159,8 +159,10 @@ Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
   note(lease, progress);
   const Lock lock(live_mutex_);
   Live* const renewed = live(lease.id, lease.fence);
-  if (renewed == nullptr) return Standing::kLost;
-  renewed->lease_until = Steady::clock::now() + length;
+  // Once more, because this process may have been stopped for long since the first look.
+  const auto now = Steady::clock::now();
+  if (renewed == nullptr || renewed->lease_until < now) return Standing::kLost;
+  renewed->lease_until = now + length;
   return renewed->cancelling ? Standing::kCancel : Standing::kOk;
 }
 

@@ -31,7 +31,7 @@ std::vector<MeshFormat> formats_of_a_surface();
 // Those that round nothing.
 std::vector<MeshFormat> exact_formats();
 
-// Of a mesh whose files are to be in that space.
+// For a mesh whose files are to be in that space.
 codec::Provenance provenance_in(Space space);
 
 // All bytes that an encoder hands to its sink.
