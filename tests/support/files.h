@@ -9,7 +9,7 @@
 
 namespace isomesh::test {
 
-// Where files that only one process needs are fast: in memory, if the machine has such a place.
+// A place where files that only one process needs are fast: in memory, if the machine has one.
 std::filesystem::path fast_place();
 
 // A new, empty folder; the destructor removes it with its content.

@@ -51,7 +51,7 @@ class Process {
   std::optional<int> status_;
 };
 
-// Where an isomeshd listens, as its first line says: http://127.0.0.1:PORT or unix:PATH. Throws
+// The address of an isomeshd, as its first line says: http://127.0.0.1:PORT or unix:PATH. Throws
 // std::runtime_error if it does not listen.
 std::string url_of(Process& daemon);
 

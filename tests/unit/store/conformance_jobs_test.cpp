@@ -153,7 +153,7 @@ TEST_P(JobConformance, AJobWithoutAMeshKeepsItsLastProgress) {
               jobs().finish(lease, failure());
             }),
             JobState::kCancelled);
-  // Whoever asked it to stop before it was put back would not do so again.
+  // Nobody asks for a stop again after the job was put back.
   EXPECT_EQ(end_by([&](const Lease& lease) {
               jobs().cancel("", lease.id);
               EXPECT_TRUE(jobs().put_back(lease, milliseconds(0)));

@@ -42,7 +42,7 @@ import {
 import { fragmentShader, vertexShader } from './live_shader';
 import { Painting } from './painting';
 
-// What the shader looks things up in.
+// The textures and buffers that the shader reads.
 interface Drawable {
   preview: Preview;
   samples: Data3DTexture;

@@ -103,7 +103,7 @@ vec4 shaded(vec3 p) {
   return vec4(colour * diffuse + 0.10 * shineOf(normal), 1.0);
 }
 
-// Where the ray leaves the block that it is in, and the values in that.
+// The place at which the ray leaves its block, and the values in that block.
 float blockEndAt(vec3 direction, float t, float stride, out vec2 range) {
   vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
   ivec3 block = ivec3(p / blockSize);

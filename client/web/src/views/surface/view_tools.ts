@@ -1,4 +1,4 @@
-// What all views of surfaces have: buttons for the camera, and its place in the address.
+// All views of surfaces have these: buttons for the camera, and its place in the address.
 import { placeToText, viewNames, viewTitles, type CameraPlace, type ViewName } from '../../scene/views';
 import { button } from '../../ui/dom';
 import { noteInAddress } from '../../ui/route';
