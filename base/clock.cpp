@@ -6,17 +6,16 @@
 #include <ctime>
 
 namespace isomesh {
-namespace {
 
-std::tm utc_of(std::chrono::system_clock::time_point time) {
+std::string utc_text(std::chrono::system_clock::time_point time, const char* format) {
   const std::time_t seconds =
       std::chrono::system_clock::to_time_t(std::chrono::floor<std::chrono::seconds>(time));
   std::tm parts = {};
   ::gmtime_r(&seconds, &parts);
-  return parts;
+  std::array<char, 40> text = {};
+  std::strftime(text.data(), text.size(), format, &parts);
+  return text.data();
 }
-
-}  // namespace
 
 std::string timestamp() { return timestamp_of(std::chrono::system_clock::now()); }
 
@@ -24,12 +23,9 @@ std::string timestamp_of(std::chrono::system_clock::time_point now) {
   const auto fraction = std::chrono::duration_cast<std::chrono::milliseconds>(
                             now - std::chrono::floor<std::chrono::seconds>(now))
                             .count();
-  const std::tm parts = utc_of(now);
-  std::array<char, 20> text = {};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
   std::array<char, 16> tail = {};
   std::snprintf(tail.data(), tail.size(), ".%03dZ", static_cast<int>(fraction % 1000));
-  return std::string(text.data()) + tail.data();
+  return utc_text(now, "%Y-%m-%dT%H:%M:%S") + tail.data();
 }
 
 std::chrono::system_clock::time_point time_of(std::string_view timestamp) {
@@ -48,10 +44,7 @@ std::chrono::system_clock::time_point time_of(std::string_view timestamp) {
 }
 
 std::string http_date_of(std::chrono::system_clock::time_point time) {
-  const std::tm parts = utc_of(time);
-  std::array<char, 40> text = {};
-  std::strftime(text.data(), text.size(), "%a, %d %b %Y %H:%M:%S GMT", &parts);
-  return text.data();
+  return utc_text(time, "%a, %d %b %Y %H:%M:%S GMT");
 }
 
 }  // namespace isomesh

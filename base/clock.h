@@ -14,6 +14,9 @@ std::string timestamp_of(std::chrono::system_clock::time_point time);
 // The inverse of timestamp_of; 1970 for an invalid text.
 std::chrono::system_clock::time_point time_of(std::string_view timestamp);
 
+// In UTC, in strftime's format, up to 39 characters. Thread safe.
+std::string utc_text(std::chrono::system_clock::time_point time, const char* format);
+
 // For a Date field (RFC 9110, 5.6.7): "Sun, 06 Nov 1994 08:49:37 GMT". Thread safe.
 std::string http_date_of(std::chrono::system_clock::time_point time);
 

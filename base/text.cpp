@@ -134,6 +134,20 @@ std::string in_quotes(std::string_view text) {
   return result + (text.size() > kLongest ? "...\"" : "\"");
 }
 
+std::string percent_encode(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string encoded;
+  for (const char c : text) {
+    if (is_plain(c) || c == '~') {
+      encoded += c;
+    } else {
+      const auto byte = static_cast<unsigned char>(c);
+      encoded.append({'%', kDigits[byte >> 4], kDigits[byte & 15]});
+    }
+  }
+  return encoded;
+}
+
 std::string axis_name(std::size_t axis) {
   return axis < 3 ? std::string(1, "ijk"[axis]) : std::to_string(axis + 1);
 }

@@ -15,6 +15,16 @@ namespace isomesh {
 std::string_view trimmed(std::string_view text);
 std::string lower(std::string_view text);  // ASCII only
 
+// In ASCII.
+constexpr bool is_letter_or_digit(char c) {
+  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+}
+
+// A letter, a digit, a dot, a dash or an underscore: a path and a file name take them as they are.
+constexpr bool is_plain(char c) {
+  return is_letter_or_digit(c) || c == '.' || c == '-' || c == '_';
+}
+
 // True if a UTF-8 text has characters that are invisible and not allowed in XML: control characters
 // other than tabs, or noncharacters (Unicode 15, 23.7).
 bool has_control_characters(std::string_view text);
@@ -43,6 +53,9 @@ std::string to_text(double value);
 
 // A header's value, safe to repeat to a client: printable ASCII, at most 40 characters, in quotes.
 std::string in_quotes(std::string_view text);
+
+// Encodes every byte that is not unreserved in RFC 3986 as %XX.
+std::string percent_encode(std::string_view text);
 
 // "i", "j" or "k", or "4", "5", ... beyond.
 std::string axis_name(std::size_t axis);

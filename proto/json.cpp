@@ -88,9 +88,6 @@ Job job_from_json(std::string_view text) { return from_text<Job>(text); }
 std::vector<UploadedVolume> uploaded_volumes_from_json(std::string_view text) {
   return from_text<std::vector<UploadedVolume>>(text, "volumes");
 }
-std::vector<Note> notes_from_json(std::string_view text) {
-  return from_text<std::vector<Note>>(text);
-}
 Problem problem_from_json(std::string_view text) { return from_text<Problem>(text); }
 Histogram histogram_from_json(std::string_view text) { return from_text<Histogram>(text); }
 VolumeLabels volume_labels_from_json(std::string_view text) {

@@ -44,7 +44,6 @@ std::string volume_name_to_json(const std::optional<std::string>& name);
 Volume volume_from_json(std::string_view text);
 Job job_from_json(std::string_view text);
 std::vector<UploadedVolume> uploaded_volumes_from_json(std::string_view text);
-std::vector<Note> notes_from_json(std::string_view text);
 Problem problem_from_json(std::string_view text);
 Histogram histogram_from_json(std::string_view text);
 VolumeLabels volume_labels_from_json(std::string_view text);

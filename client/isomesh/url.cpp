@@ -5,6 +5,7 @@
 
 #include <curl/curl.h>
 
+#include "base/text.h"
 #include "proto/error.h"
 
 namespace isomesh {
@@ -52,14 +53,6 @@ ServerAddress parse_server_address(std::string_view url) {
   const std::string origin(url.begin(), authority.end());
   check_host_and_port(origin);
   return {.origin = origin};
-}
-
-std::string percent_encode(std::string_view text) {
-  if (text.empty()) return {};  // libcurl takes a length of 0 for a null-terminated text
-  const std::unique_ptr<char, decltype(&curl_free)> encoded(
-      curl_easy_escape(nullptr, text.data(), static_cast<int>(text.size())), &curl_free);
-  if (!encoded) throw std::bad_alloc();
-  return encoded.get();
 }
 
 std::string path_segment(std::string_view text) {

@@ -20,9 +20,6 @@ struct ServerAddress {
 // ignored) or `unix:PATH`. Throws Error kInvalidParameter for anything else.
 ServerAddress parse_server_address(std::string_view url);
 
-// Encodes every byte of `text` that is not unreserved in RFC 3986 as %XX.
-std::string percent_encode(std::string_view text);
-
 // Encodes a segment of a path. Throws Error kInvalidParameter for text that is not an identifier
 // and would name another resource: empty, ".", ".." and text with a slash.
 std::string path_segment(std::string_view text);

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "base/text.h"
 #include "proto/parameters.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/encode_labels.h"
@@ -52,18 +54,13 @@ std::string usd_string(std::string_view text) {
   return result + '"';
 }
 
-bool is_letter_or_digit(char c) {
-  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-
 std::string material_of(const std::string& prim) { return prim + "_material"; }
 
 // A unique identifier in ASCII: other names need a reader of USD 24.03 or later. So is the name of
 // its material, which stands beside it.
 std::string prim_of(const LabelSummary& label, std::set<std::string>& taken) {
   std::string title = title_of(label);
-  std::ranges::replace_if(
-      title, [](char c) { return !is_letter_or_digit(c); }, '_');
+  std::ranges::replace_if(title, std::not_fn(is_letter_or_digit), '_');
   if (title.empty() || (title[0] >= '0' && title[0] <= '9')) title.insert(0, 1, '_');
   std::string prim = title;
   for (int more = 0; taken.contains(prim) || taken.contains(material_of(prim)); ++more) {

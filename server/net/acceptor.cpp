@@ -54,16 +54,13 @@ Acceptor::Acceptor(int listening, const AcceptorLimits& limits, FairPlaces& plac
       on_refused_(std::move(on_refused)),
       epoll_(new_epoll()) {
   ::fcntl(listening_, F_SETFL, ::fcntl(listening_, F_GETFL) | O_NONBLOCK);
-  isomesh::watch(epoll_, listening_, EPOLLIN, kListening);
-  isomesh::watch(epoll_, wakeup_.descriptor(), EPOLLIN, kWakeup);
+  watch_or_throw(epoll_.number(), listening_, EPOLLIN, kListening);
+  watch_or_throw(epoll_.number(), wakeup_.descriptor(), EPOLLIN, kWakeup);
   last_id_ = kWakeup;
   thread_ = std::jthread([this] { work(); });
 }
 
-Acceptor::~Acceptor() {
-  stop();
-  ::close(epoll_);
-}
+Acceptor::~Acceptor() { stop(); }
 
 void Acceptor::stop() {
   stopping_ = true;
@@ -75,7 +72,7 @@ void Acceptor::work() {
   std::array<epoll_event, kMostEvents> events = {};
   Clock::time_point last_tick = Clock::now();
   while (!stopping_) {
-    const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, kTickMilliseconds);
+    const int count = ::epoll_wait(epoll_.number(), events.data(), kMostEvents, kTickMilliseconds);
     bool has_new = false;
     for (int i = 0; i < count; ++i) {
       const std::uint64_t who = events.at(static_cast<std::size_t>(i)).data.u64;
@@ -216,7 +213,7 @@ bool Acceptor::is_complete(Pending& pending) {
 void Acceptor::watch(PendingList::iterator pending, Transfer::State wanted) {
   const auto events = wanted == Transfer::State::kWantsWrite ? EPOLLOUT : EPOLLIN;
   const int descriptor = pending->connection.stream->descriptor();
-  if (!isomesh::watch(epoll_, descriptor, events, pending->id,
+  if (!isomesh::watch(epoll_.number(), descriptor, events, pending->id,
                       std::exchange(pending->is_watched, true))) {
     close(pending);
   }
@@ -250,7 +247,7 @@ void Acceptor::hand_on(PendingList::iterator pending) {
   Connection connection = std::move(pending->connection);
   connection.body = std::move(pending->received);
   if (pending->is_watched) {
-    ::epoll_ctl(epoll_, EPOLL_CTL_DEL, connection.stream->descriptor(), nullptr);
+    ::epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, connection.stream->descriptor(), nullptr);
   }
   bytes_ -= connection.body.size();
   by_id_.erase(pending->id);
@@ -261,7 +258,8 @@ void Acceptor::hand_on(PendingList::iterator pending) {
 
 void Acceptor::refuse(PendingList::iterator pending, const Error& error) {
   const std::unique_ptr<ByteStream>& stream = pending->connection.stream;
-  if (pending->is_watched) ::epoll_ctl(epoll_, EPOLL_CTL_DEL, stream->descriptor(), nullptr);
+  if (pending->is_watched)
+    ::epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, stream->descriptor(), nullptr);
   on_refused_(std::move(pending->connection.stream), pending->connection.address, error);
   close(pending);
 }

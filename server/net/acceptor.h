@@ -98,7 +98,7 @@ class Acceptor {
   const StreamOf stream_of_;
   const OnRequest on_request_;
   const OnRefused on_refused_;
-  const int epoll_;
+  const Descriptor epoll_;
   Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;
   std::atomic<std::size_t> count_ = 0;  // size of pending_, for other threads

@@ -17,7 +17,7 @@ constexpr std::uint64_t kWakeup = 0;  // epoll's id; requests have higher ids
 }  // namespace
 
 Parked::Parked(HasEnded has_ended) : has_ended_(std::move(has_ended)), epoll_(new_epoll()) {
-  watch(epoll_, wakeup_.descriptor(), EPOLLIN, kWakeup);
+  watch_or_throw(epoll_.number(), wakeup_.descriptor(), EPOLLIN, kWakeup);
   thread_ = std::jthread([this] { work(); });
 }
 
@@ -26,7 +26,6 @@ Parked::~Parked() {
   stopping_ = true;
   wakeup_.ring();
   thread_.join();
-  ::close(epoll_);
 }
 
 void Parked::park(ParkedRequest request) {
@@ -40,7 +39,7 @@ void Parked::park(ParkedRequest request) {
     const std::uint64_t id = ++last_id_;
     // An unsupported descriptor is not watched.
     const bool is_watched =
-        request.descriptor >= 0 && watch(epoll_, request.descriptor, EPOLLRDHUP, id);
+        request.descriptor >= 0 && watch(epoll_.number(), request.descriptor, EPOLLRDHUP, id);
     if (!is_watched) request.descriptor = -1;
     requests_.emplace(id, std::move(request));
   }
@@ -80,13 +79,14 @@ void Parked::resume_if(const Predicate& is_over) {
 // Call before the descriptor is used elsewhere or closed.
 void Parked::unwatch(ParkedRequest& request) {
   const int descriptor = std::exchange(request.descriptor, -1);
-  if (descriptor >= 0) ::epoll_ctl(epoll_, EPOLL_CTL_DEL, descriptor, nullptr);
+  if (descriptor >= 0) ::epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, descriptor, nullptr);
 }
 
 void Parked::work() {
   std::array<epoll_event, kMostEvents> events = {};
   while (!stopping_) {
-    const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, milliseconds_to_next());
+    const int count =
+        ::epoll_wait(epoll_.number(), events.data(), kMostEvents, milliseconds_to_next());
     for (int i = 0; i < count; ++i) {
       const std::uint64_t who = events.at(static_cast<std::size_t>(i)).data.u64;
       if (who == kWakeup) {

@@ -56,7 +56,7 @@ class Parked {
   void resume_if(const Predicate& is_over) ISOMESH_EXCLUDES(mutex_);
 
   const HasEnded has_ended_;
-  const int epoll_;
+  const Descriptor epoll_;
   Wakeup wakeup_;
   std::atomic<bool> stopping_ = false;
   Mutex mutex_;

@@ -15,10 +15,6 @@ Error malformed(const std::string& what) {
   return {ErrorCode::kInvalidParameter, "the request is malformed: " + what};
 }
 
-bool is_letter_or_digit(char c) {
-  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-
 // A token: method or header name (RFC 9110, 5.6.2).
 bool is_token(std::string_view text) {
   constexpr std::string_view kOthers = "!#$%&'*+-.^_`|~";

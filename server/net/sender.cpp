@@ -57,14 +57,11 @@ Sender::Sender(const SenderLimits& limits)
       epoll_(new_epoll()),
       computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max(),
                  kComputingNiceness) {
-  isomesh::watch(epoll_, wakeup_.descriptor(), EPOLLIN, kWakeup);
+  watch_or_throw(epoll_.number(), wakeup_.descriptor(), EPOLLIN, kWakeup);
   thread_ = std::jthread([this] { work(); });
 }
 
-Sender::~Sender() {
-  stop(std::chrono::milliseconds(0));
-  ::close(epoll_);
-}
+Sender::~Sender() { stop(std::chrono::milliseconds(0)); }
 
 void Sender::send(Response response, bool request_is_whole) {
   if (is_sent(response, request_is_whole)) return;
@@ -108,7 +105,7 @@ void Sender::work() {
     }
     if (ending_ && (by_id_.empty() || now >= end)) break;
     const int patience = ending_ ? kTickMilliseconds / 20 : kTickMilliseconds;
-    const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, patience);
+    const int count = ::epoll_wait(epoll_.number(), events.data(), kMostEvents, patience);
     for (int i = 0; i < count; ++i) serve_event(events.at(static_cast<std::size_t>(i)));
   }
   by_id_.clear();
@@ -315,8 +312,8 @@ void Sender::close_overdue() {
 }
 
 bool Sender::watch(Sending& sending) {
-  return isomesh::watch(epoll_, sending.response.stream->descriptor(), sending.events, sending.id,
-                        std::exchange(sending.is_watched, true));
+  return isomesh::watch(epoll_.number(), sending.response.stream->descriptor(), sending.events,
+                        sending.id, std::exchange(sending.is_watched, true));
 }
 
 // Closing the descriptor removes it from epoll.

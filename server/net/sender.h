@@ -144,7 +144,7 @@ class Sender {
   void close(SendingList::iterator sending);
 
   const SenderLimits limits_;
-  const int epoll_;
+  const Descriptor epoll_;
   Wakeup wakeup_;
   std::atomic<std::size_t> count_ = 0;
   std::atomic<std::size_t> held_bytes_ = 0;

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 
@@ -81,6 +82,15 @@ class Inheritance {
 };
 
 }  // namespace
+
+void respond(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(kChildDescriptor, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) std::_Exit(EXIT_FAILURE);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
 
 SocketPair make_socket_pair() {
   std::array<int, 2> ends = {-1, -1};

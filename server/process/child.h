@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -20,6 +21,11 @@ namespace isomesh::process {
 // The socket's descriptor in a child. Its only others are standard input, output and error, which
 // are /dev/null.
 inline constexpr int kChildDescriptor = 3;
+
+// In a child: sends all of `bytes` to the daemon. Ends the process if the daemon has closed its
+// end.
+void respond(std::span<const std::byte> bytes);
+inline void respond(std::string_view text) { respond(std::as_bytes(std::span(text))); }
 
 // Interval at which a thread that waits for a child checks for a stop request.
 inline constexpr std::chrono::milliseconds kLook{100};

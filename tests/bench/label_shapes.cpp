@@ -238,12 +238,6 @@ LabelShape label_shape(const std::string& name, double radius, const ShapePoint&
   return makers().at(name)({radius, spacing, centre});
 }
 
-std::vector<std::string> label_shape_names() {
-  std::vector<std::string> names;
-  for (const auto& [name, maker] : makers()) names.push_back(name);
-  return names;
-}
-
 Samples sample_shape(const LabelShape& shape, const ShapePoint& spacing) {
   Samples samples;
   std::uint32_t* const counts[] = {&samples.dims.x, &samples.dims.y, &samples.dims.z};

@@ -28,13 +28,11 @@ struct LabelShape {
   double curve_length = 0;  // where three labels or more meet
 };
 
-// A shape by name, "ball" or another of label_shape_names(), of that size in the unit of the
+// A shape by name, "ball" or another of its table, of that size in the unit of the
 // spacing. `place`, from 0 on, moves it off the samples by a part of the spacing. Throws
 // std::out_of_range for another name.
 LabelShape label_shape(const std::string& name, double radius, const ShapePoint& spacing,
                        std::size_t place);
-
-std::vector<std::string> label_shape_names();
 
 // As uint8 with enough background around it that all its labels are closed.
 Samples sample_shape(const LabelShape& shape, const ShapePoint& spacing);

@@ -120,7 +120,7 @@ TEST_F(Queue, AJobHasMemoryOfItsOwn) {
 #endif
 }
 
-// The mesh does not fit; the job is run again when there is room, and no attempt is counted.
+// The mesh does not fit; the job is run again when there is room.
 TEST_F(Queue, AJobThatFindsTheDiskFullWaitsForRoom) {
   start({"--workers", "1"});
   const Volume volume = upload(daemon(), long_upload());

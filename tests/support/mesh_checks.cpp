@@ -272,6 +272,23 @@ testing::AssertionResult boundary_is_on_border(const Surface& surface, const mes
   return testing::AssertionSuccess();
 }
 
+void expect_layers(const mesh::Mesh& mesh) {
+  ASSERT_EQ(mesh.layer_vertices.size(), mesh.layer_triangles.size());
+  EXPECT_EQ(mesh.layer_vertices.front(), 0U);
+  EXPECT_EQ(mesh.layer_vertices.back(), mesh.positions.size());
+  EXPECT_EQ(mesh.layer_triangles.back(), mesh.triangles.size());
+  EXPECT_TRUE(std::ranges::is_sorted(mesh.layer_vertices));
+  for (std::size_t layer = 0; layer < mesh.layers(); ++layer) {
+    const std::uint64_t low = mesh.layer_vertices[layer];
+    const std::uint64_t high = mesh.layer_vertices[std::min(layer + 2, mesh.layers())];
+    for (const mesh::Triangle& triangle : mesh.triangles_of(layer, layer + 1)) {
+      for (const std::uint32_t vertex : triangle) {
+        ASSERT_TRUE(vertex >= low && vertex < high) << layer;
+      }
+    }
+  }
+}
+
 testing::AssertionResult same_bytes(const mesh::Mesh& a, const mesh::Mesh& b) {
   if (a.origin != b.origin) return testing::AssertionFailure() << "the origins differ";
   if (a.layer_vertices != b.layer_vertices || a.layer_triangles != b.layer_triangles) {

@@ -68,6 +68,9 @@ testing::AssertionResult boundary_is_on_border(const Surface& surface, const mes
                                                const mesh::LatticeToSpace& map,
                                                double tolerance = 1e-3);
 
+// Checks that the layers are as mesh.h has them.
+void expect_layers(const mesh::Mesh& mesh);
+
 // Compares every array byte by byte. The failure names the first that differs.
 testing::AssertionResult same_bytes(const mesh::Mesh& a, const mesh::Mesh& b);
 

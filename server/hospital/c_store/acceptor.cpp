@@ -58,11 +58,6 @@ bool has_hung_up(int peer) {
   return ::poll(&waiting, 1, 0) > 0;
 }
 
-void watch_or_throw(int epoll, int descriptor, std::uint32_t events, std::uint64_t who) {
-  if (watch(epoll, descriptor, events, who)) return;
-  throw Error(ErrorCode::kUnavailable, "a connection cannot be watched");
-}
-
 }  // namespace
 
 AssociationAcceptor::AssociationAcceptor(int listening, const AcceptorLimits& limits, Begin begin)

@@ -6,6 +6,7 @@
 
 #include "base/files.h"
 #include "base/ids.h"
+#include "base/text.h"
 
 namespace isomesh::dicomweb {
 namespace {
@@ -40,23 +41,6 @@ FoundSeries series_of(const PeersObject& object) {
           .modality = object.modality,
           .description = object.series_description,
           .instances = object.instances};
-}
-
-// Escapes a value for a query.
-std::string in_query(std::string_view text) {
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
-  std::string encoded;
-  for (const char c : text) {
-    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                          (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '_';
-    if (is_plain) {
-      encoded += c;
-    } else {
-      const auto byte = static_cast<unsigned char>(c);
-      encoded += {'%', kDigits[byte >> 4], kDigits[byte & 15]};
-    }
-  }
-  return encoded;
 }
 
 // The multipart body of an object as one stream.
@@ -164,8 +148,8 @@ std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
 std::vector<FoundSeries> DicomWeb::find_recent(const std::string& from_day,
                                                const std::string& modality,
                                                const std::stop_token& stop) {
-  std::string target = "/series?StudyDate=" + in_query(from_day) + "-&" + kSeriesFields;
-  if (!modality.empty()) target += "&Modality=" + in_query(modality);
+  std::string target = "/series?StudyDate=" + percent_encode(from_day) + "-&" + kSeriesFields;
+  if (!modality.empty()) target += "&Modality=" + percent_encode(modality);
   std::vector<FoundSeries> found;
   for (const PeersObject& object : search_all(target, &PeersObject::series, stop)) {
     if (!object.study.empty()) found.push_back(series_of(object));

@@ -36,15 +36,6 @@ std::string read_order() {
 
 int peer_socket() { return peer().number(); }
 
-void report(std::string_view line) {
-  while (!line.empty()) {
-    const ssize_t count = ::send(process::kChildDescriptor, line.data(), line.size(), MSG_NOSIGNAL);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) std::_Exit(EXIT_FAILURE);
-    line.remove_prefix(static_cast<std::size_t>(count));
-  }
-}
-
 process::DimseVerdict read_verdict() {
   char verdict = 0;
   ssize_t count = 0;

@@ -14,10 +14,8 @@ std::string read_order();
 
 int peer_socket();
 
-// Ends the process if the daemon has closed its socket.
-void report(std::string_view line);
-
-// The daemon's verdict on the object reported last. Ends the process as report() does.
+// The daemon's verdict on the object reported last. Ends the process if the daemon has closed its
+// end.
 process::DimseVerdict read_verdict();
 
 }  // namespace isomesh::dimse

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "server/hospital/dimse/associations.h"
 #include "server/hospital/dimse/daemon_channel.h"
+#include "server/process/child.h"
 #include "server/process/fork_server.h"
 #include "server/process/sandbox.h"
 
@@ -48,7 +49,7 @@ void serve_one() {
   const std::string line = dimse::read_order();
   if (line.empty()) return;
   const DimseOrder any_order = dimse_order_from(line);
-  dimse::report(to_line(std::visit(
+  respond(to_line(std::visit(
       [](const auto& order) {
         confine_to(confinement_of(order));
         return work_on(order);

@@ -22,6 +22,7 @@
 #include "server/hospital/dimse/associations.h"
 #include "server/hospital/dimse/daemon_channel.h"
 #include "server/hospital/objects/data_set.h"
+#include "server/process/child.h"
 #include "server/volume/object_classes.h"
 
 namespace isomesh::dimse {
@@ -293,7 +294,7 @@ DIC_US Association::status_of(const T_DIMSE_C_StoreRQ& request) {
       !is_uid(told.study) || !is_uid(told.series)) {
     return STATUS_STORE_Error_DataSetDoesNotMatchSOPClass;
   }
-  report(process::to_line(told));
+  process::respond(process::to_line(told));
   return read_verdict() == process::DimseVerdict::kStored ? STATUS_Success
                                                           : STATUS_STORE_Refused_OutOfResources;
 }

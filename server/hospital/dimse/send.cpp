@@ -15,7 +15,7 @@ namespace {
 using process::DimseEnd;
 using process::DimseSent;
 
-// Never resolved: talk.cpp has the connection.
+// Never resolved: daemon_channel.cpp has the connection.
 constexpr const char* kPeersAddress = "127.0.0.1:104";
 constexpr const char* kOurAddress = "isomesh";
 
@@ -28,8 +28,8 @@ struct EndAssociation {
 using Network = std::unique_ptr<T_ASC_Network, EndNetwork>;
 using Association = std::unique_ptr<T_ASC_Association, EndAssociation>;
 
-// DCMTK 3.6.9 requires a connection timeout; it has no effect, because talk.cpp is already
-// connected.
+// DCMTK 3.6.9 requires a connection timeout; it has no effect, because daemon_channel.cpp is
+// already connected.
 OFCondition make_parameters(T_ASC_Parameters** parameters) {
 #if PACKAGE_VERSION_NUMBER >= 369
   return ASC_createAssociationParameters(parameters, ASC_DEFAULTMAXPDU, dcmConnectionTimeout.get());

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <ctime>
 #include <utility>
 #include <vector>
 
+#include "base/clock.h"
 #include "proto/error.h"
 #include "proto/orders.h"
 #include "server/hospital/objects/data_set.h"
@@ -42,14 +42,7 @@ struct Moment {
 // In UTC. Without a time zone offset, because that would apply to the other times of the object
 // too.
 Moment moment_of(std::chrono::system_clock::time_point time) {
-  const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
-  std::tm parts = {};
-  ::gmtime_r(&seconds, &parts);
-  std::array<char, 16> date = {};
-  std::array<char, 16> clock = {};
-  std::strftime(date.data(), date.size(), "%Y%m%d", &parts);
-  std::strftime(clock.data(), clock.size(), "%H%M%S", &parts);
-  return {date.data(), clock.data()};
+  return {utc_text(time, "%Y%m%d"), utc_text(time, "%H%M%S")};
 }
 
 DataSet code_item(const DicomCode& code) {

@@ -159,11 +159,7 @@ void read_orders(Section section, HospitalSettings& settings) {
 void check_name(const Section& section, const std::string& name) {
   constexpr std::size_t kLongest = 40;
   section.require("name", name);
-  const bool is_plain = name.size() <= kLongest && std::ranges::all_of(name, [](char c) {
-                          return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                                 (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
-                        });
-  if (!is_plain) {
+  if (name.size() > kLongest || !std::ranges::all_of(name, is_plain)) {
     refuse(section.key_of("name"),
            "must have at most 40 characters: letters, digits, dots, dashes and underscores");
   }

@@ -1,6 +1,4 @@
 // Watches of rules, and the removal of old orders.
-#include <array>
-#include <ctime>
 #include <utility>
 
 #include "base/clock.h"
@@ -16,13 +14,7 @@ constexpr std::string_view kOwnModality = "M3D";
 
 // The day that many days ago (DA), minus one, because studies have dates without time zones.
 std::string day_before(store::Time now, std::uint32_t days) {
-  const std::time_t moment =
-      std::chrono::system_clock::to_time_t(now - std::chrono::days(days) - std::chrono::days(1));
-  std::tm parts = {};
-  ::gmtime_r(&moment, &parts);
-  std::array<char, 16> text = {};
-  std::strftime(text.data(), text.size(), "%Y%m%d", &parts);
-  return text.data();
+  return utc_text(now - std::chrono::days(days) - std::chrono::days(1), "%Y%m%d");
 }
 
 bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {

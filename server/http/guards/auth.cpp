@@ -12,41 +12,22 @@
 #include "base/hex.h"
 #include "base/ids.h"
 #include "base/sha256.h"
+#include "base/text.h"
 
 namespace isomesh::http {
 namespace {
-
-using Hash = std::array<std::uint8_t, Sha256::kBytes>;
 
 constexpr std::size_t kTokenBytes = 32;
 constexpr std::size_t kLongestName = 64;
 constexpr std::string_view kTokenPrefix =
     "isomesh_";  // lets secret scanners recognise leaked tokens
 
-Hash hash_of(std::string_view token) {
-  Sha256 digest;
-  digest.update(std::as_bytes(std::span(token)));
-  return digest.finish();
-}
-
 bool is_name(std::string_view text) {
-  return !text.empty() && text.size() <= kLongestName &&
-         std::ranges::all_of(text, [](unsigned char c) {
-           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                  c == '.' || c == '_' || c == '-';
-         });
+  return !text.empty() && text.size() <= kLongestName && std::ranges::all_of(text, is_plain);
 }
 
-std::optional<Hash> hash_from(std::string_view hex) {
-  Hash hash = {};
-  if (hex.size() != hash.size() * 2) return std::nullopt;
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  for (std::size_t i = 0; i < hex.size(); ++i) {
-    const std::size_t digit = kDigits.find(hex[i]);
-    if (digit == std::string_view::npos) return std::nullopt;
-    hash[i / 2] = static_cast<std::uint8_t>(hash[i / 2] << 4 | digit);
-  }
-  return hash;
+bool is_hash(std::string_view hex) {
+  return hex.size() == Sha256::kBytes * 2 && from_hex(hex).has_value();
 }
 
 Error at_fault(const std::string& what) { return invalid_parameter("tokens", what); }
@@ -97,18 +78,13 @@ void Tokens::reload() {
   ++loads_;
 }
 
-std::size_t Tokens::count() const {
-  const Lock lock(mutex_);
-  return entries_->size();
-}
-
 std::optional<Caller> Tokens::find(std::string_view token) const {
   std::shared_ptr<const Entries> entries;
   {
     const Lock lock(mutex_);
     entries = entries_;
   }
-  const Hash hash = hash_of(token);
+  const std::string hash = sha256_of(token);
   const Entry* found = nullptr;
   for (const Entry& entry : *entries) {
     if (CRYPTO_memcmp(entry.hash.data(), hash.data(), hash.size()) == 0) found = &entry;
@@ -131,14 +107,13 @@ Tokens::Entries Tokens::read() const {
     words >> name >> role_name >> hex >> more;
     if (name.empty() || name.starts_with('#')) continue;
     const auto role = role_from(role_name);
-    const auto hash = hash_from(hex);
-    if (!is_name(name) || !role || !hash || !more.empty()) {
+    if (!is_name(name) || !role || !is_hash(hex) || !more.empty()) {
       throw at_fault("line " + std::to_string(number) + " is not NAME ROLE HASH");
     }
     if (roles.emplace(name, *role).first->second != *role) {
       throw at_fault("line " + std::to_string(number) + " gives a name a second role");
     }
-    entries.push_back({{name, *role}, *hash});
+    entries.push_back({{name, *role}, hex});
   }
   // With authentication and no tokens the daemon would reject everybody.
   if (entries.empty()) throw at_fault("the file contains no token");
@@ -148,13 +123,7 @@ Tokens::Entries Tokens::read() const {
 std::optional<std::string> bearer_of(std::string_view authorization) {
   constexpr std::string_view kScheme = "bearer ";
   constexpr std::size_t kLongestToken = 512;
-  const bool is_bearer =
-      authorization.size() > kScheme.size() &&
-      std::ranges::equal(authorization.substr(0, kScheme.size()), kScheme,
-                         [](unsigned char c, char lower) {
-                           return (c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c) == lower;
-                         });
-  if (!is_bearer) return std::nullopt;
+  if (lower(authorization.substr(0, kScheme.size())) != kScheme) return std::nullopt;
   const std::size_t begin = authorization.find_first_not_of(' ', kScheme.size());
   if (begin == std::string_view::npos) return std::nullopt;
   const std::string_view token =
@@ -169,7 +138,7 @@ std::string token_line(const std::string& name, Role role, std::string_view toke
   if (!is_name(name)) {
     throw invalid_parameter("name", "must have 1 to 64 of the letters A-Z a-z 0-9 . _ -");
   }
-  return name + ' ' + std::string(to_string(role)) + ' ' + to_hex(hash_of(token));
+  return name + ' ' + std::string(to_string(role)) + ' ' + sha256_of(token);
 }
 
 }  // namespace isomesh::http

@@ -1,7 +1,6 @@
 // Authentication: bearer tokens from a file of their hashes.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -41,8 +40,6 @@ class Tokens {
   // Rereads the file. If that throws, the tokens stay unchanged.
   void reload();
 
-  std::size_t count() const;
-
   // Grows with each reload.
   std::uint64_t loads() const { return loads_; }
 
@@ -53,7 +50,7 @@ class Tokens {
  private:
   struct Entry {
     Caller caller;
-    std::array<std::uint8_t, 32> hash;
+    std::string hash;  // of the token, in hexadecimal
   };
   using Entries = std::vector<Entry>;
 

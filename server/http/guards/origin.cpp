@@ -2,10 +2,9 @@
 
 #include <algorithm>
 
-#include <arpa/inet.h>
-
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/net/address.h"
 
 namespace isomesh::http {
 namespace {
@@ -13,11 +12,7 @@ namespace {
 constexpr const char* kOrigin = "Origin";
 
 bool is_loopback_name(const std::string& host) {
-  in_addr v4 = {};
-  constexpr std::uint32_t kLoopbackNetwork = 127;
-  return host == "localhost" || host == "[::1]" ||
-         (::inet_pton(AF_INET, host.c_str(), &v4) == 1 &&
-          ntohl(v4.s_addr) >> 24 == kLoopbackNetwork);
+  return host == "[::1]" || net::Address{.host = host, .unix_path = {}}.is_loopback();
 }
 
 bool is_allowed(const OriginRules& rules, std::string_view origin) {

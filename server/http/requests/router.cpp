@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/text.h"
+
 namespace isomesh::http {
 namespace {
 
@@ -19,10 +21,7 @@ std::vector<std::string_view> segments_of(std::string_view path) {
 }
 
 bool is_parameter(std::string_view text) {
-  return !text.empty() && text.size() <= kLongestParameter && std::ranges::all_of(text, [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  });
+  return !text.empty() && text.size() <= kLongestParameter && std::ranges::all_of(text, is_plain);
 }
 
 }  // namespace

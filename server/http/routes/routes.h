@@ -1,4 +1,4 @@
-// Helpers for routes. Private to server/http.
+// Helpers for routes.
 #pragma once
 
 #include <chrono>

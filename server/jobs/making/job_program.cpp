@@ -57,20 +57,11 @@ class Speaker {
   void say(const JobAnswer& answer, std::span<const std::byte> piece = {}) {
     const std::string line = to_line(answer);
     const Lock lock(mutex_);
-    write(std::as_bytes(std::span(line)));
-    write(piece);
+    process::respond(line);
+    process::respond(piece);
   }
 
  private:
-  static void write(std::span<const std::byte> bytes) {
-    while (!bytes.empty()) {
-      const ssize_t count = ::write(process::kChildDescriptor, bytes.data(), bytes.size());
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) std::_Exit(EXIT_FAILURE);  // the daemon is gone
-      bytes = bytes.subspan(static_cast<std::size_t>(count));
-    }
-  }
-
   Mutex mutex_;
 };
 

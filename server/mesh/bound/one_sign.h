@@ -23,11 +23,6 @@ class OneSign {
   bool along(Vecd p, Vecd q) const;
   bool within(Vecd a, Vecd b, Vecd c) const;
 
-  // All tests for a whole triangle.
-  bool all_over(Vecd a, Vecd b, Vecd c) const {
-    return at(a) && at(b) && at(c) && along(a, b) && along(b, c) && along(c, a) && within(a, b, c);
-  }
-
  private:
   const Field& field_;
   const double sign_;

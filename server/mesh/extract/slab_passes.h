@@ -1,5 +1,5 @@
 // The three passes over the slabs of whatever is marched over, an iso-value's samples or labels;
-// private to this folder.
+// private to the kernels.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The first and the third pass of extraction on one slab of layers, compiled for several
-// instruction sets of which the best is chosen when the program runs; private to this folder.
+// instruction sets of which the best is chosen when the program runs; private to the kernels.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// From a sample's value to the number of its part; private to this folder.
+// From a sample's value to the number of its part; private to the kernels.
 #pragma once
 
 #include <algorithm>

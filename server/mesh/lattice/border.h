@@ -1,4 +1,4 @@
-// Vertices of a closed surface on the border of the volume; private to this folder.
+// Vertices of a closed surface on the border of the volume; private to the kernels.
 //
 // A surface is closed by one more layer of samples around the volume, phantoms that are outside. An
 // edge from an inside sample `a` to a phantom is crossed, and its vertex belongs to the cap. A

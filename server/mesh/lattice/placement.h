@@ -1,4 +1,4 @@
-// The position of a vertex on a lattice edge; private to this folder.
+// The position of a vertex on a lattice edge; private to the kernels.
 #pragma once
 
 #include <algorithm>

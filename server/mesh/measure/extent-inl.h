@@ -1,4 +1,4 @@
-// Area, enclosed volume and bounds of a layer; private to this folder. All measurements use it,
+// Area, enclosed volume and bounds of a layer; private to the kernels. All measurements use it,
 // layer by layer, so the same mesh always has the same figures.
 #pragma once
 

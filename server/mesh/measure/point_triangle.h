@@ -1,5 +1,5 @@
-// Distance from a point to a triangle, and the cubes that a triangle reaches; private to this
-// folder.
+// Distance from a point to a triangle, and the cubes that a triangle reaches; private to the
+// kernels.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The layers of a mesh that has lost vertices; private to this folder.
+// The layers of a mesh that has lost vertices; private to the kernels.
 #pragma once
 
 #include <vector>

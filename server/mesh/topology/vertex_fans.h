@@ -1,4 +1,4 @@
-// Checks the triangles around a vertex for being a manifold; private to this folder.
+// Checks the triangles around a vertex for being a manifold; private to the kernels.
 #pragma once
 
 #include <array>

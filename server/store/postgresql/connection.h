@@ -1,5 +1,4 @@
-// Connections, statements and transactions of PostgreSQL for the interface in sql.h. Private to
-// this folder.
+// Connections, statements and transactions of PostgreSQL for the interface in sql.h.
 #pragma once
 
 #include <chrono>

@@ -24,11 +24,10 @@ std::string random_uuid() {
 
 constexpr std::int64_t kToleranceUs = 1'000'000;
 
-std::int64_t to_steady_us(std::chrono::steady_clock::time_point time) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
+std::int64_t steady_us() {
+  const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(since_start).count();
 }
-
-std::int64_t steady_us() { return to_steady_us(std::chrono::steady_clock::now()); }
 
 // Names have any characters, and the server would reject those that its encoding lacks. SQL_ASCII
 // stores bytes as they are.
@@ -102,10 +101,6 @@ Time Database::from_us(std::int64_t us) const { return store::from_us(us - shift
 
 std::chrono::steady_clock::time_point Database::steady_of(std::int64_t us) const {
   return std::chrono::steady_clock::time_point(std::chrono::microseconds(us - beyond_steady_us_));
-}
-
-std::int64_t Database::us_of(std::chrono::steady_clock::time_point time) const {
-  return to_steady_us(time) + beyond_steady_us_;
 }
 
 // The measurement with the shortest round trip is the most accurate of several. The database's time

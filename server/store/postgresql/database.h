@@ -77,7 +77,6 @@ class Database : public SqlDatabase {
   std::size_t most_at_once() const override { return 1; }
   // The steady clock's value at that time.
   std::chrono::steady_clock::time_point steady_of(std::int64_t us) const;
-  std::int64_t us_of(std::chrono::steady_clock::time_point time) const;
 
  private:
   // A connection borrowed from the pool until destruction.

@@ -1,11 +1,10 @@
 #include "server/store/s3/address.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/files.h"
 #include "base/hex.h"
@@ -76,16 +75,6 @@ void check_credentials(const S3Credentials& credentials, const std::string& wher
     throw invalid_parameter("blob-credentials",
                             where + " must contain an access key and a secret key");
   }
-}
-
-// For example 20130524T000000Z.
-std::string compact_time(std::chrono::system_clock::time_point time) {
-  const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
-  std::tm utc = {};
-  ::gmtime_r(&seconds, &utc);
-  std::array<char, 32> text = {};
-  std::strftime(text.data(), text.size(), "%Y%m%dT%H%M%SZ", &utc);
-  return text.data();
 }
 
 }  // namespace
@@ -164,38 +153,22 @@ S3Credentials read_s3_credentials(const std::filesystem::path& file) {
   return credentials;
 }
 
-std::string uri_escaped(std::string_view text) {
-  constexpr std::string_view kBare =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
-  std::string escaped;
-  for (const char c : text) {
-    if (kBare.find(c) != kBare.npos) {
-      escaped += c;
-    } else {
-      const auto byte = static_cast<unsigned char>(c);
-      escaped.append({'%', kDigits[byte >> 4], kDigits[byte & 15]});
-    }
-  }
-  return escaped;
-}
-
 std::string presigned_url(const S3Address& address, const S3Credentials& credentials,
                           const std::string& key, const LinkedAs& as,
                           std::chrono::system_clock::time_point from) {
-  const std::string time = compact_time(from);
+  const std::string time = utc_text(from, "%Y%m%dT%H%M%SZ");
   const std::string day = time.substr(0, 8);
   const std::string scope = day + '/' + address.region + "/s3/aws4_request";
   const std::string disposition = "attachment; filename=\"" + as.name + '"';
   // Sorted by name, as the signature requires.
   std::string query = "X-Amz-Algorithm=AWS4-HMAC-SHA256&X-Amz-Credential=" +
-                      uri_escaped(credentials.access_key + '/' + scope) + "&X-Amz-Date=" + time +
+                      percent_encode(credentials.access_key + '/' + scope) + "&X-Amz-Date=" + time +
                       "&X-Amz-Expires=" + std::to_string(as.lasts.count());
   if (!credentials.session_token.empty()) {
-    query += "&X-Amz-Security-Token=" + uri_escaped(credentials.session_token);
+    query += "&X-Amz-Security-Token=" + percent_encode(credentials.session_token);
   }
-  query += "&X-Amz-SignedHeaders=host&response-content-disposition=" + uri_escaped(disposition) +
-           "&response-content-type=" + uri_escaped(as.media_type);
+  query += "&X-Amz-SignedHeaders=host&response-content-disposition=" + percent_encode(disposition) +
+           "&response-content-type=" + percent_encode(as.media_type);
   const std::string path = address.path + '/' + key;
   const std::string host = address.endpoint.substr(address.endpoint.find("://") + 3);
   const std::string request =

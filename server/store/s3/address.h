@@ -38,9 +38,6 @@ struct S3Credentials {
 // kInvalidParameter for "blob-credentials", never with the file's content.
 S3Credentials read_s3_credentials(const std::filesystem::path& file);
 
-// Escapes all but letters, digits and "-._~" as %XX.
-std::string uri_escaped(std::string_view text);
-
 // A presigned URL at which anybody can fetch the object from now on, for the time in `as` (AWS
 // Signature Version 4 in the query). `key` includes the prefix.
 std::string presigned_url(const S3Address& address, const S3Credentials& credentials,

@@ -92,9 +92,4 @@ void BlobCache::keep_only(const std::function<bool(const std::string& key)>& sta
   }
 }
 
-std::uint64_t BlobCache::bytes() const {
-  const Lock lock(mutex_);
-  return bytes_;
-}
-
 }  // namespace isomesh::store

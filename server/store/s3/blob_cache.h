@@ -41,8 +41,6 @@ class BlobCache {
   // Removes copies for which `stays` returns false, unless they are in use.
   void keep_only(const std::function<bool(const std::string& key)>& stays);
 
-  std::uint64_t bytes() const;
-
  private:
   struct Copy {
     std::uint64_t bytes = 0;  // 0: there may be no copy
@@ -57,7 +55,7 @@ class BlobCache {
 
   FileBlobStore files_;
   const std::uint64_t most_bytes_;
-  mutable Mutex mutex_;
+  Mutex mutex_;
   std::map<std::string, Copy> copies_ ISOMESH_GUARDED_BY(mutex_);
   std::uint64_t bytes_ ISOMESH_GUARDED_BY(mutex_) = 0;
   std::uint64_t uses_ ISOMESH_GUARDED_BY(mutex_) = 0;  // counter of uses

@@ -254,7 +254,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
     throw Error(ErrorCode::kUnavailable,
                 "the storage of volumes and meshes does not accept multipart uploads");
   }
-  const std::string upload = "uploadId=" + uri_escaped(id);
+  const std::string upload = "uploadId=" + percent_encode(id);
   try {
     const std::uint64_t part_bytes = std::max(options_.part_bytes, blob.bytes / kMostParts + 1);
     std::string parts;
@@ -362,8 +362,8 @@ void S3Client::try_to_erase(const std::string& key) {
 // libcurl 8.14 signs as a space.
 S3Request S3Client::listing(const std::string& beginning, const std::string& last, int most) const {
   std::string query = "list-type=2&max-keys=" + std::to_string(most) +
-                      "&prefix=" + uri_escaped(options_.address.prefix + beginning);
-  if (!last.empty()) query += "&start-after=" + uri_escaped(options_.address.prefix + last);
+                      "&prefix=" + percent_encode(options_.address.prefix + beginning);
+  if (!last.empty()) query += "&start-after=" + percent_encode(options_.address.prefix + last);
   return {.query = std::move(query)};
 }
 

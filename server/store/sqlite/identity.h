@@ -34,9 +34,6 @@ class Identity {
   // no space for that, the next call retries. Call about every minute.
   Time now();
 
-  // True if the system's clock deviates from the believed time.
-  bool doubts_clock() const { return clock_.doubt() != BelievedClock::Doubt::kNone; }
-
  private:
   struct Mark {
     std::string id;  // empty: not marked yet

@@ -36,5 +36,13 @@ TEST(Text, HalfACharacterIsNoControlCharacter) {
   }
 }
 
+TEST(Text, PercentEncodingKeepsOnlyWhatIsUnreserved) {
+  EXPECT_EQ(percent_encode(""), "");
+  EXPECT_EQ(percent_encode("azAZ09-._~"), "azAZ09-._~");
+  EXPECT_EQ(percent_encode("/?#%&=+ ,:\n"), "%2F%3F%23%25%26%3D%2B%20%2C%3A%0A");
+  EXPECT_EQ(percent_encode("\xc3\xa4"), "%C3%A4");
+  EXPECT_EQ(percent_encode(std::string_view("a\0b", 3).substr(0, 2)), "a%00");
+}
+
 }  // namespace
 }  // namespace isomesh

@@ -20,20 +20,6 @@ namespace {
 
 using test::SampleVolume;
 
-// The layers of a label's own surface are as mesh.h has them.
-void expect_layers(const Mesh& mesh) {
-  ASSERT_EQ(mesh.layer_vertices.back(), mesh.positions.size());
-  ASSERT_EQ(mesh.layer_triangles.back(), mesh.triangles.size());
-  for (std::size_t k = 0; k < mesh.layers(); ++k) {
-    for (const Triangle& triangle : mesh.triangles_of(k, k + 1)) {
-      for (const std::uint32_t v : triangle) {
-        ASSERT_GE(v, mesh.layer_vertices[k]);
-        ASSERT_LT(v, mesh.layer_vertices[std::min(k + 2, mesh.layers())]);
-      }
-    }
-  }
-}
-
 TEST(LabelSurface, IsSoundAndClosedWhateverTheLabelsAre) {
   for (std::size_t count = 2; count < 10; ++count) {
     const auto volume = label_noise(count, {9, 8, 7}, 90 + count, test::oblique_geometry());
@@ -43,7 +29,7 @@ TEST(LabelSurface, IsSoundAndClosedWhateverTheLabelsAre) {
       const SeparatingSurface surface = separated(volume, options);
       for (std::size_t number = 1; number < count; ++number) {
         const Mesh mesh = label_mesh(surface, number);
-        expect_layers(mesh);
+        test::expect_layers(mesh);
         const test::Surface own = test::surface_of(mesh);
         ASSERT_TRUE(test::is_sound(own));
         if (options.close) {

@@ -14,6 +14,7 @@
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
+#include "tests/support/points.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::mesh {
@@ -38,10 +39,6 @@ Mesh ball() {
 Mesh noise(bool regularize, bool close) {
   return test::extracted(test::noise<std::uint8_t>({0, 1, 2, 3}, {40, 19, 34}, 31),
                          {.iso = 2, .close = close, .regularize = regularize});
-}
-
-double distance(const Vec3& a, const Vec3& b) {
-  return std::hypot(double{a[0]} - b[0], double{a[1]} - b[1], double{a[2]} - b[2]);
 }
 
 TEST(MethodOf, FindsEachByItsName) {
@@ -113,7 +110,7 @@ TEST_P(SmoothingMethods, MovesNoVertexFartherThanIsAllowed) {
     const SmoothingEffect effect = smooth(options, {}, mesh);
     double largest = 0;
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-      largest = std::max(largest, distance(mesh.positions[v], before.positions[v]));
+      largest = std::max(largest, test::distance(mesh.positions[v], before.positions[v]));
     }
     EXPECT_LE(largest, most * (1 + 1e-12));
     EXPECT_NEAR(effect.max_displacement_mm, largest, 1e-9);

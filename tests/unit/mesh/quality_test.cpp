@@ -14,23 +14,22 @@
 #include "server/mesh/smooth/smooth.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
+#include "tests/support/points.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::mesh {
 namespace {
 
 using test::copy_of;
+using test::cross;
+using test::dot;
+using test::length;
 using test::method_options;
+using test::minus;
 using test::Point;
 
-Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Point plus(const Point& a, const Point& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 Point times(double s, const Point& a) { return {s * a[0], s * a[1], s * a[2]}; }
-double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double length(const Point& a) { return std::sqrt(dot(a, a)); }
-Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 Point unit(const Point& a) { return length(a) > 0 ? times(1 / length(a), a) : a; }
 Point point(const Vec3& a) { return {a[0], a[1], a[2]}; }
 

@@ -58,23 +58,6 @@ std::array<std::uint64_t, 2> sizes(const Mesh& mesh) {
   return {mesh.positions.size(), mesh.triangles.size()};
 }
 
-void expect_layers(const Mesh& mesh) {
-  ASSERT_EQ(mesh.layer_vertices.size(), mesh.layer_triangles.size());
-  EXPECT_EQ(mesh.layer_vertices.front(), 0U);
-  EXPECT_EQ(mesh.layer_vertices.back(), mesh.positions.size());
-  EXPECT_EQ(mesh.layer_triangles.back(), mesh.triangles.size());
-  EXPECT_TRUE(std::ranges::is_sorted(mesh.layer_vertices));
-  for (std::size_t layer = 0; layer < mesh.layers(); ++layer) {
-    const std::uint64_t low = mesh.layer_vertices[layer];
-    const std::uint64_t high = mesh.layer_vertices[std::min(layer + 2, mesh.layers())];
-    for (const Triangle& triangle : mesh.triangles_of(layer, layer + 1)) {
-      for (const std::uint32_t vertex : triangle) {
-        ASSERT_TRUE(vertex >= low && vertex < high) << layer;
-      }
-    }
-  }
-}
-
 // The surface within the error of what it was, and of the same kind.
 void expect_simplified(const Mesh& mesh, const Mesh& original, double max_error_mm) {
   const Certificate certificate = certify(mesh, original, {});
@@ -84,7 +67,7 @@ void expect_simplified(const Mesh& mesh, const Mesh& original, double max_error_
   EXPECT_EQ(after, before);
   EXPECT_TRUE(after.manifold && after.oriented);
   EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
-  expect_layers(mesh);
+  test::expect_layers(mesh);
 }
 
 TEST(Simplify, KeepsWithinTheErrorBothWaysAndTheSurfaceOfItsKind) {
@@ -112,7 +95,7 @@ TEST(Simplify, KeepsNoiseOfItsKind) {
     EXPECT_LT(mesh.triangles.size(), original.triangles.size());
     EXPECT_LE(certify(mesh, original, {}).max_mm(), error);
     EXPECT_EQ(measure_topology(mesh, {}), measure_topology(original, {}));
-    expect_layers(mesh);
+    test::expect_layers(mesh);
   }
 }
 
@@ -222,7 +205,7 @@ TEST(Simplify, ReachesEveryNumberThatTheSurfaceCanHave) {
     EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
     EXPECT_GT(measure_extent(mesh, {}).volume_mm3, 0);
     expect_no_doubles(mesh);
-    expect_layers(mesh);
+    test::expect_layers(mesh);
   }
 }
 

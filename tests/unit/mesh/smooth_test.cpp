@@ -11,6 +11,7 @@
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti.h"
+#include "tests/support/points.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::mesh {
@@ -291,10 +292,6 @@ void expect_same(const Extent& a, const Extent& b) {
   EXPECT_EQ(a.high, b.high);
 }
 
-double distance(const Vec3& a, const Vec3& b) {
-  return std::hypot(double{a[0]} - b[0], double{a[1]} - b[1], double{a[2]} - b[2]);
-}
-
 class SmoothEffect : public testing::TestWithParam<int> {};
 
 TEST_P(SmoothEffect, IsWhatMeasuringTheMeshesBeforeAndAfterSays) {
@@ -310,7 +307,7 @@ TEST_P(SmoothEffect, IsWhatMeasuringTheMeshesBeforeAndAfterSays) {
       double sum = 0;
       double largest = 0;
       for (std::size_t v = 0; v < before.positions.size(); ++v) {
-        const double way = distance(before.positions[v], after.positions[v]);
+        const double way = test::distance(before.positions[v], after.positions[v]);
         sum += way;
         largest = std::max(largest, way);
       }
@@ -336,7 +333,7 @@ TEST_P(SmoothWithin, MovesNoVertexFarther) {
       const Mesh after = smoothed(before, options);
       double largest = 0;
       for (std::size_t v = 0; v < before.positions.size(); ++v) {
-        largest = std::max(largest, distance(before.positions[v], after.positions[v]));
+        largest = std::max(largest, test::distance(before.positions[v], after.positions[v]));
       }
       EXPECT_LE(largest, limit * (1 + 1e-12));
       Mesh copy = copy_of(before);

@@ -56,10 +56,6 @@ export class Rulers {
     return this.rulers;
   }
 
-  get isPending(): boolean {
-    return this.pending !== null;
-  }
-
   // Every second point ends a ruler, which is returned.
   add(point: Vec3): Ruler | null {
     if (this.pending === null) {

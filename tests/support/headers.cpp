@@ -1,1 +1,0 @@
-// This library exists only for the precompiled header that test programs share.
