@@ -18,6 +18,7 @@
 #include "server/import/dicom/elements/text.h"
 #include "server/import/import.h"
 #include "server/import/peers/response.h"
+#include "server/process/child.h"
 #include "server/process/fork_server.h"
 #include "server/process/import_message.h"
 #include "server/process/sandbox.h"
@@ -36,15 +37,6 @@ std::string read_order() {
     if (count < 0) throw_system_error("read", errno);
     if (count == 0) return text;
     text.append(piece.data(), static_cast<std::size_t>(count));
-  }
-}
-
-void say(std::string_view message) {
-  while (!message.empty()) {
-    const ssize_t count = ::write(kChildDescriptor, message.data(), message.size());
-    // The daemon has closed its end: it has cancelled this import.
-    if (count < 0) std::_Exit(EXIT_FAILURE);
-    message.remove_prefix(static_cast<std::size_t>(count));
   }
 }
 
@@ -68,7 +60,7 @@ Confinement confinement_of(const ImportOrder& order) {
 
 std::string read(const ImportOrder& order) {
   return volume_message(import::import_volume(
-      order.task, [](std::string_view format) { say(reading_message(format)); }));
+      order.task, [](std::string_view format) { respond(reading_message(format)); }));
 }
 
 std::string read(const ResponseOrder& order) {
@@ -84,7 +76,7 @@ std::string read_as_ordered(const std::string& message) {
         [&](const auto& order) {
           memory_bytes = order.bounds.memory_bytes;
           confine_to(confinement_of(order));
-          say(begun_message());
+          respond(begun_message());
           return read(order);
         },
         any_order);
@@ -107,7 +99,7 @@ void import_one() {
   const std::string order = read_order();
   // The daemon does not need this process any more.
   if (order.empty()) return;
-  say(read_as_ordered(order));
+  respond(read_as_ordered(order));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <functional>
 #include <memory>
 #include <set>
 #include <span>
@@ -61,13 +62,7 @@ bool is_hidden(std::string_view name) {
 std::string plain_name(std::string_view name) {
   constexpr std::size_t kLongest = 100;
   std::string plain(base_of(name).substr(0, kLongest));
-  std::ranges::replace_if(
-      plain,
-      [](char c) {
-        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-        return !letter && !(c >= '0' && c <= '9') && c != '.' && c != '-' && c != '_';
-      },
-      '_');
+  std::ranges::replace_if(plain, std::not_fn(is_plain), '_');
   return plain;
 }
 

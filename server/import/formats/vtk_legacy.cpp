@@ -11,7 +11,6 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/vtk.h"
-#include "server/import/formats/vtk_arrays.h"
 
 namespace isomesh::import {
 namespace {

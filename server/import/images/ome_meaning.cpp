@@ -1,5 +1,3 @@
-#include "server/import/images/ome_meaning.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -13,7 +11,7 @@
 
 #include "base/text.h"
 #include "base/xml_reader.h"
-#include "server/import/images/tiff_description.h"
+#include "server/import/images/tiff_meaning.h"
 #include "server/import/source/names.h"
 
 namespace isomesh::import {

@@ -101,8 +101,11 @@ StoredType type_of(TIFF* tiff) {
     if (bits == 16) return is_signed ? StoredType::kInt16 : StoredType::kUint16;
     if (bits == 32) return is_signed ? StoredType::kInt32 : StoredType::kUint32;
   }
-  throw_unusable("The TIFF image's samples of " + std::to_string(bits) +
-                 " bits are not supported. 8, 16 and 32 bits, and floats of 32 and 64 are.");
+  throw_unusable("The TIFF image's samples are " +
+                 std::string(format == SAMPLEFORMAT_IEEEFP ? "floats of " : "of ") +
+                 std::to_string(bits) +
+                 " bits, which is not supported. Integers of 8, 16 and 32 bits, and floats of 32 "
+                 "and 64 bits are.");
 }
 
 PageLayout layout_of(TIFF* tiff) {
@@ -111,6 +114,11 @@ PageLayout layout_of(TIFF* tiff) {
   if (components != 1 ||
       (photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE)) {
     throw_unusable("The TIFF image has colours or a palette. Only grey images are supported.");
+  }
+  if (field<std::uint32_t>(tiff, TIFFTAG_IMAGEDEPTH) > 1) {
+    throw_unusable(
+        "The TIFF image has several planes in a page (ImageDepth), which is not "
+        "supported. Save each plane as a page.");
   }
   const PageLayout layout = {field<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH),
                              field<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH), type_of(tiff)};
@@ -224,6 +232,15 @@ class TiffFile::Library {
     return TIFFGetField(tiff_, TIFFTAG_IMAGEDESCRIPTION, &text) == 1 ? text : "";
   }
 
+  // Empty unless the file is of a Zeiss LSM.
+  std::string_view lsm_information() const {
+    constexpr std::uint32_t kInformation = 34412;
+    std::uint32_t count = 0;
+    const char* bytes = nullptr;
+    if (TIFFGetField(tiff_, kInformation, &count, &bytes) != 1) return {};
+    return {bytes, count};
+  }
+
   void check_corner(const Corner& corner) {
     if (first_corner_.value_or(corner) != corner) {
       throw_unusable("The pages of the TIFF differ in their orientation.");
@@ -271,9 +288,10 @@ class TiffFile::Library {
   }
 
  private:
-  // ImageJ stores large stacks with one page only, and the other planes behind its own.
+  // ImageJ stores large stacks with one page only, and the other planes behind its own. So does
+  // tifffile if it is asked to.
   std::uint64_t planes_behind() const {
-    const std::uint64_t images = imagej_images(description());
+    const std::uint64_t images = images_behind_page(description());
     if (images <= 1 || TIFFIsTiled(tiff_) != 0 || corner_of(tiff_) != Corner{} ||
         field<std::uint16_t>(tiff_, TIFFTAG_COMPRESSION) != COMPRESSION_NONE) {
       return 0;
@@ -316,6 +334,7 @@ TiffMeaning TiffFile::meaning() {
   library_->go_to(0);
   const TiffResolution resolution = {field<float>(library_->tiff(), TIFFTAG_XRESOLUTION),
                                      field<float>(library_->tiff(), TIFFTAG_YRESOLUTION)};
+  if (auto meaning = lsm_meaning(library_->lsm_information())) return *meaning;
   return tiff_meaning(library_->description(), resolution, pages());
 }
 

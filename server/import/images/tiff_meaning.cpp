@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <set>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "base/text.h"
-#include "server/import/images/ome_meaning.h"
-#include "server/import/images/tiff_description.h"
+#include "proto/error.h"
 #include "server/import/source/names.h"
 #include "server/import/source/source.h"
 
@@ -156,32 +157,55 @@ std::optional<TiffMeaning> scifio_meaning(std::string_view description, std::uin
   return meaning;
 }
 
-// From the shape of an array, which ends in y and x, and the names of its axes, if they are known.
-std::optional<TiffMeaning> tifffile_meaning(std::string_view description, std::uint64_t pages) {
+struct TifffileArray {
+  std::vector<std::uint64_t> shape;  // ends in y and x
+  std::string axes;                  // one letter for each; empty if they are not known
+  bool is_truncated = false;         // only the first plane has a page
+};
+
+std::optional<TifffileArray> tifffile_array(std::string_view description) {
   constexpr std::size_t kLongest = std::size_t{1} << 20;  // tifffile's are below 1 kB
-  if (description.size() > kLongest) return std::nullopt;
+  if (!description.starts_with('{') || description.size() > kLongest) return std::nullopt;
   const auto document = nlohmann::json::parse(description, nullptr, false);
   if (!document.is_object() || !document.contains("shape")) return std::nullopt;
-  std::vector<std::uint64_t> shape;
+  TifffileArray array;
   for (const auto& size : document["shape"]) {
     if (!size.is_number_unsigned()) return std::nullopt;
-    shape.push_back(described_count(size.dump(), 1));
+    array.shape.push_back(described_count(size.dump(), 1));
   }
-  std::string names = document.contains("axes") && document["axes"].is_string()
-                          ? document["axes"].get<std::string>()
-                          : "";
-  if (names.size() != shape.size()) names.clear();
-  if (names.ends_with('S')) {
-    names.pop_back();
-    shape.pop_back();
+  if (document.contains("axes") && document["axes"].is_string()) array.axes = document["axes"];
+  if (array.axes.size() != array.shape.size()) array.axes.clear();
+  if (array.axes.ends_with('S')) {
+    array.axes.pop_back();
+    array.shape.pop_back();
   }
-  if (shape.size() < 2 || (!names.empty() && !names.ends_with("YX"))) return std::nullopt;
+  array.is_truncated = document.contains("truncated") && document["truncated"] == true;
+  if (array.shape.size() < 2 || (!array.axes.empty() && !array.axes.ends_with("YX"))) {
+    return std::nullopt;
+  }
+  return array;
+}
+
+std::optional<TiffMeaning> tifffile_meaning(std::string_view description, std::uint64_t pages) {
+  const auto array = tifffile_array(description);
+  if (!array) return std::nullopt;
   std::vector<PageAxis> axes;
-  for (std::size_t at = shape.size() - 2; at-- > 0;) {
-    const bool is_known = !names.empty() && std::string_view("ZCT").find(names[at]) != names.npos;
-    axes.push_back({is_known ? names[at] : '?', shape[at]});
+  for (std::size_t at = array->shape.size() - 2; at-- > 0;) {
+    const bool is_known =
+        !array->axes.empty() && std::string_view("ZCT").find(array->axes[at]) != std::string::npos;
+    axes.push_back({is_known ? array->axes[at] : '?', array->shape[at]});
   }
   return meaning_of(std::move(axes), pages);
+}
+
+// --- Zeiss LSM -----------------------------------------------------------------------------------
+
+// Little-endian in all files.
+template <class Number>
+Number number_at(std::string_view bytes, std::size_t offset) {
+  Number number = {};
+  std::memcpy(&number, bytes.data() + offset, sizeof number);
+  return number;
 }
 
 }  // namespace
@@ -202,9 +226,47 @@ TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& res
   return meaning.value_or(TiffMeaning{.slices = pages});
 }
 
-std::uint64_t imagej_images(std::string_view description) {
-  if (!description.starts_with("ImageJ=")) return 0;
-  return described_count(described_value(description, "images"), 0);
+std::optional<TiffMeaning> lsm_meaning(std::string_view information) {
+  constexpr std::size_t kNeeded = 90;
+  if (information.size() < kNeeded) return std::nullopt;
+  const auto magic = number_at<std::uint32_t>(information, 0);
+  if (magic != 0x0300494C && magic != 0x0400494C) return std::nullopt;
+  const auto count = [&](std::size_t offset) -> std::uint64_t {
+    const auto number = number_at<std::int32_t>(information, offset);
+    return number >= 1 && static_cast<std::uint64_t>(number) <= kMostOfAKind
+               ? static_cast<std::uint64_t>(number)
+               : 1;
+  };
+  TiffMeaning meaning;
+  meaning.slices = count(16);
+  meaning.times = count(24);
+  const auto scan = number_at<std::uint16_t>(information, 88);
+  if (meaning.slices > 1 && meaning.times > 1 && scan != 0 && scan != 6) {
+    throw_unusable("The LSM file's scan of type " + std::to_string(scan) +
+                   " has slices and times in an order that is not supported. Only stacks (0) and "
+                   "time series of stacks (6) are.");
+  }
+  constexpr double kMillimetresPerMetre = 1000;
+  std::array<double, 3> spacing = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    spacing[axis] = number_at<double>(information, 40 + axis * 8) * kMillimetresPerMetre;
+  }
+  const auto is_length = [](double size) { return std::isfinite(size) && size > 0; };
+  if (std::ranges::all_of(spacing, is_length)) meaning.spacing = spacing;
+  return meaning;
+}
+
+std::uint64_t images_behind_page(std::string_view description) {
+  if (description.starts_with("ImageJ=")) {
+    return described_count(described_value(description, "images"), 0);
+  }
+  const auto array = tifffile_array(description);
+  if (!array || !array->is_truncated) return 0;
+  std::uint64_t images = 1;
+  for (std::size_t at = 0; at + 2 < array->shape.size(); ++at) {
+    images = std::min(images * array->shape[at], kMostOfAKind);
+  }
+  return images;
 }
 
 std::vector<std::uint64_t> TiffMeaning::volumes() const {
@@ -266,6 +328,29 @@ void check_pages(const TiffMeaning& meaning, std::uint64_t pages) {
   if (meaning.slices * meaning.channels * meaning.times == pages) return;
   throw_unusable("The TIFF's description tells of " + counts_of(meaning) + ", but the file has " +
                  std::to_string(pages) + (pages == 1 ? " page." : " pages."));
+}
+
+std::optional<double> described_length(std::string_view unit) {
+  Geometry geometry;
+  std::vector<Note> notes;
+  try {
+    scale_to_millimetres(geometry, unit == "\\u00B5m" ? "um" : unit, notes);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    return std::nullopt;
+  }
+  if (!notes.empty()) return std::nullopt;
+  return geometry.spacing[0];
+}
+
+std::optional<double> described_positive(std::string_view text) {
+  const auto number = parse_double(text);
+  return number && std::isfinite(*number) && *number > 0 ? number : std::nullopt;
+}
+
+std::uint64_t described_count(std::string_view text, std::uint64_t otherwise) {
+  const auto count = parse_uint64(text);
+  return count && *count >= 1 && *count <= kMostOfAKind ? *count : otherwise;
 }
 
 }  // namespace isomesh::import

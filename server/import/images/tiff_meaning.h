@@ -1,5 +1,5 @@
 // The meaning of a TIFF's pages, as OME-TIFF, ImageJ, SCIFIO and tifffile write it into the
-// description of the first.
+// description of the first, and Zeiss into a tag of its own.
 #pragma once
 
 #include <array>
@@ -53,8 +53,17 @@ struct TiffResolution {
 TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
                          std::uint64_t pages);
 
-// The number of images that ImageJ tells of; 0 without its description.
-std::uint64_t imagej_images(std::string_view description);
+// The same of an OME-TIFF. Empty if the text is not OME-XML with images. Images in other files are
+// left out, unless all are. Small faults of the text are passed over. Throws Error kUnusableVolume
+// if it is damaged, or this file has several images.
+std::optional<TiffMeaning> ome_meaning(std::string_view text, std::uint64_t pages);
+
+// The same of the content of a Zeiss LSM's tag CZ_LSMINFO (34412). Empty if it is another. Throws
+// Error kUnusableVolume for an order of pages that is not supported.
+std::optional<TiffMeaning> lsm_meaning(std::string_view information);
+
+// The number of images of which only the first may have a page; 0 if the description tells of none.
+std::uint64_t images_behind_page(std::string_view description);
 
 // "3 slices, 2 channels and 1 times"
 std::string counts_of(const TiffMeaning& meaning);
@@ -62,5 +71,18 @@ std::string counts_of(const TiffMeaning& meaning);
 // Throws Error kUnusableVolume if the meaning contradicts the number of pages of the file. Files of
 // one page each may tell of the whole volume.
 void check_pages(const TiffMeaning& meaning, std::uint64_t pages);
+
+// --- Values in descriptions ----------------------------------------------------------------------
+
+inline constexpr std::uint64_t kMostOfAKind = 1'000'000;
+
+// The length of a unit in millimetres; empty for unknown units and for pixels.
+std::optional<double> described_length(std::string_view unit);
+
+// Empty if the text is no positive number.
+std::optional<double> described_positive(std::string_view text);
+
+// From 1 to kMostOfAKind, or else `otherwise`.
+std::uint64_t described_count(std::string_view text, std::uint64_t otherwise);
 
 }  // namespace isomesh::import

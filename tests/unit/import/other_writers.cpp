@@ -129,7 +129,7 @@ std::string tiff_entry(std::uint16_t tag, std::uint16_t type, std::uint32_t coun
 }  // namespace
 
 std::string tiff(const std::vector<std::string>& pages, const std::string& description,
-                 int orientation) {
+                 int orientation, const TiffTag& more) {
   std::string file = "II*" + std::string(1, '\0') + one<std::uint32_t>(0);
   std::size_t link = 4;
   const auto size = [&] { return static_cast<std::uint32_t>(file.size()); };
@@ -138,8 +138,10 @@ std::string tiff(const std::vector<std::string>& pages, const std::string& descr
     file += page;
     const std::uint32_t text = size();
     file += description + std::string(1 + (description.size() + page.size() + 1) % 2, '\0');
+    const std::uint32_t further = size();
+    file += more.bytes;
     put(file, link, one(size()));
-    const std::vector<std::string> entries = {
+    std::vector<std::string> entries = {
         tiff_entry(256, 3, 1, 4),
         tiff_entry(257, 3, 1, 3),
         tiff_entry(258, 3, 1, 8),
@@ -151,6 +153,12 @@ std::string tiff(const std::vector<std::string>& pages, const std::string& descr
         tiff_entry(277, 3, 1, 1),
         tiff_entry(278, 3, 1, 3),
         tiff_entry(279, 4, 1, static_cast<std::uint32_t>(page.size()))};
+    if (more.bytes.size() == 4) {
+      entries.push_back(one(more.tag) + one<std::uint16_t>(4) + one<std::uint32_t>(1) + more.bytes);
+    } else if (!more.bytes.empty()) {
+      entries.push_back(
+          tiff_entry(more.tag, 1, static_cast<std::uint32_t>(more.bytes.size()), further));
+    }
     const bool has_text = description.size() > 3;
     file += one(static_cast<std::uint16_t>(entries.size() - (has_text ? 0 : 1)));
     for (std::size_t at = 0; at < entries.size(); ++at) {

@@ -76,9 +76,15 @@ struct ParImage {
 };
 std::string par(const std::vector<ParImage>& images);
 
+// A tag of each page, above all others: bytes, or one number if they are four.
+struct TiffTag {
+  std::uint16_t tag = 0;
+  std::string bytes = {};
+};
+
 // A TIFF with pages of 4 x 3 samples of one byte, without compression, in one strip each.
 std::string tiff(const std::vector<std::string>& pages, const std::string& description = {},
-                 int orientation = 1);
+                 int orientation = 1, const TiffTag& more = {});
 
 // Grey images of one byte a sample, with rows of `width` samples.
 std::string grey_png(std::uint32_t width, std::string_view samples);

@@ -232,6 +232,42 @@ TEST(TifffileTiff, OnlyAShapeOfThreeAxesIsClear) {
               HasSubstr("does not say which of them counts slices"));
 }
 
+TEST(TifffileTiff, PlanesMayFollowASinglePage) {
+  const std::string planes = std::string(12, 'a') + std::string(12, 'b') + std::string(12, 'c');
+  const auto read = [&](const std::string& description) {
+    return slices_of(import_bytes(tiff({planes}, description), {}, kSpaced));
+  };
+  EXPECT_EQ(read(R"({"shape": [3, 3, 4], "truncated": true})"), "abc");
+  EXPECT_EQ(read(R"({"shape": [3, 1, 3, 4], "axes": "ZCYX", "truncated": true})"), "abc");
+  EXPECT_THAT(read(R"({"shape": [300, 3, 4], "axes": "ZYX", "truncated": true})"),
+              HasSubstr("300 slices, 1 channels and 1 times, but the file has 1 page."));
+  EXPECT_THAT(read(R"({"shape": [3, 3, 4], "truncated": false})"), HasSubstr("1 slice"));
+}
+
+TEST(LsmTiff, TimesAreVolumes) {
+  const auto lsm = [](std::int32_t slices, std::int32_t times, std::uint16_t scan) {
+    std::string bytes =
+        bytes_of(std::vector<std::int32_t>{0x0400494C, 512, 4, 3, slices, 1, times, 1, 0, 0}) +
+        bytes_of(std::vector<double>{1e-6, 2e-6, 5e-6, 0, 0, 0}) +
+        bytes_of(std::vector<std::uint16_t>{scan});
+    bytes.resize(512);
+    return bytes;
+  };
+  const auto read = [](const std::string& information, const ImportOptions& options) {
+    return import_bytes(tiff(pages_of("abcdef"), {}, 1, {34412, information}), {}, options);
+  };
+  ImportOptions second;
+  second.volume = 1;
+  const Outcome outcome = read(lsm(2, 3, 6), second);
+  EXPECT_EQ(slices_of(outcome), "cd");
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{0.001, 0.002, 0.005}));
+  EXPECT_EQ(slices_of(read(lsm(6, 1, 2), {})), "abcdef");
+  EXPECT_THAT(slices_of(read(lsm(2, 3, 3), second)), HasSubstr("scan of type 3"));
+  EXPECT_THAT(slices_of(read(lsm(2, 2, 0), second)), HasSubstr("but the file has 6 pages"));
+  EXPECT_EQ(slices_of(read(lsm(2, 3, 6).substr(0, 88), kSpaced)), "abcdef");
+  EXPECT_EQ(slices_of(read(std::string(512, '\0'), kSpaced)), "abcdef");
+}
+
 TEST(ScifioTiff, AxesSeparateVolumes) {
   const std::string axes = "SCIFIO=0.41.0\naxes=X,Y,Channel,Z\nlengths=4,3,2,3\n";
   const std::string scales = "scales=500,500,1.0,2\nunits=micron,um,null,mm\n";
@@ -241,6 +277,15 @@ TEST(ScifioTiff, AxesSeparateVolumes) {
       tiff_meaning(axes + "scales=1.0,1.0,1.0,1.0\nunits=null,null,null,null\n", {}, 6).spacing);
   EXPECT_THAT(slices_of("abcdef", "SCIFIO=1\naxes=X,Y,Lifetime,Z\nlengths=4,3,2,3\n"),
               HasSubstr("does not say which of them counts slices"));
+}
+
+TEST(Tiff, PagesOfSeveralPlanesAreRefused) {
+  const auto with_depth = [](std::uint32_t depth) {
+    return slices_of(import_bytes(
+        tiff(pages_of("abc"), {}, 1, {32997, bytes_of(std::vector{depth})}), {}, kSpaced));
+  };
+  EXPECT_EQ(with_depth(1), "abc");
+  EXPECT_THAT(with_depth(2), HasSubstr("several planes in a page"));
 }
 
 // Backwards too: a page is found by its place in the file, not by all pages before it.

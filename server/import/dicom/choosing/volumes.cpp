@@ -1,6 +1,7 @@
 #include "server/import/dicom/choosing/volumes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -147,13 +148,16 @@ std::vector<std::string> objects_of(const std::vector<Placed>& placed) {
   return objects;
 }
 
+Criterion criterion_at(std::size_t attribute, const std::vector<Placed>& placed) {
+  std::vector<std::string> values;
+  for (const Placed& each : placed) values.push_back(phase_of(each.slice, attribute));
+  return criterion_of(std::string(phase_names()[attribute]), values);
+}
+
 std::vector<Criterion> criteria_of(const std::vector<Placed>& placed, const Positions& positions) {
   std::vector<Criterion> criteria;
-  const auto names = phase_names();
-  for (std::size_t attribute = 0; attribute < names.size(); ++attribute) {
-    std::vector<std::string> values;
-    for (const Placed& each : placed) values.push_back(phase_of(each.slice, attribute));
-    Criterion criterion = criterion_of(std::string(names[attribute]), values);
+  for (std::size_t attribute = 0; attribute < phase_names().size(); ++attribute) {
+    Criterion criterion = criterion_at(attribute, placed);
     if (is_useful(criterion, positions)) criteria.push_back(std::move(criterion));
   }
   Criterion objects = criterion_of("InstanceNumber", objects_of(placed));
@@ -278,6 +282,39 @@ bool for_few(const std::vector<Criterion>& criteria, std::size_t slices, const U
   return false;
 }
 
+// True if the slices of each value are evenly spaced, all alike, and those of several values
+// alternate: a second echo may lie half a slice further than the first.
+bool are_interleaved(const Criterion& criterion, const std::vector<Placed>& placed) {
+  std::vector<std::vector<double>> along(criterion.values.size());
+  std::size_t changes = 0;
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    along[criterion.ranks[i]].push_back(placed[i].along);
+    if (i > 0 && criterion.ranks[i] != criterion.ranks[i - 1]) ++changes;
+  }
+  const auto usual = usual_gap(along.front());
+  // Stacks that lie behind each other change once less than there are values.
+  if (!usual || changes < along.size()) return false;
+  return std::ranges::all_of(along, [&](const std::vector<double>& group) {
+    const auto is_uneven = [&](double a, double b) {
+      return std::abs(b - a - *usual) > kPlaceTolerance * *usual;
+    };
+    return group.size() > 1 && std::ranges::adjacent_find(group, is_uneven) == group.end();
+  });
+}
+
+// The volumes of slices that are all at different positions; empty for one.
+std::optional<SeriesVolumes> interleaved(const std::vector<Placed>& placed) {
+  for (std::size_t attribute = 0; attribute < phase_names().size(); ++attribute) {
+    if (!is_of_volumes(phase_names()[attribute])) continue;
+    const Criterion criterion = criterion_at(attribute, placed);
+    const bool is_known = std::ranges::find(criterion.values, "") == criterion.values.end();
+    if (criterion.values.size() < 2 || !is_known || !are_interleaved(criterion, placed)) continue;
+    const std::array chosen = {&criterion};
+    return SeriesVolumes{criterion.name, gathered(placed, criterion.ranks, chosen)};
+  }
+  return std::nullopt;
+}
+
 SeriesVolumes split_by_phase(Slices slices) {
   const std::vector<Placed> placed = placed_along_normal(slices);
   const Positions positions = positions_of(placed);
@@ -286,7 +323,11 @@ SeriesVolumes split_by_phase(Slices slices) {
     std::string title = count_of(slices.size(), "slice");
     return SeriesVolumes{"", {{std::move(title), std::move(slices), 0}}};
   };
-  if (positions.most_at_one == 1 || positions.count == 1) return whole();
+  if (positions.count == 1) return whole();
+  if (positions.most_at_one == 1) {
+    auto several = interleaved(placed);
+    return several ? std::move(*several) : whole();
+  }
   const bool was_split = for_few(criteria_of(placed, positions), placed.size(),
                                  [&](std::span<const Criterion* const> chosen) {
                                    const auto volumes = volumes_by(chosen, positions);

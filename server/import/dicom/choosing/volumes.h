@@ -22,9 +22,11 @@ struct SeriesVolumes {
 };
 
 // Splits frames at equal positions by the attributes that distinguish them, in ascending order of
-// their values; otherwise by the order of acquisition. Each mosaic is a volume. Frames of different
-// size, spacing or orientation are in different volumes. At least two volumes of one lattice must
-// be complete, or the first of two steps of a protocol, so duplicated slices alone cause no split.
+// their values; otherwise by the order of acquisition. Each mosaic is a volume. Frames at
+// different positions are in different volumes if these alternate and each is evenly spaced. Frames
+// of different size, spacing or orientation are in different volumes. At least two volumes of one
+// lattice must be complete, or the first of two steps of a protocol, so duplicated slices alone
+// cause no split.
 //
 // Omits nothing: if no split gives every frame its place, all frames are one volume, and make_stack
 // reports the reason.

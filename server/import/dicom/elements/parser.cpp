@@ -384,6 +384,7 @@ class Parser {
   std::vector<Extent> read_fragments(const Encoding& encoding, std::uint64_t limit) {
     std::vector<Extent> fragments;
     for (;;) {
+      if (at_ == limit) return fragments;  // some writers leave the end out
       const Head item = read_head(encoding, limit);
       if (item.tag == kSequenceEnd) return fragments;
       if (item.tag != kItem || item.has_undefined_length()) {

@@ -38,7 +38,7 @@ constexpr std::array kPhaseRows = {
     PhaseRow{"TemporalPositionTimeOffset", kTemporalPositionSequence, kTemporalPositionTimeOffset,
              Kind::kReal},
     PhaseRow{"DataType", kUsImageDescriptionSequence, kDataType, Kind::kText},
-    // Frames of nuclear medicine have no groups (tomogram.h).
+    // Frames of nuclear medicine have no groups (kinds/placed_frames.h).
     PhaseRow{"EnergyWindowVector", kNoGroup, kEnergyWindowVector, Kind::kWord},
     PhaseRow{"RRIntervalVector", kNoGroup, kRrIntervalVector, Kind::kWord},
     PhaseRow{"TimeSlotVector", kNoGroup, kTimeSlotVector, Kind::kWord},
@@ -69,6 +69,23 @@ constexpr std::array kPhaseRows = {
 constexpr std::array<std::string_view, 6> kUnplannedNames = {
     "AcquisitionNumber", "AcquisitionDateTime", "AcquisitionTime",
     "ContentTime",       "FrameType",           "ImageType"};
+
+// Scanners give each volume one value of these, also where its slices are acquired in turns.
+constexpr std::array<std::string_view, 15> kNamesOfVolumes = {"TemporalPositionIdentifier",
+                                                              "TemporalPositionIndex",
+                                                              "TemporalPositionTimeOffset",
+                                                              "DataType",
+                                                              "EnergyWindowVector",
+                                                              "RRIntervalVector",
+                                                              "TimeSlotVector",
+                                                              "EchoTime",
+                                                              "EffectiveEchoTime",
+                                                              "EchoNumbers",
+                                                              "DiffusionBValue",
+                                                              "B_value",
+                                                              "BActualValue",
+                                                              "ComplexImageComponent",
+                                                              "StackID"};
 
 bool all_finite(const std::vector<double>& numbers) {
   return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
@@ -261,6 +278,10 @@ std::size_t phase_attribute(std::string_view name) {
 bool is_planned(std::string_view phase_name) {
   return std::ranges::find(kPhaseNames, phase_name) != kPhaseNames.end() &&
          std::ranges::find(kUnplannedNames, phase_name) == kUnplannedNames.end();
+}
+
+bool is_of_volumes(std::string_view phase_name) {
+  return std::ranges::find(kNamesOfVolumes, phase_name) != kNamesOfVolumes.end();
 }
 
 std::vector<Phase> phases_of_object(const DataSet& data) {

@@ -69,6 +69,9 @@ std::size_t phase_attribute(std::string_view name);
 // which a slice that was taken twice differs from its copy.
 bool is_planned(std::string_view phase_name);
 
+// True if all slices of a volume have one value of it, wherever they lie.
+bool is_of_volumes(std::string_view phase_name);
+
 // The values of those attributes for the whole object, and for one frame alone. Missing ones are
 // omitted; the order is that of phase_names().
 std::vector<Phase> phases_of_object(const DataSet& data);

@@ -55,6 +55,7 @@ struct StreamSize {
   std::uint32_t rows = 0;
   unsigned components = 0;
   unsigned bits = 0;
+  bool is_signed = false;  // JPEG and JPEG-LS have no sign
 };
 
 std::uint32_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::size_t count) {
@@ -105,18 +106,22 @@ std::optional<StreamSize> jpeg_2000_size(std::span<const std::byte> stream) {
   return StreamSize{.columns = right - left,
                     .rows = bottom - top,
                     .components = big_endian(stream, 40, 2),
-                    .bits = (big_endian(stream, 42, 1) & 0x7FU) + 1};
+                    .bits = (big_endian(stream, 42, 1) & 0x7FU) + 1,
+                    .is_signed = (big_endian(stream, 42, 1) & 0x80U) != 0};
 }
 
 // GDCM fills up a truncated stream without an error. So the stream must end with FFD9, followed
 // only by padding.
 bool is_whole(std::span<const std::byte> stream) {
-  while (!stream.empty() && stream.back() == std::byte{0}) stream = stream.first(stream.size() - 1);
+  while (!stream.empty() && (stream.back() == std::byte{0} || stream.back() == std::byte{0xFF})) {
+    stream = stream.first(stream.size() - 1);
+  }
   return stream.size() >= 2 && big_endian(stream, stream.size() - 2, 2) == 0xFFD9;
 }
 
-void check_stream(std::span<const std::byte> stream, const Syntax& syntax,
-                  const PixelLayout& layout) {
+// Returns the stream's size, in which samples of 16 bits may be only 8.
+StreamSize check_stream(std::span<const std::byte> stream, const Syntax& syntax,
+                        const PixelLayout& layout) {
   const auto size = syntax.family == Family::kJpeg2000 ? jpeg_2000_size(stream) : jpeg_size(stream);
   if (!size) {
     throw_unusable("its compressed samples are not a " + std::string(syntax.name) + " stream");
@@ -128,10 +133,22 @@ void check_stream(std::span<const std::byte> stream, const Syntax& syntax,
                    " components, but its header declares " + std::to_string(layout.columns) +
                    " x " + std::to_string(layout.rows) + " with 1");
   }
-  if ((size->bits + 7) / 8 != layout.bits_allocated / 8) {
+  const unsigned bytes = (size->bits + 7) / 8;
+  if (bytes > 2 && syntax.family != Family::kJpeg2000) {  // GDCM would end the process
+    throw_unusable("its " + std::string(syntax.name) + " stream has " + std::to_string(size->bits) +
+                   " bits, but it may have at most 16");
+  }
+  if (bytes != layout.bits_allocated / 8 && !(bytes == 1 && layout.bits_allocated == 16)) {
     throw_unusable("its compressed samples have " + std::to_string(size->bits) +
                    " bits, but its header declares " + std::to_string(layout.bits_allocated));
   }
+  // With as many bits as are stored, the header says how to understand them.
+  if (size->is_signed && !layout.is_signed && size->bits != layout.bits_stored) {
+    throw_unusable("its compressed samples are signed, with " + std::to_string(size->bits) +
+                   " bits, but its header declares " + std::to_string(layout.bits_stored) +
+                   " bits without a sign");
+  }
+  return *size;
 }
 
 // Returns the number of bytes that the segment has for the target, up to its size.
@@ -251,9 +268,8 @@ bool decode_by_gdcm(Family family, const gdcm::DataElement& input, const PixelLa
   return false;
 }
 
-void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const PixelLayout& layout,
-                 std::span<std::byte> target) {
-  check_stream(stream, syntax, layout);
+void decode_checked(std::span<const std::byte> stream, const Syntax& syntax,
+                    const PixelLayout& layout, std::span<std::byte> target) {
   silence_gdcm();
   gdcm::Fragment fragment;
   fragment.SetByteValue(reinterpret_cast<const char*>(stream.data()),
@@ -274,6 +290,30 @@ void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const 
     throw_unusable("its " + std::string(syntax.name) + " stream is corrupt");
   }
   std::memcpy(target.data(), bytes->GetPointer(), target.size());
+}
+
+// From bytes in the first half to words, from the last, so that none is overwritten before it is
+// read.
+void widen(std::span<std::byte> target, bool is_signed) {
+  for (std::size_t at = target.size() / 2; at-- > 0;) {
+    const std::byte low = target[at];
+    const bool is_negative = is_signed && (low & std::byte{0x80}) != std::byte{0};
+    target[at * 2] = low;
+    target[at * 2 + 1] = std::byte{is_negative ? std::uint8_t{0xFF} : std::uint8_t{0}};
+  }
+}
+
+void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const PixelLayout& layout,
+                 std::span<std::byte> target) {
+  const StreamSize size = check_stream(stream, syntax, layout);
+  if (size.bits > 8 || layout.bits_allocated == 8) {
+    return decode_checked(stream, syntax, layout, target);
+  }
+  PixelLayout bytes = layout;
+  bytes.bits_allocated = 8;
+  bytes.is_signed = size.is_signed;
+  decode_checked(stream, syntax, bytes, target.first(target.size() / 2));
+  widen(target, size.is_signed);
 }
 
 // Spreads the bits at the beginning over all bytes, from the last, so that none is overwritten

@@ -33,15 +33,19 @@ bool is_one_of(const std::vector<std::uint64_t>& sorted, std::uint64_t value) {
 std::vector<std::size_t> first_fragments(const DicomFile& file, std::size_t frames) {
   const PixelElement& pixels = *file.pixels();
   const std::size_t fragments = pixels.fragments.size();
-  const bool has_table = pixels.frame_offsets.size() == frames;
   std::vector<std::size_t> firsts;
-  std::uint64_t offset = 0;  // of a fragment's item, relative to the first one's
-  for (std::size_t i = 0; i < fragments; ++i) {
-    const bool is_first = fragments == frames || i == 0 ||
-                          (frames > 1 && (has_table ? is_one_of(pixels.frame_offsets, offset)
-                                                    : begins_frame(file, pixels.fragments[i])));
-    if (is_first) firsts.push_back(i);
-    offset += pixels.fragments[i].bytes + 8;
+  // Some tables of offsets are wrong.
+  for (const bool by_table : {pixels.frame_offsets.size() == frames, false}) {
+    if (firsts.size() == frames) break;
+    firsts.clear();
+    std::uint64_t offset = 0;  // of a fragment's item, relative to the first one's
+    for (std::size_t i = 0; i < fragments; ++i) {
+      const bool is_first = fragments == frames || i == 0 ||
+                            (frames > 1 && (by_table ? is_one_of(pixels.frame_offsets, offset)
+                                                     : begins_frame(file, pixels.fragments[i])));
+      if (is_first) firsts.push_back(i);
+      offset += pixels.fragments[i].bytes + 8;
+    }
   }
   if (firsts.size() != frames) {
     throw_unusable("its compressed frames cannot be separated: " + std::to_string(fragments) +

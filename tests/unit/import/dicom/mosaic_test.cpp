@@ -5,7 +5,6 @@
 #include "server/import/dicom/elements/csa_header.h"
 #include "server/import/dicom/elements/private_elements.h"
 #include "server/import/dicom/elements/tags.h"
-#include "tests/unit/import/dicom/csa_writer.h"
 #include "tests/unit/import/dicom/mosaics.h"
 
 namespace isomesh::import::test {

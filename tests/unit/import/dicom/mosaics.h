@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
-#include "tests/unit/import/dicom/csa_writer.h"
 #include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::import::test {
@@ -17,6 +19,11 @@ std::uint16_t tile_sample(std::uint32_t i, std::uint32_t j, std::uint32_t k);
 // A slice of 3 x 2 mm a sample at (10, 20, 30), of so many tiles, of which those behind the last
 // slice are empty.
 DicomObject tiled_object(std::uint32_t across, std::uint32_t down);
+
+// The header of their own that Siemens' scanners write, with `is_newer` in the layout that begins
+// with "SV10".
+using CsaFields = std::vector<std::pair<std::string, std::vector<std::string>>>;
+std::string csa_header(const CsaFields& fields, bool is_newer = true);
 
 CsaFields csa_fields(const std::vector<std::string>& normal);
 

@@ -90,6 +90,56 @@ INSTANTIATE_TEST_SUITE_P(All, DicomSyntax,
                                                           Depth{16, 16, false}, Depth{16, 12, true},
                                                           Depth{16, 16, true})));
 
+// A stream may have fewer bytes to a sample than the header allocates.
+TEST(DicomPixels, OfBytesMayBeAllocatedWords) {
+  for (const bool is_signed : {false, true}) {
+    const DicomSeries words = compressible({16, 8, is_signed});
+    const PixelLayout bytes = {words.columns, words.rows, 8, 8, 7, is_signed};
+    for (const std::string_view syntax : {kJpegLossless, kJpegLs, kJpeg2000}) {
+      NamedFiles files;
+      for (std::uint32_t k = 0; k < words.slices; ++k) {
+        const std::string native = words.native_bytes(k);
+        std::string low;
+        for (std::size_t at = 0; at < native.size(); at += 2) low += native[at];
+        files.emplace_back(
+            std::to_string(k),
+            words.slice(k).fragments({compressed(syntax, bytes, low)}, {}).file(syntax));
+      }
+      const Outcome outcome = import_objects(files);
+      EXPECT_EQ(outcome.error, "") << syntax;
+      EXPECT_EQ(outcome.canonical, import_objects(words.files()).canonical) << syntax;
+    }
+  }
+}
+
+// Negative samples would be large positive ones.
+TEST(DicomPixels, OfSignedStreamsNeedASignedHeader) {
+  const DicomSeries series = compressible({16, 16, false});
+  const auto error_of = [&](std::string_view syntax, char size_and_sign) {
+    return import_objects(
+               compressed_files(series, syntax,
+                                [&](std::string& stream) { stream.at(42) = size_and_sign; }))
+        .error;
+  };
+  EXPECT_THAT(error_of(kJpeg2000, '\x89'), HasSubstr("are signed, with 10 bits"));
+  EXPECT_EQ(error_of(kJpeg2000, '\x0F'), "");
+}
+
+// GDCM ends the process for them.
+TEST(DicomPixels, OfMoreBitsThanJpegHasAreRefused) {
+  const DicomSeries series = compressible({16, 12, false});
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    std::string stream = compressed(kJpegLossless, series.layout(), series.native_bytes(k));
+    stream.at(stream.find("\xFF\xC3") + 4) = 32;
+    DicomObject object = series.slice(k).fragments({stream}, {});
+    object.number(kBitsAllocated, 32).number(kBitsStored, 32).number(kHighBit, 31);
+    files.emplace_back(std::to_string(k), object.file(kJpegLossless));
+  }
+  EXPECT_THAT(import_objects(files).error,
+              HasSubstr("stream has 32 bits, but it may have at most 16"));
+}
+
 class DamagedStream : public testing::TestWithParam<std::string_view> {};
 
 TEST_P(DamagedStream, IsRefusedWhereverItEnds) {
@@ -148,7 +198,8 @@ TEST(DicomFragments, OfOneFrameAreJoined) {
 }
 
 // All frames in one file, of which each lies in two fragments.
-std::string in_halves(const DicomSeries& series, bool with_table) {
+std::string in_halves(const DicomSeries& series,
+                      const std::function<void(std::vector<std::uint32_t>&)>& change) {
   std::vector<std::string> fragments;
   std::vector<std::uint32_t> offsets;
   std::uint32_t offset = 0;
@@ -160,18 +211,40 @@ std::string in_halves(const DicomSeries& series, bool with_table) {
       offset += static_cast<std::uint32_t>(half.size()) + 8;
     }
   }
-  if (!with_table) offsets.clear();
+  change(offsets);
   return series.enhanced({0, 1, 2}).fragments(fragments, offsets).file(kJpeg2000);
 }
 
 TEST(DicomFragments, OfSeveralFramesAreToldApart) {
   const DicomSeries series = compressible({16, 12, false});
   const Outcome plain = import_objects(series.files());
-  for (const bool with_table : {true, false}) {
-    const Outcome outcome = import_objects({{"one", in_halves(series, with_table)}});
+  using Table = std::vector<std::uint32_t>;
+  const std::function<void(Table&)> changes[] = {
+      [](Table&) {}, [](Table& table) { table.clear(); },
+      [](Table& table) { table.assign(3, 0); },  // wrong ones are of no use
+      [](Table& table) {
+        for (std::uint32_t& offset : table) offset += 8;
+      }};
+  for (const auto& change : changes) {
+    const Outcome outcome = import_objects({{"one", in_halves(series, change)}});
     EXPECT_EQ(outcome.error, "");
     EXPECT_EQ(outcome.canonical, plain.canonical);
   }
+}
+
+// Some writers leave out what tells the end.
+TEST(DicomFragments, MayEndWithTheFile) {
+  const DicomSeries series = compressible({16, 12, false});
+  constexpr std::size_t kEndBytes = 8;
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    const std::string stream = compressed(kJpegLs, series.layout(), series.native_bytes(k));
+    const std::string file = series.slice(k).fragments({stream}, {}).file(kJpegLs);
+    files.emplace_back(std::to_string(k), file.substr(0, file.size() - kEndBytes));
+  }
+  EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
+  files[1].second.pop_back();
+  EXPECT_EQ(import_objects(files).code, ErrorCode::kUnusableVolume);
 }
 
 TEST(DicomFragments, ThatAreMissingAreNoticed) {

@@ -98,6 +98,38 @@ TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
   }
 }
 
+// Between each other, their slices are evenly spaced as well.
+TEST(DicomVolumes, AreToldApartWhereTheyAlternate) {
+  const DicomSeries series;
+  const auto files_of = [&](Tag tag, const std::vector<std::string>& values) {
+    NamedFiles files;
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      files.emplace_back("F" + std::to_string(k),
+                         series.slice(k).text(tag, "DS", values[k]).file());
+    }
+    return files;
+  };
+  const NamedFiles echoes = files_of(kEchoTime, {"5", "80", "5", "80", "5", "80"});
+  EXPECT_THAT(import_objects(echoes).error, HasSubstr("2 volumes that differ in EchoTime"));
+  const Outcome second = import_objects(echoes, {.volume = 1});
+  ASSERT_EQ(second.error, "");
+  EXPECT_EQ(second.volume.dims[2], 3);
+  EXPECT_EQ(second.volume.geometry.spacing[2], 5);
+  EXPECT_EQ(samples_of<std::int16_t>(second)[0], series.stored(0, 0, 1));
+
+  for (const NamedFiles& whole : {
+           files_of(kEchoTime, {"5", "5", "5", "80", "80", "80"}),  // behind each other
+           files_of(kEchoTime, {"5", "5", "80", "5", "80", "80"}),  // neither is evenly spaced
+           files_of(kEchoTime, {"1", "2", "3", "4", "5", "6"}),
+           files_of(kEchoTime, {"5", "", "5", "", "5", ""}),
+           files_of(kTriggerTime, {"5", "80", "5", "80", "5", "80"})  // of acquisition in turns
+       }) {
+    const Outcome outcome = import_objects(whole);
+    ASSERT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.volume.dims[2], 6);
+  }
+}
+
 // Titles go into answers, which are UTF-8.
 TEST(DicomVolumes, HaveTitlesThatCanBeRead) {
   const Outcome outcome =
