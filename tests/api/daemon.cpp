@@ -93,29 +93,30 @@ Job finished_job(const Daemon& daemon, const std::string& members) {
   return ended;
 }
 
-Job begun_job(const Daemon& daemon, int passes, double iso) {
+Job long_job(const Daemon& daemon, double iso) {
   const std::string id =
-      submit(daemon, upload(daemon, rough_upload()), iso, slow_smoothing(passes)).id;
+      submit(daemon, upload(daemon, rough_upload()), iso, slow_smoothing(1000)).id;
   Job seen;
-  const bool is_begun = eventually([&] {
+  const bool has_begun = eventually([&] {
     seen = daemon.client().job(id);
     return seen.stage == Stage::kSmooth || is_final(seen.state);
   });
-  if (!is_begun) throw std::runtime_error(to_json(seen));
+  if (!has_begun || seen.state != JobState::kRunning) throw std::runtime_error(to_json(seen));
   return seen;
 }
 
-Job long_job(const Daemon& daemon) {
-  const Job begun = begun_job(daemon, 1000);
-  if (begun.state != JobState::kRunning) throw std::runtime_error(to_json(begun));
-  return begun;
+std::set<pid_t> job_processes(const Daemon& daemon) {
+  std::set<pid_t> found = children_of(daemon.pid());
+  std::erase_if(found, [](pid_t process) { return program_of(process) != kJobProgram; });
+  return found;
 }
 
-bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt) {
-  for (int passes = 12; passes <= 1000; passes *= 2) {
-    if (attempt(passes)) return true;
-  }
-  return false;
+HeldWorker::HeldWorker(const Daemon& daemon) {
+  finished_job(daemon);
+  const std::set<pid_t> processes = job_processes(daemon);
+  if (processes.size() != 1) throw std::runtime_error("there is not one process for jobs");
+  process_ = *processes.begin();
+  ::kill(process_, SIGSTOP);
 }
 
 }  // namespace isomesh::test

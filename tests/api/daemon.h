@@ -3,7 +3,7 @@
 
 #include <csignal>
 #include <filesystem>
-#include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -98,14 +98,27 @@ Job submit(const Daemon& daemon, const Volume& volume, double iso, const std::st
 // A sphere's job that has succeeded.
 Job finished_job(const Daemon& daemon, const std::string& members = {});
 
-// A job of so many passes as it is when it has begun to smooth, or has ended before that was seen.
-Job begun_job(const Daemon& daemon, int passes, double iso = 50);
+// A job that runs for longer than any test waits for, and has begun to smooth.
+Job long_job(const Daemon& daemon, double iso = 50);
 
-// A job that runs for longer than any test waits for, and has begun to.
-Job long_job(const Daemon& daemon);
+inline constexpr const char* kJobProgram = "isomesh-job";
 
-// Calls attempt(passes) with ever longer jobs until it is true. How long a job takes on a busy
-// machine is not known, and one that ends too soon, or too late, shows nothing.
-bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt);
+// The processes that a daemon makes meshes in.
+std::set<pid_t> job_processes(const Daemon& daemon);
+
+// Lets a daemon's only worker finish a job, then stops its process, so that no other job ends
+// before it is let go.
+class HeldWorker {
+ public:
+  explicit HeldWorker(const Daemon& daemon);
+  ~HeldWorker() { let_go(); }
+  HeldWorker(const HeldWorker&) = delete;
+  HeldWorker& operator=(const HeldWorker&) = delete;
+
+  void let_go() { ::kill(process_, SIGCONT); }
+
+ private:
+  pid_t process_ = 0;
+};
 
 }  // namespace isomesh::test

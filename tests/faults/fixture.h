@@ -35,16 +35,7 @@ class FaultTest : public testing::Test {
 
   Volume small_volume() { return upload(daemon(), sphere_upload()); }
 
-  Job begun_job(int passes, double iso = 50) { return test::begun_job(daemon(), passes, iso); }
-
-  static constexpr const char* kJobProgram = "isomesh-job";
-
-  // The processes that the daemon makes meshes in.
-  std::set<pid_t> job_processes() {
-    std::set<pid_t> found = children_of(daemon().pid());
-    std::erase_if(found, [](pid_t process) { return program_of(process) != kJobProgram; });
-    return found;
-  }
+  std::set<pid_t> job_processes() { return test::job_processes(daemon()); }
 
   // Runs SQL on the data folder's database; returns the first column of the last row.
   std::string run_sql(const std::string& sql) {
