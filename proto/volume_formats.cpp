@@ -68,12 +68,12 @@ constexpr VolumeFormat kVolumeFormats[] = {
      .content = "images of ITK, and MINC 2; MINC's integers become real values"},
     {.name = "tiff",
      .title = "TIFF",
-     .suffixes = ".tif .tiff .btf .tf8",
+     .suffixes = ".tif .tiff .btf .tf8 .lsm",
      .content =
-         "several pages, or a folder or archive of single pages; OME-TIFF and ImageJ's TIFF with "
-         "their spacing, ImageJ's with calibrated values, both also in folders; others need "
-         "`spacing`; `volume=N` chooses a channel or time; strips and tiles, BigTIFF, grey of 8 to "
-         "32 bits and floats, without loss compressed"},
+         "several pages, or a folder or archive of single pages; OME-TIFF, ImageJ's TIFF and Zeiss "
+         "LSM with their spacing, ImageJ's with calibrated values, both also in folders; others "
+         "need `spacing`; `volume=N` chooses a channel or time; strips and tiles, BigTIFF, grey of "
+         "8 to 32 bits and floats, without loss compressed"},
     {.name = "png",
      .title = "PNG",
      .suffixes = ".png",

@@ -276,7 +276,8 @@ bool are_distinct(const NumberColumn& column) {
 // A name in small letters, without the suffix of an image.
 std::string stem_of(std::string_view name) {
   std::string stem = lower(name);
-  for (const std::string_view suffix : {".gz", ".tif", ".tiff", ".btf", ".tf8", ".png", ".bmp"}) {
+  for (const std::string_view suffix :
+       {".gz", ".tif", ".tiff", ".btf", ".tf8", ".lsm", ".png", ".bmp"}) {
     if (stem.ends_with(suffix)) stem.resize(stem.size() - suffix.size());
   }
   return stem;
