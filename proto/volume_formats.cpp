@@ -70,10 +70,10 @@ constexpr VolumeFormat kVolumeFormats[] = {
      .title = "TIFF",
      .suffixes = ".tif .tiff .btf .tf8 .lsm",
      .content =
-         "several pages, or a folder or archive of single pages; OME-TIFF, ImageJ's TIFF and Zeiss "
-         "LSM with their spacing, ImageJ's with calibrated values, both also in folders; others "
-         "need `spacing`; `volume=N` chooses a channel or time; strips and tiles, BigTIFF, grey of "
-         "8 to 32 bits and floats, without loss compressed"},
+         "several pages, or a folder or archive of single pages; OME-TIFF and ImageJ's TIFF with "
+         "their spacing, ImageJ's with calibrated values, both also in folders; Zeiss LSM of one "
+         "channel with its spacing; others need `spacing`; `volume=N` chooses a channel or time; "
+         "strips and tiles, BigTIFF, grey of 8 to 32 bits and floats, without loss compressed"},
     {.name = "png",
      .title = "PNG",
      .suffixes = ".png",

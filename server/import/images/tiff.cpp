@@ -111,6 +111,12 @@ StoredType type_of(TIFF* tiff) {
 PageLayout layout_of(TIFF* tiff) {
   const auto photometric = field<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC);
   const auto components = field<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
+  if (components != 1 &&
+      field<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) == PLANARCONFIG_SEPARATE) {
+    throw_unusable(
+        "The TIFF image has several channels in a page, which is not supported. Save "
+        "one channel, or each as pages of its own.");
+  }
   if (components != 1 ||
       (photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE)) {
     throw_unusable("The TIFF image has colours or a palette. Only grey images are supported.");

@@ -242,16 +242,22 @@ std::vector<SeriesVolume> gathered(const std::vector<Placed>& placed,
     if (result[volumes[i]].slices.empty()) firsts[volumes[i]] = i;
     result[volumes[i]].slices.push_back(placed[i].slice);
   }
-  std::size_t most = 0;
-  for (const SeriesVolume& volume : result) most = std::max(most, volume.slices.size());
   for (std::size_t at = 0; at < result.size(); ++at) {
-    const std::size_t count = result[at].slices.size();
-    result[at].title = title_of(criteria, firsts[at], count);
-    if (count == most) continue;
-    result[at].whole_count = most;
-    result[at].title += " of " + std::to_string(most);
+    result[at].title = title_of(criteria, firsts[at], result[at].slices.size());
   }
   return result;
+}
+
+// Marks those that were interrupted: they have fewer slices than the others.
+std::vector<SeriesVolume> with_interrupted(std::vector<SeriesVolume> volumes) {
+  std::size_t most = 0;
+  for (const SeriesVolume& volume : volumes) most = std::max(most, volume.slices.size());
+  for (SeriesVolume& volume : volumes) {
+    if (volume.slices.size() == most) continue;
+    volume.whole_count = most;
+    volume.title += " of " + std::to_string(most);
+  }
+  return volumes;
 }
 
 std::string names_of(std::span<const Criterion* const> criteria) {
@@ -282,8 +288,16 @@ bool for_few(const std::vector<Criterion>& criteria, std::size_t slices, const U
   return false;
 }
 
+// Texts that differ in their last digits say nothing of volumes.
+bool are_alike(const std::string& a, const std::string& b) {
+  const auto one = finite_number(a);
+  const auto other = finite_number(b);
+  return one && other && std::abs(*one - *other) <= 0.01 * std::abs(*other);
+}
+
 // True if the slices of each value are evenly spaced, all alike, and those of several values
-// alternate: a second echo may lie half a slice further than the first.
+// alternate: a second echo may lie half a slice further than the first. Values that slices have by
+// the order of their acquisition have fewer slices each.
 bool are_interleaved(const Criterion& criterion, const std::vector<Placed>& placed) {
   std::vector<std::vector<double>> along(criterion.values.size());
   std::size_t changes = 0;
@@ -291,6 +305,8 @@ bool are_interleaved(const Criterion& criterion, const std::vector<Placed>& plac
     along[criterion.ranks[i]].push_back(placed[i].along);
     if (i > 0 && criterion.ranks[i] != criterion.ranks[i - 1]) ++changes;
   }
+  const auto& values = criterion.values;
+  if (std::ranges::adjacent_find(values, are_alike) != values.end()) return false;
   const auto usual = usual_gap(along.front());
   // Stacks that lie behind each other change once less than there are values.
   if (!usual || changes < along.size()) return false;
@@ -298,7 +314,8 @@ bool are_interleaved(const Criterion& criterion, const std::vector<Placed>& plac
     const auto is_uneven = [&](double a, double b) {
       return std::abs(b - a - *usual) > kPlaceTolerance * *usual;
     };
-    return group.size() > 1 && std::ranges::adjacent_find(group, is_uneven) == group.end();
+    return group.size() > along.size() &&
+           std::ranges::adjacent_find(group, is_uneven) == group.end();
   });
 }
 
@@ -328,13 +345,13 @@ SeriesVolumes split_by_phase(Slices slices) {
     auto several = interleaved(placed);
     return several ? std::move(*several) : whole();
   }
-  const bool was_split = for_few(criteria_of(placed, positions), placed.size(),
-                                 [&](std::span<const Criterion* const> chosen) {
-                                   const auto volumes = volumes_by(chosen, positions);
-                                   if (!volumes) return false;
-                                   result = {names_of(chosen), gathered(placed, *volumes, chosen)};
-                                   return true;
-                                 });
+  const bool was_split = for_few(
+      criteria_of(placed, positions), placed.size(), [&](std::span<const Criterion* const> chosen) {
+        const auto volumes = volumes_by(chosen, positions);
+        if (!volumes) return false;
+        result = {names_of(chosen), with_interrupted(gathered(placed, *volumes, chosen))};
+        return true;
+      });
   if (was_split) return result;
   if (const auto volumes = volumes_by_order(placed, positions)) {
     SeriesVolumes ordered = {"the order of acquisition", gathered(placed, *volumes, {})};

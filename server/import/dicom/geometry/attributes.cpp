@@ -70,7 +70,7 @@ constexpr std::array<std::string_view, 6> kUnplannedNames = {
     "AcquisitionNumber", "AcquisitionDateTime", "AcquisitionTime",
     "ContentTime",       "FrameType",           "ImageType"};
 
-// Scanners give each volume one value of these, also where its slices are acquired in turns.
+// Scanners give each volume one value of these.
 constexpr std::array<std::string_view, 15> kNamesOfVolumes = {"TemporalPositionIdentifier",
                                                               "TemporalPositionIndex",
                                                               "TemporalPositionTimeOffset",

@@ -142,8 +142,8 @@ StreamSize check_stream(std::span<const std::byte> stream, const Syntax& syntax,
     throw_unusable("its compressed samples have " + std::to_string(size->bits) +
                    " bits, but its header declares " + std::to_string(layout.bits_allocated));
   }
-  // With as many bits as are stored, the header says how to understand them.
-  if (size->is_signed && !layout.is_signed && size->bits != layout.bits_stored) {
+  // With all bits that are stored, the header says how to understand them.
+  if (size->is_signed && !layout.is_signed && size->bits < layout.bits_stored) {
     throw_unusable("its compressed samples are signed, with " + std::to_string(size->bits) +
                    " bits, but its header declares " + std::to_string(layout.bits_stored) +
                    " bits without a sign");

@@ -100,7 +100,7 @@ TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
 
 // Between each other, their slices are evenly spaced as well.
 TEST(DicomVolumes, AreToldApartWhereTheyAlternate) {
-  const DicomSeries series;
+  DicomSeries series;
   const auto files_of = [&](Tag tag, const std::vector<std::string>& values) {
     NamedFiles files;
     for (std::uint32_t k = 0; k < series.slices; ++k) {
@@ -116,17 +116,25 @@ TEST(DicomVolumes, AreToldApartWhereTheyAlternate) {
   EXPECT_EQ(second.volume.dims[2], 3);
   EXPECT_EQ(second.volume.geometry.spacing[2], 5);
   EXPECT_EQ(samples_of<std::int16_t>(second)[0], series.stored(0, 0, 1));
+  series.slices = 7;
+  EXPECT_EQ(
+      import_objects(files_of(kEchoTime, {"5", "80", "5", "80", "5", "80", "5"}), {.volume = 1})
+          .volume.dims[2],
+      3);
 
   for (const NamedFiles& whole : {
-           files_of(kEchoTime, {"5", "5", "5", "80", "80", "80"}),  // behind each other
-           files_of(kEchoTime, {"5", "5", "80", "5", "80", "80"}),  // neither is evenly spaced
-           files_of(kEchoTime, {"1", "2", "3", "4", "5", "6"}),
-           files_of(kEchoTime, {"5", "", "5", "", "5", ""}),
-           files_of(kTriggerTime, {"5", "80", "5", "80", "5", "80"})  // of acquisition in turns
+           files_of(kEchoTime, {"5", "5", "5", "80", "80", "80", "80"}),  // behind each other
+           files_of(kEchoTime, {"5", "5", "80", "5", "80", "80", "5"}),  // neither is evenly spaced
+           files_of(kEchoTime, {"1", "2", "3", "4", "5", "6", "7"}),
+           files_of(kEchoTime, {"4.6", "4.60", "4.6", "4.60", "4.6", "4.61", "4.6"}),
+           files_of(kTemporalPositionIdentifier, {"1", "2", "3", "1", "2", "3", "1"}),
+           files_of(kEchoTime, {"5", "", "5", "", "5", "", "5"}),
+           files_of(kTriggerTime,
+                    {"5", "80", "5", "80", "5", "80", "5"})  // of acquisition in turns
        }) {
     const Outcome outcome = import_objects(whole);
     ASSERT_EQ(outcome.error, "");
-    EXPECT_EQ(outcome.volume.dims[2], 6);
+    EXPECT_EQ(outcome.volume.dims[2], 7);
   }
 }
 
