@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <functional>
 #include <set>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
 #include "server/import/source/source.h"
 
@@ -198,16 +198,6 @@ std::optional<TiffMeaning> tifffile_meaning(std::string_view description, std::u
   return meaning_of(std::move(axes), pages);
 }
 
-// --- Zeiss LSM -----------------------------------------------------------------------------------
-
-// Little-endian in all files.
-template <class Number>
-Number number_at(std::string_view bytes, std::size_t offset) {
-  Number number = {};
-  std::memcpy(&number, bytes.data() + offset, sizeof number);
-  return number;
-}
-
 }  // namespace
 
 TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& resolution,
@@ -229,10 +219,12 @@ TiffMeaning tiff_meaning(std::string_view description, const TiffResolution& res
 std::optional<TiffMeaning> lsm_meaning(std::string_view information) {
   constexpr std::size_t kNeeded = 90;
   if (information.size() < kNeeded) return std::nullopt;
-  const auto magic = number_at<std::uint32_t>(information, 0);
+  constexpr bool kIsBigEndian = false;  // in any file
+  const HeaderBytes bytes(information, kIsBigEndian);
+  const auto magic = bytes.at<std::uint32_t>(0);
   if (magic != 0x0300494C && magic != 0x0400494C) return std::nullopt;
   const auto count = [&](std::size_t offset) -> std::uint64_t {
-    const auto number = number_at<std::int32_t>(information, offset);
+    const auto number = bytes.at<std::int32_t>(offset);
     return number >= 1 && static_cast<std::uint64_t>(number) <= kMostOfAKind
                ? static_cast<std::uint64_t>(number)
                : 1;
@@ -240,7 +232,7 @@ std::optional<TiffMeaning> lsm_meaning(std::string_view information) {
   TiffMeaning meaning;
   meaning.slices = count(16);
   meaning.times = count(24);
-  const auto scan = number_at<std::uint16_t>(information, 88);
+  const auto scan = bytes.at<std::uint16_t>(88);
   if (meaning.slices > 1 && meaning.times > 1 && scan != 0 && scan != 6) {
     throw_unusable("The LSM file's scan of type " + std::to_string(scan) +
                    " has slices and times in an order that is not supported. Only stacks (0) and "
@@ -248,9 +240,8 @@ std::optional<TiffMeaning> lsm_meaning(std::string_view information) {
   }
   constexpr double kMillimetresPerMetre = 1000;
   std::array<double, 3> spacing = {};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    spacing[axis] = number_at<double>(information, 40 + axis * 8) * kMillimetresPerMetre;
-  }
+  bytes.read<double>(40, spacing);
+  for (double& size : spacing) size *= kMillimetresPerMetre;
   const auto is_length = [](double size) { return std::isfinite(size) && size > 0; };
   if (std::ranges::all_of(spacing, is_length)) meaning.spacing = spacing;
   return meaning;
