@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -96,10 +97,11 @@ void cancel(App& app, const Request& request, Response& response) {
   answer_json(response, 200, to_json(app.services.jobs.cancel(viewer_of(request), id)));
 }
 
-// The events of the job after `last`, without superseded progress.
+// All events of the job so far, without superseded progress.
 std::vector<store::Event> past_of(const App& app, const store::Viewer& viewer,
-                                  const std::string& job, std::uint64_t last) {
+                                  const std::string& job) {
   std::vector<store::Event> past;
+  std::uint64_t last = 0;
   while (true) {
     const auto more = app.services.jobs.events(viewer, job, last, std::chrono::milliseconds(0));
     if (more.empty()) return past;
@@ -131,14 +133,18 @@ void events(App& app, const Request& request, Response& response) {
   // duplicates.
   auto mailbox = app.events.listen_to(id);
   const Job job = app.services.jobs.get(viewer_of(request), id);
-  auto past = past_of(app, viewer_of(request), id, last);
+  auto past = past_of(app, viewer_of(request), id);
+  const bool is_told = !past.empty() && past.back().kind == store::EventKind::kDone;
+  const bool is_forgotten = past.empty() && last > 0;  // jobs outlive their events
+  if (is_final(job.state) && !is_told && !is_forgotten) {
+    // The state of a job can be read shortly before the event of its end.
+    const std::uint64_t next = std::max(last, past.empty() ? 0 : past.back().id) + 1;
+    past.push_back({next, "", id, store::EventKind::kDone, job.state, job.stage, job.progress});
+  }
+  std::erase_if(past, [last](const store::Event& event) { return event.id <= last; });
   if (is_final(job.state) && past.empty()) {
-    if (last > 0) {
-      response.status = 204;  // tells a browser not to reconnect
-      return;
-    }
-    // The job outlives its events.
-    past.push_back({1, "", id, store::EventKind::kDone, job.state, job.stage, job.progress});
+    response.status = 204;  // tells a browser not to reconnect
+    return;
   }
   answer_events(response,
                 event_source({.mailbox = std::move(mailbox),

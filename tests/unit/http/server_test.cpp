@@ -1,14 +1,18 @@
 // Starting and ending a whole server.
 #include "server/http/server.h"
 
+#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/api/http.h"
 #include "tests/unit/http/services.h"
 
 namespace isomesh::http {
@@ -44,6 +48,35 @@ TEST(Server, OrdersEndBeforeItIfTheStartFailsLater) {
     EXPECT_TRUE(orders.has_listener());
   }
   EXPECT_FALSE(orders.has_listener());
+}
+
+// A reader that reconnects in that moment would never hear of it otherwise.
+TEST(Server, TheEndOfAJobIsToldAlthoughItsEventIsNotThereYet) {
+  OpenServices services;
+  services.volumes().add("", Volume{});
+  const std::string id = job_of(services.jobs().submit({"", JobParameters{}, "", ""})).id;
+  const auto last_id = [&] {
+    return services.jobs().events("", id, 0, std::chrono::milliseconds(0)).back().id;
+  };
+  const std::uint64_t begun = last_id();
+  services.jobs().cancel("", id);
+  const std::uint64_t ended = last_id();
+  Server server(services.all(), ServerOptions{});
+  const std::string url = server.bind(net::parse_address("127.0.0.1:0"));
+  server.start();
+  const auto listen = [&](std::uint64_t last) {
+    return test::answer_to(url, test::request("GET", "/v1/jobs/" + id + "/events", {},
+                                              {{"Last-Event-ID", std::to_string(last)}}));
+  };
+  for (const bool is_late : {true, false}) {
+    services.jobs().is_late = is_late;
+    for (const std::uint64_t last : {std::uint64_t{0}, begun}) {
+      const test::Answer answer = listen(last);
+      EXPECT_EQ(answer.status, 200) << last;
+      EXPECT_THAT(answer.body, testing::HasSubstr("event: done")) << last;
+    }
+  }
+  EXPECT_EQ(listen(ended).status, 204);
 }
 
 }  // namespace

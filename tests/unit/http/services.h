@@ -1,6 +1,12 @@
 // The services of a server on a data folder of its own.
 #pragma once
 
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "server/http/app/services.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/retention.h"
@@ -12,8 +18,29 @@
 
 namespace isomesh::http {
 
+// Can tell the end of a job later than it can be read.
+class LateJobStore : public store::SqliteJobStore {
+ public:
+  using SqliteJobStore::SqliteJobStore;
+
+  std::vector<store::Event> events(const store::Viewer& viewer, const std::string& job,
+                                   std::uint64_t since,
+                                   std::chrono::milliseconds timeout) const override {
+    auto events = SqliteJobStore::events(viewer, job, since, timeout);
+    if (is_late) {
+      std::erase_if(events,
+                    [](const auto& event) { return event.kind == store::EventKind::kDone; });
+    }
+    return events;
+  }
+
+  std::atomic<bool> is_late = false;
+};
+
 class OpenServices {
  public:
+  store::SqlVolumeStore& volumes() { return volumes_; }
+  LateJobStore& jobs() { return jobs_; }
   Services all(Wing* hospital = nullptr) {
     return {.folder = data_,
             .blobs = blobs_,
@@ -37,7 +64,7 @@ class OpenServices {
   store::Database database_{data_};
   store::FileBlobStore blobs_{data_};
   store::SqlVolumeStore volumes_{database_};
-  store::SqliteJobStore jobs_{database_, blobs_, store::JobStoreOptions{}};
+  LateJobStore jobs_{database_, blobs_, store::JobStoreOptions{}};
   store::Retention retention_{jobs_, volumes_, blobs_, data_.scratch(), store::RetentionOptions{}};
   jobs::VolumeLibrary library_{
       data_, blobs_, volumes_, retention_, volume::SizeLimits{}, jobs::RunnerOptions{}};

@@ -95,7 +95,11 @@ TEST_F(WorkersTest, AFailureOfOursTellsNothingAndIsTriedThreeTimes) {
   EXPECT_EQ(job.state, JobState::kFailed);
   ASSERT_TRUE(job.error);
   EXPECT_EQ(job.error->status, 500);
-  const auto events = jobs_.events("", job.id, 0, milliseconds(0));
+  std::vector<store::Event> events;
+  EXPECT_TRUE(eventually([&] {  // the state can be read shortly before the event of the end
+    events = jobs_.events("", job.id, 0, milliseconds(0));
+    return events.back().kind == store::EventKind::kDone;
+  }));
   EXPECT_EQ(std::ranges::count(events, Stage::kLoad, &store::Event::stage), 3 + 1);
   EXPECT_EQ(job.error->detail.find(folder_.path()), std::string::npos);
 }
