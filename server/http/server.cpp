@@ -19,10 +19,11 @@ constexpr std::chrono::seconds kLongestWatch{1};
 constexpr std::chrono::seconds kLastResponses{5};
 
 // Distributes events of jobs to waiting requests, streams, the log and the metrics, until the
-// service stops.
+// service stops and all have been distributed.
 void watch_jobs(App& app) {
   std::uint64_t last = app.first_event;
-  while (!app.stopping) {
+  while (true) {
+    const bool is_ending = app.stopping;
     try {
       const auto events = app.services.jobs.events(std::nullopt, "", last, kLongestWatch);
       bool is_heard = false;
@@ -35,8 +36,10 @@ void watch_jobs(App& app) {
         if (!event.is_elsewhere) report_ended(app, event.job);
       }
       if (is_heard) app.connections.wake_sources();
+      if (is_ending && events.empty()) return;
     } catch (const std::exception& error) {
       log_error("job events cannot be read and are retried: {}", error.what());
+      if (is_ending) return;
       std::this_thread::sleep_for(kLongestWatch);
     }
   }

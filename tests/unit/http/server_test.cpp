@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <latch>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,10 +30,14 @@ class Orders final : public Wing {
   void on_end(std::function<void(const std::string& id)> listener) override {
     listener_ = std::move(listener);
   }
-  void job_ended(const std::string& /*job*/) override {}
+  void job_ended(const std::string& job) override {
+    if (on_job_ended) on_job_ended(job);
+  }
   std::vector<MeasuredFamily> measure() const override { return {}; }
   void begin_drain() override {}
   void stop() override { listener_ = {}; }
+
+  std::function<void(const std::string& job)> on_job_ended;
 
  private:
   std::function<void(const std::string& id)> listener_;
@@ -50,11 +55,40 @@ TEST(Server, OrdersEndBeforeItIfTheStartFailsLater) {
   EXPECT_FALSE(orders.has_listener());
 }
 
+std::string add_job(OpenServices& services, double iso = 1) {
+  services.volumes().add("", Volume{});
+  JobParameters parameters;
+  parameters.iso = iso;
+  return job_of(services.jobs().submit({"", parameters, "", ""})).id;
+}
+
+TEST(Server, JobsThatEndWhileItEndsAreReported) {
+  OpenServices services;
+  const std::string first = add_job(services, 1);
+  const std::string second = add_job(services, 2);
+  Orders orders;
+  std::vector<std::string> reported;
+  std::latch begun{1};
+  orders.on_job_ended = [&](const std::string& job) {
+    reported.push_back(job);
+    if (reported.size() > 1) return;
+    begun.count_down();
+    services.jobs().is_closed.wait(false);
+  };
+  Server server(services.all(&orders), ServerOptions{});
+  server.bind(net::parse_address("127.0.0.1:0"));
+  server.start();
+  services.jobs().cancel("", first);
+  begun.wait();
+  services.jobs().cancel("", second);
+  server.stop();
+  EXPECT_THAT(reported, testing::ElementsAre(first, second));
+}
+
 // A reader that reconnects in that moment would never hear of it otherwise.
 TEST(Server, TheEndOfAJobIsToldAlthoughItsEventIsNotThereYet) {
   OpenServices services;
-  services.volumes().add("", Volume{});
-  const std::string id = job_of(services.jobs().submit({"", JobParameters{}, "", ""})).id;
+  const std::string id = add_job(services);
   const auto last_id = [&] {
     return services.jobs().events("", id, 0, std::chrono::milliseconds(0)).back().id;
   };

@@ -34,7 +34,14 @@ class LateJobStore : public store::SqliteJobStore {
     return events;
   }
 
+  void close() override {
+    SqliteJobStore::close();
+    is_closed = true;
+    is_closed.notify_all();
+  }
+
   std::atomic<bool> is_late = false;
+  std::atomic<bool> is_closed = false;
 };
 
 class OpenServices {
