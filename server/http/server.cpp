@@ -97,8 +97,9 @@ void Server::start() {
 }
 
 void Server::begin_drain() {
-  state_->app.draining = true;
+  // Before /readyz tells of it.
   state_->app.services.jobs.refuse_new();
+  state_->app.draining = true;
 }
 
 void Server::stop() {

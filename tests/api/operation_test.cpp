@@ -29,7 +29,8 @@ TEST(Start, TellsWhereItListensOnItsFirstLine) {
   const Daemon daemon;
   EXPECT_THAT(daemon.url(), testing::MatchesRegex("http://127\\.0\\.0\\.1:[1-9][0-9]*"));
   EXPECT_EQ(daemon.get("/livez").body, "ok\n");
-  EXPECT_EQ(daemon.get("/readyz").body, "ok\n");
+  // The first check may take longer than the answer waits for it.
+  EXPECT_TRUE(eventually([&] { return daemon.get("/readyz").body == "ok\n"; }));
 }
 
 // A file that the daemon opens must not become its standard output or its log.

@@ -289,7 +289,7 @@ TEST_F(Cluster, OneDaemonProcessesOrdersAlsoAfterARestartOfTheDatabase) {
   ask("UPDATE tasks SET node = gen_random_uuid(), folder = '', held_until = isomesh_now() + "
       "600000000");
   EXPECT_TRUE(is_paused(0, "1"));
-  EXPECT_EQ(node(0).get("/readyz").status, 200);
+  EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
   ask("DELETE FROM tasks");
   EXPECT_TRUE(is_paused(0, "0"));
 }

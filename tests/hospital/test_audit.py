@@ -146,6 +146,7 @@ class Syslog(Loop):
         series = self.series()
         self.succeeded(daemon, self.order(daemon, series))
         self.assertEqual(daemon.stop(), 0)
+        peers.until(lambda: len(collector.events()) >= 5)  # its thread reads what has come by then
         told = collector.events()
         self.assertEqual([(event, kind) for event, kind, _ in told],
                          [("110100", "110120"), ("110112", None), ("110104", None),

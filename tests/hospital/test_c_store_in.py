@@ -29,10 +29,10 @@ send = [ {{ pacs = "main" }} ]
 
 
 class Receiving(Loop):
-    def receiver(self, settle=1, idle=2, associations=3, most_object=1 << 30, most_held=1 << 30,
+    def receiver(self, settle=3, idle=3, associations=3, most_object=1 << 30, most_held=1 << 30,
                  *options):
         port = peers.free_port()
-        daemon = self.daemon(None, settle, 2, 500_000_000, "", DIMSE.format(
+        daemon = self.daemon(None, settle, 10, 500_000_000, "", DIMSE.format(
             port=port, idle=idle, associations=associations, most_object=most_object,
             most_held=most_held), *options)
         daemon.dimse_port = port
@@ -155,6 +155,10 @@ class Receiving(Loop):
         subprocess.run(["echoscu", "-aet", "CT1", "-aec", "BONE", "127.0.0.1",
                         str(daemon.dimse_port)], check=True)
 
+    @staticmethod
+    def refused(daemon):
+        return [each for each in daemon.audit() if each["event"] == "110114"]
+
     def test_titles(self):
         """Only known titles, on both sides."""
         series, folder = self.made()
@@ -163,7 +167,8 @@ class Receiving(Loop):
                                      ("BONE", "STRANGER", "Calling AE Title Not Recognized")]:
             said = self.send(daemon, self.in_folder(folder), called, calling, False)
             self.assertIn(why, said)
-        refused = [each for each in daemon.audit() if each["event"] == "110114"]
+            peers.until(lambda: self.refused(daemon))  # written after the answer
+        refused = self.refused(daemon)
         # At most one a second has an entry.
         self.assertEqual([(refused[0]["peer"], refused[0]["called"], refused[0]["calling"])],
                          [("127.0.0.1", "NOBODY", "CT1")])
@@ -252,7 +257,7 @@ class Receiving(Loop):
     def test_idle_associations(self):
         """As many as may be that say nothing, or stop in the middle: they hold up nobody for long."""
         series, folder = self.made()
-        daemon = self.receiver(1, 1, 3)
+        daemon = self.receiver(3, 3, 3)
         silent = [socket.create_connection(("127.0.0.1", daemon.dimse_port)) for _ in range(6)]
         for each in silent[:3]:
             each.sendall(b"\x01\x00\x00\x00\x10")
@@ -264,7 +269,7 @@ class Receiving(Loop):
     def sent_beside(self, count, greeting, address="127.0.0.1"):
         """The seconds that a series takes beside so many connections that send that and no more."""
         _, folder = self.made()
-        daemon = self.receiver(1, 60, 8)
+        daemon = self.receiver(3, 60, 8)
         silent = []
         for _ in range(count):
             silent.append(socket.create_connection(("127.0.0.1", daemon.dimse_port),
@@ -303,7 +308,7 @@ class Receiving(Loop):
     def test_aborted_association(self):
         """What was acknowledged stays, what was not does not count: aborted, cut, left alone."""
         series, folder = self.made()
-        daemon = self.receiver(3, 1)
+        daemon = self.receiver(20, 3)
         instances = series.instances
 
         def begun(number):
@@ -317,7 +322,7 @@ class Receiving(Loop):
         begun(0).abort()
         begun(2).connection.close()
         left = begun(4)
-        self.assertIn(left.receive()[0], (7, None))  # given up after a second
+        self.assertIn(left.receive()[0], (7, None))  # given up after three seconds
         self.send(daemon, [self.in_folder(folder)[n] for n in (1, 3, 5, 6, 7, 8, 9, 10, 11)])
         order = self.succeeded(daemon, self.only_order(daemon, series))
         self.assertEqual(order["source"]["instances"], 12)
@@ -376,7 +381,7 @@ class Receiving(Loop):
         try:
             series, files = self.made(size=64)
             files = self.in_folder(files)
-            daemon = self.receiver(3, 2, 3, 1 << 30, 1 << 30, "--data", folder)
+            daemon = self.receiver(15, 2, 3, 1 << 30, 1 << 30, "--data", folder)
             self.send(daemon, files[:4])
             filling = os.path.join(folder, "filling")
             peers.fill_disk(filling)
@@ -396,7 +401,7 @@ class Receiving(Loop):
     def test_killed_while_receiving(self):
         """kill -9 at any time: what storescu was told is stored is there, and one order comes of it."""
         series, folder = self.made(slices=60)
-        daemon = self.receiver(2)
+        daemon = self.receiver(15)  # beyond the starts of the daemon and of storescu
         files = self.in_folder(folder)
         left = files
         for pause in (0.05, 0.15, 0.3):

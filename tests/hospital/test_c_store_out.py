@@ -9,7 +9,7 @@ from fixture import Loop
 
 
 class Sending(Loop):
-    def daemon_to(self, port, aet="ORTHANC", timeout=2, more=""):
+    def daemon_to(self, port, aet="ORTHANC", timeout=10, more=""):
         """One that asks over DICOMweb, and sends by C-STORE."""
         return self.daemon(timeout=timeout, pacs=f'send-by = "c-store"\nhost = "127.0.0.1"\n'
                            f'aet = "{aet}"\nport = {port}\n{more}')

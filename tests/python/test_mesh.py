@@ -332,11 +332,12 @@ class Limits(LimitedTest):
                 with contextlib.suppress(Exception):
                     __import__("threading").Event().wait()
 
+        class Ends(LimitedTest):
             def test_that_ends(self):
                 pass
 
         printed = io.StringIO()
-        suite = unittest.defaultTestLoader.loadTestsFromTestCase(Hangs)
+        suite = unittest.TestSuite([Hangs("test_that_waits"), Ends("test_that_ends")])
         result = unittest.TextTestRunner(printed).run(suite)
         self.assertEqual((result.testsRun, len(result.errors)), (2, 1))
         self.assertRegex(printed.getvalue(), r"test_that_waits takes longer than 0.2 s")

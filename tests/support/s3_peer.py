@@ -46,6 +46,7 @@ class State:
     def __init__(self):
         self.objects = {}  # key: (bytes, time of change)
         self.uploads = {}  # id: (key, {number: bytes})
+        self.begun = 0  # uploads, also those that have ended
         self.faults = []
         self.requests = []  # (method, target)
         self.page = 1000
@@ -321,7 +322,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def post(self, key, query, body):
         if "uploads" in query:
             with state.lock:
-                number = "upload~%d/=" % (len(state.uploads) + 1)
+                state.begun += 1
+                number = "upload~%d/=" % state.begun
                 state.uploads[number] = (key, {})
             self.answer_xml("<InitiateMultipartUploadResult><UploadId>%s</UploadId>"
                             "</InitiateMultipartUploadResult>" % number)

@@ -103,6 +103,7 @@ class ConnectionsTest : public testing::Test {
     patient.acceptor.head_time = 1h;
     patient.body.patience = 1h;
     patient.sender.patience = 1h;
+    patient.client_patience = 1h;
     return patient;
   }
 

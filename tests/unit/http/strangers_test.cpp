@@ -130,6 +130,7 @@ TEST_F(StrangersTest, WhatTooManyWaitForIsRefused) {
   ConnectionOptions narrow = options();
   narrow.computing_threads = 2;
   narrow.backlog = 2;
+  narrow.sender.linger = 1h;
   open(narrow);
   hang_on(1, request("GET", "/compute"));
   ASSERT_TRUE(eventually([&] { return runs_ == 1; }));
@@ -164,7 +165,7 @@ TEST_F(StrangersTest, WaitersAreAnsweredHoweverManyThereAre) {
 }
 
 TEST_F(StrangersTest, AnAbandonedRequestIsToldOfAndLetGo) {
-  open(options());
+  open(patient_options());
   hang_on(1, request("GET", "/cancel"));
   ASSERT_TRUE(eventually([&] { return runs_ == 1; }));
   clients_.clear();
@@ -173,7 +174,7 @@ TEST_F(StrangersTest, AnAbandonedRequestIsToldOfAndLetGo) {
 }
 
 TEST_F(StrangersTest, AnAbandonedWaitEnds) {
-  open(options());
+  open(patient_options());
   hang_on(3, request("GET", "/wait"));
   ASSERT_TRUE(eventually([&] { return runs_ == 3; }));
   clients_.clear();

@@ -195,7 +195,7 @@ TEST_F(WorkersTest, AJobThatTakesTooLongFails) {
 
 TEST_F(WorkersTest, ALeaseIsProlongedWhileItsJobRuns) {
   WorkerOptions options = threads(1);
-  options.lease = std::chrono::seconds(1);
+  options.lease = std::chrono::seconds(3);
   const Workers workers(options, jobs_, volumes_, blobs_);
   const std::string id = submit_long();
   ASSERT_TRUE(comes_to(id, JobState::kRunning));
@@ -223,9 +223,10 @@ TEST_F(WorkersTest, DrainLetsARunningJobFinishAndBeginsNoOther) {
   JobParameters parameters = parameters_of(add_much(), 50);
   parameters.passes = 40;
   parameters.formats = {MeshFormat::kStl};  // Draco's would take long where all processors are busy
+  const JobParameters others = parameters_of(add_sphere(), 0);
   const std::string running = submit(parameters);
   ASSERT_TRUE(comes_to(running, JobState::kRunning));
-  const std::string waiting = submit(parameters_of(add_sphere(), 0));
+  const std::string waiting = submit(others);
   EXPECT_TRUE(workers->drain(kLongest));
   EXPECT_EQ(jobs_.get("", running).state, JobState::kSucceeded);
   EXPECT_EQ(jobs_.get("", waiting).state, JobState::kQueued);
