@@ -112,9 +112,17 @@ bool Connection::send(std::string_view bytes) const {
 
 void Connection::finish_sending() const { ::shutdown(socket_, SHUT_WR); }
 
+// The end of a child process interrupts it.
+ssize_t Connection::receive_into(std::string& block) const {
+  while (true) {
+    const ssize_t count = ::recv(socket_, block.data(), block.size(), 0);
+    if (count >= 0 || errno != EINTR) return count;
+  }
+}
+
 std::string Connection::receive_some() const {
   std::string block(4096, '\0');
-  const ssize_t count = ::recv(socket_, block.data(), block.size(), 0);
+  const ssize_t count = receive_into(block);
   if (count < 0) throw std::runtime_error("the daemon does not answer");
   block.resize(static_cast<std::size_t>(count));
   return block;
@@ -124,7 +132,7 @@ Answer Connection::receive() const {
   std::string text;
   std::string block(1 << 16, '\0');
   while (true) {
-    const ssize_t count = ::recv(socket_, block.data(), block.size(), 0);
+    const ssize_t count = receive_into(block);
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
       throw std::runtime_error("the daemon does not answer");
     }

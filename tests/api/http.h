@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <sys/types.h>
+
 namespace isomesh::test {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
@@ -45,6 +47,8 @@ class Connection {
   Answer receive() const;
 
  private:
+  ssize_t receive_into(std::string& block) const;
+
   int socket_;
 };
 

@@ -99,8 +99,10 @@ TEST(Server, TheEndOfAJobIsToldAlthoughItsEventIsNotThereYet) {
   const std::string url = server.bind(net::parse_address("127.0.0.1:0"));
   server.start();
   const auto listen = [&](std::uint64_t last) {
-    return test::answer_to(url, test::request("GET", "/v1/jobs/" + id + "/events", {},
-                                              {{"Last-Event-ID", std::to_string(last)}}));
+    const test::Connection connection(url);
+    connection.send(test::request("GET", "/v1/jobs/" + id + "/events", {},
+                                  {{"Last-Event-ID", std::to_string(last)}}));
+    return connection.receive();
   };
   for (const bool is_late : {true, false}) {
     services.jobs().is_late = is_late;
