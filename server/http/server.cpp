@@ -38,8 +38,8 @@ void watch_jobs(App& app) {
       if (is_heard) app.connections.wake_sources();
       if (is_ending && events.empty()) return;
     } catch (const std::exception& error) {
+      if (is_ending) return log_error("the last job events cannot be read: {}", error.what());
       log_error("job events cannot be read and are retried: {}", error.what());
-      if (is_ending) return;
       std::this_thread::sleep_for(kLongestWatch);
     }
   }

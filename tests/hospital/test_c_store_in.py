@@ -179,7 +179,7 @@ class Receiving(Loop):
     def test_sent_twice(self):
         """Within an association, later, and after it has succeeded: one order."""
         series, folder = self.made()
-        daemon = self.receiver(2)
+        daemon = self.receiver()
         files = self.in_folder(folder)
         self.send(daemon, files + files)
         self.send(daemon, files)
@@ -257,7 +257,7 @@ class Receiving(Loop):
     def test_idle_associations(self):
         """As many as may be that say nothing, or stop in the middle: they hold up nobody for long."""
         series, folder = self.made()
-        daemon = self.receiver(3, 3, 3)
+        daemon = self.receiver()
         silent = [socket.create_connection(("127.0.0.1", daemon.dimse_port)) for _ in range(6)]
         for each in silent[:3]:
             each.sendall(b"\x01\x00\x00\x00\x10")
@@ -269,7 +269,7 @@ class Receiving(Loop):
     def sent_beside(self, count, greeting, address="127.0.0.1"):
         """The seconds that a series takes beside so many connections that send that and no more."""
         _, folder = self.made()
-        daemon = self.receiver(3, 60, 8)
+        daemon = self.receiver(idle=60, associations=8)
         silent = []
         for _ in range(count):
             silent.append(socket.create_connection(("127.0.0.1", daemon.dimse_port),

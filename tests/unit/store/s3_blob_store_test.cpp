@@ -44,12 +44,6 @@ class S3Blobs : public testing::Test {
     open();
   }
 
-  // For requests that no repetition helps.
-  void give_up_soon() {
-    options_.client.patience = std::chrono::milliseconds(500);
-    open();
-  }
-
   // As after a start of the daemon.
   void open() {
     blobs_.reset();
@@ -171,7 +165,8 @@ TEST_F(S3Blobs, AConnectionThatBreaksIsMadeAgain) {
 }
 
 TEST_F(S3Blobs, APeerThatIsDownIsUnavailableAndNothingIsStored) {
-  give_up_soon();
+  options_.client.patience = std::chrono::milliseconds(500);
+  open();
   peer().fail("drop");
   EXPECT_EQ(code_thrown_by([&] { put("hello"); }), ErrorCode::kUnavailable);
   EXPECT_EQ(code_thrown_by([&] { blobs_->mark(); }), ErrorCode::kUnavailable);
