@@ -42,4 +42,16 @@ bool HeldTask::is_ours(SqlConnection& connection) const {
       .next();
 }
 
+// Releases the lock itself: the server notices only some time later that a connection has ended.
+ExclusiveTask::~ExclusiveTask() {
+  if (!is_ours_) return;
+  try {
+    connection_.wait_until(Connection::Clock::now() + Connection::kPatience);
+    connection_.query("SELECT pg_advisory_unlock_all()");
+  } catch (const std::exception& error) {
+    log_debug("a task is given back only when the database notices the end of its connection: {}",
+              error.what());
+  }
+}
+
 }  // namespace isomesh::store::postgresql

@@ -50,8 +50,8 @@ class HeldTask {
   Steady sure_until_ ISOMESH_GUARDED_BY(mutex_) = {};
 };
 
-// A task that one process of a cluster has at a time. An advisory lock of the database, held while
-// its connection lives, so it is released when the process dies.
+// A task that one process of a cluster has at a time, until this object goes. An advisory lock of
+// the database, so it is also released when the process dies and its connection with it.
 class ExclusiveTask {
  public:
   // Throws Error kUnavailable if the database does not respond.
@@ -62,6 +62,9 @@ class ExclusiveTask {
     row.next();
     is_ours_ = row.boolean(0);
   }
+  ~ExclusiveTask();
+  ExclusiveTask(const ExclusiveTask&) = delete;
+  ExclusiveTask& operator=(const ExclusiveTask&) = delete;
 
   // False if another process has it.
   bool is_ours() const { return is_ours_; }

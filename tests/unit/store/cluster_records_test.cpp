@@ -1,5 +1,6 @@
 // Tests of several processes that share one database's records other than jobs: tables, retention,
 // orders, callbacks and blob ownership.
+#include <csignal>
 #include <optional>
 #include <string>
 #include <thread>
@@ -130,6 +131,23 @@ TEST_F(ClusterTest, OneRemovesAtATime) {
   EXPECT_FALSE(two().jobs.claim_removal());
   removal.reset();
   EXPECT_TRUE(two().jobs.claim_removal());
+}
+
+// The server notices only after a while that a connection has ended. Here it cannot for a while, as
+// under load.
+TEST_F(ClusterTest, WhoHasRemovedLetsOthersRemoveAtOnce) {
+  auto removal = two().jobs.claim_removal();
+  ASSERT_TRUE(removal);
+  const int holder = std::stoi(
+      ask("SELECT pid FROM pg_locks WHERE locktype = 'advisory' AND granted AND classid = "
+          "(hashtext('isomesh removing')::bigint & 4294967295)::oid"));
+  ASSERT_EQ(::kill(holder, SIGSTOP), 0);
+  const std::jthread resume([holder] {
+    std::this_thread::sleep_for(milliseconds(500));
+    ::kill(holder, SIGCONT);
+  });
+  removal.reset();
+  EXPECT_TRUE(one().jobs.claim_removal());
 }
 
 // The newest time that is known is 40 days later than the database's clock.
