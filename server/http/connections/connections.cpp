@@ -185,11 +185,12 @@ void Connections::finish_by(const std::shared_ptr<Exchange>& exchange, const Res
   });
 }
 
-// An accepted request is queued regardless of the backlog, unless the service stops.
+// An accepted request is queued regardless of the backlog. One that begins to wait after the queue
+// has ended is finished here, on the thread of its handler.
 void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
   const bool has_turn = tasks_->enqueue_rest(
       exchange->party, [this, exchange, resume] { finish_by(exchange, resume); });
-  if (!has_turn) refuse_at_end(*exchange);
+  if (!has_turn) finish_by(exchange, resume);
 }
 
 }  // namespace isomesh::http

@@ -161,6 +161,15 @@ class ConnectionsTest : public testing::Test {
                             response.set_body("waited", "text/plain");
                           }};
     });
+    add("GET", "/block-and-wait",
+        [this, gate = going_.get_future().share()](const Request&,
+                                                   Response&) -> std::optional<Continuation> {
+          busy_ = true;
+          gate.wait();
+          return Continuation{"job", Clock::now() + wait_, [](const Request&, Response& response) {
+                                response.set_body("waited", "text/plain");
+                              }};
+        });
     add("GET", "/cancel", [this](const Request&, Response&) -> std::optional<Continuation> {
       ++runs_;
       return Continuation{"job", Clock::now() + wait_,
@@ -258,6 +267,7 @@ class ConnectionsTest : public testing::Test {
   std::atomic<bool> ended_ = false;
   std::atomic<bool> busy_ = false;
   std::promise<void> go_;
+  std::promise<void> going_;
   std::promise<void> thinking_;
   std::promise<void> computing_;
   std::chrono::milliseconds wait_ = 60s;
