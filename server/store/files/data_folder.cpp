@@ -1,8 +1,10 @@
 #include "server/store/files/data_folder.h"
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <initializer_list>
+#include <thread>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -42,6 +44,16 @@ void check_access(const std::filesystem::path& root) {
   }
 }
 
+// A daemon that was killed can leave its lock for a moment to a process that it was starting.
+bool locks_soon(int descriptor) {
+  for (int tries = 0; ::flock(descriptor, LOCK_EX | LOCK_NB) != 0; ++tries) {
+    constexpr int kMostTries = 50;
+    if (tries == kMostTries) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return true;
+}
+
 }  // namespace
 
 BlobFolders shared_blob_folders(const std::filesystem::path& root) {
@@ -79,7 +91,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
   if (lock_ < 0) {
     throw Error(ErrorCode::kInternal, std::string(kDataFolder) + ": " + std::strerror(errno));
   }
-  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+  if (!locks_soon(lock_)) {
     ::close(lock_);
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }

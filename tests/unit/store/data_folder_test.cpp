@@ -1,7 +1,9 @@
 #include "server/store/files/data_folder.h"
 
+#include <chrono>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -40,6 +42,17 @@ TEST(DataFolder, RefusesASecondHolder) {
   EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }),
             ErrorCode::kUnavailable);
   first.reset();
+  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }), std::nullopt);
+}
+
+// As a process that a daemon was starting when it was killed.
+TEST(DataFolder, WaitsAMomentForAHolderThatGoes) {
+  const TemporaryFolder parent;
+  std::optional<DataFolder> first(std::in_place, parent / "data");
+  const std::jthread leaving([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    first.reset();
+  });
   EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }), std::nullopt);
 }
 
