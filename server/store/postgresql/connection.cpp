@@ -171,16 +171,16 @@ void check_url(const std::string& url) {
 
 namespace {
 
-// Waits until the socket is readable or writable. Returns false at the deadline.
+// Waits until the socket is readable or writable. Returns false if it is not at the deadline.
 bool waits_for(int socket, short events, Connection::Clock::time_point deadline) {
   while (true) {
     const auto left =
         std::chrono::ceil<std::chrono::milliseconds>(deadline - Connection::Clock::now());
-    if (left.count() <= 0) return false;
     pollfd watched = {socket, events, 0};
     const int count =
-        ::poll(&watched, 1, static_cast<int>(std::min<std::int64_t>(left.count(), 60'000)));
+        ::poll(&watched, 1, static_cast<int>(std::clamp<std::int64_t>(left.count(), 0, 60'000)));
     if (count > 0) return true;
+    if (count == 0 && left.count() <= 0) return false;
     if (count < 0 && errno != EINTR) return false;
   }
 }

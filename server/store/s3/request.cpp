@@ -55,11 +55,10 @@ class Attempt {
   void set_connection() {
     curl::connect_directly(easy_, options_.authorities);
     curl_easy_setopt(easy_, CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
-    constexpr long kQuick = 2'000;
-    const auto connect = static_cast<long>(options_.connect.count());
-    curl_easy_setopt(easy_, CURLOPT_CONNECTTIMEOUT_MS,
-                     request_.is_quick ? std::min(kQuick, connect) : connect);
-    if (request_.is_quick) curl_easy_setopt(easy_, CURLOPT_TIMEOUT_MS, kQuick);
+    curl_easy_setopt(easy_, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options_.connect.count()));
+    if (request_.is_quick) {
+      curl_easy_setopt(easy_, CURLOPT_TIMEOUT_MS, static_cast<long>(options_.quick.count()));
+    }
     if (request_.is_sent_once) curl_easy_setopt(easy_, CURLOPT_FRESH_CONNECT, 1L);
     curl_easy_setopt(easy_, CURLOPT_LOW_SPEED_LIMIT, 1024L);
     curl_easy_setopt(easy_, CURLOPT_LOW_SPEED_TIME, static_cast<long>(options_.stall.count()));

@@ -30,6 +30,8 @@ struct S3ClientOptions {
   // A request is repeated for this long; a transfer that advances is repeated for longer.
   std::chrono::milliseconds patience{20'000};
   std::chrono::milliseconds first_pause{100};  // before the first repetition; doubles up to 2 s
+  // Limit for requests that others wait for, or that may fail: a sign of life, or erasing.
+  std::chrono::milliseconds quick{2'000};
   std::uint64_t multipart_above = std::uint64_t{64} << 20;
   std::uint64_t part_bytes = std::uint64_t{16} << 20;
 };
@@ -51,7 +53,7 @@ struct S3Request {
   std::string sha256 = {};       // of the body; empty: computed from the text
   const S3Sink* sink = nullptr;  // receives the body of a response 200 or 206
   std::uint64_t sink_begin = 0;  // offset in the object of the sink's first byte
-  bool is_quick = false;         // limited to two seconds
+  bool is_quick = false;         // limited to S3ClientOptions::quick
   // Uses a new connection: libcurl silently repeats requests that fail on a reused one.
   bool is_sent_once = false;
 };
