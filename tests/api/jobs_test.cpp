@@ -123,7 +123,7 @@ TEST_F(JobsTest, ARunningJobStopsWhenItIsCancelled) {
   EXPECT_EQ(ended.state, JobState::kCancelled);
   EXPECT_FALSE(ended.mesh || ended.error);
   EXPECT_EQ(blobs_below(daemon_.data()).size(), 2U) << "the two volumes and nothing else";
-  EXPECT_TRUE(files_below(daemon_.data() / "scratch").empty());
+  EXPECT_TRUE(eventually([&] { return files_below(daemon_.data() / "scratch").empty(); }));
   EXPECT_TRUE(is_problem(daemon_.get(path + "/mesh.drc"), ErrorCode::kCancelled));
 }
 

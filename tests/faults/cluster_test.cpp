@@ -74,10 +74,18 @@ class Cluster : public testing::Test {
                 std::chrono::milliseconds longest = kLongest) {
     const auto deadline = std::chrono::steady_clock::now() + longest;
     while (std::chrono::steady_clock::now() < deadline) {
-      if (this->node(node).client().job(id).state == state) return true;
+      if (insist([&] { return job(node, id).state == state; })) return true;
       std::this_thread::sleep_for(milliseconds(20));
     }
     return false;
+  }
+
+  Job job(std::size_t node, const std::string& id) { return this->node(node).client().job(id); }
+  void cancel(std::size_t node, const std::string& id) {
+    insist([&] { return this->node(node).client().cancel(id); });
+  }
+  Volume upload_to(std::size_t node, const RawUpload& upload) {
+    return insist([&] { return test::upload(this->node(node), upload); });
   }
 
   // The id of a job that one of the nodes has accepted; `number` tells it from all others. The key
@@ -95,12 +103,12 @@ class Cluster : public testing::Test {
 
   // A job that runs for longer than anybody waits.
   Job endless_job(std::size_t node) {
-    Daemon& daemon = this->node(node);
+    const Volume volume = upload_to(node, rough_upload());
+    const double iso = 50 + 0.01 * ++endless_;
     const std::string id =
-        submit(daemon, upload(daemon, rough_upload()), 50 + 0.01 * ++endless_, slow_smoothing(1000))
-            .id;
+        insist([&] { return submit(this->node(node), volume, iso, slow_smoothing(1000)).id; });
     if (!comes_to(node, id, JobState::kRunning)) throw std::runtime_error("it does not run");
-    return daemon.client().job(id);
+    return insist([&] { return job(node, id); });
   }
 
   std::unique_ptr<Postgres> postgres_;
@@ -141,7 +149,7 @@ TEST_F(Cluster, NothingIsLostOrDoneTwiceWhenNodesAndTheDatabaseDie) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
   start_all();
-  const Volume volume = upload(node(0), sphere_upload());
+  const Volume volume = upload_to(0, sphere_upload());
   std::vector<std::string> accepted;
   const auto submit_some = [&](int count) {
     for (int n = 0; n < count; ++n) {
@@ -187,7 +195,7 @@ TEST_F(Cluster, AStandbyThatTakesOverHasEveryAcceptedJob) {
   store_ = postgres_->or_on(standby, postgres_->new_place());
   std::array<Postgres*, 2> servers = {postgres_.get(), &standby};
   start_all();
-  const Volume volume = upload(node(0), sphere_upload());
+  const Volume volume = upload_to(0, sphere_upload());
   std::vector<std::string> accepted;
   std::mt19937 random(std::random_device{}());
   for (int round = 0; round < rounds; ++round) {
@@ -215,16 +223,18 @@ TEST_F(Cluster, AStandbyThatTakesOverHasEveryAcceptedJob) {
 TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   start(0, {"--workers", "0"});  // only answers
   start(1, {"--workers", "1"});
-  const Volume volume = upload(node(0), sphere_upload());
+  const Volume volume = upload_to(0, sphere_upload());
   // Who waits at one node is told of the end at another, long before the wait is over.
   const auto began = std::chrono::steady_clock::now();
-  const Answer answer =
-      node(0).send("POST", "/v1/jobs", job_body(volume.id, 90), {{"Prefer", "wait=60"}});
-  EXPECT_EQ(job_from_json(answer.body).state, JobState::kSucceeded) << answer.body;
+  const Job made = insist([&] {
+    return job_from_json(
+        node(0).send("POST", "/v1/jobs", job_body(volume.id, 90), {{"Prefer", "wait=60"}}).body);
+  });
+  EXPECT_EQ(made.state, JobState::kSucceeded);
   EXPECT_LT(std::chrono::steady_clock::now() - began, seconds(50));
   // By itself it would go on for longer than anybody waits.
   const Job running = endless_job(0);
-  node(0).client().cancel(running.id);
+  cancel(0, running.id);
   EXPECT_TRUE(comes_to(0, running.id, JobState::kCancelled));
   for (const std::size_t each : {0U, 1U}) {
     EXPECT_TRUE(eventually([&] { return node(each).get("/readyz").status == 200; }));
@@ -262,7 +272,7 @@ TEST_F(Cluster, ARunOutlivesAnOutageThatIsLongerThanItsLease) {
       [&] { return ask("SELECT count(*) FROM runs WHERE lease_until > isomesh_now()") == "1"; }));
   EXPECT_EQ(ask("SELECT fence FROM runs"), fence);
   EXPECT_EQ(ask("SELECT count(*) FROM events WHERE state = 1"), "1") << "it was begun once";
-  node(1).client().cancel(running.id);
+  cancel(1, running.id);
   EXPECT_TRUE(comes_to(0, running.id, JobState::kCancelled));
 }
 
@@ -298,7 +308,7 @@ TEST_F(Cluster, OneDaemonProcessesOrdersAlsoAfterARestartOfTheDatabase) {
 TEST_F(Cluster, ADatabaseThatStandsStillIsToldAfterFiveSeconds) {
   store_ += (store_.find('?') == std::string::npos ? "?" : "&") + std::string("connect_timeout=60");
   start(0, {"--workers", "0"});
-  const Volume volume = upload(node(0), sphere_upload());
+  const Volume volume = upload_to(0, sphere_upload());
   postgres_->stand_still();
   const auto began = std::chrono::steady_clock::now();
   EXPECT_EQ(node(0).get("/v1/volumes/" + volume.id).status, 503);
@@ -316,23 +326,23 @@ TEST_F(Cluster, ANodeThatStandsStillCannotFinishAndADrainedOneGivesItsJobsBack) 
   start(1, {"--workers", "1", "--drain-seconds", "0"});
   node(0).send_signal(SIGSTOP);
   ASSERT_TRUE(eventually([&] {
-    const Job now = node(1).client().job(before.id);
+    const Job now = insist([&] { return job(1, before.id); });
     return now.state == JobState::kRunning && now.started != before.started;
   }));
   node(0).send_signal(SIGCONT);
   EXPECT_TRUE(
       eventually([&] { return node(0).errors().find("lost its lease") != std::string::npos; }));
   EXPECT_EQ(ask("SELECT attempts FROM jobs WHERE id = '" + before.id + "'"), "1");
-  const Job second = node(1).client().job(before.id);
+  const Job second = insist([&] { return job(1, before.id); });
   EXPECT_EQ(second.state, JobState::kRunning);
   EXPECT_EQ(node(1).stop(), 0);
   // At once, and not when the lease is over.
   EXPECT_TRUE(eventually([&] {
-    const Job now = node(0).client().job(before.id);
+    const Job now = insist([&] { return job(0, before.id); });
     return now.state == JobState::kRunning && now.started != second.started;
   }));
-  node(0).client().cancel(before.id);
-  EXPECT_EQ(node(0).client().wait(before.id).state, JobState::kCancelled);
+  cancel(0, before.id);
+  EXPECT_TRUE(comes_to(0, before.id, JobState::kCancelled));
 }
 
 TEST_F(Cluster, AFolderIsMovedWithAllThatItHolds) {

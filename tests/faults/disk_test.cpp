@@ -154,7 +154,8 @@ TEST_F(Disk, AJobThatMayFitLaterWaitsAndSaysSo) {
   EXPECT_TRUE(eventually(is_told)) << "while it is not tried again";
   // Others still fit.
   EXPECT_TRUE(eventually([&] { return daemon().get("/readyz").status == 200; }));
-  EXPECT_EQ(daemon().client().job(id).waiting_for, WaitingFor::kDisk);
+  EXPECT_TRUE(
+      eventually([&] { return daemon().client().job(id).waiting_for == WaitingFor::kDisk; }));
   EXPECT_EQ(finished_job(daemon(), "\"passes\": 1").state, JobState::kSucceeded);
   std::filesystem::remove(disk_.outside() / "foreign");
   const Job done = daemon().client().wait(id);

@@ -29,7 +29,7 @@ TEST_F(Folder, OfANewerVersionIsRefusedAndLeftAsItIs) {
 }
 
 TEST_F(Folder, WhatHasExpiredIsGone) {
-  start({"--keep-days", "0.0001"});  // 9 s
+  start({"--keep-days", "0.0003"});  // 26 s
   const Job job = finished_job(daemon());
   const std::string path = "/v1/jobs/" + job.id;
   ASSERT_TRUE(eventually([&] { return daemon().get(path).status == 410; }));

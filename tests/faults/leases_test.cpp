@@ -52,10 +52,10 @@ TEST_F(Leases, KilledInTheMiddleOfAJobItRunsAgainAndGivesOneResult) {
 }
 
 TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
-  start({"--lease-seconds", "1", "--workers", "1"});
+  start({"--lease-seconds", "4", "--workers", "1"});
   const Job before = long_job(daemon());
   daemon().send_signal(SIGSTOP);
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  std::this_thread::sleep_for(std::chrono::milliseconds(4500));
   daemon().send_signal(SIGCONT);
   ASSERT_TRUE(eventually([&] {
     const Job now = job(before.id);

@@ -40,9 +40,17 @@ std::string read_file(const std::filesystem::path& path) {
 
 std::vector<std::string> files_below(const std::filesystem::path& folder) {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) names.push_back(entry.path().lexically_relative(folder).string());
-  }
+  const auto add = [&](const auto& self, std::filesystem::directory_iterator entries) -> void {
+    for (const auto& entry : entries) {
+      std::error_code gone;  // files and folders may go meanwhile
+      if (entry.is_regular_file(gone)) {
+        names.push_back(entry.path().lexically_relative(folder).string());
+      } else if (entry.is_directory(gone) && !entry.is_symlink(gone)) {
+        self(self, std::filesystem::directory_iterator(entry.path(), gone));
+      }
+    }
+  };
+  add(add, std::filesystem::directory_iterator(folder));
   std::ranges::sort(names);
   return names;
 }

@@ -71,6 +71,7 @@ int S3Peer::open_uploads() { return std::stoi(tell("/-/uploads")); }
 
 std::string S3Peer::tell(const std::string& target, std::string_view body) {
   httplib::Client client(endpoint_);
+  client.set_read_timeout(std::chrono::minutes(5));
   const auto answer = client.Post(target, body.data(), body.size(), "application/octet-stream");
   if (!answer || answer->status != 200) throw std::runtime_error("the S3 peer: " + target);
   return answer->body;

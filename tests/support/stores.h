@@ -1,9 +1,12 @@
 // Steps with stores that tests of many components share.
 #pragma once
 
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -36,6 +39,19 @@ inline Job end_of(const store::JobStore& jobs, const store::Viewer& viewer, cons
     if (events.empty()) return job;
     since = events.back().id;
   }
+}
+
+// The events of a job after `since`, once there are as many as `count`; fewer after kLongest. On
+// PostgreSQL they can be read only shortly after the change that they tell of.
+inline std::vector<store::Event> events_of(const store::JobStore& jobs, const store::Viewer& viewer,
+                                           const std::string& id, std::size_t count,
+                                           std::uint64_t since = 0) {
+  std::vector<store::Event> events;
+  eventually([&] {
+    events = jobs.events(viewer, id, since, std::chrono::milliseconds(0));
+    return events.size() >= count;
+  });
+  return events;
 }
 
 }  // namespace isomesh::test

@@ -320,7 +320,7 @@ class CancelledUpload : public testing::Test {
     // The response comes only after the client has cancelled the upload.
     server_.http.Patch("/v1/uploads/7", [this](const httplib::Request&, httplib::Response&) {
       stop_.request_stop();
-      cancelled_.get_future().wait();
+      cancelled_.get_future().wait_for(test::kLongest);
     });
   }
 

@@ -68,7 +68,7 @@ TEST(ImportRunner, ACrashIsOneRefusedUpload) {
 }
 
 TEST(ImportRunner, AHangEndsWithItsTime) {
-  expect_refused(Faulty(seconds(5)).run("hang"), "after 5 seconds while reading nifti");
+  expect_refused(Faulty(seconds(10)).run("hang"), "after 10 seconds while reading nifti");
   expect_refused(Faulty().run("close and hang"), "ended without a response while reading nifti");
 }
 

@@ -70,6 +70,7 @@ class S3Engine : public EngineOfFolders {
     test::write_file(folder_ / "credentials", credentials);
     options_.client.address = store::parse_s3_url(url);
     options_.client.credentials = folder_ / "credentials";
+    options_.client.quick = std::chrono::minutes(1);
     options_.between_sweeps = std::chrono::milliseconds(0);
     service_ = std::make_unique<store::S3Client>(options_.client);
   }

@@ -47,7 +47,7 @@ class SetClock {
 struct Node {
   Node(const std::string& url, const std::string& name, BlobStore& shared,
        JobStoreOptions options = {.grace = milliseconds(0)})
-      : database({.url = url, .node = name}),
+      : database({.url = url, .node = name, .patience = seconds(60)}),
         volumes(database),
         outbox(database),
         jobs(database, shared, for_tests(std::move(options))) {}

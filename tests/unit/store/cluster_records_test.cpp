@@ -58,7 +58,7 @@ TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
       "current_setting('statement_timeout')::interval < interval '10 minutes' THEN RAISE 'hurry'; "
       "END IF; RETURN new; END $$; CREATE TRIGGER patience BEFORE UPDATE ON isomesh_version FOR "
       "EACH ROW EXECUTE FUNCTION check_patience()");
-  Connection connection(url_);
+  Connection connection(url_, Connection::Clock::now() + std::chrono::minutes(2));
   std::optional<Transaction> dump(std::in_place, connection);
   connection.query("SELECT count(*) FROM jobs");
   std::optional<ErrorCode> failure;

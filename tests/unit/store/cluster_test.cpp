@@ -145,7 +145,7 @@ TEST_F(ClusterTest, OneKeyIsOneJobOverAllNodes) {
 TEST_F(ClusterTest, TheEndOfAJobIsHeardAtOnceByTheOtherNode) {
   const std::string id = submit();
   const Lease lease = two().claimed();
-  const std::uint64_t since = one().jobs.events("", id, 0, milliseconds(0)).back().id;
+  const std::uint64_t since = test::events_of(one().jobs, "", id, 2).back().id;
   const auto began = std::chrono::steady_clock::now();
   std::vector<Event> seen;
   std::jthread reader([&] { seen = one().jobs.events("", id, since, kLong); });
@@ -169,7 +169,7 @@ TEST_F(ClusterTest, AnEventThatIsWrittenLateIsNotMissed) {
     }
     return jobs;
   };
-  Connection connection(url_);
+  Connection connection(url_, Connection::Clock::now() + std::chrono::minutes(1));
   std::string quick;
   {
     Transaction transaction(connection);
@@ -288,7 +288,7 @@ TEST_F(ClusterTest, LostConnectionsAreMadeAgain) {
   const Lease lease = two().claimed();
   cut_connections();
   EXPECT_EQ(one().jobs.get("", id).state, JobState::kRunning);
-  const std::uint64_t since = one().jobs.events("", id, 0, milliseconds(0)).back().id;
+  const std::uint64_t since = test::events_of(one().jobs, "", id, 2).back().id;
   std::vector<Event> seen;
   std::jthread reader([&] { seen = one().jobs.events("", id, since, kLong); });
   cut_connections();

@@ -9,6 +9,7 @@
 #include "proto/error.h"
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
+#include "tests/support/stores.h"
 #include "tests/unit/store/engine.h"
 #include "tests/unit/store/wall_clock.h"
 
@@ -36,9 +37,14 @@ class FaultConformance : public test::EngineTest {
     return jobs().submit({owner, parameters(), key, digest});
   }
 
-  std::vector<EventKind> kinds_of(const std::string& job, std::uint64_t since = 0) {
+  std::vector<Event> events_of(const std::string& job, std::size_t count, std::uint64_t since = 0) {
+    return test::events_of(jobs(), "", job, count, since);
+  }
+
+  std::vector<EventKind> kinds_of(const std::string& job, std::size_t count,
+                                  std::uint64_t since = 0) {
     std::vector<EventKind> kinds;
-    for (const Event& event : jobs().events("", job, since, milliseconds(0))) {
+    for (const Event& event : events_of(job, count, since)) {
       EXPECT_EQ(event.job, job);
       kinds.push_back(event.kind);
     }
@@ -302,43 +308,44 @@ TEST_P(FaultConformance, EventsTellAJobsWay) {
   std::this_thread::sleep_for(milliseconds(120));
   jobs().renew(lease, {Stage::kSmooth, 0.5, {}}, kLongLease);
   jobs().finish(lease, some_mesh());
-  const auto events = jobs().events("", id, 0, milliseconds(0));
-  EXPECT_THAT(kinds_of(id), ElementsAre(EventKind::kStage, EventKind::kStage, EventKind::kStage,
-                                        EventKind::kProgress, EventKind::kDone));
+  const auto events = events_of(id, 5);
+  ASSERT_THAT(kinds_of(id, 5), ElementsAre(EventKind::kStage, EventKind::kStage, EventKind::kStage,
+                                           EventKind::kProgress, EventKind::kDone));
   EXPECT_EQ(events[1].stage, Stage::kLoad);
   EXPECT_EQ(events[2].stage, Stage::kSmooth);
   EXPECT_EQ(events[3].progress, 0.5);
   EXPECT_EQ(events[4].state, JobState::kSucceeded);
-  EXPECT_THAT(kinds_of(id, events[3].id), ElementsAre(EventKind::kDone));
-  EXPECT_THAT(kinds_of(other), ElementsAre(EventKind::kStage));
-  EXPECT_EQ(jobs().events("", "", 0, milliseconds(0)).size(), 6U);
+  EXPECT_THAT(kinds_of(id, 1, events[3].id), ElementsAre(EventKind::kDone));
+  EXPECT_THAT(kinds_of(other, 1), ElementsAre(EventKind::kStage));
+  EXPECT_EQ(events_of("", 6).size(), 6U);
 }
 
 TEST_P(FaultConformance, ProgressIsToldAFewTimesASecond) {
   const std::string id = submit().id;
   const Lease lease = claimed();
   jobs().renew(lease, {Stage::kSmooth, 0, {}}, kLongLease);
-  const std::uint64_t since = jobs().events("", id, 0, milliseconds(0)).back().id;
+  const std::uint64_t since = events_of(id, 3).back().id;
   const auto began = std::chrono::steady_clock::now();
   for (int n = 1; n <= 50; ++n) jobs().renew(lease, {Stage::kSmooth, 0.01 * n, {}}, kLongLease);
   // However long that took on a busy machine.
   const auto took = std::chrono::steady_clock::now() - began;
-  EXPECT_LE(kinds_of(id, since).size(), 1 + static_cast<std::size_t>(took / milliseconds(100)));
+  EXPECT_LE(kinds_of(id, 0, since).size(), 1 + static_cast<std::size_t>(took / milliseconds(100)));
 }
 
 TEST_P(FaultConformance, WhatWasKeptIsToldAfterARestartInOrder) {
   const std::string id = submit().id;
   const Lease lease = claimed();
   jobs().renew(lease, {Stage::kSmooth, 0.3, {}}, kLongLease);
-  const std::uint64_t last = jobs().events("", id, 0, milliseconds(0)).back().id;
+  const std::uint64_t last = events_of(id, 3).back().id;
   restart();
-  EXPECT_THAT(kinds_of(id, last), ElementsAre(EventKind::kStage)) << "queued again";
-  EXPECT_THAT(kinds_of(id), ElementsAre(EventKind::kStage, EventKind::kStage, EventKind::kStage));
+  EXPECT_THAT(kinds_of(id, 1, last), ElementsAre(EventKind::kStage)) << "queued again";
+  EXPECT_THAT(kinds_of(id, 3),
+              ElementsAre(EventKind::kStage, EventKind::kStage, EventKind::kStage));
 }
 
 TEST_P(FaultConformance, ReadersOfEventsAreWoken) {
   const std::string id = submit().id;
-  const std::uint64_t since = jobs().events("", id, 0, milliseconds(0)).back().id;
+  const std::uint64_t since = events_of(id, 1).back().id;
   std::vector<Event> seen;
   std::jthread reader([&] { seen = jobs().events("", id, since, kLong); });
   claimed();

@@ -26,9 +26,9 @@ TEST_P(RaceConformance, EveryJobIsClaimedByOneWorker) {
   std::multiset<std::string> taken;
   std::vector<std::jthread> workers;
   for (int worker = 0; worker < 4; ++worker) {
-    workers.emplace_back([&] {
+    workers.emplace_back([&, name = "worker " + std::to_string(worker)] {
       while (!stop.stop_requested()) {
-        const auto lease = jobs().claim("worker", kLongLease);
+        const auto lease = jobs().claim(name, kLongLease);
         if (!lease) {
           jobs().wait_for_work(stop.get_token(), kLong);
           continue;
@@ -213,7 +213,7 @@ TEST_P(RaceConformance, ReadersOfEventsMissNoEnd) {
         JobParameters own = parameters();
         own.iso = worker * 1000 + n;
         submit(own);
-        const auto lease = jobs().claim("worker", kLongLease);
+        const auto lease = jobs().claim("worker " + std::to_string(worker), kLongLease);
         ASSERT_TRUE(lease);
         for (const Stage stage : {Stage::kExtract, Stage::kSmooth, Stage::kEncode}) {
           jobs().renew(*lease, {stage, 0.5, {}}, kLongLease);

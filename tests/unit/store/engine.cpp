@@ -147,8 +147,8 @@ class PostgresEngine
   }
 
  private:
-  const store::postgresql::DatabaseOptions database_options_{.url = Postgres::shared().new_place(),
-                                                             .node = "one"};
+  const store::postgresql::DatabaseOptions database_options_{
+      .url = Postgres::shared().new_place(), .node = "one", .patience = std::chrono::minutes(1)};
 };
 
 template <class Kind>

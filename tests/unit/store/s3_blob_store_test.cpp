@@ -39,6 +39,7 @@ class S3Blobs : public testing::Test {
     options_.client.address = parse_s3_url(peer().url());
     options_.client.credentials = folder_ / "credentials";
     options_.client.patience = std::chrono::seconds(10);
+    options_.client.quick = std::chrono::minutes(1);
     options_.client.first_pause = std::chrono::milliseconds(5);
     options_.between_sweeps = std::chrono::milliseconds(0);
     open();
@@ -424,6 +425,7 @@ TEST_F(S3Blobs, ALinkIsGoodForWhoeverHasIt) {
   const std::string link = blobs_->link(key, as).value();
   const auto fetched = [&](const std::string& url) {
     httplib::Client client(peer().endpoint());
+    client.set_read_timeout(std::chrono::minutes(1));
     return client.Get(url.substr(peer().endpoint().size()));
   };
   const auto answer = fetched(link);
