@@ -28,12 +28,16 @@ std::filesystem::path SmallDisk::outside() const {
 void SmallDisk::fill(const std::string& name, std::uint64_t leave) const {
   const Descriptor file(::open((outside() / name).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600));
   if (file.number() < 0) throw std::runtime_error("the disk cannot be filled");
-  for (off_t place = 0; free_bytes() > leave;) {
-    const auto more = static_cast<off_t>(free_bytes() - leave);
-    if (::posix_fallocate(file.number(), place, more) != 0) break;
-    place += more;
-  }
-  if (free_bytes() > leave) throw std::runtime_error("the disk is not full");
+  off_t place = 0;
+  // Others write there meanwhile, so what was free may not be any more.
+  const bool is_full = eventually([&] {
+    const std::uint64_t free = free_bytes();
+    if (free <= leave) return true;
+    const auto more = static_cast<off_t>(free - leave);
+    if (::posix_fallocate(file.number(), place, more) == 0) place += more;
+    return free_bytes() <= leave;
+  });
+  if (!is_full) throw std::runtime_error("the disk is not full");
 }
 
 }  // namespace isomesh::test
