@@ -14,10 +14,13 @@ ORTHANC = "/usr/sbin/Orthanc"
 PLUGIN = "/usr/share/orthanc/plugins/libOrthancDicomWeb.so"
 
 
+# The network is the tests' own, so nobody else listens. Linux takes the ports of connections from 32768 upwards.
+PORTS = iter(range(20000, 32768))
+
+
 def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """One that nobody has and nobody is given by chance, also while nothing listens on it yet."""
+    return next(PORTS)
 
 
 def call(port, method, path, body=None, headers=None, timeout=60):

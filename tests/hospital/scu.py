@@ -31,7 +31,7 @@ def associate_request(called="BONE", calling="CT1"):
 
 class Scu:
     def __init__(self, port, called="BONE", calling="CT1"):
-        self.connection = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.connection = socket.create_connection(("127.0.0.1", port), timeout=60)
         self.connection.sendall(associate_request(called, calling))
         self.accepted = self.receive()[0] == 2
 

@@ -111,11 +111,14 @@ class TheWay(Loop):
         daemon = self.daemon()
         identity = self.order(daemon, series)
         peers.until(lambda: daemon.get(identity)["attempts"] >= 1)
-        self.assertEqual(daemon.call("DELETE", "/v1/orders/" + identity)[2]["state"], "cancelled")
+        cancelled = daemon.call("DELETE", "/v1/orders/" + identity)[2]
+        self.assertEqual(cancelled["state"], "cancelled")
+        # The delays double: an order that begins now and has made two attempts more is past the next one of this order.
+        later = self.order(daemon, self.series())
+        peers.until(lambda: daemon.get(later)["attempts"] >= cancelled["attempts"] + 2)
         self.proxy.fault = None
-        time.sleep(4)  # beyond its next attempt, which another one's way is waited for as well
-        self.succeeded(daemon, self.order(daemon, self.series()))
-        self.assertEqual(daemon.get(identity)["state"], "cancelled")
+        self.succeeded(daemon, later)
+        self.assertEqual(daemon.get(identity), cancelled)
         self.assertEqual(self.stored(series), [])
 
 
@@ -147,17 +150,20 @@ class Faults(Loop):
         peers.until(lambda: daemon.get(identity)["attempts"] >= 1)
         self.assertEqual(daemon.call("GET", "/v1/pacs")[2]["pacs"][0]["reason"], "timeout")
         self.proxy.fault = None
-        self.assert_one_mesh(self.succeeded(daemon, identity), series)
+        # An archive on a busy machine may itself be still for a second, now and then.
+        self.assert_one_mesh(self.succeeded(daemon, identity, 180), series)
         over.set()
 
     def test_slow_peer(self):
         """Slow is not bad: longer than the timeout in all, but never still for so long."""
         series = self.series()
+        begun = []
 
         def slowly(method, path, answer):
             if not is_wado(path):
                 return None
             status, headers, text = answer
+            begun.append(path)
 
             def drip(connection):
                 head = f"HTTP/1.1 {status} OK\r\nContent-Length: {len(text)}\r\n"
@@ -170,10 +176,9 @@ class Faults(Loop):
                 return False
             return drip
         self.proxy.twist = slowly
-        # Long enough that the archive itself, on a busy machine, does not count as still.
         daemon = self.daemon(timeout=5)
-        order = self.succeeded(daemon, self.order(daemon, series))
-        self.assertEqual(order["attempts"], 0, order)
+        self.succeeded(daemon, self.order(daemon, series))
+        self.assertEqual(len(begun), 1)  # it was not given up
 
     def once(self, twist):
         """The next answer to a request for the series is what `twist` makes of it."""

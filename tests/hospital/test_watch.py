@@ -57,7 +57,7 @@ class Watch(Loop):
         series = dicom.Series(self.uid(), slices=12)
         files = list(series.files.values())
         self.pacs.upload(files[:9])
-        daemon = self.daemon(settle=3, rules=WATCH)  # beyond the three uploads below
+        daemon = self.daemon(settle=6, rules=WATCH)  # beyond the three uploads below
         first = self.succeeded(daemon, peers.until(lambda: self.of(daemon, series))[0]["id"])
         self.pacs.upload(files[9:])
         peers.until(lambda: len(self.of(daemon, series)) == 2)

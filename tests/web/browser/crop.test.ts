@@ -38,13 +38,13 @@ describe('a slice', () => {
     const side = (Math.min(box.width, box.height) - 28) / size; // of a sample
     await page.mouse.click(middle.x + 2.5 * 7.389 * side, middle.y);
     await expect.poll(() => noted(page, 'at')).toMatch(/^2[67],2[34],24$/);
-    const place = await settled(() => noted(page, 'at'));
+    const place = await settled(page, () => noted(page, 'at'));
 
     await page.keyboard.down('Shift');
     await drag(page, [middle.x, middle.y], [middle.x - 3 * 7.389 * side, middle.y]);
     await page.keyboard.up('Shift');
     // Moving is neither a click nor another window.
-    expect(await settled(() => noted(page, 'at'))).toBe(place);
+    expect(await settled(page, () => noted(page, 'at'))).toBe(place);
     await page.mouse.click(middle.x, middle.y);
     await expect.poll(() => Number(noted(page, 'at').split(',')[0])).toBeGreaterThan(25);
 
@@ -64,8 +64,8 @@ describe('a crop', () => {
     const view = page.locator('.live-picture');
     const whole = await silhouette(page, view);
     await page.getByLabel('Crop to a box').check();
-    await expect.poll(async () => (await settled(() => noted(page, 'crop'))) !== '').toBe(true);
-    expect(await settled(() => noted(page, 'crop'))).toBe('7,7,7,40,40,40');
+    await expect.poll(async () => (await settled(page, () => noted(page, 'crop'))) !== '').toBe(true);
+    expect(await settled(page, () => noted(page, 'crop'))).toBe('7,7,7,40,40,40');
     // Its right edge, which is at sample 40, to the middle.
     const side = (Math.min(box.width, box.height) - 28) / size;
     const place = (sample: number): number => (sample + 0.5 - size / 2) * side;
@@ -74,7 +74,7 @@ describe('a crop', () => {
     await expect.poll(() => noted(page, 'crop')).toMatch(/^7,7,7,2[345],40,40$/);
     await page.getByLabel('Last sample along x').fill('23');
     await page.getByLabel('Last sample along x').press('Enter');
-    expect(await settled(() => noted(page, 'crop'))).toBe('7,7,7,23,40,40');
+    expect(await settled(page, () => noted(page, 'crop'))).toBe('7,7,7,23,40,40');
     await expect.poll(() => page.locator('.live-picture[data-still]').count()).toBe(1);
     const half = (await silhouette(page, view)).part / whole.part;
     expect(half).toBeLessThan(0.85);

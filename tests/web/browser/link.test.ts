@@ -1,7 +1,7 @@
 // The address keeps how a surface is looked at; changes are taken back; notes of jobs; the list of volumes.
 import { describe, expect, it } from 'vitest';
 import { smallNrrd } from './files';
-import { ballNrrd, boxOf, Daemon, noiseNrrd, noted, openPage, openSurface, settled, setup, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, boxOf, Daemon, noiseNrrd, noted, openPage, openSurface, pause, settled, setup, silhouette, still, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -29,7 +29,7 @@ describe('a link to a surface', () => {
     await still(page);
     await expect.poll(() => [noted(page, 'cut'), noted(page, 'style')]).toEqual(['z20-', 'flat,opacity-60']);
     expect(noted(page, 'rulers').split(',')).toHaveLength(6);
-    const address = await settled(() => page.url());
+    const address = await settled(page, () => page.url());
     await page.getByLabel('Link to this surface').focus();
     await expect.poll(() => page.getByLabel('Link to this surface').inputValue()).toBe(address);
     await page.getByLabel('Link to this surface').blur();
@@ -62,9 +62,9 @@ describe('parameters', () => {
     await page.locator('[data-parameter=passes] input').waitFor();
     await expect.poll(() => undo.isVisible()).toBe(false);
     await page.locator('[data-parameter=passes] input').fill('9');
-    await page.waitForTimeout(700);
+    await pause(page, 700); // longer than a step of typing
     await page.getByRole('radio', { name: 'Taubin' }).check({ force: true });
-    await page.waitForTimeout(700);
+    await pause(page, 700);
     await undo.click();
     await expect.poll(() => noted(page, 'smoothing')).toBe('');
     await expect.poll(() => page.locator('[data-parameter=passes] input').inputValue()).toBe('9');
@@ -89,8 +89,7 @@ describe('a drag of the iso-value', () => {
     await page.mouse.down();
     for (let step = 1; step <= 5; step += 1) {
       await page.mouse.move(line.x + (0.5 + 0.05 * step) * line.width, line.y + 30);
-      // Longer than a step of typing.
-      await page.waitForTimeout(700);
+      await pause(page, 700); // longer than a step of typing
     }
     await page.mouse.up();
     await expect.poll(() => noted(page, 'iso')).not.toBe('100');

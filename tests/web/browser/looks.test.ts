@@ -31,14 +31,14 @@ describe('a look through the volume', () => {
     // Values far below the iso-value are seen as well.
     const through = await silhouette(page, view);
     expect(through.part).toBeGreaterThan(1.5 * surface.part);
-    expect(await settled(() => noted(page, 'look'))).toBe('MR');
+    expect(await settled(page, () => noted(page, 'look'))).toBe('MR');
     await page.reload();
     await rested(page);
     expect((await silhouette(page, view)).part / through.part).toBeCloseTo(1, 1);
     await choice.selectOption('');
     await rested(page);
     expect((await silhouette(page, view)).part / surface.part).toBeCloseTo(1, 1);
-    expect(await settled(() => noted(page, 'look'))).toBe('');
+    expect(await settled(page, () => noted(page, 'look'))).toBe('');
   });
 });
 
@@ -70,7 +70,7 @@ describe('slices beside a surface', () => {
     await still(page);
     // Its place is told before it is drawn.
     await expect.poll(async () => before.equals(await page.locator('.viewport').screenshot())).toBe(false);
-    const place = await settled(() => noted(page, 'at'));
+    const place = await settled(page, () => noted(page, 'at'));
 
     await open(page, `?slices=on&at=${place}`);
     await expect.poll(() => contourPixels(page, 'sagittal')).toBeGreaterThan(20);

@@ -42,7 +42,7 @@ describe('a real volume', () => {
     await page.keyboard.press('Shift+ArrowRight');
     await page.keyboard.press('Shift+ArrowRight');
     await expect.poll(() => contourPixels(page, 'axial')).not.toBe(before);
-    const byKeys = Number(await settled(() => noted(page, 'iso')));
+    const byKeys = Number(await settled(page, () => noted(page, 'iso')));
     const box = await boxOf(line);
     await drag(page, [box.x + box.width * 0.5, box.y + 30], [box.x + box.width * 0.25, box.y + 30]);
     await expect.poll(() => Number(noted(page, 'iso'))).toBeLessThan(byKeys);
@@ -78,7 +78,7 @@ describe('a real volume', () => {
     await page.locator('.viewport canvas').focus();
     for (let i = 0; i < 6; i += 1) await page.keyboard.press('ArrowRight');
     await expect.poll(() => noted(page, 'cam')).not.toBe(fromFront);
-    const camera = await settled(() => noted(page, 'cam'));
+    const camera = await settled(page, () => noted(page, 'cam'));
 
     const download = page.waitForEvent('download');
     await page.locator('[data-format=glb]').click();
@@ -156,7 +156,7 @@ describe('a surface', () => {
     await still(page);
     const view = await boxOf(page.locator('.viewport'));
     const disc = await silhouette(page, page.locator('.viewport'));
-    const [x = 0, y = 0, z = 0] = (await settled(() => noted(page, 'cam'))).split(',').map(Number);
+    const [x = 0, y = 0, z = 0] = (await settled(page, () => noted(page, 'cam'))).split(',').map(Number);
     await page.keyboard.press('m');
     const radius = (disc.height * view.height) / 2;
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };

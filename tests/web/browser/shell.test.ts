@@ -1,7 +1,8 @@
 // What is around the views: notes, titles, keys, contrast, the token.
 import { readFileSync } from 'node:fs';
+import type { Route } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, boxOf, noted, openPage, openSurface, pixelsOf, settled, setup, still, withTokens } from './support';
+import { ballNrrd, boxOf, noted, openPage, openSurface, pause, pixelsOf, settled, setup, still, withTokens } from './support';
 
 const at = setup();
 let ball: string;
@@ -36,20 +37,18 @@ describe('the page', () => {
     const { page, daemon } = at;
     await page.goto(`${daemon.url}/#/volumes/${ball}`);
     await page.locator('.histogram .bars').waitFor();
-    const held: { go: () => void } = { go: () => undefined };
-    await page.route(/\/v1\/jobs(\?|$)/, async (route) => {
-      await new Promise<void>((resolve) => {
-        held.go = resolve;
-      });
-      await route.continue();
-    });
+    const jobs = /\/v1\/jobs(\?|$)/;
+    const held: Route[] = [];
+    await page.route(jobs, (route) => void held.push(route));
     await page.getByRole('link', { name: 'Jobs', exact: true }).click();
+    await expect.poll(() => held.length).toBeGreaterThan(0);
     await page.goBack();
     const view = page.locator('.histogram .bars');
     await view.waitFor();
-    await page.waitForTimeout(600); // when a view that is still to come says that it loads
-    held.go();
-    await page.waitForTimeout(200);
+    await pause(page, 600); // when a view that is still to come says that it loads
+    for (const route of held) await route.continue();
+    for (const route of held) await (await route.request().response())?.finished();
+    await pause(page, 500); // until a view is made of these responses
     expect(await view.count()).toBe(1);
     expect(await page.locator('.loading').count()).toBe(0);
   });
@@ -88,7 +87,7 @@ describe('a surface', () => {
     await openSurface(at, job);
     await page.getByLabel('Opacity').and(page.locator('input')).focus();
     await page.keyboard.press('a');
-    await expect.poll(async () => Math.abs(Number((await settled(() => noted(page, 'cam'))).split(',')[0]))).toBeLessThan(1);
+    await expect.poll(async () => Math.abs(Number((await settled(page, () => noted(page, 'cam'))).split(',')[0]))).toBeLessThan(1);
   });
 
   it('is turned when a cut would be seen edge-on', async () => {
@@ -99,7 +98,7 @@ describe('a surface', () => {
     await page.keyboard.press('c');
     await slice;
     const height = async (): Promise<number> => {
-      const [x = 0, y = 0, z = 0] = (await settled(() => noted(page, 'cam'))).split(',').map(Number);
+      const [x = 0, y = 0, z = 0] = (await settled(page, () => noted(page, 'cam'))).split(',').map(Number);
       return Math.abs(z) / Math.hypot(x, y, z);
     };
     await expect.poll(height).toBeGreaterThan(0.4);

@@ -2,7 +2,7 @@
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { insertNrrd, whitePixels } from './bright';
-import { ballNrrd, boxOf, contourPixels, noted, openedJob, settled, setup, tiltedNrrd } from './support';
+import { ballNrrd, boxOf, contourPixels, noted, nrrdHeader, openedJob, settled, setup } from './support';
 
 const at = setup();
 let ball: string;
@@ -10,6 +10,14 @@ let ball: string;
 beforeAll(async () => {
   ball = await at.daemon.upload(ballNrrd(48, 18));
 });
+
+// A cube of samples that grow along z, in slices that each lie farther back: a gantry tilted by that angle.
+function tiltedNrrd(size: number, degrees: number): Buffer {
+  const angle = (degrees * Math.PI) / 180;
+  const header = nrrdHeader(size).replace('(0,0,1)', `(0,${Math.sin(angle)},${Math.cos(angle)})`);
+  const samples = Buffer.alloc(size ** 3, 200);
+  return Buffer.concat([Buffer.from(header), samples.fill(100, 0, samples.length / 2)]);
+}
 
 async function open(page: Page, query = ''): Promise<void> {
   await page.goto('about:blank');
@@ -175,10 +183,10 @@ describe('slices before there is a mesh', () => {
     await page.getByLabel('Opacity of the overlay').fill('0');
     await expect.poll(async () => (await coloured()).count).toBe(0);
     // At the ball's pole there is little; a slab of 40 mm reaches its middle.
-    const many = await settled(() => greyPixels(page, 'axial'));
+    const many = await settled(page, () => greyPixels(page, 'axial'));
     await page.locator('[data-plane=axial] input[type=range]').fill('8');
     await expect.poll(() => greyPixels(page, 'axial')).toBeLessThan(many / 1.2);
-    const few = await settled(() => greyPixels(page, 'axial'));
+    const few = await settled(page, () => greyPixels(page, 'axial'));
     await page.getByLabel('Show', { exact: true }).selectOption('maximum');
     await page.getByLabel('Thickness', { exact: true }).selectOption('40');
     await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(1.25 * few);

@@ -25,7 +25,7 @@ describe('on a phone', () => {
     const volume = await daemon.upload(ballNrrd(48, 18));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
     await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(20);
-    const window = await settled(() => noted(page, 'window'));
+    const window = await settled(page, () => noted(page, 'window'));
     for (let n = 0; n < 3; n += 1) await swipe(page, 90, 150, 60);
     await expect.poll(() => scrolled(page)).toBeGreaterThan(100);
     expect(noted(page, 'window')).toBe(window);

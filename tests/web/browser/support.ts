@@ -188,7 +188,7 @@ export function openedJob({ page, daemon }: Setup): Promise<JobAnswer> {
 
 // That job, once it has succeeded. The page shows the surface of before until then, and its state.
 export async function madeJob(at: Setup): Promise<JobAnswer> {
-  await expect.poll(async () => (await openedJob(at)).state, { timeout: 30_000 }).toBe('succeeded');
+  await expect.poll(async () => (await openedJob(at)).state).toBe('succeeded');
   return openedJob(at);
 }
 
@@ -252,20 +252,12 @@ export function noiseNrrd(size: number): Buffer {
   });
 }
 
-// A cube of samples that grow along z, in slices that each lie farther back: a gantry tilted by that angle.
-export function tiltedNrrd(size: number, degrees: number): Buffer {
-  const angle = (degrees * Math.PI) / 180;
-  const header = nrrdHeader(size).replace('(0,0,1)', `(0,${Math.sin(angle)},${Math.cos(angle)})`);
-  const samples = Buffer.alloc(size ** 3, 200);
-  return Buffer.concat([Buffer.from(header), samples.fill(100, 0, samples.length / 2)]);
-}
-
 // What the address says of that.
 export function noted(page: Page, name: string): string {
   return new URLSearchParams(new URL(page.url()).hash.split('?')[1] ?? '').get(name) ?? '';
 }
 
-function nrrdHeader(size: number, fields: string[] = []): string {
+export function nrrdHeader(size: number, fields: string[] = []): string {
   return [
     'NRRD0004',
     'type: uint8',
@@ -438,12 +430,20 @@ export async function still(page: Page): Promise<void> {
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
+// Waits for so long by the page's own timers: all that were set before, and are shorter, have run then.
+export function pause(page: Page, milliseconds: number): Promise<void> {
+  return page.evaluate((time) => new Promise((resolve) => setTimeout(resolve, time)), milliseconds);
+}
+
 // The value that no longer changes.
-export async function settled<T>(read: () => T | Promise<T>): Promise<T> {
-  const seen: T[] = [];
-  // The interval is longer than the page waits before it notes its place.
+export async function settled<T>(page: Page, read: () => T | Promise<T>): Promise<T> {
+  const seen = [await read()];
   await expect
-    .poll(async () => seen.push(await read()) > 1 && seen.at(-1) === seen.at(-2), { interval: 1000 })
+    .poll(async () => {
+      await pause(page, 1000); // longer than the page waits before it notes its place
+      seen.push(await read());
+      return seen.at(-1) === seen.at(-2);
+    })
     .toBe(true);
   return seen.at(-1) as T;
 }

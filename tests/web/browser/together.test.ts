@@ -34,7 +34,7 @@ describe('surfaces in one scene', () => {
     await large.getByRole('checkbox').uncheck();
     await surfaceLoaded(page);
     expect((await silhouette(page, view)).part).toBeLessThan(0.6 * whole);
-    expect((await settled(() => noted(page, 'looks'))).split(',').sort()).toEqual(['2040d0.30-', 'd02020.100']);
+    expect((await settled(page, () => noted(page, 'looks'))).split(',').sort()).toEqual(['2040d0.30-', 'd02020.100']);
     await page.reload();
     await surfaceLoaded(page);
     expect((await silhouette(page, view)).part).toBeLessThan(0.6 * whole);

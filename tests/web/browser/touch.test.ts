@@ -36,7 +36,7 @@ async function middleOf(page: Page, selector: string): Promise<Point & { width: 
 
 // Where the camera stands around its target, and what it looks at.
 async function camera(page: Page): Promise<{ offset: number[]; target: number[]; distance: number }> {
-  const numbers = (await settled(() => noted(page, 'cam'))).split(',').map(Number);
+  const numbers = (await settled(page, () => noted(page, 'cam'))).split(',').map(Number);
   const offset = numbers.slice(0, 3);
   return { offset, target: numbers.slice(3), distance: Math.hypot(...offset) };
 }
@@ -112,13 +112,13 @@ describe('fingers', () => {
     await fingers(page, [
       { from: { x: line.x, y: line.y }, to: { x: left + 0.75 * line.width, y: line.y + 20 } },
     ]);
-    const iso = Number(await settled(() => noted(page, 'iso')));
+    const iso = Number(await settled(page, () => noted(page, 'iso')));
     expect(iso).toBeGreaterThan(100);
     await expect.poll(() => page.locator('.iso-input').inputValue()).toBe(String(iso));
 
     const slice = await middleOf(page, '[data-plane=axial] canvas');
     const width = async (): Promise<number> => {
-      const [low, high] = (await settled(() => noted(page, 'window'))).split(',').map(Number);
+      const [low, high] = (await settled(page, () => noted(page, 'window'))).split(',').map(Number);
       return (high ?? 0) - (low ?? 0);
     };
     const before = await width();

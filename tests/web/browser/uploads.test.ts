@@ -97,7 +97,7 @@ describe('an upload', () => {
         await route.continue();
       });
       await page.setInputFiles('[data-pick=files]', path);
-      await expect.poll(() => page.locator('.refusal').innerText(), { timeout: 30_000 }).toContain('The file cannot be read');
+      await expect.poll(() => page.locator('.refusal').innerText()).toContain('The file cannot be read');
     } finally {
       rmSync(folder, { recursive: true });
     }
@@ -266,7 +266,7 @@ describe('what fails for want of a connection', () => {
       await other.kill();
       await page.getByRole('button', { name: 'Make the surface' }).click();
       const refusal = page.locator('.panel .refusal');
-      await expect.poll(() => refusal.count(), { timeout: 30_000 }).toBe(1);
+      await expect.poll(() => refusal.count()).toBe(1);
       expect(await refusal.innerText()).not.toContain('automatically');
       const again = await Daemon.start(other.data, new URL(other.url).host);
       try {
