@@ -19,5 +19,7 @@ export default defineConfig({
     setupFiles: [here('../../tests/web/unit/globals.ts')],
     include: ['**/unit/**/*.test.ts'],
     fileParallelism: false,
+    // Some ask a server, on machines that have other things to do.
+    testTimeout: 60_000,
   },
 });

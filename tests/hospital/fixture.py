@@ -59,7 +59,7 @@ class Loop(unittest.TestCase):
     def uid(self):
         return f"{ROOT}.{next(Loop.counter)}"
 
-    def daemon(self, port=None, settle=0, timeout=10, most=500_000_000, pacs="", rules="", *options):
+    def daemon(self, port=None, settle=0, timeout=60, most=500_000_000, pacs="", rules="", *options):
         text = HOSPITAL.format(port=port or self.proxy.port, settle=settle, timeout=timeout,
                                most=most, pacs=pacs, rules=rules)
         folder = os.path.join(self.folder.name, f"daemon-{self.uid()}")

@@ -265,6 +265,7 @@ class Relay(Listener):
         self.target = port
         self.cut_after = None
         self.cut_answer_after = None
+        self.cuts = 0
         super().__init__()
 
     def _take(self, connection):
@@ -273,13 +274,12 @@ class Relay(Listener):
                                    (there, connection, self.cut_answer_after)]:
             threading.Thread(target=self._pass, args=(source, sink, most), daemon=True).start()
 
-    @staticmethod
-    def _pass(source, sink, most):
+    def _pass(self, source, sink, most):
         passed = 0
         try:
-            while True:
-                data = source.recv(65536)
-                if not data or (most is not None and passed + len(data) > most):
+            while data := source.recv(65536):
+                if most is not None and passed + len(data) > most:
+                    self.cuts += 1
                     break
                 passed += len(data)
                 sink.sendall(data)

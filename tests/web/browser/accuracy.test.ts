@@ -2,7 +2,8 @@
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { titleOf } from '../openapi';
-import { ballNrrd, ballsNrrd, boxOf, hues, madeJob, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
+import { hues, silhouette } from './seen';
+import { ballNrrd, ballsNrrd, boxOf, holdMeshes, type JobAnswer, madeJob, openedJob, setup, still, surfaceLoaded } from './support';
 
 const at = setup();
 let ball: string;
@@ -59,10 +60,7 @@ describe('the largest error', () => {
 describe('distances', () => {
   it('are colours with a legend, and a number below the pointer', async () => {
     const { daemon, page } = at;
-    const job = await daemon.submit(
-      { volume: ball, iso: 100, passes: 20, formats: ['glb'], certify: true, distances: true },
-      30,
-    );
+    const job = await daemon.make({ volume: ball, iso: 100, passes: 20, formats: ['glb'], certify: true, distances: true });
     await openJob(page, job);
     const legend = page.getByRole('group', { name: 'Distance from the scan' }).first();
     await legend.waitFor();
@@ -96,7 +94,7 @@ describe('distances', () => {
 
   it('are offered where an error was measured without them', async () => {
     const { daemon, page } = at;
-    await openJob(page, await daemon.submit({ volume: ball, iso: 100, passes: 3, formats: ['glb'], certify: true }, 30));
+    await openJob(page, await daemon.make({ volume: ball, iso: 100, passes: 3, formats: ['glb'], certify: true }));
     await expect.poll(() => page.getByRole('button', { name: 'Distance', exact: true }).isVisible()).toBe(false);
     const before = page.url();
     await page.getByRole('button', { name: 'Show the distance as colour' }).click();
@@ -110,7 +108,7 @@ describe('distances', () => {
 describe('a surface that is not what was meant', () => {
   it('says why it is empty and what to do', async () => {
     const { daemon, page } = at;
-    const { id } = await daemon.submit({ volume: ball, iso: 254.5, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume: ball, iso: 254.5, formats: ['glb'] });
     await open(page, `jobs/${id}`);
     const overlay = page.locator('.overlay.message');
     await expect.poll(() => overlay.innerText()).toContain('There is no surface at the iso-value 254.5: the volume\u2019s'.replace('\u2019', "'"));
@@ -121,7 +119,7 @@ describe('a surface that is not what was meant', () => {
   it('has no volume while it is open, and is closed by a link', async () => {
     const { daemon, page } = at;
     const cut = await daemon.upload(ballNrrd(24, 14));
-    await openJob(page, await daemon.submit({ volume: cut, iso: 100, formats: ['glb'] }, 30));
+    await openJob(page, await daemon.make({ volume: cut, iso: 100, formats: ['glb'] }));
     const panel = page.getByLabel('Job', { exact: true });
     await expect.poll(() => panel.innerText()).toMatch(/Volume\s+none: the surface is open/);
     const before = page.url();
@@ -135,7 +133,7 @@ describe('a surface that is not what was meant', () => {
   it('keeps the part alone that is clicked', async () => {
     const { daemon, page } = at;
     const two = await daemon.upload(ballsNrrd(48));
-    const job = await daemon.submit({ volume: two, iso: 100, formats: ['glb'] }, 30);
+    const job = await daemon.make({ volume: two, iso: 100, formats: ['glb'] });
     await openJob(page, job);
     await page.keyboard.press('a');
     await still(page);
@@ -158,7 +156,7 @@ describe('a surface that is not what was meant', () => {
   it('tells how large the part is that is clicked, and leaves it out', async () => {
     const { daemon, page } = at;
     const two = await daemon.upload(ballsNrrd(40));
-    const job = await daemon.submit({ volume: two, iso: 100, formats: ['glb'], passes: 0 }, 30);
+    const job = await daemon.make({ volume: two, iso: 100, formats: ['glb'], passes: 0 });
     await openJob(page, job);
     await page.keyboard.press('a');
     await still(page);
@@ -186,21 +184,8 @@ describe('a surface that is not what was meant', () => {
 describe('levels of detail', () => {
   it('show the whole surface before its finest level has come', async () => {
     const { daemon, page } = at;
-    const job = await daemon.submit({ volume: ball, iso: 100, formats: ['glb'], lods: [1, 0.1] }, 30);
-    const bytes = job.mesh?.files.glb?.bytes ?? 0;
-    // The rest of the file is held back until the first part of it was looked at.
-    let release = (): void => undefined;
-    const held = new Promise<void>((resolve) => (release = resolve));
-    let share = 0.5;
-    await page.route(/mesh\.glb/, async (route) => {
-      const answer = await route.fetch();
-      const body = await answer.body();
-      const from = Number(/bytes=(\d+)-/.exec(route.request().headers().range ?? '')?.[1] ?? 0);
-      if (from > 0) await held;
-      const whole = from > 0 ? body : body.subarray(0, Math.floor(share * bytes));
-      await route.fulfill({ response: answer, body: whole, headers: { ...answer.headers(), 'content-length': String(whole.length) } });
-      share = 1;
-    });
+    const job = await daemon.make({ volume: ball, iso: 100, formats: ['glb'], lods: [1, 0.1] });
+    const release = await holdMeshes(page);
     await open(page, `jobs/${job.id}`);
     const filling = async (): Promise<number> => {
       // The bar of the progress is in the same view.

@@ -6,7 +6,7 @@ import type { AddressInfo } from 'node:net';
 import { fileURLToPath } from 'node:url';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser } from 'playwright-core';
-import { ballNrrd, Daemon, startBrowser } from './support';
+import { ballNrrd, Daemon, slowest, startBrowser } from './support';
 
 const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 const example = here('../../../examples/three');
@@ -56,6 +56,7 @@ describe('examples/three', () => {
 
   it('shows the surface of a volume that is chosen, and says why there is none', async () => {
     const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
+    page.setDefaultTimeout(slowest);
     const faults: string[] = [];
     page.on('pageerror', (error) => faults.push(String(error)));
     page.on('requestfailed', (request) => faults.push(request.url()));

@@ -18,7 +18,7 @@ describe('a surface', () => {
     const { page, daemon } = at;
     // It leaves the volume on all sides.
     const volume = await daemon.upload(ballNrrd(24, 14));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await page.getByRole('button', { name: 'For 3D printing' }).click();
     await expect.poll(() => page.url()).not.toContain(id);
@@ -37,7 +37,7 @@ describe('a surface', () => {
   it('is saved for a phone, and simplified first where it is large', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(32, 10));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
     const { name, bytes } = await saved(page, /^USDZ for/);
     expect(name).toMatch(/iso-100\.usdz$/);
@@ -47,7 +47,7 @@ describe('a surface', () => {
     expect(bytes.includes('upAxis = "Y"')).toBe(true);
 
     const large = await daemon.upload(ballNrrd(180, 85));
-    const job = await daemon.submit({ volume: large, iso: 100, formats: ['glb'] }, 30);
+    const job = await daemon.make({ volume: large, iso: 100, formats: ['glb'] });
     expect(job.mesh?.triangles).toBeGreaterThan(150_000);
     await page.goto(`${daemon.url}/#/jobs/${job.id}`);
     await page.getByRole('button', { name: 'For a phone' }).click();

@@ -11,14 +11,20 @@ const sizes = {
   'a desktop at 200 %': { width: 700, height: 450 },
 };
 const views = new Map<string, string>();
+// Parts that come later than their view.
+const late = new Map([
+  ['a volume', ['.estimate:not(.stale) dl', '.made ul']],
+  ['a volume of labels', ['.estimate:not(.stale) dl', '.label-choice .labels li', '.made ul']],
+  ['a surface with slices', ['[data-plane=sagittal]']],
+]);
 
 beforeAll(async () => {
   const { daemon } = at;
   const volume = await daemon.upload(ballNrrd(48, 18));
   const segmented = await daemon.upload(labelsNrrd(24));
-  const { id } = await daemon.submit({ volume, iso: 100, certify: true, formats: ['glb'] }, 60);
-  const other = await daemon.submit({ volume, iso: 110, formats: ['glb'] }, 60);
-  const labels = await daemon.submit({ volume: segmented, labels: 'all', formats: ['glb'] }, 60);
+  const { id } = await daemon.make({ volume, iso: 100, certify: true, formats: ['glb'] });
+  const other = await daemon.make({ volume, iso: 110, formats: ['glb'] });
+  const labels = await daemon.make({ volume: segmented, labels: 'all', formats: ['glb'] });
   views.set('volumes', '');
   views.set('a volume', `volumes/${volume}`);
   views.set('a volume of labels', `volumes/${segmented}`);
@@ -31,13 +37,14 @@ beforeAll(async () => {
   views.set('an error', 'jobs/gone');
 });
 
-async function open(page: Page, path: string): Promise<void> {
+async function open(page: Page, name: string): Promise<void> {
   // From an empty page, so that nothing of the view before is taken for this one.
   await page.goto('about:blank');
-  await page.goto(`${at.daemon.url}/#/${path}`);
+  await page.goto(`${at.daemon.url}/#/${views.get(name) ?? ''}`);
   await page.locator('main h1').first().waitFor();
   await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
   await surfaceLoaded(page, await page.locator('.pane').count());
+  for (const part of late.get(name) ?? []) await page.locator(part).first().waitFor();
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
@@ -56,8 +63,8 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
   it('no view is taller or wider than the window', async () => {
     const { page } = at;
     await page.setViewportSize(size);
-    for (const [name, path] of views) {
-      await open(page, path);
+    for (const name of views.keys()) {
+      await open(page, name);
       expect(await excess(page), name).toEqual({ down: 0, right: 0, header: 0 });
     }
   });
@@ -66,7 +73,7 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
     const { page } = at;
     await page.setViewportSize(size);
     for (const name of ['a volume', 'a volume of labels']) {
-      await open(page, views.get(name) ?? '');
+      await open(page, name);
       await page.locator('.parameters summary', { hasText: 'More' }).click();
       const cut = await page.locator('.parameters .segments').evaluateAll((rows) =>
         rows.filter((row) => row.scrollWidth > row.clientWidth).map(({ textContent }) => textContent),

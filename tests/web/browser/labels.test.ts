@@ -3,7 +3,8 @@ import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { boxOf, hues, labelsNrrd, openedJob, openSurface, setup, still, surfaceLoaded, type Hues, type JobAnswer } from './support';
+import { hues, type Hues } from './seen';
+import { boxOf, type JobAnswer, labelsNrrd, openedJob, openSurface, setup, still, surfaceLoaded } from './support';
 
 const at = setup();
 let volume: string;
@@ -11,16 +12,13 @@ let made: JobAnswer;
 
 beforeAll(async () => {
   volume = await at.daemon.upload(labelsNrrd(32));
-  made = await at.daemon.submit(
-    {
-      volume,
-      labels: 'all',
-      label_names: { 1: 'Right half', 2: 'Left half' },
-      label_colors: { 1: '#d02020', 2: '#2040e0' },
-      formats: ['glb', 'stl'],
-    },
-    30,
-  );
+  made = await at.daemon.make({
+    volume,
+    labels: 'all',
+    label_names: { 1: 'Right half', 2: 'Left half' },
+    label_colors: { 1: '#d02020', 2: '#2040e0' },
+    formats: ['glb', 'stl'],
+  });
 });
 
 async function openForm(page: Page, query = ''): Promise<Locator> {
@@ -169,7 +167,7 @@ describe('more labels than are listed', () => {
     await page.getByRole('button', { name: 'None' }).click();
     await expect.poll(() => count.innerText()).toBe('599 of 600 labels');
     // A surface's list says it as well.
-    const { id } = await daemon.submit({ volume: many, labels: 'all', passes: 0, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume: many, labels: 'all', passes: 0, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await expect.poll(() => page.locator('.label-list .labels li').count()).toBe(500);
     await expect.poll(() => page.locator('.label-list .hint[role=status]').innerText()).toContain('the first 500 are listed');
@@ -302,6 +300,8 @@ describe('the surfaces of labels', () => {
     const now = await seen(view);
     expect([now.red, await picked.isVisible()]).toEqual([0, false]);
     expect(now.blue).toBeGreaterThan(1000);
+    await page.mouse.click(place.x + 0.55 * place.width, place.y + 0.5 * place.height);
+    await expect.poll(() => picked.innerText()).toContain('Left half');
     await page.mouse.click(place.x + 5, place.y + 0.8 * place.height);
     await expect.poll(() => picked.isVisible()).toBe(false);
   });

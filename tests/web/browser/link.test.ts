@@ -1,7 +1,8 @@
 // The address keeps how a surface is looked at; changes are taken back; notes of jobs; the list of volumes.
 import { describe, expect, it } from 'vitest';
 import { smallNrrd } from './files';
-import { ballNrrd, boxOf, Daemon, noiseNrrd, noted, openPage, openSurface, pause, settled, setup, silhouette, still, surfaceLoaded } from './support';
+import { silhouette } from './seen';
+import { ballNrrd, boxOf, Daemon, keepNotices, noiseNrrd, noted, openPage, openSurface, pause, settled, setup, still, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -9,7 +10,7 @@ describe('a link to a surface', () => {
   it('carries its camera, cut, style and measurements', async () => {
     const { page, daemon, browser } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
     const box = await boxOf(page.locator('.viewport canvas'));
     await page.keyboard.press('a');
@@ -104,7 +105,7 @@ describe('the jobs that are chosen to compare', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(32, 12));
     const ids: string[] = [];
-    for (const iso of [90, 110]) ids.push((await daemon.submit({ volume, iso, formats: ['glb'] }, 30)).id);
+    for (const iso of [90, 110]) ids.push((await daemon.make({ volume, iso, formats: ['glb'] })).id);
     await page.goto(`${daemon.url}/#/jobs`);
     const boxes = ids.map((id) => page.locator(`[data-job="${id}"]`).getByRole('checkbox'));
     for (const box of boxes) await box.check();
@@ -121,6 +122,7 @@ describe('a job that was left', () => {
     const own = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
     try {
       const { page } = await openPage(browser, own.url);
+      await keepNotices(page);
       const volume = await own.upload(noiseNrrd(80));
       // The page's job waits behind one that takes long.
       const before = await own.submit({ volume, iso: 100, passes: 1000, max_error_mm: 0.01, formats: ['glb'] });

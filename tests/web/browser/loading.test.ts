@@ -1,7 +1,7 @@
 // How a surface comes: its progress, and what can be done with it meanwhile.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, labelsNrrd, openSurface, setup, surfaceLoaded } from './support';
+import { ballNrrd, keepNotices, labelsNrrd, openSurface, setup, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -27,7 +27,7 @@ describe('a surface that is loading', () => {
     const { page, daemon } = at;
     await listen(page);
     const volume = await daemon.upload(labelsNrrd(24));
-    const { id, mesh } = await daemon.submit({ volume, labels: 'all', formats: ['glb'] }, 30);
+    const { id, mesh } = await daemon.make({ volume, labels: 'all', formats: ['glb'] });
     await openSurface(at, id);
     const counts = (await page.evaluate(() => window.said))
       .map((text) => /^(.+) of (.+) triangles$/.exec(text.replaceAll('\u202f', '')))
@@ -42,8 +42,9 @@ describe('a surface that is loading', () => {
   it('says so where it is measured', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     const held: { go: () => void } = { go: () => undefined };
+    await keepNotices(page);
     await page.route(/\/glb|\.glb/, async (route) => {
       await new Promise<void>((resolve) => {
         held.go = resolve;

@@ -1,7 +1,8 @@
 // Looks through a volume, and slices beside a surface.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, ballsNrrd, boxOf, contourPixels, noted, openSurface, settled, setup, silhouette, still, type JobAnswer } from './support';
+import { contourPixels, silhouette } from './seen';
+import { ballNrrd, ballsNrrd, boxOf, type JobAnswer, noted, openSurface, settled, setup, still } from './support';
 
 const at = setup();
 const size = 48;
@@ -10,7 +11,7 @@ let made: JobAnswer;
 
 beforeAll(async () => {
   ball = await at.daemon.upload(ballNrrd(size, 18));
-  made = await at.daemon.submit({ volume: ball, iso: 100, formats: ['glb'] }, 30);
+  made = await at.daemon.make({ volume: ball, iso: 100, formats: ['glb'] });
 });
 
 async function rested(page: Page): Promise<void> {
@@ -54,7 +55,7 @@ describe('slices beside a surface', () => {
     await page.keyboard.press('a');
     await page.getByRole('button', { name: 'Slices' }).click();
     await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);
-    expect(noted(page, 'at')).toBe('24,24,24');
+    await expect.poll(() => noted(page, 'at')).toBe('24,24,24');
     const canvas = await boxOf(page.locator('.viewport canvas'));
     await still(page);
     await page.mouse.click(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
@@ -84,7 +85,7 @@ describe('slices beside a surface', () => {
   it('are not offered where the volume is gone', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballsNrrd(24));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await fetch(`${daemon.url}/v1/volumes/${volume}`, { method: 'DELETE' });
     await openSurface(at, id);
     await expect.poll(() => page.getByRole('button', { name: 'Slices' }).count()).toBe(0);

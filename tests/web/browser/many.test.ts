@@ -19,7 +19,7 @@ beforeAll(async () => {
 describe('the first view', () => {
   it('shows the newest of many volumes, and the others when they are asked for', async () => {
     const { page, daemon } = at;
-    await daemon.submit({ volume: first, iso: 1.5, formats: ['stl'] }, 30);
+    await daemon.make({ volume: first, iso: 1.5, formats: ['stl'] });
     const newest = await daemon.upload(ballNrrd(12, 4, 5));
     await page.goto(daemon.url);
     await expect.poll(() => page.locator('.cards > li').first().getAttribute('data-volume')).toBe(newest);
@@ -44,7 +44,7 @@ describe('the first view', () => {
     const focused = await page.evaluate(() => document.activeElement?.closest('li')?.dataset.volume);
     const volume = await daemon.upload(ballNrrd(12, 4, 6));
     await expect.poll(() => page.locator(`[data-volume="${volume}"]`).count()).toBe(1);
-    await daemon.submit({ volume, iso: 100, formats: ['stl'] }, 30);
+    await daemon.make({ volume, iso: 100, formats: ['stl'] });
     await expect.poll(() => page.locator('.rows li').first().innerText()).toMatch(/iso 100.*triangles/s);
     expect(await page.evaluate(() => document.activeElement?.closest('li')?.dataset.volume)).toBe(focused);
   });
@@ -59,7 +59,7 @@ describe('jobs that are waited for', () => {
     });
     const volume = await daemon.upload(noiseNrrd(96));
     const jobs = await Promise.all(
-      [1000, 999, 998, 997].map((passes) => daemon.submit({ volume, iso: 128, passes, formats: ['glb'] })),
+      [1000, 999, 998, 997].map((passes) => daemon.submit({ volume, iso: 128, passes, max_error_mm: 0.01, formats: ['glb'] })),
     );
     await page.goto(`${daemon.url}/#/compare?jobs=${jobs.map(({ id }) => id).join(',')}`);
     await expect.poll(() => page.locator('.cell-status', { hasText: '%' }).count()).toBe(4);
@@ -87,7 +87,8 @@ describe('the list of jobs', () => {
     const { browser } = at;
     const slow = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
     try {
-      const running = await slow.submit({ volume: await slow.upload(noiseNrrd(96)), iso: 128, passes: 1000, formats: ['stl'] });
+      const noise = await slow.upload(noiseNrrd(96));
+      const running = await slow.submit({ volume: noise, iso: 128, passes: 1000, max_error_mm: 0.01, formats: ['stl'] });
       const volume = await slow.upload(smallNrrd());
       const waiting: string[] = [];
       for (let n = 0; n < 110; n += 1) waiting.push((await slow.submit({ volume, iso: 98 + n / 10, formats: ['stl'] })).id);

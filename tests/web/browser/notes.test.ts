@@ -1,7 +1,7 @@
 // What the daemon says about an upload, and what a person may answer.
 import { describe, expect, it } from 'vitest';
 import { ctSlice, samples, seriesNifti, smallNrrd, twoFormNifti } from './files';
-import { drop, setup } from './support';
+import { drop, keepNotices, setup } from './support';
 
 const at = setup();
 
@@ -143,6 +143,7 @@ describe('a volume', () => {
     const body = new Blob([new Uint8Array(bytes)]);
     const { notes } = await daemon.json<{ notes: { detail: string }[] }>('/v1/volumes', { method: 'POST', body });
     expect(notes).toHaveLength(1);
+    await keepNotices(page);
     await page.goto(daemon.url);
     await drop(page, [{ name: 'longer.nrrd', bytes }]);
     await page.waitForURL(volumePage);
@@ -172,7 +173,7 @@ describe('a volume', () => {
     await expect.poll(() => title.innerText()).toBe(hostile);
     await page.reload();
     await expectText(hostile);
-    await daemon.submit({ volume: id, iso: 110, formats: ['stl'] }, 30);
+    await daemon.make({ volume: id, iso: 110, formats: ['stl'] });
     await page.goto(`${daemon.url}/#/`);
     await expect.poll(() => page.locator(`[data-volume="${id}"] strong`).getAttribute('title')).toBe(hostile);
     await expectText(hostile);

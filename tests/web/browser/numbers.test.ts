@@ -94,7 +94,6 @@ describe('a field for a number', () => {
     await openBall();
     await page.getByLabel('Crop to a box').check();
     const last = page.getByLabel('Last sample along x');
-    const before = noted(page, 'crop');
     await type(last, '1,2,3');
     await last.press('Tab');
     expect([await last.inputValue(), await last.getAttribute('aria-invalid')]).toEqual(['1,2,3', 'true']);
@@ -102,6 +101,6 @@ describe('a field for a number', () => {
     await type(last, '15');
     await last.press('Tab');
     await expect.poll(() => run(page).isEnabled()).toBe(true);
-    await expect.poll(() => noted(page, 'crop')).not.toBe(before);
+    await expect.poll(() => noted(page, 'crop')).toMatch(/^(\d+,){3}15,/);
   });
 });

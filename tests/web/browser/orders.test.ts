@@ -48,7 +48,7 @@ describe('orders', () => {
     status = 503;
     const { id: waiting } = await order('1.2.3.4');
     const row = page.locator(`tr[data-order="${waiting}"]`);
-    await expect.poll(() => row.innerText()).toMatch(/waiting[^]*503[^]*1 attempt failed[^]*next attempt in \d+ s[^]*main[^]*1\.2\.3\.4[^]*bone/);
+    await expect.poll(() => row.innerText()).toMatch(/waiting[^]*503[^]*\d+ attempts? failed[^]*next attempt (in \d+ s|now)[^]*main[^]*1\.2\.3\.4[^]*bone/);
     await expect.poll(() => page.locator('[data-pacs=main]').innerText()).toMatch(/last request failed/);
     await row.getByRole('button', { name: /Cancel/ }).click();
     await expect.poll(() => row.locator('td').first().innerText()).toBe('cancelled');

@@ -2,16 +2,18 @@
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import { beforeAll, describe, expect, it } from 'vitest';
+import { contourPixels, silhouette } from './seen';
 import {
   ballNrrd,
   boxOf,
   brain,
   brainHull,
   chordOfBall,
-  contourPixels,
   Daemon,
   drag,
   drop,
+  type JobAnswer,
+  keepNotices,
   noiseNrrd,
   noted,
   openedJob,
@@ -19,10 +21,8 @@ import {
   openSurface,
   settled,
   setup,
-  silhouette,
   still,
   surfaceLoaded,
-  type JobAnswer,
 } from './support';
 
 const at = setup();
@@ -103,7 +103,7 @@ describe('a surface', () => {
 
   beforeAll(async () => {
     ball = await at.daemon.upload(ballNrrd(48, 18));
-    made = await at.daemon.submit({ volume: ball, iso: 100, passes: 2, formats: ['glb', 'drc', 'stl'] }, 30);
+    made = await at.daemon.make({ volume: ball, iso: 100, passes: 2, formats: ['glb', 'drc', 'stl'] });
   });
 
   it('of a ball is a disc from every side', async () => {
@@ -151,6 +151,7 @@ describe('a surface', () => {
 
   it('is measured in millimetres', async () => {
     const { page } = at;
+    await keepNotices(page);
     await openSurface(at, made.id);
     await page.keyboard.press('a');
     await still(page);
@@ -174,7 +175,7 @@ describe('a surface', () => {
 
   it('made as Draco alone is shown as well', async () => {
     const { daemon, page } = at;
-    const draco = await daemon.submit({ volume: ball, iso: 100, formats: ['drc'] }, 30);
+    const draco = await daemon.make({ volume: ball, iso: 100, formats: ['drc'] });
     await openSurface(at, draco.id);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
   });
@@ -224,7 +225,7 @@ describe('a job', () => {
   it('is cancelled while it runs', async () => {
     const { daemon, page } = at;
     const volume = await daemon.upload(noiseNrrd(96));
-    const { id } = await daemon.submit({ volume, iso: 128, passes: 1000, formats: ['glb'] });
+    const { id } = await daemon.submit({ volume, iso: 128, passes: 1000, max_error_mm: 0.01, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await expect.poll(() => page.locator('.progress-text').innerText()).toMatch(/%/);
     await page.getByRole('button', { name: 'Cancel' }).click();
@@ -279,7 +280,7 @@ describe('the page', () => {
     });
     // With a surface, so that what draws is counted; its decoder is not.
     const volume = await daemon.upload(ballNrrd(16, 5));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['stl'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['stl'] });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await expect.poll(() => page.locator('.overlay.message').count()).toBe(1);
     await expect.poll(() => files.some(({ path }) => path.includes('/three'))).toBe(true);

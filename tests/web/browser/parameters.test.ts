@@ -147,7 +147,7 @@ describe('the kind of smoothing', () => {
   // Through the link that takes over the parameters of a job, whose answer names its step.
   const change = async (from: string, to: string): Promise<Record<string, unknown>> => {
     const { page, daemon } = at;
-    const { id } = await daemon.submit({ volume: ball, iso: 100, smoothing: from, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume: ball, iso: 100, smoothing: from, formats: ['glb'] });
     await page.goto('about:blank');
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await page.getByRole('link', { name: 'Change parameters' }).click();

@@ -7,7 +7,8 @@ import { gunzipSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
-import { ballNrrd, brain, brainHull, contourPixels, Daemon, openPage, pixelsOf, silhouette, startBrowser, still, surfaceLoaded } from './support';
+import { contourPixels, pixelsOf, silhouette } from './seen';
+import { ballNrrd, brain, brainHull, Daemon, openPage, startBrowser, still, surfaceLoaded } from './support';
 
 const skullProject = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
 const atlas = '/usr/share/mricron/templates/aal.nii';
@@ -126,13 +127,13 @@ describe('pictures', () => {
       await page.goto(`${daemon.url}/#/${place}`);
       await surfaceLoaded(page, surfaces);
     };
-    const bone = await daemon.submit({ volume: skull, iso: 250, formats: ['glb'] }, 30);
+    const bone = await daemon.make({ volume: skull, iso: 250, formats: ['glb'] });
     await show(`jobs/${bone.id}`, 1);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
     await take(page, 'surface');
 
     const { id: labelled, names } = await uploadAtlas();
-    const labels = await daemon.submit({ volume: labelled, labels: 'all', label_names: names, formats: ['glb', 'stl'] }, 30);
+    const labels = await daemon.make({ volume: labelled, labels: 'all', label_names: names, formats: ['glb', 'stl'] });
     await show(`jobs/${labels.id}`, 1);
     const view = await page.locator('.viewport').boundingBox();
     if (!view) throw new Error('there is no viewport');
@@ -141,7 +142,7 @@ describe('pictures', () => {
     await still(page);
     await take(page, 'labels');
 
-    const cut = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 30);
+    const cut = await daemon.make({ volume, iso: brainHull, formats: ['glb'] });
     await page.emulateMedia({ colorScheme: 'dark' });
     await show(`jobs/${cut.id}`, 1);
     const slice = page.waitForResponse(/slice\.png/);
@@ -156,7 +157,7 @@ describe('pictures', () => {
     const jobs = [];
     for (const scheme of [5, 6]) {
       for (const interpolation of ['linear', 'midpoint']) {
-        jobs.push((await daemon.submit({ volume, iso: brainHull, scheme, interpolation, formats: ['glb'] }, 30)).id);
+        jobs.push((await daemon.make({ volume, iso: brainHull, scheme, interpolation, formats: ['glb'] })).id);
       }
     }
     await show(`compare?jobs=${jobs.join(',')}`, 4);
@@ -165,7 +166,7 @@ describe('pictures', () => {
     const ball = await daemon.upload(ballNrrd(24, 9));
     const lattices = [];
     for (const scheme of [6, 5, 'bcc']) {
-      lattices.push((await daemon.submit({ volume: ball, iso: 100, scheme, smoothing: 'optimize', formats: ['glb'] }, 30)).id);
+      lattices.push((await daemon.make({ volume: ball, iso: 100, scheme, smoothing: 'optimize', formats: ['glb'] })).id);
     }
     await show(`compare?jobs=${lattices.join(',')}`, 3);
     await page.getByRole('button', { name: 'Flat' }).click();

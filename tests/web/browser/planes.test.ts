@@ -2,7 +2,8 @@
 import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { insertNrrd, whitePixels } from './bright';
-import { ballNrrd, boxOf, contourPixels, drag, noted, openSurface, setup, silhouette, still, surfaceLoaded } from './support';
+import { contourPixels, silhouette } from './seen';
+import { ballNrrd, boxOf, drag, noted, openSurface, setup, still, surfaceLoaded } from './support';
 
 const at = setup();
 let ball: string;
@@ -112,14 +113,14 @@ describe('an oblique plane', () => {
 describe('a free cut', () => {
   it('is parallel to the screen, is moved, and is in the address', async () => {
     const { page, daemon } = at;
-    const { id } = await daemon.submit({ volume: ball, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume: ball, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
     const view = page.locator('.viewport');
     await page.getByRole('button', { name: 'Cut', exact: true }).click();
     await page.getByLabel('Direction of the cut').selectOption('Free');
     await page.locator('.viewport[data-slice^=f]').waitFor();
     await still(page);
-    expect(noted(page, 'cut')).toMatch(/^f(-?[\d.]+,){3}0$/);
+    await expect.poll(() => noted(page, 'cut')).toMatch(/^f(-?[\d.]+,){3}0$/);
     // The middle of a ball seen from the cut side is its largest section, flat and bright.
     const half = await silhouette(page, view);
     expect(half.part).toBeGreaterThan(0.1);

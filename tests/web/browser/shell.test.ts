@@ -2,7 +2,8 @@
 import { readFileSync } from 'node:fs';
 import type { Route } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, boxOf, noted, openPage, openSurface, pause, pixelsOf, settled, setup, still, withTokens } from './support';
+import { pixelsOf } from './seen';
+import { ballNrrd, boxOf, noted, openPage, openSurface, pause, settled, setup, still, withTokens } from './support';
 
 const at = setup();
 let ball: string;
@@ -10,7 +11,7 @@ let job: string;
 
 beforeAll(async () => {
   ball = await at.daemon.upload(ballNrrd(48, 18));
-  job = (await at.daemon.submit({ volume: ball, iso: 100, formats: ['glb'] }, 30)).id;
+  job = (await at.daemon.make({ volume: ball, iso: 100, formats: ['glb'] })).id;
 });
 
 describe('the page', () => {
@@ -43,13 +44,12 @@ describe('the page', () => {
     await page.getByRole('link', { name: 'Jobs', exact: true }).click();
     await expect.poll(() => held.length).toBeGreaterThan(0);
     await page.goBack();
-    const view = page.locator('.histogram .bars');
-    await view.waitFor();
+    await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
     await pause(page, 600); // when a view that is still to come says that it loads
     for (const route of held) await route.continue();
     for (const route of held) await (await route.request().response())?.finished();
     await pause(page, 500); // until a view is made of these responses
-    expect(await view.count()).toBe(1);
+    expect(await page.locator('.histogram .bars').count()).toBe(1);
     expect(await page.locator('.loading').count()).toBe(0);
   });
 

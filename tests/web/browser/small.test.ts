@@ -1,7 +1,8 @@
 // A phone: 375 by 667, with fingers.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, boxOf, contourPixels, labelsNrrd, noted, openSurface, settled, setup, surfaceLoaded } from './support';
+import { contourPixels } from './seen';
+import { ballNrrd, boxOf, holdMeshes, labelsNrrd, noted, openSurface, settled, setup, surfaceLoaded } from './support';
 
 const at = setup({ viewport: { width: 375, height: 667 }, hasTouch: true, isMobile: true });
 
@@ -65,7 +66,7 @@ describe('on a phone', () => {
   it('nothing goes beyond the edge, and what is loaded is told below the tools', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     // The space at the right is as wide as that at the left.
     const rightOf = (selector: string): Promise<number> =>
       page.locator(selector).evaluateAll((all) => Math.max(...all.map((element) => element.getBoundingClientRect().right)));
@@ -73,7 +74,7 @@ describe('on a phone', () => {
     await page.goto(daemon.url);
     await page.locator('[data-volume]').first().waitFor();
     expect(await rightOf('.home section, .home section > *, .volume-search, .card')).toBeLessThanOrEqual(300);
-    await page.route('**/files/glb*', () => undefined);
+    await holdMeshes(page);
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await expect.poll(() => page.locator('.load-status').innerText()).not.toBe('');
     const [status, tools] = await Promise.all(['.load-status', '.tools'].map((one) => page.locator(one).boundingBox()));
@@ -84,7 +85,7 @@ describe('on a phone', () => {
   it('a tap on a label leaves the page where it is', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(labelsNrrd(24));
-    const { id } = await daemon.submit({ volume, labels: 'all', formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, labels: 'all', formats: ['glb'] });
     await openSurface(at, id);
     await page.locator('.viewport canvas').tap();
     await expect.poll(() => page.locator('.labels [aria-current]').count()).toBe(1);
@@ -95,7 +96,7 @@ describe('on a phone', () => {
   it('jobs are cards that a finger can choose', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs`);
     const card = page.locator(`[data-job="${id}"]`);
     await card.waitFor();
@@ -119,8 +120,8 @@ describe('on a phone', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
     const segmented = await daemon.upload(labelsNrrd(24));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'], certify: true }, 30);
-    const labels = await daemon.submit({ volume: segmented, labels: 'all', formats: ['glb', 'stl'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'], certify: true });
+    const labels = await daemon.make({ volume: segmented, labels: 'all', formats: ['glb', 'stl'] });
     const found: string[] = [];
     for (const place of ['', `volumes/${volume}`, `volumes/${segmented}`, 'jobs', `jobs/${id}?cut=z24%2B`, `jobs/${labels.id}`, `together?jobs=${id},${labels.id}`]) {
       await page.goto(`${daemon.url}/#/${place}`);
@@ -145,7 +146,7 @@ describe('on a phone', () => {
   it('what controls a cut is on the screen', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
     await page.getByRole('button', { name: 'Cut' }).tap();
     for (const element of await page.locator('.cut-controls > *').all()) {

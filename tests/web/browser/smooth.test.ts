@@ -14,7 +14,7 @@ interface Watched {
 it('the page does not wait for shaders while a surface comes and is looked at', async () => {
   const { page, daemon } = at;
   const volume = await daemon.upload(ballNrrd(48, 18));
-  const job = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+  const job = await daemon.make({ volume, iso: 100, formats: ['glb'] });
   await page.addInitScript(() => {
     const watched: Watched = { linked: 0, tooSoon: 0 };
     Object.assign(window, { watched });

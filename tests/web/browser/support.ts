@@ -4,7 +4,7 @@ import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
-import { chromium, type Browser, type JSHandle, type Locator, type Page } from 'playwright-core';
+import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, beforeEach, expect } from 'vitest';
 
 // A head in magnetic resonance and its brain alone, of Debian's mricron-data. The brain's hull has a
@@ -67,8 +67,15 @@ export class Daemon {
     return (await this.json<{ id: string }>('/v1/volumes', { method: 'POST', body })).id;
   }
 
-  submit(parameters: Record<string, unknown>, waitSeconds = 0): Promise<JobAnswer> {
-    return this.json(`/v1/jobs?wait=${waitSeconds}`, { method: 'POST', body: JSON.stringify(parameters) });
+  submit(parameters: Record<string, unknown>): Promise<JobAnswer> {
+    return this.json('/v1/jobs', { method: 'POST', body: JSON.stringify(parameters) });
+  }
+
+  // The job when it has ended.
+  async make(parameters: Record<string, unknown>): Promise<JobAnswer> {
+    let job = await this.submit(parameters);
+    while (job.state === 'queued' || job.state === 'running') job = await this.json(`/v1/jobs/${job.id}?wait=30`);
+    return job;
   }
 }
 
@@ -124,7 +131,7 @@ export function startBrowser(options = process.env.ISOMESH_WEBGPU === undefined 
   });
 }
 
-const slowest = 90_000;
+export const slowest = 90_000;
 
 export interface OpenPage {
   page: Page;
@@ -285,117 +292,27 @@ export async function drop(page: Page, files: { name: string; bytes: Buffer }[],
   await page.dispatchEvent(on, 'drop', { dataTransfer: transfer });
 }
 
-// Pixels of a slice that have the contour's colour.
-export function contourPixels(page: Page, plane: string): Promise<number> {
-  return page.evaluate((name) => {
-    const canvas = document.querySelector<HTMLCanvasElement>(`[data-plane=${name}] canvas`);
-    const pixels = canvas?.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height).data ?? [];
-    let count = 0;
-    for (let i = 0; i < pixels.length; i += 4) {
-      // Grey has equal parts; the contour is green and blue.
-      if ((pixels[i + 1] ?? 0) - (pixels[i] ?? 0) > 60) count += 1;
-    }
-    return count;
-  }, plane);
-}
-
-export interface Silhouette {
-  // The part of the picture that differs from its background.
-  part: number;
-  // The box around what differs, in parts of the picture.
-  width: number;
-  height: number;
-  // The part of that box that differs.
-  filling: number;
-  // Distinct colours in it: a flat patch has one.
-  colours: number;
-}
-
-export interface Hues {
-  red: number;
-  green: number;
-  blue: number;
-}
-
-// A PNG's pixels, in the page.
-export function pixelsOf(page: Page, picture: Buffer): Promise<JSHandle<ImageData>> {
-  return page.evaluateHandle(async (text) => {
-    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const canvas = document.createElement('canvas');
-    canvas.width = bitmap.width;
-    canvas.height = bitmap.height;
-    const context = canvas.getContext('2d');
-    if (!context) throw new Error('no canvas');
-    context.drawImage(bitmap, 0, 0);
-    return context.getImageData(0, 0, bitmap.width, bitmap.height);
-  }, picture.toString('base64'));
-}
-
-// The pixels of a view, without the tools over it.
-async function pixelsOfView(page: Page, element: Locator): Promise<JSHandle<ImageData>> {
-  const showTools = (visibility: string): Promise<void> =>
-    page.locator('.tools, .legend').evaluateAll((all, value) => {
-      for (const tools of all as HTMLElement[]) tools.style.visibility = value;
-    }, visibility);
-  await showTools('hidden');
-  const picture = await element.screenshot();
-  await showTools('');
-  return pixelsOf(page, picture);
-}
-
-// Pixels of a view, without the tools over it, that are clearly of one of these hues.
-export async function hues(page: Page, element: Locator): Promise<Hues> {
-  const pixels = await pixelsOfView(page, element);
-  return pixels.evaluate(({ data }) => {
-    const count = { red: 0, green: 0, blue: 0 };
-    const clear = 60;
-    for (let at = 0; at < data.length; at += 4) {
-      const [red = 0, green = 0, blue = 0] = data.subarray(at, at + 3);
-      if (red > Math.max(green, blue) + clear) count.red += 1;
-      if (green > Math.max(red, blue) + clear) count.green += 1;
-      if (blue > Math.max(red, green) + clear) count.blue += 1;
-    }
-    return count;
+// The first half of each mesh comes, and the rest when it is released.
+export async function holdMeshes(page: Page): Promise<() => void> {
+  let release = (): void => undefined;
+  const released = new Promise<void>((resolve) => (release = resolve));
+  await page.route(/mesh\.glb/, async (route) => {
+    const isRest = /bytes=[1-9]/.test(route.request().headers().range ?? '');
+    if (isRest) await released;
+    const answer = await route.fetch();
+    const whole = await answer.body();
+    const body = isRest ? whole : whole.subarray(0, Math.floor(whole.length / 2));
+    await route.fulfill({ response: answer, body, headers: { ...answer.headers(), 'content-length': String(body.length) } });
   });
+  return release;
 }
 
-// What stands out in a picture of a view, without the tools over it.
-export async function silhouette(page: Page, element: Locator, tolerance = 24): Promise<Silhouette> {
-  const pixels = await pixelsOfView(page, element);
-  return pixels.evaluate(({ data, width: across, height: down }, most) => {
-    const corner = 116; // the orientation cube
-    const seen = { count: 0, left: Infinity, right: -1, top: Infinity, bottom: -1 };
-    const colours = new Set<number>();
-    for (let y = 0; y < down; y += 1) {
-      // The background is a gradient from top to bottom, so that every row has its own.
-      const edge = 4 * (y * across + across - 3);
-      for (let x = 0; x < across; x += 1) {
-        if (x < corner && y > down - corner) continue;
-        const at = 4 * (y * across + x);
-        const difference =
-          Math.abs((data[at] ?? 0) - (data[edge] ?? 0)) +
-          Math.abs((data[at + 1] ?? 0) - (data[edge + 1] ?? 0)) +
-          Math.abs((data[at + 2] ?? 0) - (data[edge + 2] ?? 0));
-        if (difference <= most) continue;
-        seen.count += 1;
-        seen.left = Math.min(seen.left, x);
-        seen.right = Math.max(seen.right, x);
-        seen.top = Math.min(seen.top, y);
-        seen.bottom = Math.max(seen.bottom, y);
-        colours.add(((data[at] ?? 0) << 16) | ((data[at + 1] ?? 0) << 8) | (data[at + 2] ?? 0));
-      }
-    }
-    const width = Math.max(0, seen.right - seen.left + 1);
-    const height = Math.max(0, seen.bottom - seen.top + 1);
-    return {
-      part: seen.count / (across * down),
-      width: width / across,
-      height: height / down,
-      filling: seen.count / Math.max(1, width * height),
-      colours: colours.size,
-    };
-  }, tolerance);
+// Short notices stay. They are gone after six seconds otherwise, in which a busy machine may stand still.
+export function keepNotices(page: Page): Promise<void> {
+  return page.addInitScript(() => {
+    const original = window.setTimeout.bind(window);
+    Object.assign(window, { setTimeout: (run: TimerHandler, time?: number) => original(run, time === 6000 ? 600_000 : time) });
+  });
 }
 
 // Waits until all parts of the surfaces are there and drawn.

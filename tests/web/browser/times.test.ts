@@ -70,7 +70,7 @@ async function heapOf(session: CDPSession): Promise<number> {
 it('a surface of millions of triangles', async () => {
   const { daemon, browser } = at;
   const volume = await uploadHead();
-  const job = await daemon.submit({ volume, iso: 60, regularize: false, formats: ['glb'] }, 60);
+  const job = await daemon.make({ volume, iso: 60, regularize: false, formats: ['glb'] });
   const seen: Times[] = [];
   for (let run = 0; run < 3; run += 1) {
     const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
@@ -117,7 +117,7 @@ async function framesTurning(page: Page, seconds: number): Promise<number> {
 it('a surface of millions of triangles that is turned', async () => {
   const { page, daemon } = at;
   const volume = await uploadHead();
-  const { id, mesh } = await daemon.submit({ volume, iso: 60, regularize: false, formats: ['glb'] }, 60);
+  const { id, mesh } = await daemon.make({ volume, iso: 60, regularize: false, formats: ['glb'] });
   await page.goto(`${daemon.url}/#/jobs/${id}`);
   await surfaceLoaded(page);
   for (let run = 0; run < 3; run += 1) {
@@ -135,7 +135,7 @@ it('twenty surfaces, one after the other', async () => {
   const session = await page.context().newCDPSession(page);
   const heap: number[] = [];
   for (let count = 0; count <= 20; count += 1) {
-    const job = await daemon.submit({ volume, iso: 90 + count, formats: ['glb'] }, 60);
+    const job = await daemon.make({ volume, iso: 90 + count, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs/${job.id}`);
     await surfaceLoaded(page);
     if (count === 1 || count === 20) heap.push(await heapOf(session));

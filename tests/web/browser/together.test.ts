@@ -1,6 +1,7 @@
 // Several surfaces in one scene.
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, hues, labelsNrrd, noted, settled, setup, silhouette, surfaceLoaded } from './support';
+import { hues, silhouette } from './seen';
+import { ballNrrd, labelsNrrd, noted, settled, setup, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -9,7 +10,7 @@ describe('surfaces in one scene', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
     const jobs = [];
-    for (const iso of [70, 200]) jobs.push(await daemon.submit({ volume, iso, formats: ['glb'] }, 30));
+    for (const iso of [70, 200]) jobs.push(await daemon.make({ volume, iso, formats: ['glb'] }));
     await page.goto(`${daemon.url}/#/jobs`);
     const boxes = page.getByRole('checkbox', { name: /to compare/ });
     await expect.poll(() => boxes.count()).toBe(2);
@@ -46,7 +47,7 @@ describe('surfaces in one scene', () => {
   it('show each label of a job in its own colour until they get one together', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(labelsNrrd(32));
-    const job = await daemon.submit({ volume, labels: 'all', label_colors: { 1: '#d02020', 2: '#2040e0' }, formats: ['glb'] }, 30);
+    const job = await daemon.make({ volume, labels: 'all', label_colors: { 1: '#d02020', 2: '#2040e0' }, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/together?jobs=${job.id}`);
     await surfaceLoaded(page);
     const view = page.locator('.viewport');

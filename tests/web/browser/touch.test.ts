@@ -1,7 +1,8 @@
 // The page under fingers, as on a tablet.
 import type { CDPSession, Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, boxOf, chordOfBall, contourPixels, noted, openSurface, settled, setup, silhouette, still } from './support';
+import { contourPixels, silhouette } from './seen';
+import { ballNrrd, boxOf, chordOfBall, noted, openSurface, settled, setup, still } from './support';
 
 const at = setup({ viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
 
@@ -45,7 +46,7 @@ describe('fingers', () => {
   it('turn, move and zoom a surface, and measure it', async () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
-    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
     await page.getByRole('button', { name: /^Anterior/ }).tap();
     await still(page);

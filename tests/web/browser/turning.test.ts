@@ -43,7 +43,7 @@ describe('a large surface', () => {
     const { daemon, page } = at;
     await countTriangles(page);
     const volume = await daemon.upload(readFileSync(brain));
-    const { id, mesh } = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 120);
+    const { id, mesh } = await daemon.make({ volume, iso: brainHull, formats: ['glb'] });
     await openSurface(at, id);
     const all = mesh?.triangles ?? Infinity;
     const canvas = page.locator('.viewport canvas');

@@ -1,16 +1,8 @@
 // What comes in: several files, refused ones, and those of people with a token.
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
-import {
-  ballNrrd,
-  brain,
-  contourPixels,
-  setup,
-  drop,
-  openPage,
-  surfaceLoaded,
-  withTokens,
-} from './support';
+import { contourPixels } from './seen';
+import { ballNrrd, brain, setup, drop, openPage, surfaceLoaded, withTokens } from './support';
 
 const at = setup();
 

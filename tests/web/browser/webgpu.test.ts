@@ -2,7 +2,8 @@
 // if it has none even so, the tests that need it say so.
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it, type TaskContext } from 'vitest';
-import { ballNrrd, Daemon, labelsNrrd, openPage, pixelsOf, startBrowser, webGpuOptions } from './support';
+import { pixelsOf } from './seen';
+import { ballNrrd, Daemon, labelsNrrd, openPage, startBrowser, webGpuOptions } from './support';
 
 const without: string[] = [];
 let daemon: Daemon;
@@ -16,7 +17,7 @@ beforeAll(async () => {
   browsers = { gl: await startBrowser(without), gpu: await startBrowser(webGpuOptions) };
   ball = await daemon.upload(ballNrrd(80, 30));
   labels = await daemon.upload(labelsNrrd(40));
-  const page = await browsers.gpu.newPage();
+  const { page } = await openPage(browsers.gpu, daemon.url);
   await page.goto(daemon.url);
   hasGpu = await page.evaluate(async () => ((await navigator.gpu?.requestAdapter()) ?? null) !== null);
   await page.close();

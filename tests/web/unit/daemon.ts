@@ -1,6 +1,12 @@
 // An HTTP server that responds as openapi.yaml describes, as far as clients need it for one job.
 import { createServer, type IncomingMessage, type Server, type ServerResponse } from 'node:http';
 import type { AddressInfo } from 'node:net';
+import { vi } from 'vitest';
+
+// Waits until the check passes.
+export function eventually(check: () => void): Promise<void> {
+  return vi.waitFor(check, { timeout: 30_000 });
+}
 
 // The one job that a daemon has.
 export const id = '0123456789abcdef';

@@ -1,6 +1,7 @@
 // Uploads that continue after their connection broke, against a daemon as openapi.yaml describes it.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { ApiError, Client } from '@/api/index';
+import { eventually } from './daemon';
 
 const place = '/v1/uploads/0123';
 const whole = new Blob([Uint8Array.from({ length: 10_000_000 }, (_, at) => (at * 7919) >> 8)]);
@@ -156,9 +157,9 @@ describe('upload in parts', () => {
     const over = new AbortController();
     daemon.cuts = 1000;
     const refused = client.upload(whole, { signal: over.signal }).catch((error: unknown) => error);
-    await vi.waitFor(() => expect(daemon.asked).toContain(`HEAD ${place}`));
+    await eventually(() => expect(daemon.asked).toContain(`HEAD ${place}`));
     over.abort();
     expect(await refused).toBeInstanceOf(DOMException);
-    await vi.waitFor(() => expect(daemon.asked.at(-1)).toBe(`DELETE ${place}`));
+    await eventually(() => expect(daemon.asked.at(-1)).toBe(`DELETE ${place}`));
   });
 });
