@@ -44,7 +44,7 @@ class Readme(DaemonTest):
         code = code.replace("http://127.0.0.1:8080", self.url)
         checks = """
 assert abs(mesh.vertices).max() < 60 and (same.faces == client.mesh("head.nii.gz", iso=60).faces).all()
-assert len(left) > 100 and len(bone.faces) > 1000
+assert len(left) > 100 and len(bone.faces) > 1000 and (bone.labels == 1).all()
 assert surface.GetNumberOfCells() == len(solid.given["faces"]) == len(mesh.faces)
 """
         output = subprocess.check_output([sys.executable, "-c", code + checks], cwd=self.folder, text=True)

@@ -33,6 +33,9 @@ class Server:
             raise result
         return result
 
+    def within(self, retry_seconds):
+        return self
+
     def upload(self):
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda seconds: None)
         with mock.patch.object(resume, "time", clock):

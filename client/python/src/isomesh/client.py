@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import os
 import re
 import time
@@ -11,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
-from . import answers, ply, uploads
+from . import answers, busy, ply, uploads
 from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
 from .exchange import Exchange
 from .files import FINAL_STATES, file_of, format_of, written
-from .mesh import Mesh
+from .mesh import Mesh, why_empty
 from .parameters import OMITTED, as_query, by_keywords, given
 from .transport import Transport
 
@@ -40,13 +41,15 @@ class Client:
     token        the bearer token, if the server needs one. Default: ISOMESH_TOKEN
     authorities  a file of trusted certificate authorities. Default: ISOMESH_CA, or the system's
     timeout      the longest silence of the server, in seconds
+    retry_seconds  how long a request waits for a busy server, in seconds; 0: not at all
 
     A method that takes a volume or a job takes its id, or the dict that another method returned.
 
     Methods raise Refused if the server rejects the request, Unreachable if no response arrives,
     WrongAnswer if a response does not follow the API, and ValueError or TypeError for wrong arguments.
     If a connection breaks, safe requests are repeated: reading, and submitting a job. Uploads of
-    8 MiB or more resume where they broke; they fail after a minute without progress.
+    8 MiB or more resume where they broke; they fail after a minute without progress. If the server is
+    busy (429 or 503), every request waits as the server's Retry-After says, and is sent again.
     """
 
     def __init__(
@@ -56,12 +59,13 @@ class Client:
         token: Optional[str] = None,
         authorities: Optional[str] = None,
         timeout: float = 300,
+        retry_seconds: float = 600,
     ) -> None:
         environment = os.environ.get
         self.server = server or environment("ISOMESH_SERVER") or "http://127.0.0.1:8080"
         token = token if token is not None else environment("ISOMESH_TOKEN", "")
         authorities = authorities or environment("ISOMESH_CA") or None
-        self._exchange = Exchange(Transport(self.server, token, authorities, timeout))
+        self._exchange = Exchange(Transport(self.server, token, authorities, timeout, retry_seconds))
 
     @by_keywords
     def mesh(
@@ -126,10 +130,12 @@ class Client:
         except BaseException:  # an interrupt, or an exception of `progress`
             with contextlib.suppress(Exception):
                 # The key finds the job even if its response was interrupted.
-                self.cancel(self._submit(stored, key, parameters))
+                parting = copy.copy(self)
+                parting._exchange = self._exchange.within(busy.PARTING_SECONDS)
+                parting.cancel(parting._submit(stored, key, parameters))
             raise
         if done["mesh"]["empty"]:
-            warn(f"the surface is empty: {_why_empty(done, stored)}")
+            warn(f"the surface is empty: {why_empty(done, stored)}")
         return self._fetch(done, stored["notes"])
 
     # --- Volumes ---------------------------------------------------------------------------------
@@ -268,7 +274,13 @@ class Client:
             if end is not None:
                 longest = max(0, min(longest, end - asked))
             target = f"{_job_path(job)}?wait={longest:.3f}"
-            seen = cast("api.Job", self._exchange.get(target, answers.JOB, patience=longest))
+            exchange = self._exchange if end is None else self._exchange.within(max(0.0, end - asked))
+            try:
+                seen = cast("api.Job", exchange.get(target, answers.JOB, patience=longest))
+            except Refused as error:
+                if end is None or error.status not in busy.STATUSES:
+                    raise
+                raise TimeoutError(f"the server is busy: {error}; no retry is left in {timeout} s") from error
             if progress:
                 progress(seen)
             if seen["state"] == "succeeded":
@@ -406,17 +418,6 @@ class Client:
         return Mesh(*ply.parse(data), job=job, notes=notes, download=self.download)
 
 _UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form")
-
-
-def _why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
-    iso, (low, high) = job["mesh"].get("iso"), volume["range"]
-    if job["mesh"]["dropped"]["components"] > 0:
-        return "no connected component was kept"
-    if iso is None:
-        return "the labels have no surface"
-    if not low <= iso <= high:
-        return f"the iso-value {iso:g} is outside the samples' range, {low:g} to {high:g}"
-    return f"there is none at the iso-value {iso:g}"
 
 
 def _is_empty(keyword: str, value: Any) -> bool:

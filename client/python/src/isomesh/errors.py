@@ -52,13 +52,16 @@ class Refused(IsomeshError):
 
     `status` is the HTTP status, and `problem` is the server's explanation (RFC 9457). `choices` and
     `overridable` say how to repeat an upload so that the server accepts it, if there is a way.
+    `retry_after` is the number of seconds after which a busy server (429, 503) wants the request again;
+    None if it does not say.
     """
 
-    def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
+    def __init__(self, status: int, problem: Mapping[str, Any], retry_after: Optional[float] = None) -> None:
         text = str(problem.get("detail") or problem.get("title") or f"the server responded with status {status}")
         super().__init__(text + _remedy(self._list(problem, "choices"), problem.get("overridable")))
         self.status = status
         self.problem = problem
+        self.retry_after = retry_after
 
     @property
     def choices(self) -> Sequence[Mapping[str, str]]:
@@ -86,7 +89,7 @@ class JobFailed(IsomeshError):
         self.job = job
 
 
-def refusal(status: int, content_type: str, body: bytes) -> Refused:
+def refusal(status: int, content_type: str, body: bytes, retry_after: Optional[float]) -> Refused:
     """The exception for an unsuccessful response. A proxy's response may have no problem document."""
     problem: object = None
     if content_type.startswith(("application/problem+json", "application/json")):
@@ -94,7 +97,7 @@ def refusal(status: int, content_type: str, body: bytes) -> Refused:
             problem = json.loads(body)
         except ValueError:
             problem = None
-    return Refused(status, problem if isinstance(problem, dict) else {})
+    return Refused(status, problem if isinstance(problem, dict) else {}, retry_after)
 
 
 def _remedy(choices: Sequence[Mapping[str, str]], overridable: object) -> str:

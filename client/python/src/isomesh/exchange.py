@@ -27,6 +27,10 @@ class Exchange:
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
 
+    def within(self, retry_seconds: float) -> Exchange:
+        """The same exchange, which waits that long for a busy server."""
+        return Exchange(self._transport.within(retry_seconds))
+
     def get(self, target: str, members: Members, patience: float = 0) -> Dict[str, Any]:
         """The response's object. Raises WrongAnswer if it lacks one of the `members`."""
         return _parsed(self._transport.repeat(Request("GET", target, patience=patience)), members)

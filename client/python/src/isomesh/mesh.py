@@ -206,6 +206,17 @@ def read_ply(source: Union[bytes, bytearray, memoryview, str, os.PathLike[str]])
     return Mesh(*ply.parse(data))
 
 
+def why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
+    iso, (low, high) = job["mesh"].get("iso"), volume["range"]
+    if job["mesh"]["dropped"]["components"] > 0:
+        return "no connected component was kept"
+    if iso is None:
+        return "the labels have no surface"
+    if not low <= iso <= high:
+        return f"the iso-value {iso:g} is outside the samples' range, {low:g} to {high:g}"
+    return f"there is none at the iso-value {iso:g}"
+
+
 def _checked(space: str) -> str:
     if space not in ("ras", "lps"):
         raise ValueError(f"space must be 'ras' or 'lps', not {space!r}")

@@ -7,6 +7,7 @@ import json
 import time
 from typing import Dict, Iterator, Optional, Union
 
+from . import busy
 from .errors import IsomeshError, Refused, Unreachable, WrongAnswer, warn
 from .transport import Answer, Request, Transport
 from .uploads import Body
@@ -16,8 +17,9 @@ _PLACES = "/v1/uploads/"
 _LONGEST_CUT = 60.0  # seconds without progress, then the upload fails
 _FIRST_PAUSE = 0.1
 _LONGEST_PAUSE = 3.0
-# Temporary: the server is busy, stops, or has not yet noticed the broken connection.
-_PASSING = (408, 409, 429, 502, 503, 504)
+# Temporary: a proxy does not reach the server, or the server has not yet noticed the broken connection. While the
+# server is busy, Transport.send waits.
+_PASSING = (408, 409, 502, 504)
 
 
 def send(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> Answer:
@@ -39,7 +41,7 @@ def send(transport: Transport, target: str, headers: Dict[str, str], body: Body)
 
 def _give_up(transport: Transport, place: str) -> None:
     try:
-        answer = transport.send(Request("DELETE", place))
+        answer = transport.within(busy.PARTING_SECONDS).send(Request("DELETE", place))
         told = answer.text()
     except IsomeshError:
         return  # the server deletes the upload when it expires

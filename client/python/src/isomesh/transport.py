@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import http.client
+import math
 import socket
 import ssl
 import time
@@ -11,7 +13,8 @@ from dataclasses import dataclass, field
 from typing import Dict, Iterator, Optional
 from urllib.parse import urlsplit
 
-from .errors import Unreachable, refusal
+from . import busy
+from .errors import Refused, Unreachable, refusal
 from .uploads import Body
 
 _TRIES = 4
@@ -77,12 +80,17 @@ class Transport:
     connection, directly to the server. Proxies of the environment are not used and redirects are not
     followed, because volumes and tokens are for the named machine only."""
 
-    def __init__(self, server: str, token: str, authorities: Optional[str], timeout: float) -> None:
+    def __init__(
+        self, server: str, token: str, authorities: Optional[str], timeout: float, retry_seconds: float
+    ) -> None:
+        if not math.isfinite(retry_seconds) or retry_seconds < 0:
+            raise ValueError(f"retry_seconds must be a number of seconds from 0 up, not {retry_seconds!r}")
         if not token.isascii() or any(c <= " " or c == "\x7f" for c in token):
             raise ValueError("the token must be printable ASCII characters without spaces")
         self._server = server
         self._token = token
         self._timeout = timeout
+        self._retry_seconds = retry_seconds
         self._socket = server[len("unix:") :] if server.startswith("unix:") else ""
         parts = urlsplit("http://localhost" if self._socket else server)
         if (
@@ -98,8 +106,23 @@ class Transport:
         self._port = parts.port  # raises ValueError for an invalid port
         self._tls = _tls_context(authorities) if parts.scheme == "https" else None
 
+    def within(self, retry_seconds: float) -> Transport:
+        """The same transport, which waits that long for a busy server."""
+        other = copy.copy(self)
+        other._retry_seconds = retry_seconds
+        return other
+
     def send(self, request: Request) -> Answer:
-        """A successful response. Raises Refused for any other, and Unreachable without a response."""
+        """A successful response. Raises Refused for any other, and Unreachable without a response. While
+        the server is busy, the request is sent again: every request of the API can be repeated."""
+        patience = busy.Patience(self._retry_seconds)
+        while True:
+            try:
+                return self._send_once(request)
+            except Refused as error:
+                patience.wait(error)
+
+    def _send_once(self, request: Request) -> Answer:
         connection = self._connection(request)
         try:
             connection.connect()
@@ -118,7 +141,9 @@ class Transport:
             connection.close()
             raise
         connection.close()
-        raise refusal(response.status, response.getheader("Content-Type") or "", body)
+        header = response.headers.get
+        retry_after = busy.retry_after(header("Retry-After", ""), header("Date", ""))
+        raise refusal(response.status, header("Content-Type", ""), body, retry_after)
 
     def repeat(self, request: Request) -> bytes:
         """The response body of a request that may be repeated; it is, if its connection breaks."""

@@ -1,0 +1,294 @@
+"""A server that is busy: every request waits as it says, and none is lost."""
+
+import contextlib
+import http.client
+import http.server
+import subprocess
+import sys
+import threading
+import unittest
+from collections import Counter
+from unittest import mock
+
+import isomesh
+import numpy
+from isomesh import busy
+from limits import LimitedTest
+from support import DaemonTest, ball
+
+NEVER = 10**9
+
+
+class Clock:
+    """Sleeping takes no time, and is recorded."""
+
+    def __init__(self, interrupts=()):
+        self.now = 1000.0
+        self.pauses = []
+        self.interrupts = list(interrupts)
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.pauses.append(seconds)
+        self.now += seconds
+        if self.interrupts:
+            raise self.interrupts.pop()
+
+    def installed(self):
+        return mock.patch.object(busy, "time", self)
+
+
+class BusyServer:
+    """Rejects the first `refusals` requests of each method and path, and passes all others on to the
+    daemon at `url`."""
+
+    def __init__(self, url="", refusals=1, status=429, headers=None):
+        self.refused, self.seen = Counter(), []
+        told = {"Retry-After": "7"} if headers is None else headers
+        outer = self
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def respond(self):
+                body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+                # The body of a large upload says nothing here, and its offset does.
+                sent = (self.command, self.path, self.headers.get("Upload-Offset"))
+                outer.seen.append((*sent, self.headers.get("Idempotency-Key"), body))
+                if outer.refused[sent] < refusals:
+                    outer.refused[sent] += 1
+                    answer = status, told, b'{"title": "Busy", "detail": "come again"}'
+                else:
+                    answer = self.passed_on(body)
+                code, headers, content = answer
+                self.send_response_only(code)
+                for name, value in headers.items():
+                    if name.lower() not in ("transfer-encoding", "content-length", "connection"):
+                        self.send_header(name, value)
+                self.send_header("Content-Length", str(len(content)))
+                self.send_header("Content-Type", "application/problem+json")
+                self.end_headers()
+                if self.command != "HEAD":
+                    self.wfile.write(content)
+
+            def passed_on(self, body):
+                daemon = http.client.HTTPConnection(url.removeprefix("http://"), timeout=60)
+                with contextlib.closing(daemon):
+                    daemon.request(self.command, self.path, body, dict(self.headers))
+                    response = daemon.getresponse()
+                    return response.status, dict(response.getheaders()), response.read()
+
+            do_GET = do_POST = do_PATCH = do_DELETE = do_HEAD = respond
+
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.url = f"http://127.0.0.1:{self.server.server_address[1]}"
+        self.thread = threading.Thread(target=self.server.serve_forever, daemon=True)
+        self.thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.server.shutdown()
+        self.server.server_close()
+        self.thread.join(60)
+
+
+class RetryAfter(LimitedTest):
+    def test_its_forms(self):
+        date = "Sat, 28 Nov 2026 09:40:00 GMT"
+        for value, seconds in (
+            ("0", 0),
+            ("7", 7),
+            (" 120 ", 120),
+            ("1.5", 1.5),
+            ("Sat, 28 Nov 2026 09:41:30 GMT", 90),
+            ("Saturday, 28-Nov-26 09:41:30 GMT", 90),
+            ("Sat Nov 28 09:41:30 2026", 90),
+            ("Sat, 28 Nov 2026 09:39:00 GMT", 0),
+            ("", None),
+            ("soon", None),
+            ("-5", None),
+            ("nan", None),
+            ("Sat, 99 Nov 99999 99:99:99 GMT", None),
+        ):
+            self.assertEqual(busy.retry_after(value, date), seconds, value)
+
+    def test_a_date_is_compared_with_this_machines_clock_if_the_response_has_none(self):
+        self.assertEqual(busy.retry_after("Thu, 01 Jan 1970 00:00:00 GMT", ""), 0)
+        self.assertGreater(busy.retry_after("Fri, 31 Dec 9999 23:59:59 GMT", "yesterday"), 1e9)
+
+    def test_clients_that_were_rejected_together_return_apart(self):
+        for asked, latest in ((0, 0.5), (1, 1.5), (40, 50)):
+            clock = Clock()
+            with clock.installed():
+                for _ in range(200):
+                    busy.Patience(100).wait(isomesh.Refused(503, {}, asked))
+            self.assertTrue(all(asked <= pause <= latest for pause in clock.pauses))
+            self.assertGreater(max(clock.pauses) - min(clock.pauses), (latest - asked) / 2)
+
+    def test_pauses_grow_if_the_server_does_not_say(self):
+        clock, patience = Clock(), busy.Patience(600)
+        with clock.installed(), self.assertRaises(isomesh.Refused):
+            for _ in range(NEVER):
+                patience.wait(isomesh.Refused(429, {}))
+        for pause, longest in zip(clock.pauses, (0.5, 1, 2, 4, 8, 15, 15, 15)):
+            self.assertTrue(longest / 2 <= pause <= longest, clock.pauses)
+        self.assertTrue(570 < sum(clock.pauses) <= 600, clock.pauses)
+
+
+class Limits(LimitedTest):
+    def assert_rejected(self, server, clock, **options):
+        with clock.installed(), self.assertRaises(isomesh.Refused) as caught:
+            isomesh.Client(server.url, **options).job("7")
+        return caught.exception
+
+    def test_it_waits_for_ten_minutes(self):
+        clock = Clock()
+        with BusyServer(refusals=NEVER) as server:
+            error = self.assert_rejected(server, clock)
+        self.assertEqual((error.status, error.retry_after, str(error)), (429, 7, "come again"))
+        self.assertTrue(590 < sum(clock.pauses) <= 600, clock.pauses)
+        self.assertTrue(all(7 <= pause <= 8.75 for pause in clock.pauses))
+        self.assertEqual(len(server.seen), len(clock.pauses) + 1)
+
+    def test_its_limit_can_be_set(self):
+        for seconds, tries in ((0, 1), (6, 1), (20, 3)):
+            clock = Clock()
+            with BusyServer(refusals=NEVER, status=503) as server:
+                with mock.patch.object(busy.random, "uniform", lambda low, high: high):
+                    self.assert_rejected(server, clock, retry_seconds=seconds)
+                self.assertEqual(len(server.seen), tries)
+
+    def test_it_does_not_begin_to_wait_for_what_comes_too_late(self):
+        clock = Clock()
+        with BusyServer(refusals=NEVER, headers={"Retry-After": "3600"}) as server:
+            self.assertEqual(self.assert_rejected(server, clock).retry_after, 3600)
+        self.assertEqual(clock.pauses, [])
+
+    def test_a_date(self):
+        clock = Clock()
+        told = {"Retry-After": "Sat, 28 Nov 2026 09:41:30 GMT", "Date": "Sat, 28 Nov 2026 09:41:00 GMT"}
+        with BusyServer(refusals=NEVER, headers=told) as server:
+            self.assertEqual(self.assert_rejected(server, clock, retry_seconds=60).retry_after, 30)
+        self.assertTrue(30 <= clock.pauses[0] <= 37.5)
+
+    def test_other_errors_are_not_retried(self):
+        for status in (400, 404, 409, 410, 413, 422, 500, 502, 507):
+            clock = Clock()
+            with BusyServer(refusals=NEVER, status=status) as server:
+                self.assertEqual(self.assert_rejected(server, clock).status, status)
+            self.assertEqual((len(server.seen), clock.pauses), (1, []))
+
+    def test_an_interrupt_ends_the_wait(self):
+        clock = Clock(interrupts=[KeyboardInterrupt])
+        with BusyServer(refusals=NEVER) as server:
+            with clock.installed(), self.assertRaises(KeyboardInterrupt):
+                isomesh.Client(server.url).job("7")
+        self.assertEqual(len(server.seen), 1)
+
+    def test_waiting_for_a_job_ends_at_its_timeout(self):
+        clock = Clock()
+        with BusyServer(refusals=NEVER) as server:
+            with clock.installed(), self.assertRaises(TimeoutError):
+                isomesh.Client(server.url).wait("7", timeout=30)
+        self.assertTrue(20 < sum(clock.pauses) <= 30, clock.pauses)
+
+    def test_a_limit_that_is_none(self):
+        for seconds in (-1, float("nan"), float("inf")):
+            with self.assertRaisesRegex(ValueError, "retry_seconds"):
+                isomesh.Client("http://127.0.0.1:1", retry_seconds=seconds)
+
+
+class Everything(DaemonTest):
+    def test_every_request_waits_and_is_repeated_as_it_was(self):
+        big = numpy.zeros((256, 256, 160), numpy.uint8)  # is sent in parts
+        big[100:130, 100:130, 60:90] = 1
+        clock = Clock()
+        with BusyServer(self.url) as server, clock.installed():
+            client = isomesh.Client(server.url)
+            volume = client.upload(ball())
+            client.erase(client.upload(ball() - 1))
+            mesh = client.mesh(big, labels=[1], formats=["glb"])
+            client.download(mesh.job, self.folder / "one.glb")
+            self.assertEqual(len(client.fetch(mesh.job["id"]).faces), len(mesh.faces))
+            client.cancel(client.submit(volume, iso=-4))
+            client.rename(volume, "ball")
+            self.assertEqual(client.volume(volume)["name"], "ball")
+            self.assertIn(volume["id"], [each["id"] for each in client.volumes()])
+            self.assertIn(mesh.job["id"], [each["id"] for each in client.jobs()])
+            client.histogram(volume)
+            client.labels(mesh.job["volume"])
+            client.estimate(volume, iso=-4)
+            self.assertEqual(len(list(client.job_labels(mesh.job))), 1)
+        self.assertGreater(len(server.refused), 15)
+        self.assertEqual(len(clock.pauses), len(server.refused))
+        self.assertTrue(all(7 <= pause <= 8.75 for pause in clock.pauses))
+        jobs = [(key, body) for method, path, _, key, body in server.seen if (method, path) == ("POST", "/v1/jobs")]
+        # The first of them was rejected. A job has one key, and no other job has it.
+        self.assertEqual(len(jobs), 3)
+        self.assertEqual(jobs[0], jobs[1])
+        self.assertNotEqual(jobs[1][0], jobs[2][0])
+        methods = [method for method, path, *_ in server.seen if path.startswith("/v1/uploads/")]
+        self.assertEqual(methods, ["PATCH", "PATCH"])
+
+    def test_an_interrupt_of_a_wait_leaves_no_job(self):
+        volume = self.client.upload(numpy.random.default_rng(1).random((128, 128, 96), "float32"))
+        clock = Clock(interrupts=[KeyboardInterrupt])
+        with BusyServer(self.url, headers={"Retry-After": "1"}) as server, clock.installed():
+            with self.assertRaises(KeyboardInterrupt):
+                isomesh.Client(server.url).mesh(volume, iso=0.5, passes=1000)
+        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
+            self.client.wait(next(iter(self.client.jobs())))
+
+    def test_an_interrupt_does_not_wait_long_for_a_server_that_stays_busy(self):
+        clock = Clock(interrupts=[KeyboardInterrupt])
+        with BusyServer(refusals=NEVER, headers={"Retry-After": "1"}) as server, clock.installed():
+            with self.assertRaises(KeyboardInterrupt):
+                isomesh.Client(server.url).mesh({"id": "a" * 64, "notes": []}, iso=-7)
+        self.assertTrue(1 <= sum(clock.pauses[1:]) <= 2, clock.pauses)
+
+
+class Crowd(DaemonTest):
+    """More uploads at once than a client has places: half of two."""
+
+    options = ("--upload-places", "2")
+    crowd = 10
+
+    def test_threads(self):
+        sizes = {}
+
+        def mesh(number):
+            sizes[number] = len(self.client.mesh(ball((64, 64, 64)) + number, iso=number - 20).faces)
+
+        with self.assertLogs("isomesh", "INFO") as waits:
+            threads = [threading.Thread(target=mesh, args=(number,)) for number in range(self.crowd)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+        self.assertEqual(len(sizes), self.crowd)
+        self.assertIn("the server is busy", waits.output[0])
+
+    def test_processes(self):
+        code = (
+            "import logging, sys, numpy, isomesh\n"
+            "logging.basicConfig(level=logging.INFO)\n"
+            "samples = numpy.zeros((64, 64, 64), numpy.float32)\n"
+            "samples[10:50, 10:50, 10:50] = int(sys.argv[1])\n"
+            "mesh = isomesh.Client(sys.argv[2]).mesh(samples, iso=0.5)\n"
+            "sys.stdout.write(f'{len(mesh.faces)}\\n')\n"
+        )
+        numbers = "\n".join(str(number) for number in range(1, self.crowd + 1))
+        command = ["xargs", "-P", str(self.crowd), "-I", "{}", sys.executable, "-c", code, "{}", self.url]
+        done = subprocess.run(command, input=numbers, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(len(done.stdout.split()), self.crowd)
+        self.assertIn("the server is busy", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
