@@ -16,7 +16,7 @@ class PageClient extends Client {
 
 // The page comes from the server itself, so it needs no address.
 export const client = new PageClient({ server: '' });
-export const { connected, token, unauthorized } = client.connection;
+export const { busy, connected, token, unauthorized } = client.connection;
 
 // Calls it whenever the server can be reached again.
 export function onReconnect(scope: Scope, run: () => void): void {

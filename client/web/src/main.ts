@@ -12,7 +12,7 @@ import './style/compare.css';
 import './style/small.css';
 import './style/contrast.css';
 import './ui/kept_token';
-import { client, connected, onReconnect } from './client';
+import { busy, client, connected, onReconnect } from './client';
 import { ApiError, asApiError } from './api/problem';
 import { surfaceInWords } from './job/parameters';
 import { WatchedJobs } from './job/watched';
@@ -168,13 +168,21 @@ async function show(): Promise<void> {
   }
 }
 
+function showConnection(): void {
+  banner.hidden = connected.value && !busy.value;
+  banner.classList.toggle('waits', connected.value);
+  banner.textContent = connected.value
+    ? 'The server is busy. The page tries again automatically.'
+    : 'The connection to the server is lost. The page reconnects automatically.';
+}
+
 function watchConnection(): void {
   let timer = 0;
+  busy.subscribe(showConnection);
   connected.subscribe((isConnected) => {
     clearInterval(timer);
-    banner.hidden = isConnected;
+    showConnection();
     if (isConnected) return;
-    banner.textContent = 'The connection to the server is lost. The page reconnects automatically.';
     timer = window.setInterval(() => {
       void client.connection.isAlive().then((alive) => {
         if (alive) connected.value = true;

@@ -151,7 +151,7 @@ describe('the surface beside the slices', () => {
 
   it('comes when the daemon has it again', async () => {
     const { page } = at;
-    await page.route('**/preview?*', (route) => route.fulfill({ status: 503, body: '' }));
+    await page.route('**/preview?*', (route) => route.fulfill({ status: 500, body: '' }));
     await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100`);
     await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/could not be loaded/);
     await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);

@@ -59,7 +59,7 @@ describe('a slice', () => {
 
   it('that fails at first comes by itself as well', async () => {
     const { page } = at;
-    await page.route('**/slice.png?*', (route) => route.fulfill({ status: 503, body: '' }));
+    await page.route('**/slice.png?*', (route) => route.fulfill({ status: 500, body: '' }));
     await page.goto('about:blank');
     await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100`);
     await expect.poll(() => page.locator('.slice-state', { hasText: 'could not be loaded' }).count()).toBe(3);

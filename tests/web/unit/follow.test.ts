@@ -1,5 +1,6 @@
 // Following a job to its end. The stubbed daemon sends its responses in the order that a test chooses.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { Client } from '@/api/client';
 import type { Job } from '@/api/types';
 import { client } from '@/client';
 import { WatchedJobs } from '@/job/watched';
@@ -13,6 +14,7 @@ class Daemon {
   questions = 0;
   // Statuses of the next responses.
   readonly refusals: number[] = [];
+  retryAfter: Record<string, string> = {};
   holds = false;
 
   answer(address: string): Promise<Response> {
@@ -22,7 +24,7 @@ class Daemon {
     }
     this.questions += 1;
     const status = this.refusals.shift();
-    if (status !== undefined) return Promise.resolve(new Response('<html></html>', { status }));
+    if (status !== undefined) return Promise.resolve(new Response('<html></html>', { status, headers: this.retryAfter }));
     const answer = Response.json({ id, state: this.state });
     if (!this.holds) return Promise.resolve(answer);
     return new Promise((resolve) => this.held.push(() => resolve(answer)));
@@ -103,6 +105,26 @@ describe('a job that is followed', () => {
       await settled();
     }
     expect(daemon.refusals).toEqual([]);
+    expect(states).toEqual(['running']);
+  });
+
+  it('is left alone as long as the server says, also by a client that does not wait itself', async () => {
+    vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout'] });
+    // It asks at once, and when the stream begins.
+    daemon.refusals.push(503, 503);
+    daemon.retryAfter = { 'Retry-After': '30' };
+    const states: string[] = [];
+    const hasty = new Client({ server: '', retrySeconds: 0 });
+    const job = hasty.follow(id, over.signal, ({ state }) => states.push(state));
+    job.catch(() => undefined);
+    await settled();
+    await settled();
+    const { questions } = daemon;
+    await vi.advanceTimersByTimeAsync(29_000);
+    await settled();
+    expect([daemon.questions, states]).toEqual([questions, []]);
+    await vi.advanceTimersByTimeAsync(1000);
+    await settled();
     expect(states).toEqual(['running']);
   });
 

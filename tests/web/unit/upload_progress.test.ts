@@ -26,4 +26,16 @@ describe('the progress of an upload', () => {
     vi.advanceTimersByTime(10_000);
     expect(progress.text.textContent).not.toContain('Waiting');
   });
+
+  it('says that the server is busy until something is sent again', async () => {
+    const { UploadProgress } = await import('@/views/volumes/upload_progress');
+    const progress = new UploadProgress(1_000_000);
+    progress.show(200_000);
+    progress.showBusy();
+    vi.advanceTimersByTime(10_000);
+    expect(progress.text.textContent).toBe('The server is busy. The upload is tried again automatically');
+    progress.show(100_000);
+    expect(progress.text.textContent).toMatch(/\/s$/);
+    progress.end();
+  });
 });

@@ -1,8 +1,9 @@
 // One client of one server: the server's routes as methods. A failure is thrown as an ApiError.
 import { Connection } from './connection';
 import { follow } from './follow';
-import { JobEvents, sleep } from './job_events';
+import { JobEvents } from './job_events';
 import { asApiError } from './problem';
+import { sleep } from './sleep';
 import type {
   Axis,
   ClientOptions,
@@ -65,8 +66,8 @@ export class Client {
   readonly events: JobEvents;
 
   /** Outside a page `server` is required. On a page it may be left out, which means the server that the page comes from. */
-  constructor({ server, token = '' }: ClientOptions = {}) {
-    this.connection = new Connection(server, token);
+  constructor({ server, token = '', retrySeconds }: ClientOptions = {}) {
+    this.connection = new Connection(server, token, retrySeconds);
     this.events = new JobEvents(this.connection);
   }
 

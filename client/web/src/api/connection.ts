@@ -1,6 +1,8 @@
 // Requests to one server, on a page and in Node. A failure is thrown as an ApiError.
 import { Signal } from '../ui/signal';
+import { BusyPauses, checkedLimit, isBusy, usualLimit, type HeaderValues } from './busy';
 import { ApiError, asApiError, errorOf, jsonOf } from './problem';
+import { sleep } from './sleep';
 
 // The address without the slash at its end.
 function baseOf(server: string | undefined): string {
@@ -17,9 +19,19 @@ function baseOf(server: string | undefined): string {
 // A response with its whole body.
 export interface Answer {
   status: number;
-  headers: Pick<Headers, 'get'>;
+  headers: HeaderValues;
   text: string;
 }
+
+export interface Patience {
+  signal?: AbortSignal | null;
+  // How long the server may be busy, if that differs from the connection's own limit.
+  retrySeconds?: number;
+  // Called before each pause, with its seconds.
+  onBusy?: (seconds: number) => void;
+}
+
+export type Init = RequestInit & Patience;
 
 export class Connection {
   // False after a request that got no whole response.
@@ -28,11 +40,16 @@ export class Connection {
   readonly unauthorized = new Signal<boolean>(false);
   // Requests carry this token. An empty one is not sent.
   readonly token: Signal<string>;
+  // True while requests wait because the server is busy.
+  readonly busy = new Signal<boolean>(false);
+  private waiting = 0;
   private readonly base: string;
+  private readonly retrySeconds: number;
 
   // An empty address stands for the server that the page comes from.
-  constructor(server: string | undefined, token: string) {
+  constructor(server: string | undefined, token: string, retrySeconds = usualLimit) {
     this.base = baseOf(server);
+    this.retrySeconds = checkedLimit(retrySeconds);
     this.token = new Signal(token);
   }
 
@@ -55,22 +72,22 @@ export class Connection {
   }
 
   // Returns every response, also one with an error status.
-  async ask(path: string, init: RequestInit = {}): Promise<Answer> {
+  async ask(path: string, init: Init = {}): Promise<Answer> {
     const response = await this.begin(path, init);
     const text = await this.received(response.text(), init);
     return { status: response.status, headers: response.headers, text };
   }
 
   // Returns the response before its body has come. Throws an ApiError for one with an error status.
-  async send(path: string, init: RequestInit = {}): Promise<Response> {
+  async send(path: string, init: Init = {}): Promise<Response> {
     const response = await this.begin(path, init);
-    if (!response.ok) throw errorOf(response.status, await this.received(response.text(), init));
+    if (!response.ok) throw errorOf(response.status, await this.received(response.text(), init), response.headers);
     return response;
   }
 
   async json<T>(path: string, init?: RequestInit): Promise<T> {
-    const { status, text } = await this.ask(path, init);
-    return jsonOf(status, text) as T;
+    const { status, text, headers } = await this.ask(path, init);
+    return jsonOf(status, text, headers) as T;
   }
 
   async blob(path: string, init: RequestInit = {}): Promise<Blob> {
@@ -81,12 +98,44 @@ export class Connection {
     return this.received((await this.send(path, init)).arrayBuffer(), init);
   }
 
-  private async begin(path: string, init: RequestInit): Promise<Response> {
-    const headers = this.headers(init.headers as Record<string, string>);
-    const response = await this.received(fetch(this.addressOf(path), { ...init, headers }), init);
-    this.connected.value = true;
-    if (response.status === 401) this.unauthorized.value = true;
-    return response;
+  // All requests go through this. Calls `attempt` until the server is no longer busy, or the time is over: every request
+  // of the API can be repeated, and so can its body.
+  async patiently<T extends Pick<Answer, 'status' | 'headers'>>(
+    attempt: () => Promise<T>,
+    { signal, retrySeconds = this.retrySeconds, onBusy }: Patience,
+    discard: (refused: T) => void = () => undefined,
+  ): Promise<T> {
+    const pauses = new BusyPauses(retrySeconds);
+    for (;;) {
+      const answer = await attempt();
+      const seconds = isBusy(answer.status) ? pauses.next(answer.headers) : null;
+      if (seconds === null) return answer;
+      discard(answer);
+      onBusy?.(seconds);
+      await this.wait(1000 * seconds, signal);
+    }
+  }
+
+  private async wait(milliseconds: number, signal: AbortSignal | null | undefined): Promise<void> {
+    this.waiting += 1;
+    this.busy.value = true;
+    await sleep(milliseconds, signal);
+    this.waiting -= 1;
+    this.busy.value = this.waiting > 0;
+    signal?.throwIfAborted();
+  }
+
+  private begin(path: string, { retrySeconds, onBusy, ...init }: Init): Promise<Response> {
+    const attempt = async (): Promise<Response> => {
+      const headers = this.headers(init.headers as Record<string, string>);
+      const response = await this.received(fetch(this.addressOf(path), { ...init, headers }), init);
+      this.connected.value = true;
+      if (response.status === 401) this.unauthorized.value = true;
+      return response;
+    };
+    // Or Node keeps the connection for a body that nobody reads.
+    const discard = ({ body }: Response): void => void body?.cancel().catch(() => undefined);
+    return this.patiently(attempt, { signal: init.signal, retrySeconds, onBusy }, discard);
   }
 
   // A connection may break before a response and in its body.

@@ -1,7 +1,8 @@
 // Follows a job to its end: by the stream of all jobs, and by requests while there is no stream.
+import { delayAfter } from './busy';
 import type { Client } from './client';
 import { isHidden } from './job_events';
-import { asApiError, isPassing } from './problem';
+import { asApiError, isPassing, type ApiError } from './problem';
 import { isFinal, type Job, type JobChange } from './types';
 
 // The time between two requests while there is no stream. A hidden page asks less often.
@@ -73,9 +74,10 @@ class Follower {
     }
   }
 
-  private askLater(): void {
+  private askLater(failure: ApiError | null = null): void {
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => void this.ask(), isHidden() ? askHidden : askEvery);
+    const delay = isHidden() ? askHidden : askEvery;
+    this.timer = setTimeout(() => void this.ask(), failure ? delayAfter(failure, delay) : delay);
   }
 
   private async ask(): Promise<void> {
@@ -84,7 +86,7 @@ class Follower {
     this.asksAgain = this.isAsking;
     if (this.isAsking || signal.aborted) return;
     this.isAsking = true;
-    let hasFailed = false;
+    let failure: ApiError | null = null;
     try {
       const job = await this.client.getJob(this.id, 0, signal);
       if (signal.aborted) return;
@@ -94,18 +96,13 @@ class Follower {
         this.over.abort();
       }
     } catch (error) {
-      hasFailed = true;
-      if (!signal.aborted) this.takeError(error);
+      failure = asApiError(error);
+      if (!signal.aborted && !isPassing(failure.status)) this.fail(failure);
     } finally {
       this.isAsking = false;
       if (this.asksAgain) void this.ask();
-      else if (!signal.aborted && (hasFailed || !this.client.events.isTelling)) this.askLater();
+      else if (!signal.aborted && (failure || !this.client.events.isTelling)) this.askLater(failure);
     }
-  }
-
-  private takeError(error: unknown): void {
-    const failure = asApiError(error);
-    if (!isPassing(failure.status)) this.fail(failure);
   }
 }
 

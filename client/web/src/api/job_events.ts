@@ -1,8 +1,10 @@
 // What happens to jobs, in one stream for the whole client: a browser makes only six connections to a server over
 // HTTP/1.1, and each stream keeps one.
+import { delayAfter } from './busy';
 import type { Connection } from './connection';
 import { EventParser } from './events';
 import { asApiError } from './problem';
+import { sleep } from './sleep';
 import type { JobChange } from './types';
 
 export interface JobListener {
@@ -70,7 +72,8 @@ export class JobEvents {
       } catch (error) {
         if (signal.aborted) return;
         failures += 1;
-        if (!asApiError(error).isUnreachable) pause = refusedDelay;
+        const failure = asApiError(error);
+        if (!failure.isUnreachable) pause = delayAfter(failure, refusedDelay);
       }
       if (signal.aborted) return;
       this.pause();
@@ -79,7 +82,9 @@ export class JobEvents {
   }
 
   private async read(signal: AbortSignal): Promise<void> {
-    const answer = await this.connection.send('/v1/events', { signal, headers: { Accept: 'text/event-stream' } });
+    // Without waiting for a busy server: listeners ask in the meantime.
+    const init = { signal, headers: { Accept: 'text/event-stream' }, retrySeconds: 0 };
+    const answer = await this.connection.send('/v1/events', init);
     const reader = answer.body?.getReader();
     if (!reader) return;
     this.isOpen = true;
@@ -101,17 +106,4 @@ export class JobEvents {
 // Always false in Node, which has no page.
 export function isHidden(): boolean {
   return typeof document !== 'undefined' && document.hidden;
-}
-
-// Ends early when the signal is aborted, without an error.
-export function sleep(milliseconds: number, signal?: AbortSignal): Promise<void> {
-  return new Promise((resolve) => {
-    const end = (): void => {
-      clearTimeout(timer);
-      signal?.removeEventListener('abort', end);
-      resolve();
-    };
-    const timer = setTimeout(end, signal?.aborted ? 0 : milliseconds);
-    signal?.addEventListener('abort', end);
-  });
 }

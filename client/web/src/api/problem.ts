@@ -1,3 +1,4 @@
+import { isBusy, retryAfterOf, type HeaderValues } from './busy';
 import type { Choice, FieldFault, Problem } from './types';
 
 // How a request may succeed: by accepting a note, or by choosing one of several.
@@ -17,6 +18,8 @@ export class ApiError extends Error {
     readonly remedy: Remedy = {},
     /** A link that helps. */
     readonly link: { href: string; text: string } | null = null,
+    /** A busy server (429, 503) wants the request again after so many seconds, if it says so. */
+    readonly retryAfter?: number,
   ) {
     super(detail || title);
     this.name = 'ApiError';
@@ -36,33 +39,35 @@ function isProblem(value: unknown): value is Problem {
   return typeof problem === 'object' && problem !== null && typeof problem.title === 'string';
 }
 
-export function errorOfProblem(problem: Problem, kept?: string): ApiError {
+export function errorOfProblem(problem: Problem, headers?: HeaderValues): ApiError {
   return new ApiError(
     problem.status,
     problem.title,
     problem.detail,
     Array.isArray(problem.errors) ? problem.errors : [],
-    { overridable: problem.overridable, choices: problem.choices, kept },
+    { overridable: problem.overridable, choices: problem.choices, kept: headers?.get('Isomesh-Upload') ?? undefined },
+    null,
+    headers && retryAfterOf(headers),
   );
 }
 
 // Reads an error response. A proxy before the daemon may send any body.
-export function errorOf(status: number, body: string, kept?: string): ApiError {
+export function errorOf(status: number, body: string, headers?: HeaderValues): ApiError {
   try {
     const problem: unknown = JSON.parse(body);
-    if (isProblem(problem)) return errorOfProblem({ ...problem, status }, kept);
+    if (isProblem(problem)) return errorOfProblem({ ...problem, status }, headers);
   } catch {
     // The body is not JSON. Only the status is known.
   }
   const detail = isSuccess(status)
     ? 'The response is not one of isomeshd. A proxy before it may ask for a login.'
     : `The server answered with status ${status}.`;
-  return new ApiError(status, `HTTP status ${status}`, detail);
+  return new ApiError(status, `HTTP status ${status}`, detail, [], {}, null, headers && retryAfterOf(headers));
 }
 
 // The JSON of a response. Throws an ApiError for an error status, or if the body is not one of the API's.
-export function jsonOf(status: number, body: string, kept?: string): unknown {
-  if (!isSuccess(status)) throw errorOf(status, body, kept);
+export function jsonOf(status: number, body: string, headers?: HeaderValues): unknown {
+  if (!isSuccess(status)) throw errorOf(status, body, headers);
   try {
     const value: unknown = JSON.parse(body);
     if (typeof value === 'object' && value !== null) return value;
@@ -121,7 +126,7 @@ export function adviceFor(error: ApiError): string {
 // Returns whether a client should repeat the request: the server cannot be reached, is busy or shuts down, or a proxy before
 // it says so.
 export function isPassing(status: number): boolean {
-  return [0, 408, 429, 502, 503, 504].includes(status);
+  return isBusy(status) || [0, 408, 502, 504].includes(status);
 }
 
 // Returns whether what was asked for is not there, or not any more.

@@ -1,12 +1,14 @@
 // Uploads that continue after their connection broke, by "Resumable Uploads for HTTP"
 // (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
-import type { Answer, Connection } from './connection';
-import { sleep } from './job_events';
+import { isBusy, partingLimit } from './busy';
+import type { Answer, Connection, Init } from './connection';
 import { ApiError, errorOf, isPassing, isSuccess } from './problem';
+import { sleep } from './sleep';
 
 interface Options {
   signal?: AbortSignal;
   onProgress?: (sent: number, total: number) => void;
+  onBusy?: (seconds: number) => void;
 }
 
 interface Reached {
@@ -89,7 +91,8 @@ class Parts {
         const answer = reached ? await this.send(reached) : await this.look();
         if (answer === null) continue;
         // With 409 the daemon still holds the broken connection; asked how far it is, it says so of cancelled uploads only.
-        const mayGoOn = (answer.status === 409 && reached !== null) || isPassing(answer.status);
+        // If it is busy, the connection has waited for it already.
+        const mayGoOn = (answer.status === 409 && reached !== null) || (isPassing(answer.status) && !isBusy(answer.status));
         if (!mayGoOn) return answer;
         giveUp = () => answer;
       } catch (error) {
@@ -108,9 +111,9 @@ class Parts {
 
   // Asks how much the daemon has. Returns null, or an error response.
   private async look(): Promise<Answer | null> {
-    const answer = await this.connection.ask(this.place, { method: 'HEAD', signal: this.options.signal });
+    const answer = await this.ask(this.place, { method: 'HEAD' });
     // The reason of a conflict is in the body of a GET.
-    if (answer.status === 409) return this.connection.ask(this.place, { signal: this.options.signal });
+    if (answer.status === 409) return this.ask(this.place, {});
     if (!isSuccess(answer.status)) return answer;
     const offset = Number(answer.headers.get('Upload-Offset'));
     this.goTo({ offset, isWhole: answer.headers.get('Upload-Complete') === '?1' });
@@ -119,18 +122,16 @@ class Parts {
 
   // Sends one part. Returns null, the response to the last part, or an error response.
   private async send({ offset, isWhole }: Reached): Promise<Answer | null> {
-    const { signal } = this.options;
     // All bytes are there, but the response was lost. This request repeats it.
     if (isWhole) {
-      return this.connection.ask(`${this.path}&upload=${this.place.split('/').at(-1)}`, { method: 'POST', signal });
+      return this.ask(`${this.path}&upload=${this.place.split('/').at(-1)}`, { method: 'POST' });
     }
     const body = this.part(offset);
     const end = offset + body.size;
     const isLast = end === this.whole.size;
     const began = Date.now();
-    const answer = await this.connection.ask(this.place, {
+    const answer = await this.ask(this.place, {
       method: 'PATCH',
-      signal,
       body,
       headers: {
         'Content-Type': 'application/partial-upload',
@@ -144,6 +145,11 @@ class Parts {
     if (took > longTime) this.size = Math.max(this.size / 2, leastPart);
     this.goTo({ offset: end, isWhole: false });
     return null;
+  }
+
+  private ask(path: string, init: Init): Promise<Answer> {
+    const { signal, onBusy } = this.options;
+    return this.connection.ask(path, { ...init, signal, onBusy });
   }
 
   private part(offset: number): Blob {
@@ -167,21 +173,23 @@ export async function answerInParts(
   whole: Blob,
   options: Options,
 ): Promise<Answer> {
+  const { signal, onBusy } = options;
   const begun = await connection.ask(path, {
     method: 'POST',
-    signal: options.signal,
+    signal,
+    onBusy,
     headers: { ...headers, 'Upload-Complete': '?0', 'Upload-Length': String(whole.size) },
   });
   const place = begun.headers.get('Location');
-  if (!isSuccess(begun.status) || place === null) throw errorOf(begun.status, begun.text);
+  if (!isSuccess(begun.status) || place === null) throw errorOf(begun.status, begun.text, begun.headers);
   try {
     const answer = await new Parts(connection, path, place, whole, options).answer();
     if (answer.status !== 410) return answer;
     // The upload has expired, or another daemon has it.
-    return await connection.ask(path, { method: 'POST', signal: options.signal, body: whole, headers });
+    return await connection.ask(path, { method: 'POST', signal, onBusy, body: whole, headers });
   } catch (error) {
     // If this request fails, too, the daemon deletes the upload when it expires.
-    if (!isUnreachable(error)) void connection.ask(place, { method: 'DELETE' }).catch(() => undefined);
+    if (!isUnreachable(error)) void connection.ask(place, { method: 'DELETE', retrySeconds: partingLimit }).catch(() => undefined);
     throw error;
   }
 }

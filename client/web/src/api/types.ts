@@ -18,6 +18,8 @@ export interface ClientOptions {
   server?: string;
   /** The access token, if the server requires one. */
   token?: string;
+  /** How long a request waits for a busy server (429 or 503), in seconds. The default is 600. With 0 it fails at once. */
+  retrySeconds?: number;
 }
 
 export type Vec3 = Schemas['Vector'];
@@ -78,6 +80,8 @@ export interface UploadOptions {
   signal?: GlobalAbortSignal;
   /** Bytes sent so far. All of them are sent while the server reads the volume. */
   onProgress?: (sent: number, total: number) => void;
+  /** The server is busy. The request that it refused is sent again after so many seconds. */
+  onBusy?: (seconds: number) => void;
 }
 
 export interface Uploaded {

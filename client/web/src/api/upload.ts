@@ -1,4 +1,5 @@
 // Uploads with their progress.
+import type { HeaderValues } from './busy';
 import type { Answer, Connection } from './connection';
 import { ApiError, jsonOf, unreachable } from './problem';
 import { answerInParts, assertReadable } from './resume';
@@ -24,8 +25,8 @@ export function dispositionOf(name: string): string {
 }
 
 // The result for each volume of the body. If there is only one, its `member` is empty.
-export function uploadedOf(status: number, body: string, kept?: string): UploadedVolume[] {
-  const answer = jsonOf(status, body, kept);
+export function uploadedOf(status: number, body: string, headers?: HeaderValues): UploadedVolume[] {
+  const answer = jsonOf(status, body, headers);
   if (status === 207) return (answer as { volumes: UploadedVolume[] }).volumes;
   return [{ member: '', status, volume: answer as Volume, problem: null }];
 }
@@ -51,7 +52,7 @@ export async function upload(connection: Connection, given: unknown, options: Up
   options.signal?.throwIfAborted();
   const { status, headers, text } = await answerTo(connection, whole, options);
   const kept = headers.get('Isomesh-Upload') ?? undefined;
-  const volumes = uploadedOf(status, text, kept);
+  const volumes = uploadedOf(status, text, headers);
   options.onProgress?.(whole.size, whole.size);
   return { volumes, kept };
 }
@@ -61,10 +62,11 @@ function answerTo(connection: Connection, whole: Blob, options: UploadOptions): 
   const named: Record<string, string> =
     options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
   // The server has the bytes.
-  if (options.kept !== undefined) return connection.ask(path, { method: 'POST', headers: named, signal: options.signal });
+  const { signal, onBusy } = options;
+  if (options.kept !== undefined) return connection.ask(path, { method: 'POST', headers: named, signal, onBusy });
   // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
   return whole.size < resumableBytes && typeof XMLHttpRequest !== 'undefined'
-    ? answerInOne(connection, path, named, whole, options)
+    ? connection.patiently(() => answerInOne(connection, path, named, whole, options), { signal, onBusy })
     : answerInParts(connection, path, named, whole, options);
 }
 

@@ -1,7 +1,7 @@
 // A finished job's mesh, part by part: downloaded, decoded in workers, and handed over as it comes.
 import { client, connected } from '../client';
-import { sleep } from '../api/job_events';
-import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
+import { ApiError, asApiError, unreachable } from '../api/problem';
+import { sleep } from '../api/sleep';
 import type { Job, MeshFile } from '../api/types';
 import { coarseCell, type Block } from './blocks';
 import { GlbReader, type DracoPrimitive, type Part } from './glb';
@@ -70,12 +70,10 @@ async function download(
     try {
       const range: Record<string, string> =
         received > 0 ? { Range: `bytes=${received}-`, 'If-Range': `"${file.sha256}"` } : {};
-      const answer = await fetch(file.href, { signal, headers: client.connection.headers(range) });
-      if (!answer.ok) throw errorOf(answer.status, await answer.text());
+      const answer = await client.connection.send(file.href, { signal, headers: range });
       if (received > 0 && answer.status !== 206) {
         throw new ApiError(-1, 'The mesh changed', 'The file has changed on the server. Reload the page.');
       }
-      connected.value = true;
       const reader = answer.body?.getReader();
       if (!reader) throw unreachable();
       for (;;) {

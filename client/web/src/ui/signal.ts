@@ -54,11 +54,17 @@ export class Scope {
     target.addEventListener(name, handler as EventListener, { ...options, signal: this.signal });
   }
 
-  // Calls it so often while the page is seen. A lost connection is said at the top of the page.
+  // Calls it so often while the page is seen, but not before it has ended: it may wait for a busy server. A lost connection
+  // is said at the top of the page.
   repeat(milliseconds: number, refresh: () => Promise<void>): void {
-    const timer = setInterval(() => {
-      if (!document.hidden) refresh().catch(() => undefined);
-    }, milliseconds);
+    let isRunning = false;
+    const run = async (): Promise<void> => {
+      if (document.hidden || isRunning) return;
+      isRunning = true;
+      await refresh().catch(() => undefined);
+      isRunning = false;
+    };
+    const timer = setInterval(() => void run(), milliseconds);
     this.onEnd(() => clearInterval(timer));
   }
 

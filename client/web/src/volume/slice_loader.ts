@@ -1,5 +1,6 @@
 // Brings the slice that is wanted: one request at a time, of which the next is for what is wanted last.
 import { onReconnect } from '../client';
+import { delayAfter } from '../api/busy';
 import { asApiError, mayPass, type ApiError } from '../api/problem';
 import type { Axis } from '../api/types';
 import type { Scope } from '../ui/signal';
@@ -115,7 +116,7 @@ export class SliceLoader {
     } else {
       const delay = retryDelays[Math.min(this.failures, retryDelays.length - 1)] ?? 0;
       this.failures += 1;
-      this.retry = window.setTimeout(() => this.load(), delay);
+      this.retry = window.setTimeout(() => this.load(), delayAfter(error, delay));
     }
   }
 }

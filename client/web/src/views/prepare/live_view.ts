@@ -1,5 +1,6 @@
 // The surface at the iso-value, beside the slices and as it changes: drawn from a reduced copy of the volume.
 import { onReconnect } from '../../client';
+import { delayAfter } from '../../api/busy';
 import { asApiError } from '../../api/problem';
 import type { Vec3, Volume } from '../../api/types';
 import { graphicsStarted } from '../../scene/graphics';
@@ -192,7 +193,7 @@ export class LiveView {
       this.hasFailed = true;
       const failure = asApiError(error);
       this.say(`The preview could not be loaded${failure.isUnreachable ? '' : `: ${failure.detail}`}`);
-      this.retry = window.setTimeout(() => this.load(), retryDelay);
+      this.retry = window.setTimeout(() => this.load(), delayAfter(failure, retryDelay));
     });
   }
 

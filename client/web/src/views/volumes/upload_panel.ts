@@ -144,6 +144,10 @@ export class UploadPanel {
           progress.show(sent);
           if (kept === undefined) this.state.value = `Uploading ${Math.floor((100 * sent) / gathered.body.size)} %`;
         },
+        onBusy: () => {
+          progress.showBusy();
+          this.state.value = 'Upload: the server is busy';
+        },
       });
       gathered.kept = uploaded.kept ?? kept;
       this.running = null;

@@ -34,6 +34,13 @@ export class UploadProgress {
     this.still = window.setTimeout(() => (this.text.textContent = `${text}. Waiting for the server`), stillAfter);
   }
 
+  // The request was refused for the moment, and is sent again.
+  showBusy(): void {
+    clearTimeout(this.still);
+    this.bar.removeAttribute('value');
+    this.text.textContent = 'The server is busy. The upload is tried again automatically';
+  }
+
   // The upload is over: nothing is waited for any more.
   end(): void {
     clearTimeout(this.still);

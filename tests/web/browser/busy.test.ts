@@ -1,0 +1,113 @@
+// A daemon that takes few uploads at once: the page and the JavaScript client wait for it.
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { connect, type Socket } from 'node:net';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import { Client } from '../../../client/web/src/api/index';
+import { ballNrrd, Daemon, drop, openPage, setup } from './support';
+
+const at = setup();
+const crowd = 12;
+// Takes one upload of a client at a time, which is half of its places.
+let few: Daemon;
+
+beforeEach(async () => {
+  few = await Daemon.start(undefined, undefined, ['--upload-places', '2']);
+});
+afterEach(() => few.remove());
+
+// Uploads without an end, until it is destroyed.
+async function occupy({ url }: Daemon): Promise<Socket> {
+  const socket = connect(Number(new URL(url).port), '127.0.0.1');
+  socket.on('error', () => undefined); // the daemon may end before it
+  socket.write('POST /v1/volumes HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 10000000\r\n\r\nNRRD0004\n');
+  const body = new Uint8Array(1_000_000);
+  await expect.poll(async () => (await fetch(`${url}/v1/volumes`, { method: 'POST', body })).status).toBe(429);
+  return socket;
+}
+
+describe('the page', () => {
+  it.each([
+    ['in one request', 64],
+    ['in parts', 208],
+  ])('says that the server is busy, and uploads %s when it is not', async (_, size) => {
+    const { page, faults } = await openPage(at.browser, few.url);
+    await page.goto(few.url);
+    const other = await occupy(few);
+    await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(size, 20) }]);
+    await expect.poll(() => page.locator('.upload-status').innerText()).toBe('The server is busy. The upload is tried again automatically');
+    await expect.poll(() => page.locator('.banner').innerText()).toBe('The server is busy. The page tries again automatically.');
+    expect(await page.locator('.refusal').count()).toBe(0);
+    other.destroy();
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    await expect.poll(() => page.locator('.banner').isVisible()).toBe(false);
+    await page.close();
+    expect(faults).toEqual([]);
+  });
+
+  it('ends its wait when a person cancels it', async () => {
+    const { page } = await openPage(at.browser, few.url);
+    await page.goto(few.url);
+    const other = await occupy(few);
+    await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(64, 20) }]);
+    await page.locator('.banner').waitFor();
+    await page.getByRole('button', { name: 'Cancel' }).click();
+    await page.getByRole('heading', { name: 'Drop a volume here' }).waitFor();
+    await expect.poll(() => page.locator('.banner').isVisible()).toBe(false);
+    other.destroy();
+    await page.close();
+  });
+});
+
+describe('many uploads at once', () => {
+  const module = mkdtempSync(join(tmpdir(), 'isomesh-module-'));
+
+  beforeAll(() => {
+    execFileSync('node', [fileURLToPath(new URL('../../../client/javascript/build.mjs', import.meta.url)), module]);
+  });
+  afterAll(() => rmSync(module, { recursive: true }));
+
+  it('all arrive from Node', async () => {
+    const client = new Client({ server: few.url });
+    let waits = 0;
+    const onBusy = (): void => void (waits += 1);
+    const uploads = Array.from({ length: crowd }, (_, number) => client.upload(ballNrrd(64, 20, number), { onBusy }));
+    const ids = (await Promise.all(uploads)).map(({ volumes }) => volumes[0]?.volume?.id);
+    expect(new Set(ids).size).toBe(crowd);
+    expect(waits).toBeGreaterThan(0);
+  });
+
+  it('all arrive from a page', async () => {
+    const { page, faults } = await openPage(at.browser, few.url);
+    await page.route('**/module/**', (route) => {
+      const path = new URL(route.request().url()).pathname.replace('/module/', '');
+      const start = "import * as isomesh from './src/api/index.js'; Object.assign(globalThis, { isomesh });";
+      return route.fulfill({ contentType: 'text/javascript', body: path === 'start.js' ? start : readFileSync(join(module, path), 'utf8') });
+    });
+    await page.goto(few.url);
+    await page.addScriptTag({ type: 'module', url: '/module/start.js' });
+    const head = ballNrrd(64, 20).toString('base64');
+    const { ids, waits } = await page.evaluate(
+      async ({ head, crowd }) => {
+        const { isomesh } = globalThis as unknown as { isomesh: typeof import('../../../client/web/src/api/index') };
+        const client = new isomesh.Client();
+        let waits = 0;
+        const uploads = Array.from({ length: crowd }, (_, number) => {
+          const bytes = Uint8Array.from(atob(head), (letter) => letter.charCodeAt(0));
+          bytes[bytes.length - 1] = number + 1;
+          return client.upload(bytes, { onBusy: () => (waits += 1) });
+        });
+        const uploaded = await Promise.all(uploads);
+        return { ids: uploaded.map(({ volumes }) => volumes[0]?.volume?.id), waits };
+      },
+      { head, crowd },
+    );
+    expect(new Set(ids).size).toBe(crowd);
+    expect(waits).toBeGreaterThan(0);
+    await page.close();
+    expect(faults).toEqual([]);
+  });
+});
