@@ -1,6 +1,7 @@
 // The one exception type of the project.
 #pragma once
 
+#include <chrono>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -77,13 +78,20 @@ class Error : public std::runtime_error {
   ErrorCode code() const { return code_; }
   const std::vector<FieldError>& fields() const { return fields_; }
   const Remedy& remedy() const { return remedy_; }
+  // The pause before a retry that the other side asked for (Retry-After); 0: none.
+  std::chrono::seconds retry_after() const { return retry_after_; }
 
   Error with_detail(const std::string& detail) const {
-    return Error(code_, detail, fields_).with_remedy(remedy_);
+    return Error(code_, detail, fields_).with_remedy(remedy_).with_retry_after(retry_after_);
   }
   Error with_remedy(Remedy remedy) const {
     Error other = *this;
     other.remedy_ = std::move(remedy);
+    return other;
+  }
+  Error with_retry_after(std::chrono::seconds pause) const {
+    Error other = *this;
+    other.retry_after_ = pause;
     return other;
   }
 
@@ -91,6 +99,7 @@ class Error : public std::runtime_error {
   ErrorCode code_;
   std::vector<FieldError> fields_;
   Remedy remedy_;
+  std::chrono::seconds retry_after_{0};
 };
 
 Error invalid_parameter(const std::string& field, const std::string& message);

@@ -25,6 +25,9 @@
 
 namespace isomesh {
 
+// A server is busy (429 or 503) for that reason, and the request is sent again after the pause.
+using BusyListener = std::function<void(const Error& reason, std::chrono::milliseconds pause)>;
+
 struct ClientOptions {
   // `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`. Certificates that are not valid for the
   // host or not signed by a trusted authority are rejected.
@@ -40,6 +43,13 @@ struct ClientOptions {
   std::chrono::milliseconds silence_timeout{300'000};
   // For uploads: the longest time without progress before the connection counts as broken.
   std::chrono::milliseconds stall_timeout{60'000};
+
+  // The longest time that a request waits for a busy server, which responds with 429 or 503. The
+  // pauses are those of its Retry-After. After that time, and with 0 immediately, the request fails
+  // with the server's error, which has `retry_after`.
+  std::chrono::milliseconds retry_timeout{600'000};
+  // Called before each of these pauses by the request's thread. Must not throw.
+  BusyListener busy = {};
 
   // A stop request ends the present request immediately with Error kCancelled. A large upload is
   // cancelled on the server first, which takes a few seconds at most. Jobs on the server continue.
@@ -102,6 +112,7 @@ struct JobPage {
 //
 // Every request has its own connection, so a Client may be used from several threads. Connections
 // do not use the environment's proxies. No signals are raised. Callbacks run on the calling thread.
+// While the server is busy, every request is sent again (ClientOptions::retry_timeout).
 // After a broken connection, a GET or the submission of a job is retried, at most three times, and
 // a large upload is resumed. Other requests are not repeated, and no request is if the server
 // cannot be connected to.

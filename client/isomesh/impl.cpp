@@ -1,8 +1,6 @@
 #include "client/isomesh/impl.h"
 
 #include <algorithm>
-#include <condition_variable>
-#include <mutex>
 #include <utility>
 
 #include "client/isomesh/url.h"
@@ -17,6 +15,7 @@ constexpr int kTries = 4;
 constexpr milliseconds kFirstPause{100};
 // For the server to end the import of a cancelled upload, or to finish storing its volume.
 constexpr milliseconds kPartingSilence{5'000};
+constexpr milliseconds kPartingRetries{2'000};
 
 TransportOptions transport_options(ClientOptions&& options) {
   const bool sendable =
@@ -33,12 +32,21 @@ TransportOptions transport_options(ClientOptions&& options) {
           .stop = std::move(options.stop)};
 }
 
+PersistentTransport transport_of(ClientOptions options) {
+  PersistenceOptions persistence{.retry_timeout = options.retry_timeout,
+                                 .busy = std::move(options.busy),
+                                 .stop = options.stop};
+  return {transport_options(std::move(options)), std::move(persistence)};
+}
+
 // The time limits are short, because the user waits.
-TransportOptions parting_options(ClientOptions&& options) {
+ClientOptions parting_options(ClientOptions options) {
   options.stop = {};
+  options.busy = {};
   options.connect_timeout = std::chrono::seconds{2};
   options.silence_timeout = std::min<milliseconds>(options.silence_timeout, kPartingSilence);
-  return transport_options(std::move(options));
+  options.retry_timeout = std::min<milliseconds>(options.retry_timeout, kPartingRetries);
+  return options;
 }
 
 // For errors of intermediaries, which do not send our problem documents.
@@ -47,9 +55,7 @@ ErrorCode code_of_status(int status) {
   return is_gateway ? ErrorCode::kUnreachable : error_code_of_status(status);
 }
 
-}  // namespace
-
-Error refusal(const HttpResponse& response) {
+Error reason_of(const HttpResponse& response) {
   const std::string status = "the server responded with status " + std::to_string(response.status);
   if (!response.content_type.starts_with("application/problem+json")) {
     return {code_of_status(response.status), status};
@@ -67,10 +73,16 @@ Error refusal(const HttpResponse& response) {
       .with_remedy(problem.remedy);
 }
 
+}  // namespace
+
+Error refusal(const HttpResponse& response) {
+  return reason_of(response).with_retry_after(response.retry_after);
+}
+
 Client::Impl::Impl(ClientOptions&& options)
     : stop_(options.stop),
-      transport_(transport_options(ClientOptions(options))),
-      parting_(parting_options(std::move(options))) {}
+      transport_(transport_of(options)),
+      parting_(transport_of(parting_options(std::move(options)))) {}
 
 HttpResponse Client::Impl::exchange(const HttpRequest& request) const {
   HttpResponse response = transport_.send(request);
@@ -89,14 +101,6 @@ HttpResponse Client::Impl::repeated(const HttpRequest& request,
     }
     pause(kFirstPause * (1 << (attempt - 1)));
   }
-}
-
-void Client::Impl::pause(milliseconds duration) const {
-  std::mutex mutex;
-  std::unique_lock lock(mutex);
-  const auto never = [] { return false; };
-  std::condition_variable_any().wait_for(lock, stop_, duration, never);
-  if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
 }
 
 }  // namespace isomesh

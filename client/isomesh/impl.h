@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/isomesh/busy.h"
 #include "client/isomesh/client.h"
 #include "client/isomesh/transport.h"
 #include "client/isomesh/url.h"
@@ -74,7 +75,7 @@ class Client::Impl {
   HttpResponse resumed(const HttpRequest& request) const;
 
   // Throws Error kCancelled immediately on a stop request.
-  void pause(std::chrono::milliseconds duration) const;
+  void pause(std::chrono::milliseconds duration) const { isomesh::pause(duration, stop_); }
 
  private:
   std::string begin_upload(const HttpRequest& request) const;
@@ -82,8 +83,8 @@ class Client::Impl {
   std::string give_up(const std::string& place) const;
 
   std::stop_token stop_;
-  Transport transport_;
-  Transport parting_;  // for a last request, also after a stop request
+  PersistentTransport transport_;
+  PersistentTransport parting_;  // for a last request, also after a stop request
 };
 
 }  // namespace isomesh

@@ -32,6 +32,11 @@ class Patience {
     reached_ = offset;
   }
 
+  // Call with the time for which the client waits because the server is busy, which is no outage.
+  void excuse(std::chrono::milliseconds busy) {
+    if (cut_at_) *cut_at_ += busy;
+  }
+
   // Call after a question that failed, or whose answer was heard.
   bool is_over() const { return cut_at_ && now_() - *cut_at_ >= kLongestCut; }
 

@@ -50,9 +50,10 @@ HttpRequest reading_of(const HttpRequest& upload, const std::string& place) {
           .headers = {{"Content-Type", "application/octet-stream"}}};
 }
 
-// True if a retry may help: the server is busy, stops, or still has the broken connection.
+// True if a retry may help: a proxy does not reach the server, or it still has the broken
+// connection. While the server is busy, the transport waits.
 bool may_pass(int status) {
-  constexpr std::array kPassing = {408, 409, 429, 502, 503, 504};
+  constexpr std::array kPassing = {408, 409, 502, 504};
   return std::ranges::count(kPassing, status) > 0;
 }
 
@@ -106,7 +107,7 @@ HttpResponse Client::Impl::resumed(const HttpRequest& request) const {
     if (error.code() == ErrorCode::kGone) return exchange(request);
     const std::string left = give_up(place);
     if (left.empty()) throw;
-    throw Error(error.code(), error.what() + left, error.fields()).with_remedy(error.remedy());
+    throw error.with_detail(error.what() + left);
   } catch (...) {
     give_up(place);
     throw;
@@ -129,6 +130,7 @@ HttpResponse Client::Impl::finish_upload(const HttpRequest& request,
   std::optional<Progress> known = Progress();
   Patience patience;
   std::exception_ptr failure;
+  const auto excuse = [&](std::chrono::milliseconds busy) { patience.excuse(busy); };
   const auto fail = [&](const std::exception_ptr& why) {
     failure = why;
     patience.fail();
@@ -142,9 +144,10 @@ HttpResponse Client::Impl::finish_upload(const HttpRequest& request,
       HttpResponse response =
           transport_.send(!known            ? HttpRequest{.method = "HEAD", .target = place}
                           : known->is_whole ? reading_of(request, place)
-                                            : rest_of(request, place, known->offset));
+                                            : rest_of(request, place, known->offset),
+                          excuse);
       // The reason of a conflict is in the body of a GET.
-      if (!known && response.status == 409) response = transport_.send({.target = place});
+      if (!known && response.status == 409) response = transport_.send({.target = place}, excuse);
       if (is_success(response)) {
         if (known) return response;
         known = progress_of(response, request.source_bytes);

@@ -1,6 +1,7 @@
 #include "client/isomesh/transport.h"
 
 #include <algorithm>
+#include <ctime>
 #include <memory>
 #include <new>
 #include <optional>
@@ -50,6 +51,21 @@ Headers headers_of(const HttpRequest& request, const TransportOptions& options) 
   for (const auto& [name, value] : request.headers) append(headers, name, value);
   if (!options.token.empty()) append(headers, "Authorization", "Bearer " + options.token);
   return headers;
+}
+
+// Retry-After is a number of seconds or a date. The clocks of both machines may differ, so the date
+// counts from that of the response.
+std::chrono::seconds retry_after_of(const HttpResponse& response) {
+  constexpr std::int64_t kMost = 86'400 * 365;
+  const std::string value = response.header("retry-after");
+  if (const auto given = parse_uint64(value)) {
+    return std::chrono::seconds(std::min<std::uint64_t>(*given, kMost));
+  }
+  const time_t then = curl_getdate(value.c_str(), nullptr);
+  if (then < 0) return {};
+  const time_t sent = curl_getdate(response.header("date").c_str(), nullptr);
+  const std::int64_t left = then - (sent < 0 ? std::time(nullptr) : sent);
+  return std::chrono::seconds(std::clamp<std::int64_t>(left, 0, kMost));
 }
 
 bool is_broken(CURLcode code) {
@@ -105,6 +121,7 @@ class Transfer {
       throw no_response(reason_of(CURLE_WEIRD_SERVER_REPLY), false);
     const char* type = info<char*>(CURLINFO_CONTENT_TYPE);
     if (type != nullptr) response_.content_type = type;
+    response_.retry_after = retry_after_of(response_);
     return std::move(response_);
   }
 

@@ -43,6 +43,8 @@ struct HttpResponse {
   std::string content_type;
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers;  // names in lower case
+  // The pause until the next request that the server asked for; 0: none.
+  std::chrono::seconds retry_after{0};
 
   // The first header of that name, given in lower case; empty if missing.
   std::string header(std::string_view name) const;

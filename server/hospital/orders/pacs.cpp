@@ -49,6 +49,6 @@ std::string_view to_string(PacsFault fault) {
 
 PacsFailure::PacsFailure(PacsFault fault, const std::string& detail,
                          std::chrono::seconds retry_after)
-    : Error(code_of(fault), detail), fault_(fault), retry_after_(retry_after) {}
+    : Error(Error(code_of(fault), detail).with_retry_after(retry_after)), fault_(fault) {}
 
 }  // namespace isomesh::orders

@@ -42,11 +42,9 @@ class PacsFailure : public Error {
   PacsFault fault() const { return fault_; }
   // True if a retry may succeed.
   bool may_pass() const { return fault_ != PacsFault::kRefused; }
-  std::chrono::seconds retry_after() const { return retry_after_; }
 
  private:
   PacsFault fault_;
-  std::chrono::seconds retry_after_;
 };
 
 struct FoundSeries {

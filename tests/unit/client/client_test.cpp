@@ -35,7 +35,7 @@ TEST(Refusals, KeepTheServersCodeReasonAndFields) {
     server.http.Post("/v1/jobs", [&](const httplib::Request&, httplib::Response& response) {
       answer_with(response, refused);
     });
-    Client client({.server = server.start()});
+    Client client({.server = server.start(), .retry_timeout = {}});
     const Error error = error_of([&] { client.submit({}); });
     EXPECT_EQ(error.code(), refused.code());
     EXPECT_STREQ(error.what(), refused.what());
@@ -57,7 +57,7 @@ TEST(Refusals, OfSomethingInFrontOfTheServerAreToldByTheirStatus) {
                       response.set_content("<html>no</html>", "text/html");
                       response.status = answer;
                     });
-    Client client({.server = server.start()});
+    Client client({.server = server.start(), .retry_timeout = {}});
     const Error error = error_of([&] { client.volumes(); });
     EXPECT_EQ(error.code(), code) << status;
     EXPECT_THAT(error.what(), HasSubstr(std::to_string(status)));

@@ -42,6 +42,18 @@ TEST_F(PatienceTest, BeginsAnewIfTheServerHasMore) {
   EXPECT_TRUE(patience_.is_over());
 }
 
+// The server was there, and asked for the time.
+TEST_F(PatienceTest, DoesNotCountTheTimeThatABusyServerAskedFor) {
+  patience_.excuse(seconds{100});
+  patience_.fail();
+  pass(seconds{59});
+  patience_.excuse(seconds{300});
+  pass(seconds{300});
+  EXPECT_FALSE(patience_.is_over());
+  pass(seconds{1});
+  EXPECT_TRUE(patience_.is_over());
+}
+
 TEST_F(PatienceTest, PausesGrowUntilTheServerHasMore) {
   const auto first = patience_.next_pause();
   for (int n = 0; n < 20; ++n) patience_.next_pause();
