@@ -12,12 +12,17 @@
 
 namespace isomesh {
 
-// A temporary file beside `target`. `publish` moves it to `target`, replacing an existing file;
-// without it nothing remains. Follows links. The constructor rejects an existing target that is not
-// a regular file.
+// A new file that replaces `target` when it is published; without that nothing remains. It has no
+// name until then, so nothing remains of a process that was killed either. On file systems without
+// such files it has a temporary name beside `target`; those that nobody has written to for a day
+// are removed. Follows links. The constructor rejects an existing target that is not a regular
+// file.
 class PartFile {
  public:
-  explicit PartFile(const std::filesystem::path& target);
+  enum class Until { kUnnamed, kNamed };
+
+  // `until`: kNamed as on a file system without unnamed files, for tests.
+  explicit PartFile(const std::filesystem::path& target, Until until = Until::kUnnamed);
   ~PartFile();
   PartFile(const PartFile&) = delete;
   PartFile& operator=(const PartFile&) = delete;
@@ -26,14 +31,15 @@ class PartFile {
 
   void restart();
 
-  // Syncs the bytes to disk, then moves the file. Call once, last.
+  // Syncs the bytes to disk, then gives the file its name. Call once, last.
   void publish();
 
  private:
+  bool link_to(const std::filesystem::path& path) const;
+
   std::filesystem::path target_;
-  std::filesystem::path part_;
   Descriptor file_;
-  bool published_ = false;
+  std::filesystem::path part_;  // its temporary name; empty if it has none
 };
 
 }  // namespace isomesh
