@@ -11,10 +11,19 @@
 
 namespace isomesh::cli {
 
-// Files that are sent together, or the id of a stored volume, and the name of the outputs.
+// The names of an input's outputs.
+struct OutputNames {
+  std::string name;         // differs from those of the other inputs
+  std::string file = name;  // the file's own, which others may share
+  std::string folder = {};  // "sub-01/anat"; empty if the input is in none
+
+  bool operator==(const OutputNames&) const = default;
+};
+
+// Files that are sent together, or the id of a stored volume.
 struct Input {
   std::vector<std::filesystem::path> files;
-  std::string name;
+  OutputNames names;
 
   bool operator==(const Input&) const = default;
 };
@@ -27,30 +36,45 @@ std::string name_of_input(const std::filesystem::path& path);
 // if that is not enough, their suffixes. Long names are cut, and numbered if necessary.
 std::vector<std::string> names_of_members(const std::string& input,
                                           const std::vector<std::string>& members);
+// The same for both names of the input.
+std::vector<OutputNames> names_of_members(const OutputNames& input,
+                                          const std::vector<std::string>& members);
 
-// The names of the outputs of one run. Thread safe.
-class TakenNames {
+// The outputs of one run. Thread safe.
+class TakenOutputs {
  public:
-  // False if another output has it.
-  bool take(const std::string& name);
+  // False if one of these files belongs to another mesh.
+  bool take(const std::vector<Output>& outputs);
 
  private:
   std::mutex mutex_;
-  std::set<std::string> names_;
+  std::set<std::filesystem::path> paths_;
 };
 
 // If outputs are named after inputs, each file is one input, without those that belong to another
-// file, such as the data of a header. Otherwise all files are one input. Throws EarlyExit if two
-// inputs would write the same output.
+// file, such as the data of a header. Otherwise all files are one input. Inputs are named as
+// members are, but without numbers. Throws EarlyExit if two inputs would write the same output, or
+// an input has no folder for "{folder}".
 std::vector<Input> inputs_of(const Options& options);
 
-// True if outputs are named after inputs: one of them has "{name}" in it.
+// True if outputs are named after inputs: one of them has "{name}" or "{folder}" in it.
 bool is_by_name(const std::vector<Output>& outputs);
 
-// Replaces "{name}" by `name`; slashes become underscores, and control characters U+FFFD.
-std::vector<Output> filled(const std::vector<Output>& outputs, const std::string& name);
+// True if the path has "{folder}" in it.
+bool has_folder(const std::string& path);
+// Where the first placeholder of the path begins; npos if there is none.
+std::size_t first_placeholder(const std::string& path);
+
+// Replaces "{name}" and "{folder}". In a path with "{folder}", "{name}" is the file's own name. A
+// "{folder}" between slashes is a path; otherwise slashes become underscores. Control characters
+// become U+FFFD.
+std::vector<Output> filled(const std::vector<Output>& outputs, const OutputNames& names);
 
 // The formats of the outputs, each once, in the order of the outputs.
 std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs);
+
+// True if every output is a file that is newer than all files of the input. A stored volume never
+// changes, and standard input has no time.
+bool is_up_to_date(const Input& input, const std::vector<Output>& outputs);
 
 }  // namespace isomesh::cli

@@ -82,31 +82,37 @@ int status(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
+// The range of the samples of an empty mesh's volume, which may have been deleted meanwhile.
+std::optional<SampleRange> range_of(Client& client, const Job& job) {
+  if (!job.mesh || !job.mesh->empty) return std::nullopt;
+  try {
+    return client.volume(job.parameters.volume).range;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 int wait(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);
   const Job job = wait(client, job_id(client, options.id), bar);
   if (!options.quiet || options.json) show(client, job, options.json);
-  std::optional<SampleRange> range;
-  if (job.mesh && job.mesh->empty) {
-    try {
-      range = client.volume(job.parameters.volume).range;
-    } catch (const Error&) {
-      // The volume may have been deleted meanwhile.
-    }
-  }
-  return status_of(job, options, {}, range);
+  return status_of(job, options, {}, range_of(client, job));
 }
 
 int fetch(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);
   const std::string id = job_id(client, options.id);
-  const std::vector<Output> outputs = filled(options.outputs, id);
+  const std::vector<Output> outputs = filled(options.outputs, {id});
+  const Job job = client.job(id);
+  if (job.state == JobState::kSucceeded && !has_mesh(job, options)) {
+    if (options.json) std::cout << job_json(job, {}, {}) << '\n';
+    return status_of(job, options, {}, range_of(client, job));
+  }
   const auto start = std::chrono::steady_clock::now();
   for (const Output& output : outputs) fetch(client, id, output, bar, options.label);
   const ClientTiming seen{.download = milliseconds_since(start)};
-  const Job job = client.job(id);
   if (options.json) {
     std::cout << job_json(job, paths_of(outputs), seen) << '\n';
   } else if (job.mesh && !options.quiet) {
@@ -213,6 +219,7 @@ int ids(const Options& options, const std::stop_token& stop) {
                  .authorities = options.authorities,
                  .connect_timeout = std::chrono::seconds{1},
                  .silence_timeout = std::chrono::seconds{2},
+                 .retry_timeout = {},
                  .stop = stop});
   for (const Candidate& each : ids_of(client, options.kind)) std::cout << each.id << '\n';
   return kDone;

@@ -1,6 +1,7 @@
 #include "client/cli/console.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -10,11 +11,11 @@
 
 #include <unistd.h>
 
-#include "base/files.h"
 #include "base/text.h"
 #include "client/cli/commands.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/report.h"
+#include "client/cli/run_folder.h"
 #include "client/cli/text.h"
 #include "client/isomesh/package.h"
 #include "proto/parameters.h"
@@ -72,41 +73,64 @@ void tell_folders(const std::vector<std::filesystem::path>& files) {
 }
 
 // Downloads to a file first, so that only a complete mesh is written.
-void fetch_to_stdout(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
-                     std::optional<std::int64_t> label) {
-  const ScratchFile file(temporary_folder(), ".mesh");
-  fetch(client, id, {file.path(), output.format}, bar, label);
-  std::ifstream mesh(file.path(), std::ios::binary);
+void fetch_to_pipe(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
+                   std::optional<std::int64_t> label) {
+  const RunFolder folder;
+  const std::filesystem::path file = folder.path() / "mesh";
+  fetch(client, id, {file, output.format}, bar, label);
+  std::ifstream mesh(file, std::ios::binary);
+  std::ofstream pipe;
+  if (!output.is_stdout()) pipe.open(output.path, std::ios::binary);
+  std::ostream& out = output.is_stdout() ? std::cout : pipe;
   std::vector<char> block(std::size_t{1} << 20);
-  while (std::cout && (mesh.read(block.data(), std::ssize(block)) || mesh.gcount() > 0)) {
-    std::cout.write(block.data(), mesh.gcount());
+  while (out && (mesh.read(block.data(), std::ssize(block)) || mesh.gcount() > 0)) {
+    out.write(block.data(), mesh.gcount());
   }
-  if (!std::cout.flush() || mesh.bad()) {
-    throw Error(ErrorCode::kInvalidParameter, "standard output cannot be written to");
+  if (!out.flush() || mesh.bad()) {
+    const std::string name = output.is_stdout() ? "standard output" : output.path.string();
+    throw Error(ErrorCode::kInvalidParameter, name + " cannot be written to");
   }
+}
+
+// For a folder that -o names with a slash at its end, or through {folder}.
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw Error(ErrorCode::kInvalidParameter,
+                "the folder " + folder.string() + " cannot be created: " + error.message());
+  }
+}
+
+// A person sees why nothing happens. Once, because with --jobs many requests wait.
+void tell_wait(const Error& reason, int seconds) {
+  static std::atomic<bool> is_told = false;
+  if (::isatty(STDERR_FILENO) != 1 || is_told.exchange(true)) return;
+  // The line of a progress bar may be there.
+  std::cerr << "\r\x1b[K";
+  complain("the server is busy (" + std::string(reason.what()) + "); trying again for up to " +
+           human_duration(1000.0 * seconds));
+}
+
+bool is_busy(const Error& error) {
+  return error.code() == ErrorCode::kTooManyRequests || error.code() == ErrorCode::kUnavailable;
 }
 
 }  // namespace
 
 Client client_of(const Options& options, const std::stop_token& stop) {
-  return Client({.server = options.server,
-                 .token = options.token,
-                 .authorities = options.authorities,
-                 .stop = stop});
-}
-
-std::filesystem::path temporary_folder() {
-  std::error_code error;
-  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
-  if (!error) return folder;
-  std::string place = "/tmp";
-  // The variables that the library looks at; it prefers the last of them.
-  for (const std::string name : {"TEMPDIR", "TEMP", "TMP", "TMPDIR"}) {
-    if (const char* const value = std::getenv(name.c_str())) place = name + '=' + value;
+  ClientOptions client{.server = options.server,
+                       .token = options.token,
+                       .authorities = options.authorities,
+                       .retry_timeout = std::chrono::seconds(options.retry_seconds),
+                       .stop = stop};
+  if (!options.quiet) {
+    client.busy = [seconds = options.retry_seconds](const Error& reason,
+                                                    std::chrono::milliseconds) {
+      tell_wait(reason, seconds);
+    };
   }
-  throw Error(ErrorCode::kInvalidParameter,
-              "the folder for temporary files cannot be used: " + place + ": " + error.message() +
-                  "; set TMPDIR to an existing folder");
+  return Client(std::move(client));
 }
 
 void complain(const std::string& message) {
@@ -116,7 +140,8 @@ void complain(const std::string& message) {
 
 void complain(const Error& error, const std::string& subject) {
   const std::string remedy = remedy_report(error.remedy());
-  const std::string text = subject + (subject.empty() ? "" : ": ") + in_options(error);
+  std::string text = subject + (subject.empty() ? "" : ": ") + in_options(error);
+  if (is_busy(error)) text += "; try again later, or wait longer with --retry-seconds";
   const std::scoped_lock lock(console_mutex());
   std::cerr << "isomesh: " << printable_lines(text) << '\n' << remedy;
 }
@@ -127,6 +152,10 @@ void suggest_local() {
 
 int status_of(const Error& error) {
   return error.code() == ErrorCode::kUnreachable ? kServerUnreachable : kRefused;
+}
+
+bool has_mesh(const Job& job, const Options& options) {
+  return job.state == JobState::kSucceeded && job.mesh && (!job.mesh->empty || options.allow_empty);
 }
 
 int status_of(const Job& job, const Options& options, const std::string& subject,
@@ -171,7 +200,10 @@ LengthUnit unit_of(Client& client, const Job& job) {
 
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
            std::optional<std::int64_t> label) {
-  if (output.is_stdout()) return fetch_to_stdout(client, id, output, bar, label);
+  if (output.is_stdout() || is_pipe(output.path)) {
+    return fetch_to_pipe(client, id, output, bar, label);
+  }
+  make_folder(output.path.parent_path());
   client.fetch(
       id, output.format, output.path,
       [&](std::uint64_t done, std::uint64_t total) { bar.transfer("download", done, total); },

@@ -22,10 +22,6 @@ inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 Client client_of(const Options& options, const std::stop_token& stop);
 
-// The folder for temporary files. Throws Error kInvalidParameter with its name if it is not a
-// folder.
-std::filesystem::path temporary_folder();
-
 // A line on standard error. Safe to call from several threads.
 void complain(const std::string& message);
 // The error, and the options that would resolve it. `subject` is the input that it is about; empty
@@ -42,6 +38,11 @@ class Lost : public Error {
 void suggest_local();
 
 int status_of(const Error& error);
+
+// True if the job has a mesh to be written: it succeeded, and its surface is not empty or that is
+// accepted.
+bool has_mesh(const Job& job, const Options& options);
+
 using SampleRange = std::array<double, 2>;
 
 // The exit status for the end of a job. The reason of a failure, or an empty surface, is reported

@@ -16,6 +16,8 @@ constexpr std::string_view kMesh = R"(
   isomesh mesh organs.seg.nrrd --labels all -o organs.glb
   isomesh mesh organs.seg.nrrd --labels 1,3-5 -o organs.zip
   isomesh mesh scans/*.nii.gz --iso otsu -o meshes/ --format glb --jobs 4
+  isomesh mesh sub-*/anat/T1.nii.gz --iso otsu --skip-existing \
+      -o 'meshes/{folder}/{name}.stl'
   isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 \
       --iso 300 -o ct.stl
   isomesh mesh 3f2a91c0 --iso 60 -o head.stl    # a stored volume, by its id

@@ -15,7 +15,6 @@
 #include "base/descriptor.h"
 #include "base/files.h"
 #include "base/text.h"
-#include "client/cli/console.h"
 #include "proto/error.h"
 
 namespace isomesh::cli {
@@ -74,14 +73,8 @@ std::string first_line(int pipe) {
 }  // namespace
 
 LocalDaemon::LocalDaemon(const fs::path& program, int jobs) {
-  const fs::path found = find_program(program);
-  std::string folder = (temporary_folder() / "isomesh-XXXXXX").string();
-  if (::mkdtemp(folder.data()) == nullptr) {
-    throw Error(ErrorCode::kInvalidParameter, "a temporary folder cannot be created: " + folder);
-  }
-  folder_ = folder;
   try {
-    start(found, jobs);
+    start(find_program(program), jobs);
   } catch (...) {
     end();
     throw;
@@ -90,14 +83,14 @@ LocalDaemon::LocalDaemon(const fs::path& program, int jobs) {
 
 LocalDaemon::~LocalDaemon() { end(); }
 
-std::string LocalDaemon::url() const { return "unix:" + (folder_ / "socket").string(); }
+std::string LocalDaemon::url() const { return "unix:" + (folder_.path() / "socket").string(); }
 
 void LocalDaemon::start(const fs::path& program, int jobs) {
   std::vector<std::string> words = {program.string(),
                                     "--listen",
                                     url(),
                                     "--data",
-                                    folder_ / "data",
+                                    folder_.path() / "data",
                                     "--workers",
                                     std::to_string(jobs),
                                     "--log-level",
@@ -113,7 +106,7 @@ void LocalDaemon::start(const fs::path& program, int jobs) {
   }
   const Descriptor output(ends[0]);
   Descriptor input(ends[1]);
-  const std::string log = folder_ / "log";
+  const std::string log = folder_.path() / "log";
   const Descriptor errors(::open(log.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
   const pid_t parent = ::getpid();
   process_ = ::fork();
@@ -124,6 +117,8 @@ void LocalDaemon::start(const fs::path& program, int jobs) {
     if (::getppid() != parent) ::_exit(1);
     ::dup2(input.number(), STDOUT_FILENO);
     ::dup2(errors.number(), STDERR_FILENO);
+    // The daemon and its processes hold the folder for as long as they run.
+    ::fcntl(folder_.lock().number(), F_SETFD, 0);
     ::execve(arguments[0], arguments.data(), setting.data());
     ::_exit(127);
   }
@@ -144,8 +139,6 @@ void LocalDaemon::end() noexcept {
     }
   }
   process_ = -1;
-  std::error_code ignored;  // leftovers are in the folder for temporary files
-  std::filesystem::remove_all(folder_, ignored);
 }
 
 }  // namespace isomesh::cli

@@ -6,6 +6,8 @@
 
 #include <sys/types.h>
 
+#include "client/cli/run_folder.h"
+
 namespace isomesh::cli {
 
 // isomeshd on a private socket, with a temporary data folder. It ends with this object, and also
@@ -27,7 +29,7 @@ class LocalDaemon {
   void start(const std::filesystem::path& program, int jobs);
   void end() noexcept;
 
-  std::filesystem::path folder_;
+  RunFolder folder_;
   pid_t process_ = -1;
 };
 

@@ -1,274 +1,46 @@
 #include <algorithm>
 #include <atomic>
 #include <filesystem>
-#include <functional>
-#include <iostream>
-#include <memory>
-#include <mutex>
-#include <optional>
 #include <set>
 #include <thread>
 #include <utility>
 
-#include "base/ids.h"
+#include <sys/stat.h>
+
 #include "client/cli/batch.h"
 #include "client/cli/commands.h"
 #include "client/cli/console.h"
-#include "client/cli/ids.h"
+#include "client/cli/mesh_run.h"
 #include "client/cli/report.h"
-#include "client/cli/standard_input.h"
-#include "client/cli/text.h"
 #include "client/isomesh/package.h"
-#include "proto/json.h"
 
 namespace isomesh::cli {
 namespace {
 
-constexpr std::size_t kKeyBytes = 16;
-
-// For the last requests, also after an interrupt. The time limits are short, because the user
-// waits.
-Client parting_client(const Options& options) {
-  return Client({.server = options.server,
-                 .token = options.token,
-                 .authorities = options.authorities,
-                 .connect_timeout = std::chrono::seconds{2},
-                 .silence_timeout = std::chrono::seconds{5}});
-}
-
-// Cancels the job with that key, which may not have come to the server yet. `id` is empty if it is
-// not known.
-void cancel_after_stop(const Options& options, const JobParameters& parameters,
-                       const std::string& key, std::string id) {
-  Client client = parting_client(options);
-  try {
-    if (id.empty()) id = client.submit(parameters, key).id;
-    const JobState state = client.cancel(id).state;
-    const bool had_ended = state == JobState::kSucceeded || state == JobState::kFailed;
-    complain("interrupted; the job " + id + (had_ended ? " had already ended" : " was cancelled"));
-  } catch (const Error& error) {
-    complain("interrupted; the job " + (id.empty() ? "" : id + ' ') +
-             "could not be cancelled: " + error.what());
-  }
-}
-
-// The volumes that a dry run has stored. They are deleted when all inputs have ended, because
-// several inputs may be the same volume.
-class Leftovers {
- public:
-  explicit Leftovers(const Options& options) : options_(options) {}
-  Leftovers(const Leftovers&) = delete;
-  Leftovers& operator=(const Leftovers&) = delete;
-
-  void add(const std::vector<UploadedVolume>& uploaded) {
-    constexpr int kCreated = 201;
-    const std::scoped_lock lock(mutex_);
-    for (const UploadedVolume& each : uploaded) {
-      if (each.volume && each.status == kCreated) ids_.insert(each.volume->id);
-    }
-  }
-
-  ~Leftovers() {
-    for (const std::string& id : ids_) {
-      try {
-        parting_client(options_).erase_volume(id);
-      } catch (const Error& error) {
-        complain("the volume " + id + " could not be deleted: " + error.what());
-      }
-    }
-  }
-
- private:
-  const Options& options_;
-  std::mutex mutex_;
-  std::set<std::string> ids_;
-};
-
-Error overwriting(const std::string& name, const std::string& member) {
-  return Error(ErrorCode::kInvalidParameter,
-               "two meshes would be called " + name + ": --member takes one of the volumes")
-      .with_remedy({.choices = {{"member", member, ""}}});
-}
-
-// Processes one input at a time: uploads it, meshes it and downloads the mesh. One object per
-// thread.
-class Run {
- public:
-  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many, TakenNames& names,
-      Leftovers& leftovers)
-      : options_(options),
-        stop_(stop),
-        names_(names),
-        leftovers_(leftovers),
-        is_one_of_many_(is_one_of_many),
-        client_(client_of(options, stop)),
-        bar_(!options.quiet && (!is_one_of_many || options.jobs == 1)) {}
-
-  int input(const Input& input) {
-    seen_ = {};
-    UploadOptions how = options_.upload;
-    std::vector<std::filesystem::path> files = input.files;
-    const auto copy = standard_input_as_file(files, how, stop_);
-    if (is_stored_volume(files.front())) return stored(files.front().string(), input);
-    const auto uploading = std::chrono::steady_clock::now();
-    const std::vector<UploadedVolume> volumes =
-        upload_all(client_, options_, files, how, bar_, subject_of(input));
-    seen_.upload = milliseconds_since(uploading);
-    if (options_.dry_run) leftovers_.add(volumes);
-    if (volumes.size() == 1 && volumes.front().volume) {
-      return mesh(*volumes.front().volume, input.name, subject_of(input));
-    }
-    if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
-    return members(input.name, volumes);
-  }
-
- private:
-  // A member that cannot be meshed does not keep the others from it.
-  int members(const std::string& input, std::vector<UploadedVolume> volumes) {
-    int status = kDone;
-    const auto refuse = [&](const Error& error, const UploadedVolume& which) {
-      complain(error, input + ": " + which.member);
-      status = std::max(status, status_of(error));
-    };
-    for (const UploadedVolume& each : volumes) {
-      if (each.problem) refuse(to_error(*each.problem), each);
-    }
-    std::erase_if(volumes, [](const UploadedVolume& each) { return each.problem.has_value(); });
-    std::vector<std::string> members;
-    members.reserve(volumes.size());
-    for (const UploadedVolume& each : volumes) members.push_back(each.member);
-    const std::vector<std::string> names = names_of_members(input, members);
-    for (std::size_t n = 0; n < volumes.size() && !stop_.stop_requested(); ++n) {
-      const UploadedVolume& each = volumes[n];
-      try {
-        if (!names_.take(names[n])) throw overwriting(names[n], each.member);
-        status = std::max(status, mesh(*each.volume, names[n], input + ": " + each.member));
-      } catch (const Error& error) {
-        if (error.code() == ErrorCode::kUnreachable || stop_.stop_requested()) throw;
-        refuse(error, each);
-      }
-    }
-    return status;
-  }
-
-  int stored(const std::string& id, const Input& input) {
-    const Volume found = client_.volume(volume_id(client_, id));
-    if (!options_.quiet) tell_notes(found, subject_of(input));
-    return mesh(found, input.name, subject_of(input));
-  }
-
-  // The subject of messages; empty if there is only one.
-  std::string subject_of(const Input& input) const { return is_one_of_many_ ? input.name : ""; }
-
-  int mesh(const Volume& volume, const std::string& name, const std::string& subject) {
-    const std::vector<Output> outputs = filled(options_.outputs, name);
-    JobParameters parameters = options_.parameters;
-    parameters.volume = volume.id;
-    if (!outputs.empty()) parameters.formats = formats_of(outputs);
-    if (!options_.preset.empty()) parameters.iso = preset_of(volume, options_.preset);
-    if (options_.dry_run) return dry_run(parameters, subject.empty() ? "" : name + '\n');
-
-    const std::optional<Job> job = made(parameters);
-    if (!job) return kRefused;
-    if (job->state != JobState::kSucceeded) {
-      if (options_.json) print(job_json(*job, {}, seen_) + '\n');
-      return status_of(*job, options_, subject);
-    }
-    const auto downloading = std::chrono::steady_clock::now();
-    resumable(job->id, [&] {
-      for (const Output& output : outputs) fetch(client_, job->id, output, bar_);
-    });
-    seen_.download = milliseconds_since(downloading);
-    report(*job, outputs);
-    return status_of(*job, options_, subject, volume.range);
-  }
-
-  // Returns the job when it has ended; empty after an interrupt.
-  std::optional<Job> made(const JobParameters& parameters) {
-    const std::string key = random_hex(kKeyBytes);
-    std::optional<Job> job;
-    try {
-      job = client_.submit(parameters, key);
-      resumable(job->id, [&] { job = wait(client_, job->id, bar_); });
-      return job;
-    } catch (const Error&) {
-      bar_.clear();
-      if (!stop_.stop_requested()) throw;
-      cancel_after_stop(options_, parameters, key, job ? job->id : "");
-      return std::nullopt;
-    }
-  }
-
-  // If the server is lost, the job continues there; the error says how to resume.
-  template <class Step>
-  void resumable(const std::string& job, const Step& step) {
-    try {
-      step();
-    } catch (const Error& error) {
-      bar_.clear();
-      if (error.code() != ErrorCode::kUnreachable || options_.is_local) throw;
-      const std::string command = "isomesh --server " + options_.server;
-      throw Lost(std::string(error.what()) + "\nThe server has accepted the job " + job +
-                 " and continues it. To resume:\n  " + command + " wait " + job + "\n  " + command +
-                 " fetch " + job + " -o OUT");
-    }
-  }
-
-  int dry_run(const JobParameters& parameters, const std::string& title) {
-    const Estimate estimate = client_.estimate(parameters);
-    print(options_.json ? to_json(estimate) + '\n' : title + estimate_report(estimate));
-    return kDone;
-  }
-
-  void report(const Job& job, const std::vector<Output>& outputs) {
-    if (options_.json) return print(job_json(job, paths_of(outputs), seen_) + '\n');
-    const bool has_mesh_on_stdout =
-        std::ranges::any_of(outputs, [](const Output& output) { return output.is_stdout(); });
-    if (options_.quiet || has_mesh_on_stdout) return;
-    std::string text = outputs_report(job, outputs);
-    if (!is_one_of_many_) {
-      if (job.reused) text += "\nthe mesh was reused from an identical earlier job\n";
-      text += '\n' + timing_report(job.timing, seen_) + '\n' +
-              mesh_report(*with_labels(client_, job).mesh, unit_of(client_, job));
-    }
-    print(text);
-  }
-
-  static void print(const std::string& text) {
-    static std::mutex mutex;
-    const std::scoped_lock lock(mutex);
-    std::cout << text << std::flush;
-  }
-
-  const Options& options_;
-  const std::stop_token stop_;
-  TakenNames& names_;
-  Leftovers& leftovers_;
-  const bool is_one_of_many_;
-  Client client_;
-  ProgressBar bar_;
-  ClientTiming seen_;
-};
-
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
-             TakenNames& names, Leftovers& leftovers) {
+             TakenOutputs& taken, Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;
   std::atomic<int> worst = kDone;
   std::atomic<std::size_t> failed = 0;
   std::atomic<bool> is_lost = false;
+  const auto fail = [&](const Error& error, const Input& input) {
+    complain(error, input.names.name);
+    if (options.json) {
+      print(failure_json(error, {.input = input.files.front().string()}) + '\n');
+    }
+    return status_of(error);
+  };
   const auto work = [&] {
-    Run run(options, stop, true, names, leftovers);
+    MeshRun run(options, stop, true, taken, leftovers);
     for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
       int status = kDone;
       try {
         status = run.input(inputs[at]);
       } catch (const Lost& error) {
         is_lost = true;
-        complain(error, inputs[at].name);
-        status = kServerUnreachable;
+        status = fail(error, inputs[at]);
       } catch (const Error& error) {
-        complain(error, inputs[at].name);
-        status = status_of(error);
+        status = fail(error, inputs[at]);
       }
       if (status == kDone) continue;
       ++failed;
@@ -292,42 +64,61 @@ int mesh_all(const Options& options, const std::vector<Input>& inputs, const std
 
 // A mesh must not replace a file of a volume: .vtk, for one, is a format of both.
 void refuse_to_overwrite(const std::vector<Input>& inputs, const Options& options) {
-  std::vector<std::filesystem::path> sent;
+  std::set<std::pair<dev_t, ino_t>> sent;
+  struct stat status = {};
   for (const Input& input : inputs) {
     for (const std::filesystem::path& path : input.files) {
       std::error_code absent;
       if (!std::filesystem::exists(path, absent)) continue;  // standard input, or a stored volume
       try {
-        for (PackedFile& file : files_of_upload(path)) sent.push_back(std::move(file.path));
+        for (const PackedFile& file : files_of_upload(path)) {
+          if (::stat(file.path.c_str(), &status) == 0) sent.emplace(status.st_dev, status.st_ino);
+        }
       } catch (const Error&) {
         // The upload of this input tells it.
       }
     }
   }
   for (const Input& input : inputs) {
-    for (const Output& output : filled(options.outputs, input.name)) {
-      std::error_code error;
-      if (!std::filesystem::exists(output.path, error)) continue;
-      for (const std::filesystem::path& file : sent) {
-        if (std::filesystem::equivalent(output.path, file, error)) {
-          wrong_usage("-o: the mesh would overwrite the volume " + file.string());
-        }
+    for (const Output& output : filled(options.outputs, input.names)) {
+      if (::stat(output.path.c_str(), &status) != 0) continue;
+      if (sent.contains({status.st_dev, status.st_ino})) {
+        wrong_usage("-o: the mesh would overwrite the volume " + output.path.string());
       }
     }
   }
 }
 
+// Leaves out the inputs whose outputs are newer.
+void skip_existing(std::vector<Input>& inputs, const Options& options) {
+  const std::size_t all = inputs.size();
+  std::erase_if(inputs, [&](const Input& input) {
+    const std::vector<Output> outputs = filled(options.outputs, input.names);
+    if (!is_up_to_date(input, outputs)) return false;
+    if (options.json) {
+      print(skipped_json(paths_of(outputs), {.input = input.files.front().string()}) + '\n');
+    }
+    return true;
+  });
+  if (options.quiet) return;
+  complain("skipped " + std::to_string(all - inputs.size()) + " of " + std::to_string(all) +
+           (all == 1 ? " input, whose mesh is newer" : " inputs, whose meshes are newer"));
+}
+
 }  // namespace
 
 int mesh(const Options& options, const std::stop_token& stop) {
-  const std::vector<Input> inputs = inputs_of(options);
+  std::vector<Input> inputs = inputs_of(options);
   refuse_to_overwrite(inputs, options);
+  const bool is_one = inputs.size() == 1;
   // An archive's members are known after its upload; by then other inputs have their names.
-  TakenNames names;
-  for (const Input& input : inputs) names.take(input.name);
+  TakenOutputs taken;
+  for (const Input& input : inputs) taken.take(filled(options.outputs, input.names));
+  if (options.skip_existing) skip_existing(inputs, options);
+  if (inputs.empty()) return kDone;
   Leftovers leftovers(options);
-  if (inputs.size() > 1) return mesh_all(options, inputs, stop, names, leftovers);
-  return Run(options, stop, false, names, leftovers).input(inputs.front());
+  if (!is_one) return mesh_all(options, inputs, stop, taken, leftovers);
+  return MeshRun(options, stop, false, taken, leftovers).input(inputs.front());
 }
 
 }  // namespace isomesh::cli

@@ -31,7 +31,9 @@ constexpr const char* kDescription =
     "Turns medical volumes into surface meshes, on an isomesh server or on this computer alone.";
 
 constexpr const char* kExitStatus =
-    "0 done, 1 the job failed or was rejected, 2 wrong usage, 3 the server could not be reached. "
+    "0 done, 1 the job failed or was rejected, or the surface is empty, 2 wrong usage, 3 the "
+    "server "
+    "could not be reached. "
     "Ctrl-C cancels the job and ends the command by SIGINT.";
 
 command_line::Manual manual() {
@@ -51,10 +53,13 @@ void add_id(CLI::App& app, Options& options, const std::string& name) {
       ->type_name("ID");
 }
 
-void add_allow_empty(CLI::App& app, Options& options) {
-  app.add_flag("--allow-empty", options.allow_empty,
-               "Exit with status 0 instead of 1 if the surface is empty");
+void add_allow_empty(CLI::App& app, Options& options, const std::string& help) {
+  app.add_flag("--allow-empty", options.allow_empty, help);
 }
+
+constexpr const char* kWriteEmpty =
+    "Write the mesh and exit with status 0 if the surface is empty. Otherwise an empty surface "
+    "writes nothing and exits with status 1";
 
 bool is_utf8(const std::string& text) {
   try {
@@ -89,6 +94,14 @@ class Parser {
         ->envname("ISOMESH_CA")
         ->type_name("FILE")
         ->check(CLI::ExistingFile);
+    add_number<int>(
+        app_, "--retry-seconds",
+        "Seconds that a request waits if the server is busy; 0 does not wait (default: 600)",
+        [&](int seconds) {
+          if (seconds < 0) refuse("--retry-seconds", kSecondsRange);
+          options_.retry_seconds = seconds;
+        },
+        kSecondsRange);
     app_.add_flag("--json", options_.json, "Print JSON to standard output");
     app_.add_flag("-q,--quiet", options_.quiet, "Print only errors");
 
@@ -117,7 +130,7 @@ class Parser {
     add_id(command(Command::kStatus, "status", "Show a job"), options_, "JOB");
     CLI::App& wait = command(Command::kWait, "wait", "Wait until a job ends, then show it");
     add_id(wait, options_, "JOB");
-    add_allow_empty(wait, options_);
+    add_allow_empty(wait, options_, "Exit with status 0 instead of 1 if the surface is empty");
 
     CLI::App& fetch = command(Command::kFetch, "fetch", "Download the mesh of a finished job");
     add_id(fetch, options_, "JOB");
@@ -125,6 +138,7 @@ class Parser {
     add_number<std::int64_t>(fetch, "--label",
                              "Download the surface of this label alone, from a job with --labels",
                              [&](std::int64_t label) { options_.label = label; });
+    add_allow_empty(fetch, options_, kWriteEmpty);
 
     add_id(command(Command::kCancel, "cancel", "Cancel a job"), options_, "JOB");
 
@@ -188,6 +202,7 @@ class Parser {
     if (options_.command == Command::kFetch && options_.outputs.empty()) {
       wrong_usage("-o is required");
     }
+    if (options_.command == Command::kFetch) check_fetch();
     check_parameters();
     return std::move(options_);
   }
@@ -253,7 +268,10 @@ class Parser {
         kJobsRange);
     app.add_flag("--dry-run", options_.dry_run,
                  "Upload the volume, estimate the job, and delete the volume again if it is new");
-    add_allow_empty(app, options_);
+    app.add_flag("--skip-existing", options_.skip_existing,
+                 "Leave out each FILE whose meshes are all newer than it, such as those of a run "
+                 "that was interrupted. Other options may differ from that run's");
+    add_allow_empty(app, options_, kWriteEmpty);
     add_parameters(app, options_.parameters, options_.preset, Formats::kByFiles);
     add_raw(app, options_);
   }
@@ -296,6 +314,12 @@ class Parser {
     }
     check_outputs();
     check_stored();
+  }
+
+  void check_fetch() const {
+    for (const Output& output : options_.outputs) {
+      if (has_folder(output.path)) wrong_usage("-o: {folder} needs a FILE; a job is in no folder");
+    }
   }
 
   // Rejects in advance what the server would reject.
@@ -362,6 +386,7 @@ class Parser {
            " --help` explains the options";
   }
 
+  static constexpr const char* kSecondsRange = "must be a whole number from 0 up";
   static constexpr int kMostJobs = 64;
   static constexpr const char* kJobsRange = "must be a whole number from 1 to 64";
 
@@ -374,6 +399,12 @@ class Parser {
 };
 
 }  // namespace
+
+bool is_pipe(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  return std::filesystem::is_fifo(status) || std::filesystem::is_character_file(status);
+}
 
 void wrong_usage(const std::string& message) {
   throw EarlyExit(kWrongUsage, "isomesh: " + message + '\n');

@@ -49,7 +49,7 @@ struct OrderOptions {
 };
 
 // A file to write a mesh to, in the format that its suffix names. "-" is standard output; "{name}"
-// in its name stands for the input's name.
+// in it stands for the input's name, and "{folder}" for its folder.
 struct Output {
   std::filesystem::path path;
   MeshFormat format = MeshFormat::kDrc;
@@ -63,6 +63,7 @@ struct Options {
   std::string server = "http://127.0.0.1:8080";
   std::string token;
   std::filesystem::path authorities;  // certificate authorities; empty: the system's
+  int retry_seconds = 600;            // how long a request waits for a busy server
   bool json = false;
   bool allow_empty = false;  // an empty surface is a success
   bool quiet = false;
@@ -73,6 +74,7 @@ struct Options {
   JobParameters parameters;                  // mesh, submit, estimate
   std::string preset;                        // the iso-value's name; empty: see parameters
   bool dry_run = false;                      // mesh: only an estimate
+  bool skip_existing = false;                // mesh: not if its outputs are newer than the input
   int jobs = 1;                              // mesh: inputs processed concurrently
   bool is_local = false;                     // mesh: with a daemon of its own
   std::filesystem::path daemon;              // its program; empty: searched for
@@ -88,6 +90,9 @@ struct Options {
   OrderOptions order;                        // order, orders
   std::string kind;                          // ids: volumes, jobs or orders
 };
+
+// True for a pipe or a device, which is written to; any other file is replaced.
+bool is_pipe(const std::filesystem::path& path);
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on
 // standard output if the status is 0, otherwise on standard error.

@@ -149,6 +149,11 @@ std::string labels_report(const std::vector<LabelSummary>& labels, const Units& 
       rows);
 }
 
+void write_paths(Json& place, const std::vector<std::filesystem::path>& paths) {
+  json_values::make_array(place);
+  for (const auto& path : paths) json_values::assign(json_values::append(place), path.string());
+}
+
 }  // namespace
 
 std::string timing_report(const Timing& timing, const ClientTiming& client) {
@@ -349,18 +354,39 @@ std::string label_list(const VolumeLabels& labels) {
                     rows);
 }
 
+std::string with_origin(const std::string& json, const Origin& origin) {
+  using namespace json_values;
+  JsonTree tree(json);
+  if (!origin.input.empty()) assign(member(tree.root(), "input"), origin.input);
+  if (!origin.member.empty()) assign(member(tree.root(), "member"), origin.member);
+  return dump(tree.root());
+}
+
 std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
-                     const ClientTiming& client) {
+                     const ClientTiming& client, const Origin& origin) {
   using namespace json_values;
   JsonTree tree(to_json(job));
-  Json& paths = member(tree.root(), "outputs");
-  make_array(paths);
-  for (const auto& path : outputs) assign(append(paths), path.string());
+  write_paths(member(tree.root(), "outputs"), outputs);
   Json& times = member(tree.root(), "client");
   make_object(times);
   if (client.upload) assign(member(times, "upload"), *client.upload);
   if (client.download) assign(member(times, "download"), *client.download);
-  return dump(tree.root());
+  return with_origin(dump(tree.root()), origin);
+}
+
+std::string failure_json(const Error& error, const Origin& origin) {
+  Problem problem = to_problem(error, "");
+  problem.detail = error.what();  // also of an error of the client's own
+  return with_origin("{\"error\":" + to_json(problem) + '}', origin);
+}
+
+std::string skipped_json(const std::vector<std::filesystem::path>& outputs, const Origin& origin) {
+  using namespace json_values;
+  JsonTree tree;
+  make_object(tree.root());
+  assign(member(tree.root(), "skipped"), true);
+  write_paths(member(tree.root(), "outputs"), outputs);
+  return with_origin(dump(tree.root()), origin);
 }
 
 }  // namespace isomesh::cli

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/error.h"
 #include "proto/notes.h"
 #include "proto/types.h"
 
@@ -40,9 +41,21 @@ std::string job_list(const std::vector<Job>& jobs, const VolumeNames& names = {}
 std::string volume_list(const std::vector<Volume>& volumes);
 std::string label_list(const VolumeLabels& labels);
 
+// The input that a line of JSON is about, in its members `input`, as given on the command line, and
+// `member` if it has several volumes. Empty ones are left out.
+struct Origin {
+  std::string input = {};
+  std::string member = {};
+};
+std::string with_origin(const std::string& json, const Origin& origin);
+
 // The server's JSON of the job. The client adds `outputs`, the files that were written, and
 // `client`, with `upload` and `download` in milliseconds.
 std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
-                     const ClientTiming& client);
+                     const ClientTiming& client, const Origin& origin = {});
+// `error`: the problem, as in a job that failed.
+std::string failure_json(const Error& error, const Origin& origin);
+// `skipped` is true, and `outputs` are the files that are newer than the input.
+std::string skipped_json(const std::vector<std::filesystem::path>& outputs, const Origin& origin);
 
 }  // namespace isomesh::cli

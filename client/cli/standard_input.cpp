@@ -12,7 +12,6 @@
 
 #include "base/descriptor.h"
 #include "base/error.h"
-#include "client/cli/console.h"
 
 namespace isomesh::cli {
 namespace {
@@ -37,16 +36,16 @@ class InputWait {
   const std::stop_callback<std::function<void()>> wake_;
 };
 
-std::unique_ptr<ScratchFile> copied(const std::stop_token& stop) {
-  auto file = std::make_unique<ScratchFile>(temporary_folder(), ".volume");
+std::unique_ptr<InputCopy> copied(const std::stop_token& stop) {
+  auto copy = std::make_unique<InputCopy>();
   const InputWait wait(stop);
   std::vector<std::byte> block(std::size_t{1} << 20);
   while (true) {
     wait();
     const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
-    if (count == 0) return file;
+    if (count == 0) return copy;
     if (count > 0) {
-      file->write(std::span(block).first(static_cast<std::size_t>(count)));
+      copy->file.write(std::span(block).first(static_cast<std::size_t>(count)));
     } else if (errno != EINTR && errno != EAGAIN) {
       throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
     }
@@ -55,13 +54,12 @@ std::unique_ptr<ScratchFile> copied(const std::stop_token& stop) {
 
 }  // namespace
 
-std::unique_ptr<ScratchFile> standard_input_as_file(std::vector<std::filesystem::path>& files,
-                                                    UploadOptions& how,
-                                                    const std::stop_token& stop) {
+std::unique_ptr<InputCopy> standard_input_as_file(std::vector<std::filesystem::path>& files,
+                                                  UploadOptions& how, const std::stop_token& stop) {
   for (std::filesystem::path& file : files) {
     if (file != "-") continue;
     auto copy = copied(stop);
-    file = copy->path();
+    file = copy->file.path();
     if (how.name.empty()) how.name = "stdin";
     return copy;
   }

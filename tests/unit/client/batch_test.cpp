@@ -22,13 +22,39 @@ class Batch : public testing::Test {
     return path;
   }
 
-  std::vector<std::string> names_of(const std::vector<std::filesystem::path>& files) const {
+  static std::vector<Input> inputs(const std::vector<std::filesystem::path>& files,
+                                   const std::string& output = "{name}.stl") {
     Options options;
     options.files = files;
-    options.outputs = {{"{name}.stl", MeshFormat::kStl}};
+    options.outputs = {{output, MeshFormat::kStl}};
+    return inputs_of(options);
+  }
+
+  static std::vector<std::string> names_of(const std::vector<std::filesystem::path>& files) {
     std::vector<std::string> names;
-    for (const Input& input : inputs_of(options)) names.push_back(input.name);
+    for (const Input& input : inputs(files)) names.push_back(input.names.name);
     return names;
+  }
+
+  // The paths that the meshes of these files have.
+  static std::vector<std::string> paths_of(const std::vector<std::filesystem::path>& files,
+                                           const std::string& output) {
+    std::vector<std::string> paths;
+    for (const Input& input : inputs(files, output)) {
+      paths.push_back(filled({{output, MeshFormat::kStl}}, input.names).front().path);
+    }
+    return paths;
+  }
+
+  static std::string refusal_of(const std::vector<std::filesystem::path>& files,
+                                const std::string& output = "{name}.stl") {
+    try {
+      inputs(files, output);
+    } catch (const EarlyExit& refused) {
+      EXPECT_EQ(refused.status(), kWrongUsage);
+      return refused.what();
+    }
+    return "";
   }
 
   test::TemporaryFolder folder_;
@@ -50,7 +76,7 @@ TEST_F(Batch, FilesAreOneUploadUnlessOutputsHaveNames) {
   Options options;
   options.files = {file("a.nii"), file("b.nii")};
   options.outputs = {{"mesh.stl", MeshFormat::kStl}};
-  EXPECT_THAT(inputs_of(options), ElementsAre(Input{options.files, "a"}));
+  EXPECT_THAT(inputs_of(options), ElementsAre(Input{options.files, {"a"}}));
   EXPECT_THAT(names_of(options.files), ElementsAre("a", "b"));
 }
 
@@ -69,16 +95,57 @@ TEST_F(Batch, WhatAnotherInputSendsIsNoInput) {
   EXPECT_THAT(names_of({file("e.PAR"), rec}), ElementsAre("e"));
 }
 
-TEST_F(Batch, TwoOfOneNameAreRefused) {
-  try {
-    names_of({file("x/a.nii"), file("y/a.nrrd")});
-    FAIL() << "they are not refused";
-  } catch (const EarlyExit& refused) {
-    EXPECT_EQ(refused.status(), kWrongUsage);
-    EXPECT_THAT(refused.what(), HasSubstr("two inputs are called a"));
-  }
-  EXPECT_THROW(names_of({file("tab\x01.nii"), file("tab\x02.nii")}), EarlyExit)
+TEST_F(Batch, InputsOfOneNameHaveTheFoldersThatTellThemApart) {
+  EXPECT_THAT(names_of({file("sub-01/anat/T1.nii.gz"), file("sub-02/anat/T1.nii.gz"),
+                        file("sub-01/anat/FLAIR.nii.gz")}),
+              ElementsAre("sub-01_anat_T1", "sub-02_anat_T1", "FLAIR"));
+  EXPECT_THAT(names_of({file("x/a.nii"), file("y/a.nrrd")}), ElementsAre("x_a", "y_a"));
+  EXPECT_THAT(names_of({file("x/a.nii"), file("x/b/a.nii"), file("a.nii")}),
+              ElementsAre("x_a", "x_b_a", "a"));
+  EXPECT_THAT(names_of({file("x/a.nii"), file("x/a.nrrd")}), ElementsAre("a.nii", "a.nrrd"));
+  file("s1/ct.1/one.dcm");
+  file("s2/ct.1/one.dcm");
+  EXPECT_THAT(names_of({folder_ / "s1/ct.1", folder_ / "s2/ct.1/"}),
+              ElementsAre("s1_ct.1", "s2_ct.1"));
+}
+
+TEST_F(Batch, TheFolderOfAnInputIsTheOneBelowAllFolders) {
+  const std::vector<std::filesystem::path> files = {file("sub-01/anat/T1.nii.gz"),
+                                                    file("sub-02/anat/T1.nii.gz")};
+  EXPECT_THAT(paths_of(files, "{folder}_{name}.stl"),
+              ElementsAre("sub-01_anat_T1.stl", "sub-02_anat_T1.stl"));
+  EXPECT_THAT(paths_of(files, "out/{folder}/{name}.stl"),
+              ElementsAre("out/sub-01/anat/T1.stl", "out/sub-02/anat/T1.stl"));
+  EXPECT_THAT(paths_of(files, "{folder}.stl"), ElementsAre("sub-01_anat.stl", "sub-02_anat.stl"));
+  EXPECT_THAT(paths_of({files.front()}, "{folder}-{name}.stl"), ElementsAre("anat-T1.stl"));
+  EXPECT_THAT(paths_of({file("x/a.nii"), file("x/b.nii")}, "{folder}-{name}.stl"),
+              ElementsAre("x-a.stl", "x-b.stl"));
+  EXPECT_THAT(paths_of({file("t\x01/a.nii"), file("u/a.nii")}, "o/{folder}/{name}.stl"),
+              ElementsAre("o/t\uFFFD/a.stl", "o/u/a.stl"));
+  EXPECT_THAT(refusal_of({"3f2a91c0", files.front()}, "{folder}.stl"),
+              HasSubstr("3f2a91c0 is in no folder"));
+}
+
+TEST_F(Batch, InputsThatWouldOverwriteEachOtherAreRefusedByName) {
+  const auto one = file("tab\x01.nii");
+  const auto other = file("tab\x02.nii");
+  file("a/b_c/x.nii");
+  EXPECT_THAT(refusal_of({one, other}), testing::AllOf(HasSubstr(one), HasSubstr(other)))
       << "both outputs would have U+FFFD in their names";
+  const auto left = file("a/b_c/x.nii");
+  const auto right = file("a_b/c/x.nii");
+  EXPECT_THAT(refusal_of({left, right}), testing::AllOf(HasSubstr(left), HasSubstr(right)));
+  EXPECT_THAT(paths_of({left, right}, "{folder}/{name}.stl"),
+              ElementsAre("a/b_c/x.stl", "a_b/c/x.stl"));
+  const auto twin = file("a/b_c/y.nii");
+  EXPECT_THAT(refusal_of({left, twin}, "{folder}.stl"),
+              testing::AllOf(HasSubstr(left), HasSubstr(twin)));
+}
+
+TEST_F(Batch, LongNamesOfInputsStay) {
+  const std::string name(240, 'n');
+  EXPECT_THAT(names_of({file(name + "1.nii"), file(name + "2.nii")}),
+              ElementsAre(name + "1", name + "2"));
 }
 
 TEST_F(Batch, AHeaderThatCannotBeReadIsAnInput) {
@@ -122,22 +189,72 @@ TEST_F(Batch, LongNamesOfMembersAreCut) {
                   cut.substr(0, 198) + "-2"));
 }
 
-TEST_F(Batch, EachNameIsTakenOnce) {
-  TakenNames names;
-  EXPECT_TRUE(names.take("s-x"));
-  EXPECT_TRUE(names.take("s-y"));
-  EXPECT_FALSE(names.take("s-x"));
+TEST_F(Batch, EachOutputIsTakenOnce) {
+  TakenOutputs taken;
+  EXPECT_TRUE(taken.take({{"x.stl", MeshFormat::kStl}, {"x.glb", MeshFormat::kGlb}}));
+  EXPECT_FALSE(taken.take({{"y.stl", MeshFormat::kStl}, {"./x.glb", MeshFormat::kGlb}}));
+  EXPECT_TRUE(taken.take({{"y.stl", MeshFormat::kStl}}));
+}
+
+class UpToDate : public Batch {
+ protected:
+  // `hours` after the others.
+  std::filesystem::path at(int hours, const std::string& name, const std::string& text = "x") {
+    auto path = file(name, text);
+    std::filesystem::last_write_time(path, begin_ + std::chrono::hours(hours));
+    return path;
+  }
+
+  bool is(const std::vector<std::filesystem::path>& files,
+          const std::vector<std::filesystem::path>& outputs) const {
+    std::vector<Output> all;
+    for (const auto& path : outputs) all.push_back({path, MeshFormat::kStl});
+    return is_up_to_date({files, {}}, all);
+  }
+
+  std::filesystem::file_time_type begin_ =
+      std::filesystem::file_time_type::clock::now() - std::chrono::hours(100);
+};
+
+TEST_F(UpToDate, IsAnInputWhoseOutputsAreAllNewer) {
+  const auto input = at(1, "a.nii");
+  const auto newer = at(2, "a.stl");
+  EXPECT_TRUE(is({input}, {newer}));
+  EXPECT_TRUE(is({input}, {newer, at(3, "a.glb")}));
+  EXPECT_FALSE(is({input}, {newer, at(0, "b.glb")}));
+  EXPECT_FALSE(is({input}, {newer, folder_ / "absent.glb"}));
+  EXPECT_FALSE(is({input}, {at(1, "same.stl")}));
+  EXPECT_FALSE(is({input}, {folder_.path()}));
+  EXPECT_FALSE(is({input}, {}));
+}
+
+TEST_F(UpToDate, ComparesAllFilesOfAnInput) {
+  at(1, "series/one.dcm");
+  at(3, "series/deep/two.dcm");
+  EXPECT_FALSE(is({folder_ / "series"}, {at(2, "series.stl")}));
+  EXPECT_TRUE(is({folder_ / "series"}, {at(4, "series.stl")}));
+  const auto header = at(1, "b.mhd", "ElementDataFile = b.raw\n");
+  at(3, "b.raw");
+  EXPECT_FALSE(is({header}, {at(2, "b.stl")}));
+  EXPECT_FALSE(is({at(1, "c.hdr"), at(3, "c.img")}, {at(2, "c.stl")}));
+}
+
+TEST_F(UpToDate, IsAStoredVolumeThatHasItsOutputButNeverStandardInput) {
+  EXPECT_TRUE(is({"3f2a91c0"}, {at(0, "a.stl")}));
+  EXPECT_FALSE(is({"3f2a91c0"}, {folder_ / "absent.stl"}));
+  EXPECT_FALSE(is({"-"}, {at(0, "a.stl")}));
 }
 
 TEST_F(Batch, NamesFillOutputsAndStayInTheirFolder) {
   const std::vector<Output> outputs = {{"out/{name}-{name}.stl", MeshFormat::kStl},
                                        {"-", MeshFormat::kStl}};
-  EXPECT_EQ(filled(outputs, "a").front().path, "out/a-a.stl");
-  EXPECT_EQ(filled(outputs, "../a").front().path, "out/.._a-.._a.stl");
-  EXPECT_EQ(filled(outputs, "a\x1b[31m\a").front().path,
+  EXPECT_EQ(filled(outputs, {"a"}).front().path, "out/a-a.stl");
+  EXPECT_EQ(filled(outputs, {"../a"}).front().path, "out/.._a-.._a.stl");
+  EXPECT_EQ(filled(outputs, {"a\x1b[31m\a"}).front().path,
             "out/a\uFFFD[31m\uFFFD-a\uFFFD[31m\uFFFD.stl");
-  EXPECT_EQ(filled(outputs, "{name}").front().path, "out/{name}-{name}.stl");
-  EXPECT_TRUE(filled(outputs, "a").back().is_stdout());
+  EXPECT_EQ(filled(outputs, {"{name}{folder}"}).front().path,
+            "out/{name}{folder}-{name}{folder}.stl");
+  EXPECT_TRUE(filled(outputs, {"a"}).back().is_stdout());
 }
 
 }  // namespace

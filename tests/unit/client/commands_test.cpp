@@ -6,6 +6,7 @@
 #include <functional>
 #include <iostream>
 #include <set>
+#include <sstream>
 #include <stop_token>
 
 #include <fcntl.h>
@@ -173,6 +174,64 @@ TEST_F(Commands, SeveralInputsHaveAMeshEach) {
   EXPECT_EQ(test::read_file(folder_ / "knee.drc"), "mesh");
   options_.json = true;
   EXPECT_EQ(std::ranges::count(outcome_of(options_).out, '\n'), 2);
+}
+
+TEST_F(Commands, AnEmptySurfaceWritesNothingUnlessThatIsAccepted) {
+  job_.mesh->empty = true;
+  test::write_file(folder_ / "head.drc", "old");
+  const Outcome refused = outcome_of(options_);
+  EXPECT_EQ(refused.status, kRefused);
+  EXPECT_THAT(refused.err, HasSubstr("the surface is empty"));
+  EXPECT_EQ(refused.out, "");
+  EXPECT_EQ(test::read_file(folder_ / "head.drc"), "old");
+  options_.json = true;
+  EXPECT_THAT(outcome_of(options_).out, HasSubstr("\"outputs\":[]"));
+  options_.outputs = {{.path = folder_ / "new" / "{name}.drc", .format = MeshFormat::kDrc}};
+  EXPECT_EQ(outcome_of(options_).status, kRefused);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "new"));
+  options_.allow_empty = true;
+  EXPECT_EQ(outcome_of(options_).status, kDone);
+  EXPECT_EQ(test::read_file(folder_ / "new" / "head.drc"), "mesh");
+}
+
+TEST_F(Commands, AnEmptySurfaceIsNotFetchedUnlessThatIsAccepted) {
+  job_.mesh->empty = true;
+  options_.command = Command::kFetch;
+  options_.id = "7";
+  EXPECT_EQ(outcome_of(options_).status, kRefused);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "head.drc"));
+  options_.allow_empty = true;
+  EXPECT_EQ(outcome_of(options_).status, kDone);
+  EXPECT_EQ(test::read_file(folder_ / "head.drc"), "mesh");
+}
+
+TEST_F(Commands, EachLineOfJsonSaysItsInput) {
+  const std::string good = folder_ / "head.nii";
+  const std::string bad = folder_ / "bad.nii";
+  std::filesystem::create_symlink("bad.nii", bad);  // a loop, which cannot be read
+  options_.files = {good, bad};
+  options_.outputs = {{.path = folder_ / "{name}.drc", .format = MeshFormat::kDrc}};
+  options_.json = true;
+  const Outcome outcome = outcome_of(options_);
+  EXPECT_EQ(outcome.status, kRefused);
+  std::istringstream lines(outcome.out);
+  std::string first;
+  std::string second;
+  std::getline(lines, first);
+  std::getline(lines, second);
+  EXPECT_THAT(first, HasSubstr("\"input\":\"" + good + '"'));
+  EXPECT_THAT(first, HasSubstr("\"state\":\"succeeded\""));
+  EXPECT_THAT(second, HasSubstr("\"input\":\"" + bad + '"'));
+  EXPECT_THAT(second, HasSubstr("\"error\":{\"type\":"));
+  EXPECT_THAT(second, HasSubstr("bad.nii: "));
+
+  std::filesystem::last_write_time(
+      good, std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  options_.skip_existing = true;
+  const Outcome again = outcome_of(options_);
+  EXPECT_THAT(again.out, HasSubstr("{\"skipped\":true,\"outputs\":[\"" +
+                                   (folder_ / "head.drc").string() + "\"],\"input\":\"" + good));
+  EXPECT_THAT(again.err, HasSubstr("skipped 1 of 2 inputs"));
 }
 
 // The first part of a large mesh fits into a pipe that nobody reads, as it does on a disk that is

@@ -67,13 +67,24 @@ TEST_F(OptionsTest, OutputsAreFilesFoldersNamesOrStandardOutput) {
   EXPECT_EQ(outputs_of({"-o", "-", "--format", "stl"}),
             (std::vector<Output>{{"-", MeshFormat::kStl}}));
 
-  const std::string absent = folder + "/absent/";
+  EXPECT_EQ(outputs_of({"-o", folder + "/new/folder/"}),
+            (std::vector<Output>{{folder + "/new/folder/{name}.drc", MeshFormat::kDrc}}));
+  EXPECT_EQ(outputs_of({"-o", folder + "/new/{folder}/{name}.stl"}),
+            (std::vector<Output>{{folder + "/new/{folder}/{name}.stl", MeshFormat::kStl}}));
+  EXPECT_FALSE(std::filesystem::exists(folder + "/new")) << "it is made when a mesh is written";
+  EXPECT_EQ(outputs_of({"-o", "/dev/stdout", "--format", "stl"}),
+            (std::vector<Output>{{"-", MeshFormat::kStl}}));
+  EXPECT_EQ(outputs_of({"-o", "/dev/null", "--format", "stl"}),
+            (std::vector<Output>{{"/dev/null", MeshFormat::kStl}}));
+
   for (const std::vector<std::string>& wrong :
        std::vector<std::vector<std::string>>{{"-o", "-"},
                                              {"-o", "-", "--format", "stl,glb"},
                                              {"-o", "-", "--format", "stl", "--json"},
                                              {"-o", "-", "--format", "stl", "-o", drc_},
-                                             {"-o", absent},
+                                             {"-o", file_ + "/"},
+                                             {"-o", folder + "/absent/{name}.stl"},
+                                             {"-o", "/dev/null"},
                                              {"-o", drc_, "--format", "drc"},
                                              {"-o", drc_, "-o", named},
                                              {"-o", folder, "--format", "xyz"},
