@@ -270,7 +270,7 @@ class Parser {
                  "Upload the volume, estimate the job, and delete the volume again if it is new");
     app.add_flag("--skip-existing", options_.skip_existing,
                  "Leave out each FILE whose meshes are all newer than it, such as those of a run "
-                 "that was interrupted. Other options may differ from that run's");
+                 "that was interrupted. Other options are not compared");
     add_allow_empty(app, options_, kWriteEmpty);
     add_parameters(app, options_.parameters, options_.preset, Formats::kByFiles);
     add_raw(app, options_);

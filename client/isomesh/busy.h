@@ -56,7 +56,8 @@ struct PersistenceOptions {
 
 // A Transport that sends a request again while the server is busy (429 or 503). Every request of
 // the API may be repeated then: most are refused before they are looked at, and the others change
-// nothing more the second time. Constant after construction; thread safe.
+// nothing more the second time. Every body can be sent again, because HttpRequest::source gives any
+// of its bytes twice. Constant after construction; thread safe.
 class PersistentTransport {
  public:
   PersistentTransport(TransportOptions transport, PersistenceOptions options)

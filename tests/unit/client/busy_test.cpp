@@ -203,6 +203,34 @@ TEST_F(BusyTest, AClientWaitsAndSaysWhy) {
   EXPECT_THAT(reasons, ElementsAre(HasSubstr("503")));
 }
 
+// A part that was refused is sent again without a question about what has arrived.
+TEST_F(BusyTest, AnUploadInPartsWaits) {
+  std::vector<std::string> asked;
+  server_.http.set_pre_routing_handler([&](const httplib::Request& request, auto& response) {
+    asked.push_back(request.method);
+    if (asked.size() == 1) {
+      response.status = 201;
+      response.set_header("Location", "/v1/uploads/7");
+      return httplib::Server::HandlerResponse::Handled;
+    }
+    if (asked.size() > 2) return httplib::Server::HandlerResponse::Unhandled;
+    response.status = 503;
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  server_.http.Patch("/v1/uploads/7", [&](const httplib::Request& request, auto& response) {
+    bodies_.push_back(request.body);
+    response.status = 201;
+    response.set_content(to_json(some_volume()), "application/json");
+  });
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "head.nii", test::pattern(1000));
+  Client client({.server = server_.start()});
+  EXPECT_EQ(client.upload(folder / "head.nii", {.resumable_bytes = 1}), some_volume());
+  EXPECT_THAT(asked, ElementsAre("POST", "PATCH", "PATCH"));
+  ASSERT_EQ(bodies_.size(), 1U);
+  EXPECT_TRUE(bodies_.front() == test::pattern(1000));
+}
+
 TEST_F(BusyTest, AnErrorSaysWhenToComeAgain) {
   refusals_ = 1'000'000;
   serve(429, {{"Retry-After", "7"}});
