@@ -1,7 +1,10 @@
 #include "server/codec/libdraco.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <draco/compression/encode.h>
@@ -52,6 +55,28 @@ std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
   return result;
 }
 
+// Numbers as libdraco's options, which are text: nine digits keep every bit. Its own setters write
+// six decimals, which are none of a small number.
+std::string text_of(std::span<const float> numbers) {
+  std::string text;
+  for (const float number : numbers) {
+    std::array<char, 32> digits = {};
+    std::snprintf(digits.data(), digits.size(), "%.9g ", double{number});
+    text += digits.data();
+  }
+  return text;
+}
+
+// Replaces all options of the attribute.
+void quantise(draco::Encoder& encoder, draco::GeometryAttribute::Type type,
+              std::span<const float> low, float range, int bits) {
+  draco::Options options;
+  options.SetInt("quantization_bits", bits);
+  options.SetString("quantization_origin", text_of(low));
+  options.SetString("quantization_range", text_of({&range, 1}));
+  encoder.options().SetAttributeOptions(type, options);
+}
+
 // Edgebreaker drops triangles that repeat a vertex.
 bool is_sequential(std::span<const mesh::Triangle> triangles, int speed) {
   return speed == kSequentialSpeed || std::ranges::any_of(triangles, [](const auto& triangle) {
@@ -90,11 +115,17 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
         add_attribute(*draco_mesh, draco::GeometryAttribute::GENERIC, data.distances);
     // All streams share one scale, so a seam vertex has the same number on both sides.
     const float nearest = 0;
-    const float range = data.most_distance > 0 ? data.most_distance : 1;
-    encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::GENERIC, kDistanceBits, 1,
-                                             &nearest, range);
+    quantise(encoder, draco::GeometryAttribute::GENERIC, {&nearest, 1},
+             range_from_zero(data.most_distance, kDistanceBits), kDistanceBits);
   }
   encoder.SetSpeedOptions(speed, speed);
+  // Neither edgebreaker nor quantisation supports an empty mesh.
+  const bool is_empty = arrays.triangles.empty();
+  encoder.SetEncodingMethod(is_empty || sequential ? draco::MESH_SEQUENTIAL_ENCODING
+                                                   : draco::MESH_EDGEBREAKER_ENCODING);
+  if (!is_empty) {
+    quantise(encoder, draco::GeometryAttribute::POSITION, grid.low, grid.side, grid.bits);
+  }
   if (grid.bits > kMostEntropyCodedBits) {
     encoder.options().SetGlobalBool("use_built_in_attribute_compression", false);
     // The predictions of the slowest speeds also count values in such an array.
@@ -103,15 +134,6 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
   }
   // In sequential encoding: indices as entropy-coded differences, a third of their size.
   encoder.options().SetGlobalBool("compress_connectivity", true);
-  if (arrays.triangles.empty()) {
-    // Neither edgebreaker nor quantisation supports an empty mesh.
-    encoder.SetEncodingMethod(draco::MESH_SEQUENTIAL_ENCODING);
-  } else {
-    encoder.SetEncodingMethod(sequential ? draco::MESH_SEQUENTIAL_ENCODING
-                                         : draco::MESH_EDGEBREAKER_ENCODING);
-    encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::POSITION, grid.bits, 3,
-                                             grid.low.data(), grid.side);
-  }
   // If a block's cut leaves two fans at a vertex, edgebreaker duplicates it.
   encoder.SetTrackEncodedProperties(true);
   draco::EncoderBuffer buffer;

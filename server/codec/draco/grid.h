@@ -18,8 +18,12 @@ struct Grid {
   float decoded(float coordinate, std::size_t axis) const;
 };
 
-// The grid that covers the mesh, to a millionth of a millimetre; the point 0 for an empty mesh.
-// Throws Error kUnusableVolume if a position is not finite, or the mesh is too large for a grid.
+// The grid that covers the mesh, to a step or a millionth of a millimetre, whichever is less; the
+// point 0 for an empty mesh. No step is too small for a normal number in single precision. Throws
+// Error kUnusableVolume if a position is not finite, or the mesh is too large for a grid.
 Grid grid_of(const mesh::Mesh& mesh, int bits);
+
+// The side of such a grid for numbers from 0 to `most`; 1 if all are 0.
+float range_from_zero(float most, int bits);
 
 }  // namespace isomesh::codec

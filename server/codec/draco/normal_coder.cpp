@@ -28,7 +28,7 @@ std::array<std::int32_t, 3> on_octahedron(const mesh::Vec3& normal, std::int32_t
   const double y = normal[1];
   const double z = normal[2];
   const double sum = std::abs(x) + std::abs(y) + std::abs(z);
-  if (!(sum > 1e-6)) return {center, 0, 0};
+  if (!(sum > 1e-6) || std::isinf(sum)) return {center, 0, 0};  // no direction
   const double scale = 1.0 / sum;
   const std::int32_t a = rounded_down(x * scale * center + 0.5);
   const std::int32_t b = rounded_down(y * scale * center + 0.5);

@@ -197,7 +197,9 @@ std::optional<BoundedMesh> simplify_within(const Lattice<T>& lattice, const Extr
   std::optional<Tube> tube =
       make_start(surface, find_clusters(lattice, extract, *field, crossings, context), context);
   if (!tube) return unproven("Samples differ too little from the iso-value.");
-  collapse_edges({*field, metric, reach}, options.triangles, context, *tube);
+  const double unit = unit_mm(lattice.to_space);
+  collapse_edges({*field, metric.in_units_of(unit), reach / unit}, options.triangles, context,
+                 *tube);
   if (!is_proven(surface, context, *tube)) return unproven("The final check failed.");
   return deliver(surface, *tube, shift, options.max_error_mm, mesh);
 }

@@ -28,13 +28,14 @@ constexpr float kLargestCost = 1.5F;  // of the reach, as a distance
 constexpr std::size_t kTries = 2;     // edges of a vertex
 constexpr float kShift = 0.4F;        // of the reach: away from a side that fails by little
 
+// Lengths are in the unit of the surroundings.
 template <class Test>
 class Collapser {
  public:
   Collapser(const CollapseSurroundings& around, Block& block)
       : field_(around.field),
         metric_(around.metric),
-        reach_(static_cast<float>(around.reach_mm)),
+        reach_(static_cast<float>(around.reach)),
         block_(block),
         corners_(block.triangles, block.vertices.size()),
         star_(around.field, around.metric, reach_) {
@@ -70,7 +71,7 @@ class Collapser {
   // The data for computing costs, in one cache line.
   struct alignas(64) Node {
     Quadric quadric;  // about the place
-    Vecf place;       // in millimetres, from the block's first vertex
+    Vecf place;       // from the block's first vertex
     bool stays = false;
   };
 
@@ -203,15 +204,15 @@ class Collapser {
     return true;
   }
 
-  Vertex place(std::uint32_t a, Vecf way_mm, Vecf reach_mm) const {
+  Vertex place(std::uint32_t a, Vecf way, Vecf reach) const {
     const Vecf from = block_.vertices[a].p;
-    Vecf p = snap(wide(from) + metric_.steps(wide(way_mm)));
+    Vecf p = snap(wide(from) + metric_.steps(wide(way)));
     const unsigned planes = block_.planes[a];
     if ((planes & 0b000011) != 0) p.x = from.x;
     if ((planes & 0b001100) != 0) p.y = from.y;
     if ((planes & 0b110000) != 0) p.z = from.z;
-    const Vecd reach = metric_.steps(wide(reach_mm));
-    return {p, snap(wide(p) + reach), snap(wide(p) - reach)};
+    const Vecd copy = metric_.steps(wide(reach));
+    return {p, snap(wide(p) + copy), snap(wide(p) - copy)};
   }
 
   // Beside caps a surface stays on their inner side, or it would cross them.

@@ -10,11 +10,12 @@
 
 namespace isomesh::mesh::bound {
 
-// The data that collapses need besides the tube.
+// The data that collapses need besides the tube. Metric and reach are in one unit near the steps of
+// the lattice: quadrics multiply three areas in single precision.
 struct CollapseSurroundings {
   const Field& field;
-  const Metric& metric;
-  double reach_mm = 0;  // how far T+ and T- are put from T
+  const Metric metric;
+  double reach = 0;  // how far T+ and T- are put from T
 };
 
 // Some triangles of a tube with vertices numbered anew.

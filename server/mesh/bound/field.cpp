@@ -171,7 +171,9 @@ double shift_of(const Lattice<T>& lattice, const ExtractOptions& options, const 
       const double b = difference(outside);
       const double p = field.values[inside];
       const double q = field.values[outside];
-      const double placed = std::clamp(a / (a - b), kept, 1 - kept);
+      // The difference of two doubles can overflow; that of their halves cannot.
+      const double share = std::isinf(a - b) ? (a / 2) / (a / 2 - b / 2) : a / (a - b);
+      const double placed = std::clamp(share, kept, 1 - kept);
       const double moved = std::abs(placed - p / (p - q)) *
                            length(metric.mm(field.place(outside) - field.place(inside)));
       if (!(moved <= farthest)) farthest = moved;

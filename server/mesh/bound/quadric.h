@@ -7,7 +7,7 @@
 
 namespace isomesh::mesh::bound {
 
-// d' A d + 2 b d + c of the way d from the vertex, in millimetres.
+// d' A d + 2 b d + c of the way d from the vertex.
 struct Quadric {
   float a00 = 0, a01 = 0, a02 = 0, a11 = 0, a12 = 0, a22 = 0;
   Vecf b;

@@ -21,7 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::bound::HWY_NAMESPACE {
 
-// The data of a vertex of T that collapses need, in millimetres except for `copies`.
+// The data of a vertex of T that collapses need, in the metric's unit except for `copies`.
 struct Site {
   std::array<float, kLanes> copies;  // as copies_of; not Lanes, which allocators may misalign
   Vecf up;                           // the way to T+
@@ -40,7 +40,7 @@ class Star {
     std::optional<Side> failed;  // alone, and by so little that moving may help
   };
 
-  // `reach`: how far T+ and T- are from T, in millimetres.
+  // `reach`: how far T+ and T- are from T, in the metric's unit.
   Star(const Field& field, const Metric& metric, float reach)
       : clear_(field),
         last_(copies_of({{}, last_sample(field), last_sample(field)})),

@@ -72,6 +72,14 @@ class Metric {
     return metric;
   }
 
+  // The same space in a unit of so many millimetres.
+  Metric in_units_of(double mm) const {
+    const auto scaled = [&](Vecd step) {
+      return std::array{step.x / mm, step.y / mm, step.z / mm};
+    };
+    return Metric({scaled(origin_), scaled(x_), scaled(y_), scaled(z_)});
+  }
+
   // The length in millimetres of the longest way across a cell.
   double largest_step() const { return length(x_) + length(y_) + length(z_); }
   // The least distance between two planes of samples.

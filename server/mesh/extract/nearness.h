@@ -11,6 +11,24 @@
 
 namespace isomesh::mesh {
 
+// A power of two that, multiplied with distances from the iso-value, makes the largest about 1; 1
+// itself if single precision holds them as they are. Some samples tell, because the largest need
+// not be exact.
+template <class T>
+double power_for(const T* samples, std::uint64_t count, double iso) {
+  if constexpr (std::is_integral_v<T>) return 1;
+  constexpr std::uint64_t kLookedAt = 4096;
+  constexpr int kHeld = 64;  // half of single precision's exponents
+  constexpr int kMost = std::numeric_limits<double>::max_exponent - 1;
+  double largest = 0;
+  for (std::uint64_t at = 0; at < count; at += count / kLookedAt | 1) {
+    largest = std::max(largest, std::abs(static_cast<double>(samples[at]) - iso));
+  }
+  if (largest == 0) return 1;
+  const int exponent = std::isinf(largest) ? kMost : std::ilogb(largest);
+  return std::abs(exponent) <= kHeld ? 1 : std::ldexp(1.0, std::min(-exponent, kMost));
+}
+
 // Ranks samples of type T by their distance from the iso-value in single precision; what is inside
 // comes first of those that are equally near. Ranks are signed integers of bytes() each. Only those
 // of samples on different sides can be compared. Immutable.
@@ -21,8 +39,10 @@ namespace isomesh::mesh {
 template <class T>
 class Nearness {
  public:
-  // `has_centres`: means of eight samples are ranked, too. Then steps are eighths.
-  Nearness(double iso, bool has_centres) : iso_(iso), parts_(has_centres ? 8 : 1) {
+  // `has_centres`: means of eight samples are ranked, too. Then steps are eighths. `power`: of two;
+  // ranks that are bits are those of the distance times it.
+  Nearness(double iso, bool has_centres, double power = 1)
+      : iso_(iso), power_(power), parts_(has_centres ? 8 : 1) {
     if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
       const double low = parts_ * static_cast<double>(std::numeric_limits<T>::lowest());
       const double high = parts_ * static_cast<double>(std::numeric_limits<T>::max());
@@ -44,7 +64,7 @@ class Nearness {
 
   // Only if bytes() is 4.
   std::int32_t of_value(double value) const {
-    const auto distance = static_cast<float>(std::abs(value - iso_));
+    const auto distance = static_cast<float>(std::abs(value * power_ - iso_ * power_));
     // Its bits rise with a number that is not negative; they are moved down to where signed
     // numbers begin, since those are what processors compare.
     const std::uint32_t rank =
@@ -83,6 +103,7 @@ class Nearness {
   }
 
   double iso_;
+  double power_;
   std::int32_t parts_;
   std::size_t bytes_ = sizeof(std::int32_t);
   std::int32_t first_inside_ = 0;

@@ -74,7 +74,8 @@ class RowsOf final : public SampleRows {
       : lattice_(lattice),
         iso_(options.iso),
         smallest_(smallest),
-        nearness_(options.iso, options.scheme == Scheme::kBcc),
+        nearness_(options.iso, options.scheme == Scheme::kBcc,
+                  power_for(lattice.samples, lattice.dims.samples(), options.iso)),
         placement_(options, lattice.dims, lattice.to_space),
         // An edge from a centre to a corner takes half a step along each axis.
         half_edges_(options, std::min(2 * placement_.nearest(), kMostNearest)) {

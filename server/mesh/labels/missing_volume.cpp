@@ -182,10 +182,14 @@ Buffer<float> missing_volume(const Lattice<T>& lattice, const SeparateOptions& o
   const std::array<TallyCases, 2> cases = make_tally_cases(options.scheme, separation.walls);
   std::vector<std::int64_t> units(fans.size(), 0);
   VolumeTally tally = {surface, fans, cases, index_of(lattice.to_space, {0, 0, 0}), {}, units};
+  // The difference of two indices has few digits if the way between them is much shorter than a
+  // step.
+  const double mm = unit_mm(lattice.to_space);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Point unit = {0, 0, 0};
-    unit[axis] = 1;
+    unit[axis] = mm;
     tally.axes[axis] = minus(index_of(lattice.to_space, unit), tally.origin);
+    for (double& part : tally.axes[axis]) part /= mm;
   }
   write_pass(separation, kSlotPlaces, context, surface.mesh, tally);
   for (std::size_t fan = 0; fan < units.size(); ++fan) {

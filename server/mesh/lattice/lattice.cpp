@@ -1,5 +1,8 @@
 #include "server/mesh/lattice/lattice.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "server/mesh/points.h"
 
 namespace isomesh::mesh {
@@ -13,6 +16,14 @@ LatticeToSpace lattice_to_space(const Geometry& geometry) {
                       geometry.direction[6 + axis] * length};
   };
   return {geometry.origin, column(0), column(1), column(2)};
+}
+
+double unit_mm(const LatticeToSpace& to_space) {
+  constexpr double kExponents = 16;
+  const auto length = [](const Point& step) { return std::hypot(step[0], step[1], step[2]); };
+  const double longest =
+      std::max({length(to_space.step_x), length(to_space.step_y), length(to_space.step_z)});
+  return std::exp2(kExponents * std::round(std::log2(longest) / kExponents));
 }
 
 std::array<double, 3> index_of(const LatticeToSpace& to_space, const std::array<double, 3>& point) {

@@ -143,7 +143,7 @@ Displacements take_over(const WallShape& shape, const LatticeToSpace& to_space, 
   return all;
 }
 
-std::vector<float> in_cubic_millimetres(const Buffer<float>& voxels, const WallShape& shape) {
+std::vector<float> volumes_in(const WallShape& shape, const Buffer<float>& voxels) {
   const Lanes spacing = shape.spacing();
   const float voxel = std::abs(spacing[0] * spacing[1] * spacing[2]);
   std::vector<float> volumes(voxels.begin(), voxels.end());
@@ -166,8 +166,8 @@ SmoothingEffect remove_stairs(const Lattice<T>& lattice, const SeparateOptions& 
   if (surface.mesh.positions.size() == 0) return effect;
   WallShape shape(surface, lattice.dims, lattice.to_space, options.close, quiet);
   report(0.2);
-  const std::vector<float> missing = in_cubic_millimetres(
-      missing_volume(lattice, options, count, shape.fans(), quiet, surface), shape);
+  const std::vector<float> missing =
+      volumes_in(shape, missing_volume(lattice, options, count, shape.fans(), quiet, surface));
   report(0.3);
   Remover(missing, quiet, shape).run();
   report(0.9);

@@ -89,7 +89,7 @@ std::vector<float> VolumeKeeper::diffused(std::vector<float> values, Way way) co
   return sum;
 }
 
-// Along the normals, which are found too, in millimetres.
+// Along the normals, which are found too.
 std::vector<float> VolumeKeeper::offsets(const WallShape& shape,
                                          std::vector<Lanes>& normals) const {
   constexpr float kLeastRoom = 0.02F;  // of the area

@@ -13,7 +13,7 @@ namespace isomesh::mesh {
 // the offsets times the areas add up to the missing volume.
 class VolumeKeeper {
  public:
-  // `missing`: by fan, what the wall's back lacks at the start, in cubic millimetres. `series`: how
+  // `missing`: by fan, what the wall's back lacks at the start, in the shape's unit. `series`: how
   // far it is spread. All have to outlive this.
   VolumeKeeper(const WallShape& shape, const Mobility& mobility, const std::vector<float>& missing,
                const std::vector<float>& series, const Context& context);

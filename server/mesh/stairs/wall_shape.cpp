@@ -19,9 +19,10 @@ WallShape::WallShape(const SeparatingSurface& surface, const Dims& dims,
 void WallShape::place(const SeparatingSurface& surface, const Dims& dims,
                       const LatticeToSpace& to_space, const Context& context) {
   const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
+  const double unit = unit_mm(to_space);
   for (int axis = 0; axis < 3; ++axis) {
     const Point& step = steps[static_cast<std::size_t>(axis)];
-    spacing_[axis] = static_cast<float>(std::sqrt(dot(step, step)));
+    spacing_[axis] = static_cast<float>(std::sqrt(dot(step, step)) / unit);
   }
   largest_spacing_ = std::max({spacing_[0], spacing_[1], spacing_[2]});
   smallest_spacing_ = std::min({spacing_[0], spacing_[1], spacing_[2]});

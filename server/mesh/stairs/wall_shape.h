@@ -32,8 +32,8 @@ inline Lanes cross(Lanes a, Lanes b) {
 
 inline float length(Lanes a) { return std::sqrt(dot(a, a)); }
 
-// Places are in millimetres along the lattice's axes, as if those were orthogonal. Threads may read
-// it while none writes.
+// Places are along the lattice's axes, as if those were orthogonal, in one unit near the steps
+// (unit_mm): walls multiply lengths in single precision. Threads may read it while none writes.
 class WallShape {
  public:
   // `surface` as extracted; `closed` as SeparateOptions says.

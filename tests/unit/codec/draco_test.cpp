@@ -1,5 +1,8 @@
 // Our own encoder of Draco streams, held against libdraco's decoder.
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -102,6 +105,78 @@ TEST(OwnDraco, EncodesNoise) {
                           {.iso = 0.3 + 0.1 * static_cast<double>(seed), .close = close});
       expect_ours(mesh);
     }
+  }
+}
+
+// A mesh of that length, beside the origin.
+mesh::Mesh of_length(double length) {
+  mesh::Mesh mesh = surface_in(test::sphere({8, 7, 6}, 4.7), {16, 14, 12}, false);
+  for (mesh::Vec3& position : mesh.positions) {
+    for (float& coordinate : position) {
+      coordinate = static_cast<float>((coordinate - 2.1) * length / 9.4);
+    }
+  }
+  return mesh;
+}
+
+// libdraco keeps its options as text.
+TEST(OwnDraco, AndLibdracoDecodeToTheSameBits) {
+  for (const double length : {1e-32, 1e-20, 1e-6, 1e-3, 0.05, 1.0, 100.0, 1e9}) {
+    SCOPED_TRACE(length);
+    const mesh::Mesh mesh = of_length(length);
+    const Grid grid = grid_of(mesh, kBits);
+    std::vector<mesh::Vec3> expected;
+    double farthest = 0;
+    for (const mesh::Vec3& position : mesh.positions) {
+      mesh::Vec3& decoded = expected.emplace_back();
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        decoded[axis] = grid.decoded(position[axis], axis);
+        farthest = std::max(farthest, std::abs(double{decoded[axis]} - position[axis]));
+      }
+    }
+    EXPECT_LE(farthest, 0.52 * length / ((1 << kBits) - 1));
+    std::ranges::sort(expected);
+    for (const int speed : {0, 3, 7, 10}) {
+      SCOPED_TRACE(speed);
+      test::DecodedMesh decoded =
+          decode_in_process(test::encoded(mesh, MeshFormat::kDrc, DracoParameters{kBits, speed}));
+      std::ranges::sort(decoded.points);
+      EXPECT_TRUE(std::ranges::equal(decoded.points, expected));
+    }
+    EXPECT_TRUE(ours(mesh));
+  }
+}
+
+TEST(OwnDraco, GridsOfUsualSizesHaveSixDecimals) {
+  const Grid grid = grid_of(mesh_of({{0.1234567F, -3, 2}, {1, 1, 1}}, {}), kBits);
+  EXPECT_EQ(grid.low, (mesh::Vec3{0.123457F, -3, 1}));
+  EXPECT_EQ(grid.side, 4.000001F);
+  EXPECT_EQ(range_from_zero(0.1234567F, 12), 0.123457F);
+  EXPECT_EQ(range_from_zero(1.2345e-7F, 12), 1.2345e-7F);
+  EXPECT_EQ(range_from_zero(0, 12), 1);
+}
+
+TEST(OwnDraco, AGridOfOnePointHasSteps) {
+  for (const int bits : {1, 14, 30}) {
+    const Grid grid = grid_of(mesh_of({{1e-40F, 7, -1e6F}}, {}), bits);
+    EXPECT_TRUE(std::isnormal(grid.side / static_cast<float>((1 << bits) - 1)));
+    EXPECT_TRUE(std::isfinite(static_cast<float>((1 << bits) - 1) / grid.side));
+    EXPECT_EQ(grid.decoded(7, 1), 7);
+  }
+}
+
+TEST(OwnDraco, NormalsWithoutADirectionAreSomeDirection) {
+  const mesh::Mesh mesh = of_length(1);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const std::vector<mesh::Vec3> normals(mesh.positions.size(), {kInfinity, 0, -kInfinity});
+  Surface surface = surface_of(mesh);
+  surface.normals = normals;
+  const auto encoded = Encoder().encode(surface, grid_of(mesh, kBits), Threads::kOne, {});
+  ASSERT_TRUE(encoded);
+  const auto attributes = test::attributes_in_process(text_of(*encoded));
+  ASSERT_EQ(attributes.size(), 2U);
+  for (std::size_t i = 0; i < attributes[1].size(); i += 3) {
+    EXPECT_NEAR(std::hypot(attributes[1][i], attributes[1][i + 1], attributes[1][i + 2]), 1, 0.01);
   }
 }
 

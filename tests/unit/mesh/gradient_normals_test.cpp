@@ -92,5 +92,33 @@ TEST(GradientNormals, AreThoseOfTrianglesWhereSamplesHaveNoDirection) {
   }
 }
 
+Buffer<Vec3> normals_of_a_ball(double scale) {
+  const auto volume =
+      test::sample<double>(test::scaled(test::sphere({10, 10, 10}, 7.3), scale, 0), {21, 21, 21});
+  Mesh mesh = test::extracted(volume, {});
+  set_gradient_normals(volume.lattice(), {}, mesh);
+  Buffer<Vec3> normals;
+  vertex_normals(mesh, {}, normals);
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const Point outward = minus(to_point(mesh.positions[v]), Point{10, 10, 10});
+    EXPECT_GT(cosine(normals[v], outward), std::cos(8 * std::numbers::pi / 180));
+  }
+  return normals;
+}
+
+TEST(GradientNormals, AreTheSameForSamplesTimesAPowerOfTwo) {
+  const Buffer<Vec3> normals = normals_of_a_ball(1);
+  for (const double scale : {0x1p-1000, 0x1p-560, 0x1p-500, 0x1p500, 0x1p1019}) {
+    EXPECT_TRUE(std::ranges::equal(normals, normals_of_a_ball(scale))) << scale;
+  }
+}
+
+TEST(GradientNormals, OfSamplesThatAreHardlyNumbersPointFromTheCentre) {
+  for (const double scale : {1e-322, 1e-170, 1e-162, 1e300}) {
+    SCOPED_TRACE(scale);
+    normals_of_a_ball(scale);
+  }
+}
+
 }  // namespace
 }  // namespace isomesh::mesh

@@ -93,5 +93,23 @@ TEST(Nearness, TakesStepsOfOneByteWhereValuesAreBytes) {
   EXPECT_EQ(Nearness<std::uint8_t>(60 + 1e-11, false).bytes(), 4);
 }
 
+TEST(Nearness, OrdersNumbersThatSinglePrecisionDoesNotHold) {
+  for (const double scale :
+       {0x1p-1040, 0x1p-400, 0x1p-130, 0x1p-50, 1.0, 0x1p60, 0x1p200, 0x1p1022}) {
+    SCOPED_TRACE(scale);
+    const std::vector<double> samples = {-3 * scale, 1.5 * scale, 2 * scale};
+    const double power = power_for(samples.data(), samples.size(), 0);
+    const Nearness<double> nearness(0, false, power);
+    EXPECT_LT(nearness.of_value(samples[1]), nearness.of_value(samples[2]));
+    EXPECT_LT(nearness.of_value(samples[2]), nearness.of_value(samples[0]));
+    EXPECT_EQ(power == 1, scale >= 0x1p-50 && scale <= 0x1p60);
+  }
+  const std::vector<double> widest = {-1.7e308, 1.2e308};
+  const Nearness<double> nearness(-1e308, false, power_for(widest.data(), 2, -1e308));
+  EXPECT_LT(nearness.of_value(widest[0]), nearness.of_value(widest[1]));
+  const std::vector<double> equal = {7, 7};
+  EXPECT_EQ(power_for(equal.data(), equal.size(), 7), 1);
+}
+
 }  // namespace
 }  // namespace isomesh::mesh

@@ -134,6 +134,19 @@ TEST_F(SliceTest, TheWindowIsLinearBetweenBlackAndWhite) {
               ElementsAre(0, 0, 1, 128, 254, 255, 0, 255));
 }
 
+TEST_F(SliceTest, TheWindowMayBeAsNarrowOrWideAsNumbersAre) {
+  CanonicalHeader header;
+  header.dims = {3, 1, 1};
+  header.type = SampleType::kFloat64;
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  const auto narrow = volume_of(header, std::vector<double>{3 * kLeast, 4 * kLeast, 5 * kLeast});
+  EXPECT_THAT(picture(narrow, {Axis::kZ, 0, {3 * kLeast, 5 * kLeast}}).pixels,
+              ElementsAre(0, 128, 255));
+  constexpr double kMost = std::numeric_limits<double>::max();
+  const auto wide = volume_of(header, std::vector<double>{-kMost, 0, kMost});
+  EXPECT_THAT(picture(wide, {Axis::kZ, 0, {-kMost, kMost}}).pixels, ElementsAre(0, 128, 255));
+}
+
 TEST_F(SliceTest, AConstantVolumeIsBlackInItsRange) {
   CanonicalHeader header;
   header.dims = {2, 2, 1};
