@@ -1,5 +1,6 @@
 #include "server/net/incoming_body.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/text.h"
@@ -26,13 +27,32 @@ IncomingBody::IncomingBody(Connection& connection, const BodyLimits& limits,
       limits_(limits),
       stopping_(stopping),
       waits_for_invitation_(begin_.empty() && asks_first(connection.head)),
-      received_(begin_.size()) {}
+      received_(begin_.size()),
+      left_(framing_.length.value_or(0)) {}
 
 std::optional<std::size_t> IncomingBody::read(std::span<char> target) {
+  if (!framing_.chunked) {
+    if (left_ == 0) return 0;
+    const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(left_, target.size()));
+    const auto count = receive(target.first(most));
+    left_ -= count.value_or(0);
+    return count;
+  }
+  while (!chunks_.is_over() && !was_malformed_) {
+    const auto count = receive(target);
+    if (!count) return std::nullopt;
+    const auto data = chunks_.decode(target.first(*count));
+    was_malformed_ = !data;
+    if (data.value_or(0) > 0) return data;
+  }
+  return was_malformed_ ? std::nullopt : std::optional<std::size_t>(0);
+}
+
+// Waits for bytes as sent, of which there are some in what it returns.
+std::optional<std::size_t> IncomingBody::receive(std::span<char> target) {
   if (begin_read_ < begin_.size()) {
     const std::size_t count = begin_.copy(target.data(), target.size(), begin_read_);
     begin_read_ += count;
-    if (!is_well_formed({target.data(), count})) return std::nullopt;
     return count;
   }
   if (std::exchange(waits_for_invitation_, false)) invite();
@@ -41,7 +61,7 @@ std::optional<std::size_t> IncomingBody::read(std::span<char> target) {
     const Transfer transfer = stream_->read(target);
     if (transfer.state == Transfer::State::kClosed) {
       was_cut_ = true;
-      return 0;
+      return std::nullopt;
     }
     if (transfer.state == Transfer::State::kDone) {
       received_ += transfer.bytes;
@@ -50,18 +70,12 @@ std::optional<std::size_t> IncomingBody::read(std::span<char> target) {
         since_deadline_ = 0;
         deadline_ = Clock::now() + limits_.patience;
       }
-      if (!is_well_formed({target.data(), transfer.bytes})) return std::nullopt;
       return transfer.bytes;
     }
     was_too_slow_ = Clock::now() >= *deadline_;
     if (stopping_ || was_too_slow_) return std::nullopt;
     wait_for(*stream_, transfer.state, kStopMilliseconds);
   }
-}
-
-bool IncomingBody::is_well_formed(std::string_view bytes) {
-  if (framing_.chunked && !chunks_.scan(bytes)) was_malformed_ = true;
-  return !was_malformed_;
 }
 
 // The first bytes in this direction always fit the socket's buffer. If they were lost, the client

@@ -13,7 +13,7 @@
 
 #include "server/net/acceptor.h"
 #include "server/net/byte_stream.h"
-#include "server/net/chunk_scanner.h"
+#include "server/net/chunk_decoder.h"
 
 namespace isomesh::net {
 
@@ -23,8 +23,8 @@ struct BodyLimits {
   std::chrono::milliseconds patience{15'000};
 };
 
-// The bytes after a request's head, as sent: a chunked body includes the sizes of its chunks. Owns
-// the connection. Not thread safe, but may move between threads.
+// The body after a request's head, without the framing of its chunks and without trailer fields.
+// Owns the connection. Not thread safe, but may move between threads.
 class IncomingBody {
  public:
   static constexpr std::size_t kLeastBytes = 64 * 1024;
@@ -32,16 +32,18 @@ class IncomingBody {
   // Reading ends when `stopping` becomes true. Does not refer to the connection's head later.
   IncomingBody(Connection& connection, const BodyLimits& limits, const std::atomic<bool>& stopping);
 
-  // Waits for bytes and returns their number: 0 if the client has closed, empty if they come too
-  // slowly, if chunks are malformed, or if the service stops. Invites the body of a client that
-  // sent Expect: 100-continue.
+  // Waits for bytes and returns their number: 0 at the end of the body, empty if the client closes
+  // before, if they come too slowly, if chunks are malformed, or if the service stops. Invites the
+  // body of a client that sent Expect: 100-continue.
   std::optional<std::size_t> read(std::span<char> target);
 
-  // Bytes received, including those that came with the head.
+  // Bytes received, including those that came with the head, and the framing of chunks.
   std::uint64_t received() const { return received_; }
 
-  // True if all bytes have arrived; never for a chunked body, whose end is not checked here.
-  bool is_whole() const { return !framing_.chunked && received_ >= framing_.length.value_or(0); }
+  // True if all bytes have arrived; for a chunked body only once its end was read.
+  bool is_whole() const {
+    return framing_.chunked ? chunks_.is_over() : received_ >= framing_.length.value_or(0);
+  }
 
   bool was_malformed() const { return was_malformed_; }
 
@@ -58,7 +60,7 @@ class IncomingBody {
 
  private:
   void invite();
-  bool is_well_formed(std::string_view bytes);
+  std::optional<std::size_t> receive(std::span<char> target);
 
   std::unique_ptr<ByteStream> stream_;
   const BodyFraming framing_;
@@ -71,7 +73,8 @@ class IncomingBody {
   std::size_t since_deadline_ = 0;
   std::optional<std::chrono::steady_clock::time_point> deadline_;  // set by the first read
   bool was_too_slow_ = false;
-  ChunkScanner chunks_;
+  std::uint64_t left_ = 0;  // bytes of a body of known length that were not read
+  ChunkDecoder chunks_;
   bool was_malformed_ = false;
   bool was_cut_ = false;
 };

@@ -15,15 +15,10 @@ Error malformed(const std::string& what) {
   return {ErrorCode::kInvalidParameter, "the request is malformed: " + what};
 }
 
-// A token: method or header name (RFC 9110, 5.6.2).
+// A method or the name of a header.
 bool is_token(std::string_view text) {
-  constexpr std::string_view kOthers = "!#$%&'*+-.^_`|~";
-  return !text.empty() && std::ranges::all_of(text, [&](char c) {
-    return is_letter_or_digit(c) || kOthers.find(c) != std::string_view::npos;
-  });
+  return !text.empty() && std::ranges::all_of(text, is_token_character);
 }
-
-bool is_control(char c) { return (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F; }
 
 // Absolute targets are for proxies, but servers must accept them.
 std::string path_and_query(std::string_view target) {
@@ -85,6 +80,13 @@ void check_host(const RequestHead& head) {
 bool equal_names(std::string_view a, std::string_view b) {
   return a.size() == b.size() && ::strncasecmp(a.data(), b.data(), a.size()) == 0;
 }
+
+bool is_token_character(char c) {
+  constexpr std::string_view kOthers = "!#$%&'*+-.^_`|~";
+  return is_letter_or_digit(c) || kOthers.find(c) != std::string_view::npos;
+}
+
+bool is_control(char c) { return (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F; }
 
 const std::string* find_header(const Headers& headers, std::string_view name) {
   const auto found = std::ranges::find_if(

@@ -24,6 +24,12 @@ bool equal_names(std::string_view a, std::string_view b);
 // The value of the first header of that name; null if missing.
 const std::string* find_header(const Headers& headers, std::string_view name);
 
+// A character of a token, such as a header's name (RFC 9110, 5.6.2).
+bool is_token_character(char c);
+
+// A character that no header's value may have.
+bool is_control(char c);
+
 struct RequestHead {
   std::string method;
   std::string target;   // path and query

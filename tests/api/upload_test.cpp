@@ -97,6 +97,30 @@ TEST_F(UploadTest, ComesChunkedAsWell) {
   EXPECT_EQ(post(sphere_.bytes).status, 200);
 }
 
+TEST_F(UploadTest, ComesWithTrailers) {
+  const std::string chunks = chunked(sphere_.bytes, 1000);
+  const std::string body = chunks.substr(0, chunks.size() - 2) + "X-Checksum: abc\r\n\r\n";
+  const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
+                                                     " HTTP/1.1\r\nHost: localhost\r\nTrailer: "
+                                                     "X-Checksum\r\nTransfer-Encoding: "
+                                                     "chunked\r\n\r\n" +
+                                                     body);
+  EXPECT_EQ(answer.status, 201) << answer.body;
+  EXPECT_EQ(post(sphere_.bytes).status, 200);
+}
+
+// Also without the line break after the form.
+TEST_F(UploadTest, AFormComesChunkedAsWell) {
+  const std::string whole = form("file", sphere_.bytes) + kFormEnd;
+  for (const std::string& body : {whole, whole.substr(0, whole.rfind("\r\n"))}) {
+    const Answer answer =
+        answer_to(daemon_.url(), "POST " + target_ + " HTTP/1.1\r\nHost: localhost\r\n" +
+                                     kForm.front().first + ": " + kForm.front().second +
+                                     "\r\nTransfer-Encoding: chunked\r\n\r\n" + chunked(body, 999));
+    EXPECT_LT(answer.status, 300) << answer.body;
+  }
+}
+
 TEST_F(UploadTest, ComesAsAForm) {
   const Answer answer = post(form("file", sphere_.bytes) + kFormEnd, kForm);
   ASSERT_EQ(answer.status, 201) << answer.body;

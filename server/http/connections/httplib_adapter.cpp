@@ -1,11 +1,8 @@
 #include "server/http/connections/httplib_adapter.h"
 
-#include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -31,33 +28,22 @@ std::string with_one_question_mark(const std::string& target) {
   return result;
 }
 
-// The headers by which the library reads a body and compresses a response. It gets no others: it
-// would answer Expect before the handler knows whether it wants the body, and it reads ranges and
-// keeps connections in ways of its own.
-bool is_for_library(std::string_view name) {
-  constexpr std::array<std::string_view, 5> kNames = {
-      "Content-Type", "Content-Length", "Content-Encoding", "Transfer-Encoding", "Accept-Encoding"};
-  return std::ranges::any_of(kNames,
-                             [&](std::string_view each) { return net::equal_names(each, name); });
-}
-
 // The library reads a form only if a line break follows its last boundary, which RFC 2046, 5.1.1
-// does not require. The break is added to a form whose length is known; what follows the last
-// boundary is ignored, so a second break does not matter.
+// does not require. The break is added; what follows the last boundary is ignored, so a second
+// break does not matter.
 constexpr std::string_view kFormEnd = "\r\n";
 
-std::optional<std::uint64_t> form_bytes(const Request& request) {
-  return request.is_form() ? request.content_length : std::nullopt;
-}
+constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
+
+constexpr const char* kAcceptEncoding = "Accept-Encoding";
 
 // The library's view of a connection. It reads a head without headers, because it decodes percent
-// signs in headers and is too lenient, and then the body. Its output is collected.
+// signs in headers and is too lenient, and then the body of a form, up to its end: it has no
+// length, because it was decoded from its chunks. The output is collected.
 class HttplibStream : public httplib::Stream {
  public:
   HttplibStream(const Request& request, net::IncomingBody& body)
-      : head_("GET " + with_one_question_mark(request.target) + " HTTP/1.1\r\n\r\n"),
-        form_left_(form_bytes(request)),
-        body_(body) {}
+      : head_("GET " + with_one_question_mark(request.target) + " HTTP/1.1\r\n\r\n"), body_(body) {}
 
   ssize_t read(char* target, std::size_t size) override {
     if (head_read_ < head_.size()) {
@@ -65,7 +51,7 @@ class HttplibStream : public httplib::Stream {
       head_read_ += count;
       return static_cast<ssize_t>(count);
     }
-    if (ahead_read_ == ahead_.size() && !read_ahead()) return -1;
+    if (ahead_read_ == ahead_.size() && !is_over_ && !read_ahead()) return -1;
     const std::size_t count = ahead_.copy(target, size, ahead_read_);
     ahead_read_ += count;
     return static_cast<ssize_t>(count);
@@ -88,40 +74,44 @@ class HttplibStream : public httplib::Stream {
  private:
   // Buffers the body: the library reads in pieces too small for system calls.
   bool read_ahead() {
-    constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
     ahead_read_ = 0;
-    if (form_left_ == 0U) {
-      ahead_ = kFormEnd;
-      form_left_.reset();
-      return true;
-    }
     ahead_.resize(kPieceBytes);
     const auto count = body_.read(ahead_);
     ahead_.resize(count.value_or(0));
-    if (form_left_) *form_left_ -= std::min<std::uint64_t>(*form_left_, ahead_.size());
+    is_over_ = count == 0U;
+    if (is_over_) ahead_ = kFormEnd;
     return count.has_value();
   }
 
   const std::string head_;
   std::size_t head_read_ = 0;
-  std::optional<std::uint64_t> form_left_;  // bytes of a form before kFormEnd
-  std::string ahead_;                       // buffered bytes of the body
+  std::string ahead_;  // buffered bytes of the body
   std::size_t ahead_read_ = 0;
+  bool is_over_ = false;
   net::IncomingBody& body_;
   std::string written_;
 };
 
 class HttplibBodyReader : public BodyReader {
  public:
-  HttplibBodyReader(const httplib::ContentReader& reader, const net::IncomingBody& body)
+  HttplibBodyReader(const httplib::ContentReader& reader, net::IncomingBody& body)
       : reader_(reader), body_(body) {}
 
-  bool read(const TakePiece& take) override { return reader_(receiver_of(take)); }
+  bool read(const TakePiece& take) override {
+    std::string piece(kPieceBytes, '\0');
+    while (true) {
+      const auto count = body_.read(piece);
+      if (!count || *count == 0) return count.has_value();
+      if (!take(std::string_view(piece).substr(0, *count))) return false;
+    }
+  }
 
   bool read_form(const BeginField& begin, const TakePiece& take) override {
     return reader_(
         [&](const httplib::MultipartFormData& field) { return begin(field.name, field.filename); },
-        receiver_of(take));
+        [&](const char* bytes, std::size_t size) {
+          return take({bytes, size});
+        });
   }
 
   bool is_whole() const override { return body_.is_whole(); }
@@ -130,12 +120,8 @@ class HttplibBodyReader : public BodyReader {
   bool was_cut() const override { return body_.was_cut(); }
 
  private:
-  static httplib::ContentReceiver receiver_of(const TakePiece& take) {
-    return [&take](const char* bytes, std::size_t size) { return take({bytes, size}); };
-  }
-
   const httplib::ContentReader& reader_;
-  const net::IncomingBody& body_;
+  net::IncomingBody& body_;
 };
 
 // The library's server for one request: its callbacks have no argument to distinguish requests.
@@ -191,28 +177,24 @@ class HttplibServer : public httplib::Server {
 
   bool takes_body() const { return request_.method == "POST" || request_.method == "PATCH"; }
 
-  // Takes the decoded path and query from the library, and gives it the headers it needs.
+  // Takes the decoded path and query from the library, and gives it the headers it needs: it would
+  // answer Expect before the handler knows whether it wants the body, and it inflates bodies, reads
+  // ranges and keeps connections in ways of its own.
   void exchange_heads(httplib::Request& in) {
     in_ = &in;
     request_.path = std::move(in.path);
     request_.query.assign(in.params.begin(), in.params.end());
     in.path = "/";
-    in.method = request_.method;
+    if (takes_body()) in.method = request_.method;
     in.headers.clear();
     for (const auto& [name, value] : request_.headers) {
-      if (is_for_library(name)) in.headers.emplace(name, value);
+      if (net::equal_names(name, kAcceptEncoding)) in.headers.emplace(kAcceptEncoding, value);
     }
-    if (request_.is_form()) describe_form(in);
-  }
-
-  // The library knows the type of a form in lower case only, with no parameter but the boundary.
-  void describe_form(httplib::Request& in) {
-    const std::string boundary = header_parameter(request_.header("Content-Type"), "boundary");
-    in.headers.erase("Content-Type");
-    in.headers.emplace("Content-Type", "multipart/form-data; boundary=" + boundary);
-    if (const auto bytes = form_bytes(request_)) {
-      in.headers.erase("Content-Length");
-      in.headers.emplace("Content-Length", std::to_string(*bytes + kFormEnd.size()));
+    // The library knows the type of a form in lower case only, with no parameter but the boundary.
+    if (request_.is_form()) {
+      in.headers.emplace("Content-Type",
+                         "multipart/form-data; boundary=" +
+                             header_parameter(request_.header("Content-Type"), "boundary"));
     }
   }
 
@@ -230,7 +212,7 @@ class HttplibServer : public httplib::Server {
     for (const auto& [name, value] : response_.headers) out.set_header(name, value);
     if (response_.stream) {
       // The sender does not compress, so the library must not say so in the head.
-      if (in_ != nullptr) in_->headers.erase("Accept-Encoding");
+      if (in_ != nullptr) in_->headers.erase(kAcceptEncoding);
       announce(*response_.stream, out);
     } else if (!response_.body.empty()) {
       out.set_content(std::move(response_.body), response_.media_type);
@@ -263,14 +245,20 @@ class HttplibServer : public httplib::Server {
 
 }  // namespace
 
+// The library answers HEAD as GET, so that both have the same headers; the body is left out here.
 WrittenResponse run_through_httplib(Request& request, net::IncomingBody& body, Response& response,
                                     const std::function<void()>& handle) {
+  constexpr std::string_view kHeadEnd = "\r\n\r\n";
   HttplibStream stream(request, body);
   HttplibServer(request, body, response, handle).run(stream);
-  if (request.method == "HEAD") response.stream.reset();
   WrittenResponse written{.bytes = stream.take_written()};
-  const std::size_t head_end = written.bytes.find("\r\n\r\n");
-  if (head_end != std::string::npos) written.body_bytes = written.bytes.size() - head_end - 4;
+  const std::size_t head_end = written.bytes.find(kHeadEnd);
+  const bool has_head_only = request.method == "HEAD";
+  if (has_head_only) response.stream.reset();
+  if (head_end != std::string::npos) {
+    if (has_head_only) written.bytes.resize(head_end + kHeadEnd.size());
+    written.body_bytes = written.bytes.size() - head_end - kHeadEnd.size();
+  }
   if (response.stream) written.body_bytes += response.stream->length;
   return written;
 }

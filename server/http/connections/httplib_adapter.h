@@ -1,6 +1,6 @@
-// The only user of cpp-httplib. The library decodes paths and queries, reads chunked bodies and
-// forms, and compresses and writes responses (docs/decisions/own-connections.md). It does not
-// listen or read heads, and knows one route; Router finds the request's route.
+// The only user of cpp-httplib. The library decodes paths and queries, reads forms, and compresses
+// and writes responses (docs/decisions/own-connections.md). It does not listen or read heads and
+// other bodies, and knows one route; Router finds the request's route.
 #pragma once
 
 #include <cstdint>

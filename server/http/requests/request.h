@@ -66,8 +66,8 @@ class BodyReader {
   virtual bool read(const TakePiece& take) = 0;
   virtual bool read_form(const BeginField& begin, const TakePiece& take) = 0;
 
-  // True if the whole body has arrived, so that reading does not block. False for a chunked one,
-  // whose end is unknown.
+  // True if the whole body has arrived, so that reading does not block. False for a chunked one
+  // until its end was read.
   virtual bool is_whole() const = 0;
   // True if reading ended because the body arrived too slowly, or because its chunks are malformed.
   virtual bool was_too_slow() const = 0;

@@ -19,7 +19,7 @@
 namespace isomesh::http {
 namespace {
 
-// The library would inflate an encoded body beyond all limits.
+// Inflated bodies would need limits of their own.
 void refuse_encoded(const Request& request) {
   const std::string_view encoding = request.header("Content-Encoding");
   if (!encoding.empty() && encoding != "identity") {
@@ -49,7 +49,8 @@ Error incomplete(const BodyReader& body, bool is_form) {
     return {ErrorCode::kRequestTimeout, "the body arrived too slowly"};
   }
   if (body.was_malformed()) {
-    return invalid_parameter("Transfer-Encoding", "the body is not in chunks");
+    return invalid_parameter("Transfer-Encoding",
+                             "the body is not in chunks, or the fields after it are malformed");
   }
   if (is_form && !body.was_cut()) {
     return {ErrorCode::kInvalidParameter,

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/http/connections_fixture.h"
+#include "tests/unit/net/chunk_framings.h"
 
 namespace isomesh::http::fixture {
 namespace {
@@ -79,6 +80,43 @@ TEST_F(ConnectionsTest, ABodyComesInWhateverPieces) {
                                 chunked(std::string(5000, 'y'), 700))
                 .body,
             "whole 5000");
+}
+
+// From the connection to the handler, whichever way the request announces its body.
+TEST_F(ConnectionsTest, EveryFramingOfChunksIsReadOrRefused) {
+  open(options());
+  for (const auto& [bytes, data] : net::chunk_framings()) {
+    for (const std::string header : {"", "Trailer: X-Checksum\r\nTE: trailers\r\n"}) {
+      const Answer answer =
+          answer_to(url_, "POST /body HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n" +
+                              header + "\r\n" + bytes);
+      const std::string expected = data ? "whole " + std::to_string(data->size()) : "malformed";
+      EXPECT_THAT(answer.body, testing::StartsWith(expected)) << bytes.substr(0, 80);
+    }
+  }
+}
+
+TEST_F(ConnectionsTest, ChunksAreInvitedAsWell) {
+  open(options());
+  const Connection connection(url_);
+  connection.send(
+      "POST /body HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\nTransfer-Encoding: "
+      "chunked\r\n\r\n");
+  EXPECT_EQ(connection.receive_some(), "HTTP/1.1 100 Continue\r\n\r\n");
+  connection.send("3\r\nabc\r\n0\r\nX-Checksum: abc\r\n\r\n");
+  EXPECT_EQ(connection.receive().body, "whole 3");
+}
+
+// A client that closes its direction too early has not sent a whole body.
+TEST_F(ConnectionsTest, ChunksWithoutAnEndAreCut) {
+  open(options());
+  const std::string head = "POST /body HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n";
+  for (const std::string bytes : {"", "5\r\nhel", "5\r\nhello\r\n", "0\r\n", "0\r\nA: b\r\n"}) {
+    const Connection connection(url_);
+    connection.send(head + bytes);
+    connection.finish_sending();
+    EXPECT_THAT(connection.receive().body, testing::StartsWith("cut")) << bytes;
+  }
 }
 
 // The HTTP library would collect it, for as long as it comes.
