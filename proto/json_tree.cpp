@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "proto/json_text.h"
 
 namespace isomesh {
 
@@ -15,7 +16,7 @@ std::string dump(const Json& json) {
 JsonTree::JsonTree() : root_(std::make_unique<Json>()) {}
 
 JsonTree::JsonTree(std::string_view text)
-    : root_(std::make_unique<Json>(Json::parse(text, nullptr, false))) {
+    : root_(std::make_unique<Json>(parse_json<Json>(text, nullptr, false))) {
   if (root_->is_discarded()) throw Error(ErrorCode::kInternal, "is not JSON");
 }
 

@@ -4,6 +4,7 @@
 
 #include "base/text.h"
 #include "proto/json.h"
+#include "proto/json_text.h"
 #include "proto/json_values.h"
 #include "proto/order_fields.h"
 #include "proto/request_reader.h"
@@ -20,7 +21,7 @@ namespace {
 constexpr std::string_view kFormats = "formats";
 
 Json object_of(std::string_view text, const std::string& what) {
-  Json json = text.empty() ? Json::object() : Json::parse(text, nullptr, false);
+  Json json = text.empty() ? Json::object() : parse_json<Json>(text, nullptr, false);
   if (!json.is_object()) throw Error(ErrorCode::kInvalidParameter, what + " must be a JSON object");
   return json;
 }
@@ -118,7 +119,7 @@ std::vector<PacsStatus> pacs_from_json(std::string_view text) {
 
 std::string to_record(const OrderWork& work) { return json_values::to_text(work); }
 Order order_from_record(std::string_view text) {
-  Json record = Json::parse(text, nullptr, false);
+  Json record = parse_json<Json>(text, nullptr, false);
   const Json::json_pointer results("/results");
   if (!record.is_object() || !record.contains(results) || !record[results].is_array()) {
     return json_values::from_record<Order>(text);

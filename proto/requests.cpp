@@ -13,6 +13,7 @@
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
+#include "proto/json_text.h"
 #include "proto/request_reader.h"
 
 namespace isomesh {
@@ -150,7 +151,7 @@ class Flaws {
 // Converts a query's text to the JSON value that a body would have. Numbers may also be written in
 // ways that JSON does not allow, such as ".5".
 Json value_of(const std::string& text) {
-  const Json parsed = Json::parse(text, nullptr, false);
+  const auto parsed = parse_json<Json>(text, nullptr, false);
   if (parsed.is_number() || parsed.is_boolean()) return parsed;
   const auto number = parse_double(text);
   return number && std::isfinite(*number) ? Json(*number) : Json(text);
@@ -324,7 +325,7 @@ Json request_body(std::string_view body, RequestReader& reader) {
   const std::string text = without_half_pairs(body);
   Json json;
   try {
-    json = Json::parse(text, [&](int, Json::parse_event_t event, const Json& parsed) {
+    json = parse_json<Json>(text, [&](int, Json::parse_event_t event, const Json& parsed) {
       flaws.see(event, parsed);
       return true;
     });
@@ -385,7 +386,7 @@ JobParameters parse_job_parameters(const QueryParameters& query, VolumeIn volume
 }
 
 QueryParameters to_query(const JobParameters& parameters) {
-  const Json json = Json::parse(to_json(parameters));
+  const auto json = parse_json<Json>(to_json(parameters));
   QueryParameters query;
   for (const auto& [name, place] : query_names()) {
     const Json::json_pointer pointer = pointer_to(place.path);

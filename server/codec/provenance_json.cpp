@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/json.h"
+#include "proto/json_text.h"
 
 namespace isomesh::codec {
 
@@ -10,7 +11,7 @@ using Json = nlohmann::ordered_json;
 
 Json provenance_json(const Provenance& provenance) {
   Json parameters = {{"volume", provenance.volume}};
-  parameters.update(Json::parse(to_json(provenance.parameters)));
+  parameters.update(parse_json<Json>(to_json(provenance.parameters)));
   // A file does not depend on the job's other files.
   parameters.erase("formats");
   Json json = {{"parameters", parameters}};

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/error.h"
+#include "proto/json_text.h"
 #include "server/codec/decode/decoders.h"
 #include "server/mesh/parallel.h"
 
@@ -206,7 +207,7 @@ std::vector<Primitive> primitives_of(Bytes file) {
   const Chunks chunks = chunks_of(file);
   try {
     const auto* json = reinterpret_cast<const char*>(chunks.json.data());
-    const Json gltf = Json::parse(json, json + chunks.json.size());
+    const auto gltf = parse_json<Json>({json, chunks.json.size()});
     return Scene(gltf, chunks.binary).primitives();
   } catch (const Json::exception& error) {
     refuse_glb(std::string("its JSON is malformed: ") + error.what());

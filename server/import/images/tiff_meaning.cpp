@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "proto/json_text.h"
 #include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
 #include "server/import/source/source.h"
@@ -166,7 +167,7 @@ struct TifffileArray {
 std::optional<TifffileArray> tifffile_array(std::string_view description) {
   constexpr std::size_t kLongest = std::size_t{1} << 20;  // tifffile's are below 1 kB
   if (!description.starts_with('{') || description.size() > kLongest) return std::nullopt;
-  const auto document = nlohmann::json::parse(description, nullptr, false);
+  const auto document = parse_json<nlohmann::json>(description, nullptr, false);
   if (!document.is_object() || !document.contains("shape")) return std::nullopt;
   TifffileArray array;
   for (const auto& size : document["shape"]) {

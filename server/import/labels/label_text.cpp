@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/text.h"
+#include "proto/json_text.h"
 #include "proto/types.h"
 #include "server/import/labels/label_table.h"
 
@@ -87,7 +88,7 @@ std::vector<LabelEntry> entries_of(const Sorted& table, bool is_below_labels) {
 // or this one, as that member only:
 //   {"labels": {"background": 0, "spleen": 1}}                        nnU-Net's dataset.json
 std::vector<LabelEntry> labels_of_json(std::string_view text) {
-  const Sorted document = Sorted::parse(text, nullptr, false);
+  const auto document = parse_json<Sorted>(text, nullptr, false);
   if (document.is_discarded()) return {};
   const auto labels = document.find("labels");
   const bool has_labels = labels != document.end();

@@ -118,6 +118,7 @@ TEST(LabelText, OfOtherJsonIsNone) {
     EXPECT_THAT(labels_of_text(text), IsEmpty()) << text;
   }
   EXPECT_THAT(labels_of_text(std::string(1'000'000, '[')), IsEmpty());
+  EXPECT_THAT(labels_of_text(std::string("{\"1\": \"a\"}\0{\"2\": \"b\"}", 21)), IsEmpty());
   std::string many = "{";
   for (int at = 0; at < 65'536; ++at)
     many += (at == 0 ? "\"" : ",\"") + std::to_string(at) + "\":\"a\"";

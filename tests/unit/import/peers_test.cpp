@@ -140,6 +140,10 @@ TEST(Answer, ThatIsNoneIsRefused) {
         R"([{"0020000E": {"Value": ["../../secrets"]}}])"}) {
     EXPECT_EQ(test::code_thrown_by([&] { answer_of(text); }), ErrorCode::kPacsUnreachable) << text;
   }
+  const std::string nothing = "[]";
+  EXPECT_FALSE(test::code_thrown_by([&] { answer_of(nothing); }));
+  EXPECT_EQ(test::code_thrown_by([&] { answer_of(nothing + '\0' + nothing); }),
+            ErrorCode::kPacsUnreachable);
   // As deep as it may be, it is refused like the others and ends nothing.
   EXPECT_TRUE(test::code_thrown_by([] { answer_of(std::string(2'000'000, '[')); }));
 }

@@ -159,6 +159,27 @@ TEST(Layers, OneFileOfTheServerKnowsTheHttpLibrary) {
   EXPECT_EQ(users, std::vector<std::string>{"server/http/connections/httplib_adapter.cpp"});
 }
 
+// The parser ends at a NUL byte; see there.
+TEST(Layers, OneFileOfTheProductParsesJson) {
+  const fs::path root = ISOMESH_SOURCE_DIR;
+  std::vector<std::string> users;
+  for (const std::string top : {"base", "proto", "server", "client"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      const fs::path& path = entry.path();
+      if (path.extension() != ".h" && path.extension() != ".cpp") continue;
+      std::ifstream file(path);
+      const std::string text(std::istreambuf_iterator<char>(file), {});
+      if (text.find("nlohmann") == std::string::npos) continue;
+      for (const std::string_view parsing :
+           {"Json::parse(", "json::parse(", "Value::parse(", "Sorted::parse(", "::accept(",
+            "sax_parse(", "\"_json"}) {
+        if (text.find(parsing) != std::string::npos) users.push_back(fs::relative(path, root));
+      }
+    }
+  }
+  EXPECT_EQ(users, std::vector<std::string>{"proto/json_text.h"});
+}
+
 // So that it can be left out: see ISOMESH_HOSPITAL.
 TEST(Layers, OneFileKnowsTheHospital) {
   std::vector<std::string> users;

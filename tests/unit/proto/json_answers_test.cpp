@@ -261,6 +261,13 @@ TEST(AnswerJson, ListsThatAreNotListsAreRefused) {
   }
 }
 
+TEST(AnswerJson, NulByteEndsNone) {
+  const std::string text = R"({"jobs": []})";
+  EXPECT_TRUE(jobs_from_json(text).empty());
+  EXPECT_EQ(code_thrown_by([&] { jobs_from_json(text + '\0'); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([&] { jobs_from_json(text + '\0' + text); }), ErrorCode::kInternal);
+}
+
 TEST(AnswerJson, NestingWithoutEndIsReadWithoutRecursion) {
   const std::string deep =
       "{\"later\": " + std::string(200'000, '[') + std::string(200'000, ']') + "}";

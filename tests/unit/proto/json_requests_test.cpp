@@ -427,6 +427,19 @@ TEST(JobBody, RefusesHalfOfASurrogatePairByItsMember) {
 }
 
 // Text that the parser cannot read stays unreadable.
+// The JSON library takes one for the end of the text.
+TEST(JobBody, RefusesNulBytesAnywhere) {
+  const std::string body = body_with(R"("label_names": {"3": "liver"})");
+  for (std::size_t at = 0; at <= body.size(); ++at) {
+    for (const std::string& more : {std::string(1, '\0'), std::string("\0{\"evil\": 1}", 12)}) {
+      const std::string with_nul = body.substr(0, at) + more + body.substr(at);
+      EXPECT_EQ(code_thrown_by([&] { parse_job_parameters(with_nul); }),
+                ErrorCode::kInvalidParameter)
+          << at;
+    }
+  }
+}
+
 TEST(JobBody, RefusesBrokenEscapes) {
   for (const std::string broken : {R"(\u)", R"(\ud8)", R"(\ud80)", R"(\ud80g)", R"(\)"}) {
     const auto error = thrown_by([&] { parse_job_parameters(R"({"volume": ")" + broken + "\"}"); });

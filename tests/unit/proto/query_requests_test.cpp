@@ -52,7 +52,10 @@ TEST(JobQuery, RefusesByTheQuerysNames) {
 }
 
 TEST(JobQuery, RefusesAnIsoThatIsNoNumber) {
-  for (const std::string iso : {"", "abc", "nan", "inf", "1e999", "true", "[1]", "0x10", "1,5"}) {
+  for (const std::string& iso :
+       {std::string(), std::string("abc"), std::string("nan"), std::string("inf"),
+        std::string("1e999"), std::string("true"), std::string("[1]"), std::string("0x10"),
+        std::string("1,5"), std::string("5\0", 2), std::string("5\0x", 3)}) {
     EXPECT_THAT(query_faults(Query{{"iso", iso}}), ElementsAre("iso")) << iso;
   }
 }
