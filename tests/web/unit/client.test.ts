@@ -161,6 +161,26 @@ describe('a request', () => {
     await second.start();
     expect(error).toBeInstanceOf(ApiError);
     expect(error).toMatchObject({ status: 0, isUnreachable: true, cause: { code: 'ECONNREFUSED' } });
+    expect((error as ApiError).detail).toContain(`The server at ${address} did not respond. Check`);
+  });
+
+  it('of another page says that the server may not allow it, because the browser does not', async () => {
+    const { address } = first;
+    const detailOn = async (origin: string, server?: string): Promise<string> => {
+      vi.stubGlobal('location', { origin });
+      // As browsers do, whether the server is down or does not allow the page.
+      vi.stubGlobal('fetch', () => Promise.reject(new TypeError('Failed to fetch')));
+      const error = await rejectionOf(new Client({ server }).getVolume('a'));
+      vi.unstubAllGlobals();
+      expect(error).toMatchObject({ isUnreachable: true });
+      return (error as ApiError).detail;
+    };
+    const foreign = await detailOn('https://viewer.example', address);
+    expect(foreign).toContain(`The server at ${address} did not respond, or it does not allow pages of the origin https://viewer.example.`);
+    expect(foreign).toContain('isomeshd is running there with --cors-origin https://viewer.example,');
+    expect(await detailOn('null', address)).toContain("--cors-origin '*',");
+    expect(await detailOn(address, `${address}/`)).not.toContain('--cors-origin');
+    expect(await detailOn('https://viewer.example')).not.toContain('--cors-origin');
   });
 
   it('says so also if the connection breaks within a response', async () => {

@@ -43,7 +43,8 @@ export class Connection {
   // True while requests wait because the server is busy.
   readonly busy = new Signal<boolean>(false);
   private waiting = 0;
-  private readonly base: string;
+  // The address without a slash at its end, or empty for the server that the page comes from.
+  readonly base: string;
   private readonly retrySeconds: number;
 
   // An empty address stands for the server that the page comes from.
@@ -145,7 +146,7 @@ export class Connection {
     } catch (error) {
       // The caller ended the request. This says nothing about the server.
       if (signal?.aborted) throw signal.reason;
-      const failure = asApiError(error);
+      const failure = asApiError(error, this.base);
       if (failure.isUnreachable) this.connected.value = false;
       throw failure;
     }

@@ -77,20 +77,35 @@ export function jsonOf(status: number, body: string, headers?: HeaderValues): un
   throw errorOf(status, body);
 }
 
-export function unreachable(cause?: unknown): ApiError {
+// Returns what to check after a request to another server than the page's own got no response.
+function checksOf(server: string): string {
+  const page = typeof location === 'undefined' ? undefined : location.origin;
+  if (page === undefined || page === new URL(server).origin) {
+    return `The server at ${server} did not respond. Check that isomeshd is running there and that the network works.`;
+  }
+  // Browsers do not tell pages that a server does not allow them. A page from a file has no origin that could be named.
+  const origin = page === 'null' ? "'*'" : page;
+  return (
+    `The server at ${server} did not respond, or it does not allow pages of the origin ${page}. ` +
+    `Check that isomeshd is running there with --cors-origin ${origin}, and that the network works.`
+  );
+}
+
+// The error of a request that got no whole response. Without an address, the server is that of the page.
+export function unreachable(cause?: unknown, server = ''): ApiError {
   const error = new ApiError(
     0,
     'The server cannot be reached',
-    'The server did not respond. Check that isomeshd is running and that the network works.',
+    server ? checksOf(server) : 'The server did not respond. Check that isomeshd is running and that the network works.',
   );
   error.cause = cause;
   return error;
 }
 
-export function asApiError(error: unknown): ApiError {
+export function asApiError(error: unknown, server = ''): ApiError {
   if (error instanceof ApiError) return error;
   // fetch throws a TypeError when a connection fails. Only Node says more, in its cause.
-  if (error instanceof TypeError) return unreachable(error.cause ?? error);
+  if (error instanceof TypeError) return unreachable(error.cause ?? error, server);
   return new ApiError(-1, 'An unexpected error occurred', String(error));
 }
 

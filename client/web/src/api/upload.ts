@@ -105,7 +105,7 @@ function answerInOne(
         );
       }
       connection.connected.value = false;
-      return unreachable();
+      return unreachable(undefined, connection.base);
     };
     request.onerror = () => void assertReadable(whole).then(() => reject(failure()), reject);
     request.onabort = () => reject(options.signal?.reason as Error);
