@@ -1,5 +1,5 @@
-# CPack makes the Debian packages isomeshd, isomesh and libisomesh-dev from a build that was configured with
-# -D CMAKE_INSTALL_PREFIX=/usr. Their dependencies are read from the binaries.
+# CPack makes the Debian packages isomeshd, isomesh and libisomesh-dev, whatever prefix the build was configured with. Their
+# dependencies are read from the binaries.
 set(ISOMESH_MAINTAINER "isomesh <isomesh@localhost>" CACHE STRING "Maintainer of the packages: NAME <ADDRESS>")
 string(TIMESTAMP ISOMESH_BUILT "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(changelog ${PROJECT_BINARY_DIR}/changelog)
@@ -23,6 +23,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_COMPONENTS_ALL daemon client dev)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_SET_DESTDIR ON)
+set(CPACK_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGE_NAME isomesh)
 set(CPACK_PACKAGE_VENDOR isomesh)

@@ -5,25 +5,20 @@ if(ISOMESH_HOSPITAL)
   install(TARGETS isomesh-dimse RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
 endif()
 
-# What is installed in /usr has its configuration in /etc. systemd makes the unit's data folder in /var/lib with every prefix.
-set(config ${CMAKE_INSTALL_SYSCONFDIR}/isomesh)
-set(full_state /var/lib/isomesh)
-if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
-  set(config ${CMAKE_INSTALL_FULL_SYSCONFDIR}/isomesh)
-endif()
-set(ISOMESH_FULL_CONFIG ${CMAKE_INSTALL_FULL_SYSCONFDIR}/isomesh)
 set(made ${CMAKE_CURRENT_BINARY_DIR}/installed)
 file(MAKE_DIRECTORY ${made})
-configure_file(${CMAKE_CURRENT_LIST_DIR}/isomeshd.service.in ${made}/isomeshd.service @ONLY)
-
-isomesh_written(${made}/isomeshd.toml isomeshd --data ${full_state} config)
+# systemd makes the unit's data folder in /var/lib with every prefix.
+isomesh_written(${made}/isomeshd.toml isomeshd --data /var/lib/isomesh config)
 isomesh_written(${made}/isomeshd.8 isomeshd manual)
 isomesh_written(${made}/isomeshd.bash isomeshd completion bash)
 isomesh_written(${made}/_isomeshd isomeshd completion zsh)
 isomesh_written(${made}/isomeshd.fish isomeshd completion fish)
 
-install(FILES ${made}/isomeshd.toml DESTINATION ${config} COMPONENT daemon)
-install(FILES ${made}/isomeshd.service DESTINATION lib/systemd/system COMPONENT daemon)
+install(CODE "
+  set(isomesh_made [[${made}]])
+  set(isomesh_sbindir [[${CMAKE_INSTALL_SBINDIR}]])
+  set(isomesh_sysconfdir [[${CMAKE_INSTALL_SYSCONFDIR}]])" COMPONENT daemon)
+install(SCRIPT ${CMAKE_CURRENT_LIST_DIR}/place_configuration.cmake COMPONENT daemon)
 install(FILES ${CMAKE_CURRENT_LIST_DIR}/isomesh.sysusers RENAME isomesh.conf
   DESTINATION lib/sysusers.d COMPONENT daemon)
 install(FILES ${made}/isomeshd.8 DESTINATION ${CMAKE_INSTALL_MANDIR}/man8 COMPONENT daemon)
