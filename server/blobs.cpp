@@ -19,6 +19,11 @@ store::S3ClientOptions client_options(const BlobOptions& options) {
 
 }  // namespace
 
+std::string_view kind_of(const BlobOptions& options) {
+  if (options.place.empty()) return "data";
+  return store::is_s3_url(options.place) ? "s3" : "folder";
+}
+
 void check_blobs(const BlobOptions& options) {
   if (store::is_s3_url(options.place)) {
     client_options(options);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
@@ -17,6 +18,9 @@ struct BlobOptions {
   std::filesystem::path credentials;             // a file; empty: the environment
   std::filesystem::path authorities;             // file of certificates; empty: the system's
 };
+
+// What the log calls the store: "data", "folder" or "s3".
+std::string_view kind_of(const BlobOptions& options);
 
 // Throws Error kInvalidParameter for errors that can be found without opening the store.
 void check_blobs(const BlobOptions& options);

@@ -45,7 +45,9 @@ std::string expected_by(const CLI::Option& option) {
 
 // The value as it would be on the command line; empty if it is of another type.
 std::optional<std::string> argument_of(const toml::node& value, Kind kind) {
-  if (const auto text = value.value_exact<std::string>()) return text;
+  const auto text = value.value_exact<std::string>();
+  // The library takes a flag without a text for true.
+  if (text && (kind != Kind::kFlag || !text->empty())) return text;
   if (kind == Kind::kFlag) {
     if (const auto flag = value.value_exact<bool>()) return *flag ? "true" : "false";
   }
@@ -91,6 +93,13 @@ const CLI::Option& option_of(const std::string& key, const toml::node& value, co
   refuse(value.source(), "there is no option \"" + key + "\"; `isomeshd --help` lists all options");
 }
 
+// True for an empty string, as in the environment, unless the option has a default that it would
+// hide.
+bool is_no_value(const toml::node& value, const CLI::Option& option) {
+  return value.value_exact<std::string>() == "" && option.get_default_str().empty() &&
+         kind_of(option) != Kind::kFlag;
+}
+
 bool is_in_environment(const CLI::Option& option) {
   if (option.get_envname().empty()) return false;
   const char* value = std::getenv(option.get_envname().c_str());
@@ -108,7 +117,7 @@ class ConfigFile : public CLI::ConfigTOML {
       const CLI::Option& option = option_of(name, value, cli_);
       std::vector<std::string> arguments = arguments_of(value, option);
       // The library has no empty list. An empty list is the default of all options that take one.
-      if (arguments.empty() || is_in_environment(option)) continue;
+      if (arguments.empty() || is_no_value(value, option) || is_in_environment(option)) continue;
       found.push_back({{}, name, std::move(arguments)});
     }
     return found;
@@ -161,6 +170,7 @@ std::string as_toml(const CLI::Option& option, const std::string& value) {
   const Kind kind = kind_of(option);
   if (kind == Kind::kFlag && (value == "true" || value == "false")) return value;
   if (kind == Kind::kNumber && is_toml_number(value)) return value;
+  if (value.empty() && takes_many(option)) return "[]";
   return in_toml_quotes(value);
 }
 

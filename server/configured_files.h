@@ -8,8 +8,10 @@ namespace isomesh {
 
 using http::ConfiguredFiles;
 
-// Throws Error kInvalidParameter that names each of them which cannot be read. `others` are those
-// of wings.
+// Both throw Error kInvalidParameter that names each file which cannot be read: of the files that
+// options name, as every start needs them; and also of those that the URL of --store names, and of
+// those of wings, `others`.
+void check_option_files(const Options& options);
 void check_configured_files(const Options& options, const ConfiguredFiles& others);
 
 }  // namespace isomesh

@@ -194,6 +194,18 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   return 0;
 }
 
+// Stores without their places, which may have passwords in them.
+void tell_start(const Options& options, const std::string& url, std::size_t connections) {
+  LogLine("start")
+      .add("version", ISOMESH_VERSION)
+      .add("url", url)
+      .add("records", options.store.empty() ? "sqlite" : "postgresql")
+      .add("blobs", kind_of(options.blobs))
+      .add("workers", options.workers)
+      .add("tokens", options.tokens.empty() ? "no" : "yes")
+      .add("connections", connections);
+}
+
 void take_orders(RecordStores& records) {
   const std::string reason = records.keep_orders();
   if (reason.empty()) return;
@@ -202,8 +214,11 @@ void take_orders(RecordStores& records) {
 }
 
 int run(const Options& options, const sigset_t& signals) {
+  // First, because all else opens some.
+  const std::size_t descriptors = net::raise_descriptor_limit();
   std::jthread starting = end_start_on_signal(signals);
   const net::Address address = net::parse_address(options.listen);
+  check_option_files(options);
   const Files files = open_files(options, address, http::ReadBy::kService);
   check_reach(options, address, files);
   const callbacks::CallbackTargets targets(options.callback_targets);
@@ -247,7 +262,7 @@ int run(const Options& options, const sigset_t& signals) {
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
   server_options.part_bytes = options.max_disk / 4;
-  server_options.connections = net::connections_within(net::raise_descriptor_limit());
+  server_options.connections = net::connections_within(descriptors);
   if (!options.hospital.empty()) take_orders(*records);
   const std::unique_ptr<http::Wing> hospital =
       hospital::open({.file = options.hospital,
@@ -295,6 +310,7 @@ int run(const Options& options, const sigset_t& signals) {
       .longest_job = std::chrono::minutes(options.longest_job_minutes)};
   jobs::Workers workers(worker_options, jobs, volumes, blobs);
 
+  tell_start(options, url, server_options.connections);
   std::cout << "listening on " << url << std::endl;
 
   int signal = 0;

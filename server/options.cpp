@@ -13,7 +13,9 @@
 #include <unistd.h>
 
 #include "base/command_line/closest.h"
+#include "base/text.h"
 #include "server/config_file.h"
+#include "server/http/guards/origin.h"
 
 namespace isomesh {
 namespace {
@@ -87,15 +89,13 @@ CLI::Validator size_of_bytes(std::uint64_t least = 0) {
       with_unit.get_description()};
 }
 
-// A page's origin such as "https://viewer.example", or `*` for all.
+// A page's origin such as "https://viewer.example", or `*` for all. Any other spelling than that of
+// browsers would match no page.
 std::string wrong_origin(const std::string& text) {
-  constexpr std::string_view kMark = "://";
-  const std::string scheme = text.substr(0, text.find(kMark));
-  const std::size_t host = scheme.size() + kMark.size();
-  // Browsers send no path, so an origin with one would never match.
-  const bool is_origin = (scheme == "http" || scheme == "https") && host < text.size() &&
-                         text.find('/', host) == std::string::npos;
-  return is_origin || text == "*" ? "" : text + " is not an origin such as https://viewer.example";
+  const std::string origin = http::origin_of(text);
+  if (text == "*" || (!origin.empty() && lower(text) == origin)) return "";
+  return text + (origin.empty() ? " is not an origin such as https://viewer.example"
+                                : " matches no page; the origin is " + origin);
 }
 
 std::string wrong_host(const std::string& text) {
@@ -307,7 +307,8 @@ void add_options(CLI::App& cli, Options& options) {
                  "control group, divided by --workers")
       ->envname("ISOMESH_JOB_MEMORY")
       ->transform(size_of_bytes())
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50));
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50))
+      ->capture_default_str();
   cli.add_option("--drain-seconds", options.drain_seconds,
                  "Seconds that running jobs have to finish after SIGTERM. Less than what stops the "
                  "daemon waits: TimeoutStopSec= of systemd, --stop-timeout of Docker")
@@ -358,13 +359,14 @@ std::string as_config(const CLI::App& cli, Remarks remarks) {
         "would be used.\n\n";
   }
   for (const CLI::Option* option : cli.get_options()) {
-    const bool is_set = option->count() > 0;
     if (!option->get_configurable() || option->get_lnames().empty()) continue;
     const std::string value = value_of(*option);
+    // An empty value without a default is none.
+    const bool is_set =
+        option->count() > 0 && !(value.empty() && option->get_default_str().empty());
     if (remarks == Remarks::kYes) text += "# " + option->get_description() + ".\n";
     text += (is_set ? "" : "# ") + option->get_lnames().front();
-    if (is_set || !value.empty()) text += " = " + as_toml(*option, value);
-    text += '\n';
+    text += " = " + as_toml(*option, value) + '\n';
     if (remarks == Remarks::kYes) text += '\n';
   }
   return text;

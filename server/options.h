@@ -66,8 +66,8 @@ std::vector<std::string> unknown_variables(const CLI::App& cli);
 
 enum class Remarks { kNo, kYes };
 
-// The parsed options as lines for a file of --config; defaults are comments. `remarks` explain the
-// options.
+// The parsed options as lines for a file of --config; defaults are comments. They change nothing if
+// the comment sign is removed. `remarks` explain the options.
 std::string as_config(const CLI::App& cli, Remarks remarks);
 
 }  // namespace isomesh

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <string>
 
 #include <sys/resource.h>
 
@@ -14,7 +15,15 @@ std::size_t raise_descriptor_limit() {
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) throw_system_error("getrlimit", errno);
   const rlimit raised = {limit.rlim_max, limit.rlim_max};
   // Some systems report no limit but reject an unlimited value.
-  if (::setrlimit(RLIMIT_NOFILE, &raised) == 0) return limit.rlim_max;
+  if (::setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
+  if (limit.rlim_cur < kFewestDescriptors) {
+    throw Error(ErrorCode::kUnavailable,
+                "at least " + std::to_string(kFewestDescriptors) +
+                    " file descriptors are needed, and the limit is " +
+                    std::to_string(limit.rlim_cur) +
+                    ": raise it with `ulimit -n`, LimitNOFILE= of systemd, or --ulimit nofile= of "
+                    "Docker");
+  }
   return limit.rlim_cur;
 }
 

@@ -226,7 +226,9 @@ TEST(Configuration, ValuesAreReadAsToml) {
       {"keep-days = 2.50", "keep-days = 2.5"},
       {"open-network = true", "open-network = true"},
       {R"(cors-origin = ["https://x", 'https://y'])", R"(cors-origin = "https://x,https://y")"},
-      {"callback-allow = [\n  # none\n]", "# callback-allow"}};
+      {"callback-allow = [\n  # none\n]", "# callback-allow = []"},
+      {"tokens = \"\"", "# tokens = \"\""},
+      {"disk-reserve = \"\"", "# disk-reserve = \"\""}};
   for (const auto& [text, line] : cases) {
     const Finished told = checked(folder, "# \xc2\xa7 1\r\n" + text + '\n');
     EXPECT_EQ(told.status, 0) << text << told.errors;

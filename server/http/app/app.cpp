@@ -100,6 +100,7 @@ const Handler& handler_of_method(const Route& route, const Request& request, Res
 
 std::optional<Continuation> checked_answer(App& app, Request& request, Response& response) {
   allow_reading(app.rules, request, response);
+  if (is_of_foreign_page(app.rules, request)) app.refused_origins.tell(request.header("Origin"));
   check_origin(app.rules, request);
   begin_request(app.tokens, request, response);
   check_request(request);

@@ -31,6 +31,7 @@ struct App {
   net::FairPlaces streams;
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
+  RefusedOrigins refused_origins;
   // Earlier events belong to a previous process.
   const std::uint64_t first_event = services.jobs.last_event();
   std::atomic<bool> draining = false;  // finish running jobs, accept no new ones

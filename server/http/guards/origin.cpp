@@ -1,7 +1,10 @@
 #include "server/http/guards/origin.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
 
+#include "base/log.h"
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/net/address.h"
@@ -29,6 +32,26 @@ bool is_same(std::string_view origin, std::string_view host) {
 
 }  // namespace
 
+std::string origin_of(std::string_view address) {
+  constexpr std::string_view kMark = "://";
+  const std::size_t mark = address.find(kMark);
+  const bool has_scheme = mark != std::string_view::npos;
+  const std::string scheme = has_scheme ? lower(address.substr(0, mark)) : "https";
+  if (has_scheme) address.remove_prefix(mark + kMark.size());
+  const std::string_view authority = address.substr(0, address.find_first_of("/?#\\"));
+  const std::string host = host_of(authority);
+  constexpr std::string_view kOfHosts = "-._[]:";
+  const bool is_host = !host.empty() && std::ranges::all_of(host, [&](char c) {
+    return is_letter_or_digit(c) || kOfHosts.find(c) != std::string_view::npos;
+  });
+  if (!is_host || (scheme != "http" && scheme != "https")) return {};
+  const std::string_view port = authority.substr(std::min(host.size() + 1, authority.size()));
+  const auto number = port.empty() ? std::optional<std::int64_t>(0) : parse_int64(port);
+  if (!number || *number > 65535) return {};
+  const bool is_implied = *number == 0 || *number == (scheme == "http" ? 80 : 443);
+  return scheme + std::string(kMark) + host + (is_implied ? "" : ':' + std::to_string(*number));
+}
+
 std::string host_of(std::string_view authority) {
   const bool is_v6 = authority.starts_with('[');
   const std::size_t bracket = is_v6 ? authority.find(']') : 0;
@@ -51,11 +74,29 @@ void check_origin(const OriginRules& rules, const Request& request) {
   }
   const bool changes =
       request.method != "GET" && request.method != "HEAD" && request.method != "OPTIONS";
-  if (!changes || !request.has_header(kOrigin)) return;
-  const std::string_view origin = request.header(kOrigin);
-  if (!is_same(origin, host) && !is_allowed(rules, origin)) {
-    throw Error(ErrorCode::kForbidden, "pages of this origin may not use the service");
+  if (changes && is_of_foreign_page(rules, request)) {
+    throw Error(ErrorCode::kForbidden,
+                "pages of this origin may not use the service; --cors-origin allows them");
   }
+}
+
+bool is_of_foreign_page(const OriginRules& rules, const Request& request) {
+  const std::string_view origin = request.header(kOrigin);
+  return request.has_header(kOrigin) && !is_same(origin, request.header("Host")) &&
+         !is_allowed(rules, origin);
+}
+
+void RefusedOrigins::tell(std::string_view origin) {
+  constexpr std::size_t kLongest = 200;
+  const std::string shown(origin.substr(0, kLongest));
+  const Lock lock(mutex_);
+  if (told_.size() >= kMost || !told_.insert(shown).second) return;
+  LogLine("origin_refused", LogLevel::kWarn)
+      .add("origin", shown)
+      .add("reason", told_.size() < kMost
+                         ? "pages of this origin may not use the service; --cors-origin allows them"
+                         : "pages of this origin may not use the service; no further origins are "
+                           "logged");
 }
 
 void allow_reading(const OriginRules& rules, const Request& request, Response& response) {

@@ -5,10 +5,13 @@
 // origin, and Host, the server's name in the browser, which is a foreign name after DNS rebinding.
 #pragma once
 
+#include <cstddef>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/mutex.h"
 #include "server/http/requests/request.h"
 #include "server/http/requests/response.h"
 
@@ -22,9 +25,30 @@ struct OriginRules {
   std::vector<std::string> hosts;  // without ports
 };
 
+// The origin of pages at that address as a browser sends it: scheme, host and port, in lower case
+// and without a port that the scheme implies. Without a scheme, https is assumed. Empty if it is no
+// address of a page.
+std::string origin_of(std::string_view address);
+
 // The host of an authority such as `localhost:8080` or `[::1]:8080`, in lower case; empty if
 // invalid.
 std::string host_of(std::string_view authority);
+
+// Logs each origin once, up to a number of them: pages that the rules do not allow. Thread safe.
+class RefusedOrigins {
+ public:
+  static constexpr std::size_t kMost = 64;
+
+  void tell(std::string_view origin) ISOMESH_EXCLUDES(mutex_);
+
+ private:
+  Mutex mutex_;
+  std::set<std::string, std::less<>> told_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+// True if the request comes from a page that is neither the server's nor allowed. Such a page
+// cannot read the response, and check_origin rejects its modifying requests.
+bool is_of_foreign_page(const OriginRules& rules, const Request& request);
 
 // Throws Error kForbidden for a foreign Host, and for a modifying request of a page that is not
 // allowed.

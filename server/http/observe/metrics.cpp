@@ -107,6 +107,12 @@ std::string to_openmetrics(const std::string& text) {
 
 }  // namespace
 
+std::string_view media_type_of(MetricsFormat format) {
+  return format == MetricsFormat::kOpenMetrics
+             ? "application/openmetrics-text; version=1.0.0; charset=utf-8"
+             : "text/plain; version=0.0.4; charset=utf-8";
+}
+
 std::string_view name_of(callbacks::CallbackOutcome outcome) {
   switch (outcome) {
     case callbacks::CallbackOutcome::kDelivered:
@@ -216,7 +222,7 @@ void Metrics::count(callbacks::CallbackOutcome outcome) {
   state_->callbacks.Add(label("result", name_of(outcome))).Increment();
 }
 
-std::string Metrics::text(const Levels& levels) const {
+std::string Metrics::text(const Levels& levels, MetricsFormat format) const {
   constexpr double kKibibyte = 1024;
   State& state = *state_;
   for (std::size_t i = 0; i < kPriorities.size(); ++i) {
@@ -234,7 +240,8 @@ std::string Metrics::text(const Levels& levels) const {
   state.files.Set(static_cast<double>(open_files()));
   std::vector<prometheus::MetricFamily> families = state.registry.Collect();
   for (const MeasuredFamily& family : levels.others) families.push_back(family_of(family));
-  return to_openmetrics(prometheus::TextSerializer().Serialize(families));
+  std::string text = prometheus::TextSerializer().Serialize(families);
+  return format == MetricsFormat::kOpenMetrics ? to_openmetrics(text) : text;
 }
 
 }  // namespace isomesh::http

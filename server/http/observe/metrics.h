@@ -1,4 +1,4 @@
-// The service's metrics in Prometheus's text format (OpenMetrics 1.0).
+// The service's metrics as text, in OpenMetrics or in the older format of Prometheus.
 //
 // Every label has few values, known in advance: routes are patterns, rejections are error codes. No
 // label ever holds data of a client.
@@ -54,6 +54,13 @@ struct Levels {
   std::vector<MeasuredFamily> others = {};
 };
 
+enum class MetricsFormat {
+  kOpenMetrics,     // 1.0
+  kPrometheusText,  // 0.0.4
+};
+
+std::string_view media_type_of(MetricsFormat format);
+
 // Thread safe.
 class Metrics {
  public:
@@ -70,10 +77,7 @@ class Metrics {
   void count(callbacks::CallbackOutcome outcome);
 
   // All metrics, including `levels` and the process's memory, threads and files.
-  std::string text(const Levels& levels) const;
-
-  static constexpr std::string_view kMediaType =
-      "application/openmetrics-text; version=1.0.0; charset=utf-8";
+  std::string text(const Levels& levels, MetricsFormat format) const;
 
  private:
   struct State;

@@ -83,6 +83,17 @@ std::size_t end_of_value(std::string_view text) {
   return text.size();
 }
 
+// How well a media type fits a range of Accept, more specific ranges first; 0 if it does not.
+int fit_of(std::string_view range, std::string_view asked_version, std::string_view type,
+           std::string_view version) {
+  const std::string_view main_type = type.substr(0, type.find('/'));
+  if (range == "*/*") return 1;
+  if (range.ends_with("/*") && range.substr(0, range.size() - 2) == main_type) return 2;
+  if (range != type) return 0;
+  if (asked_version.empty()) return 3;
+  return asked_version == version ? 4 : 0;
+}
+
 }  // namespace
 
 bool prefers(const Request& request, std::string_view preference) {
@@ -216,6 +227,22 @@ std::optional<ByteRange> range_of(const Request& request, std::uint64_t size) {
     throw Error(ErrorCode::kRangeNotSatisfiable, "the file has " + std::to_string(size) + " bytes");
   }
   return ByteRange{begin, end - begin + 1};
+}
+
+double accepted_weight(const Request& request, std::string_view type, std::string_view version) {
+  int best = 0;
+  double weight = 0;
+  for (const std::string_view each : split(request.header("Accept"), ',')) {
+    const std::string range = lower(split(each, ';').front());
+    const int fit = fit_of(range, header_parameter(each, "version"), type, version);
+    const std::string given = header_parameter(each, "q");
+    const double q = given.empty() ? 1 : number_of(given).value_or(0);
+    // Of ranges that fit equally well, the one with the greatest weight counts.
+    if (fit < best || (fit == best && q <= weight)) continue;
+    best = fit;
+    weight = fit == 0 ? 0 : q;
+  }
+  return weight;
 }
 
 bool accepts_gzip(const Request& request) {

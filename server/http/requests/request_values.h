@@ -71,6 +71,10 @@ struct ByteRange {
 // if the range is outside of the file.
 std::optional<ByteRange> range_of(const Request& request, std::uint64_t size);
 
+// The weight that Accept gives to a version of a media type, from 0 to 1 (RFC 9110, 12.5.1). 0 if
+// the header does not accept it or is missing.
+double accepted_weight(const Request& request, std::string_view type, std::string_view version);
+
 // True if the client accepts gzip (RFC 9110, 12.5.3).
 bool accepts_gzip(const Request& request);
 

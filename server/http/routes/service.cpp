@@ -28,6 +28,15 @@ Levels levels_of(const App& app) {
   return levels;
 }
 
+// OpenMetrics, unless Accept prefers the other. So requests without the header, of any type, and of
+// types that there are not, get it too.
+MetricsFormat metrics_format_for(const Request& request) {
+  return accepted_weight(request, "text/plain", "0.0.4") >
+                 accepted_weight(request, "application/openmetrics-text", "1.0.0")
+             ? MetricsFormat::kPrometheusText
+             : MetricsFormat::kOpenMetrics;
+}
+
 }  // namespace
 
 void add_service_routes(App& app) {
@@ -53,7 +62,9 @@ void add_service_routes(App& app) {
   });
   add_get(app, "/metrics", [&app](const auto& request, auto& response) {
     check_known(request, {});
-    response.set_body(app.metrics.text(levels_of(app)), Metrics::kMediaType);
+    const MetricsFormat format = metrics_format_for(request);
+    response.add_header("Vary", "Accept");
+    response.set_body(app.metrics.text(levels_of(app), format), media_type_of(format));
   });
 }
 

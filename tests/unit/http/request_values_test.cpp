@@ -188,5 +188,41 @@ TEST(LastEventId, IsANumber) {
   }
 }
 
+// Weights of text/plain in version 0.0.4, and of application/openmetrics-text in version 1.0.0.
+TEST(Accept, WeighsMediaTypesByTheMostSpecificRange) {
+  const std::vector<std::tuple<std::string, double, double>> cases = {
+      {"", 0, 0},
+      {"*/*", 1, 1},
+      {"text/html, application/xhtml+xml, */*;q=0.8", 0.8, 0.8},
+      {"text/plain", 1, 0},
+      {"TEXT/Plain; Version=\"0.0.4\"; Q=0.5", 0.5, 0},
+      {"text/*", 1, 0},
+      {"application/*;q=0.1, */*", 1, 0.1},
+      {"text/plain;version=0.0.3", 0, 0},
+      {"text/plain;q=0, */*", 0, 1},
+      {"text/plain;version=0.0.4;q=0.2, text/plain;q=0.9", 0.2, 0},
+      {"text/plain;q=none", 0, 0},
+      {"text/plain;q=+1", 0, 0},
+      {"text", 0, 0},
+      {"application/openmetrics-text", 0, 1},
+      {"application/openmetrics-text; version=0.0.1", 0, 0},
+      // Prometheus 2.42 and 3.0.
+      {"application/openmetrics-text;version=1.0.0,application/"
+       "openmetrics-text;version=0.0.1;q=0.75,"
+       "text/plain;version=0.0.4;q=0.5,*/*;q=0.1",
+       0.5, 1},
+      {"application/openmetrics-text;version=1.0.0;escaping=allow-utf-8;q=0.5,"
+       "application/openmetrics-text;version=0.0.1;q=0.4,"
+       "text/plain;version=1.0.0;escaping=allow-utf-8;q=0.3,text/plain;version=0.0.4;q=0.2,"
+       "*/*;q=0.1",
+       0.2, 0.5}};
+  for (const auto& [accept, plain, open] : cases) {
+    Request request;
+    if (!accept.empty()) request.headers.emplace_back("Accept", accept);
+    EXPECT_EQ(accepted_weight(request, "text/plain", "0.0.4"), plain) << accept;
+    EXPECT_EQ(accepted_weight(request, "application/openmetrics-text", "1.0.0"), open) << accept;
+  }
+}
+
 }  // namespace
 }  // namespace isomesh::http

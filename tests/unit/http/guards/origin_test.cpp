@@ -1,6 +1,8 @@
 #include "server/http/guards/origin.h"
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -65,6 +67,33 @@ TEST(Origin, OfAnotherPageMayChangeNothing) {
   EXPECT_FALSE(is_refused({}, request_of("POST", "localhost:8080")));
   EXPECT_FALSE(is_refused({.cors_origins = {"*"}, .check_host = false, .hosts = {}},
                           request_of("POST", "localhost:8080", "https://evil.example")));
+}
+
+TEST(Origin, IsSpelledAsBrowsersDo) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"https://viewer.example", "https://viewer.example"},
+      {"https://viewer.example/", "https://viewer.example"},
+      {"https://viewer.example/a/b?c#d", "https://viewer.example"},
+      {"https://viewer.example?c", "https://viewer.example"},
+      {"HTTPS://Viewer.Example:8443", "https://viewer.example:8443"},
+      {"https://viewer.example:443", "https://viewer.example"},
+      {"https://viewer.example:", "https://viewer.example"},
+      {"https://viewer.example:08443", "https://viewer.example:8443"},
+      {"http://viewer.example:80", "http://viewer.example"},
+      {"http://viewer.example:443", "http://viewer.example:443"},
+      {"viewer.example", "https://viewer.example"},
+      {"viewer.example:8443/", "https://viewer.example:8443"},
+      {"http://[::1]:8080/", "http://[::1]:8080"}};
+  for (const auto& [address, origin] : cases) {
+    EXPECT_EQ(origin_of(address), origin) << address;
+    EXPECT_EQ(origin_of(origin), origin) << address;
+  }
+  for (const std::string none :
+       {"", "*", "https://", "https:///x", "ftp://viewer.example", "file:///x", "https://*.example",
+        "https://a b", "https://me@viewer.example", "https://viewer.example:x", "https://a:70000",
+        "https://a:99999999999999999999", "https://m\xc3\xbcller.example", "https://[::1", "a,b"}) {
+    EXPECT_EQ(origin_of(none), "") << none;
+  }
 }
 
 }  // namespace
