@@ -13,6 +13,12 @@ std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+std::string valid_utf8(std::string_view text) {
+  return Json::parse(dump(Json(text))).get<std::string>();
+}
+
+bool is_json(std::string_view text) { return Json::accept(text); }
+
 JsonTree::JsonTree() : root_(std::make_unique<Json>()) {}
 
 JsonTree::JsonTree(std::string_view text)

@@ -21,6 +21,11 @@ using Json = nlohmann::ordered_json;
 // Writes one line. Replaces bytes that are not UTF-8, such as in a volume's name.
 std::string dump(const Json& json);
 
+// Replaces bytes that are not UTF-8 by U+FFFD.
+std::string valid_utf8(std::string_view text);
+
+bool is_json(std::string_view text);
+
 // Owns a value and everything below it; initially null.
 class JsonTree {
  public:

@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/held_folder.h"
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json_tree.h"
@@ -93,7 +94,8 @@ void write(Json& place, const T& value) {
   } else if constexpr (std::is_same_v<T, std::string>) {
     assign(place, std::string_view(value));
   } else if constexpr (Path<T>) {
-    assign(place, std::string_view(value.native()));
+    // Only messages have paths; their reader is another process.
+    assign(place, std::string_view(for_other_process(value).native()));
   } else if constexpr (Duration<T>) {
     assign(place, std::int64_t{value.count()});
   } else if constexpr (requires { value.begin(); }) {

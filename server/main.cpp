@@ -21,6 +21,7 @@
 #include "base/descriptor.h"
 #include "base/log.h"
 #include "base/niceness.h"
+#include "proto/json_tree.h"
 #include "server/blobs.h"
 #include "server/callbacks/callbacks.h"
 #include "server/callbacks/signature.h"
@@ -331,7 +332,7 @@ int run(const Options& options, const sigset_t& signals) {
 // machines read it.
 void tell_failure(LogFormat format, const std::string& reason) {
   if (format == LogFormat::kText) {
-    std::cerr << "isomeshd: " << reason << std::endl;
+    std::cerr << "isomeshd: " << valid_utf8(reason) << std::endl;
     return;
   }
   start_log(format, LogLevel::kCritical);

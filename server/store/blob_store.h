@@ -91,8 +91,8 @@ using Steady = std::chrono::steady_clock::time_point;
 
 // Blobs appear atomically and never change. Several daemons may share a store: no daemon erases or
 // sweeps what another one has stored and is about to name. Thread safe. All methods throw Error
-// kUnavailable if a remote store does not respond for a while; the operation may have taken place
-// nevertheless.
+// kUnavailable if a remote store does not respond for a while, or a folder is missing; the
+// operation may have taken place nevertheless.
 class BlobStore {
  public:
   virtual ~BlobStore() = default;

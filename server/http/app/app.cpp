@@ -60,6 +60,7 @@ bool has_ended(const Services& services, const std::string& id) {
 // no reason: smaller jobs and uploads still fit, and every daemon of a cluster sees the same jobs.
 std::string unready_reason(const Services& services) {
   if (!services.jobs.responds()) return "the database does not respond";
+  if (!services.folder.responds()) return "the data folder is missing or cannot be written to";
   if (services.jobs.is_full()) return "the queue is full";
   if (!services.blobs.responds()) return "the storage of volumes and meshes does not respond";
   return services.blobs.has_room() ? "" : "the disk is full: nothing new is accepted";
@@ -112,6 +113,35 @@ std::optional<Continuation> checked_answer(App& app, Request& request, Response&
   return handler_of_method(route, request, response)(request, response);
 }
 
+// Reports a failure that is no client's fault. While the data folder is missing, it is not the
+// service's either.
+void answer_failure(const App& app, const Request& request, Response& response,
+                    const Error& error) {
+  log_error("{} {} failed: {}", request.method, request.path, error.what());
+  answer_problem(request, response,
+                 app.services.folder.responds() ? error : store::missing_folder());
+}
+
+// Converts exceptions of `run` to a problem. Clients see the text of an Error only.
+std::optional<Continuation> guarded(const App& app, const Request& request, Response& response,
+                                    const std::function<std::optional<Continuation>()>& run) {
+  try {
+    return run();
+  } catch (const RecordedProblem& recorded) {
+    answer_problem(request, response, recorded.problem());
+  } catch (const Error& error) {
+    error.code() == ErrorCode::kInternal ? answer_failure(app, request, response, error)
+                                         : answer_problem(request, response, error);
+  } catch (const std::bad_alloc&) {
+    log_error("{} {} failed: out of memory", request.method, request.path);
+    answer_problem(request, response,
+                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
+  } catch (const std::exception& error) {
+    answer_failure(app, request, response, Error(ErrorCode::kInternal, error.what()));
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 App::App(const Services& the_services, const ServerOptions& the_options)
@@ -137,44 +167,23 @@ App::App(const Services& the_services, const ServerOptions& the_options)
                                 const Error& error) { report_refused(metrics, address, error); }}) {
 }
 
-std::optional<Continuation> guarded(const Request& request, Response& response,
-                                    const std::function<std::optional<Continuation>()>& run) {
-  try {
-    return run();
-  } catch (const RecordedProblem& recorded) {
-    answer_problem(request, response, recorded.problem());
-  } catch (const Error& error) {
-    if (error.code() == ErrorCode::kInternal) {
-      log_error("{} {} failed: {}", request.method, request.path, error.what());
-    }
-    answer_problem(request, response, error);
-  } catch (const std::bad_alloc&) {
-    log_error("{} {} failed: out of memory", request.method, request.path);
-    answer_problem(request, response,
-                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
-  } catch (const std::exception& error) {
-    log_error("{} {} failed: {}", request.method, request.path, error.what());
-    answer_problem(request, response, Error(ErrorCode::kInternal, error.what()));
-  }
-  return std::nullopt;
-}
-
 std::optional<Continuation> answer(App& app, Request& request, Response& response) {
   auto continuation =
-      guarded(request, response, [&] { return checked_answer(app, request, response); });
+      guarded(app, request, response, [&] { return checked_answer(app, request, response); });
   if (!continuation) return std::nullopt;
   if (continuation->abandoned) {
-    continuation->abandoned = [run = std::move(continuation->abandoned)](const Request& asked) {
+    continuation->abandoned = [&app,
+                               run = std::move(continuation->abandoned)](const Request& asked) {
       Response nobodys;
-      guarded(asked, nobodys, [&] {
+      guarded(app, asked, nobodys, [&] {
         run(asked);
         return std::optional<Continuation>();
       });
     };
   }
-  continuation->resume = [resume = std::move(continuation->resume)](const Request& asked,
-                                                                    Response& out) {
-    guarded(asked, out, [&] {
+  continuation->resume = [&app, resume = std::move(continuation->resume)](const Request& asked,
+                                                                          Response& out) {
+    guarded(app, asked, out, [&] {
       resume(asked, out);
       return std::optional<Continuation>();
     });

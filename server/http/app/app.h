@@ -44,8 +44,4 @@ struct App {
 // Passes a request through its guards to its route. Does not throw.
 std::optional<Continuation> answer(App& app, Request& request, Response& response);
 
-// Converts exceptions of `run` to a problem. Clients see the text of an Error only.
-std::optional<Continuation> guarded(const Request& request, Response& response,
-                                    const std::function<std::optional<Continuation>()>& run);
-
 }  // namespace isomesh::http

@@ -60,8 +60,9 @@ Error incomplete(const BodyReader& body, bool is_form) {
   return {ErrorCode::kInvalidParameter, "the body ended before its length"};
 }
 
-// Rejects a body larger than the free space before writing any of it.
+// Rejects a body before writing any of it if the folder is missing or has not enough free space.
 void check_room(const store::DataFolder& folder, const Request& request) {
+  folder.check_is_there();
   folder.reserve().check_room();
   if (!request.content_length) return;
   std::error_code error;

@@ -181,6 +181,7 @@ void erase(App& app, const Request& request, Response& response) {
 }  // namespace
 
 void make_room_for(App& app, std::uint64_t bytes) {
+  app.services.folder.check_is_there();
   store::Reserve& reserve = app.services.folder.reserve();
   if (!reserve.has_room() || bytes > reserve.free_bytes()) app.kept.let_all_go();
 }

@@ -15,12 +15,6 @@ namespace {
 // Names, and about ten bytes per value: bounded by the size of an import's response.
 constexpr std::size_t kMostTableBytes = std::size_t{4} << 20;
 
-std::string valid_utf8(std::string_view text) {
-  JsonTree tree;
-  json_values::assign(tree.root(), text);
-  return json_values::text(JsonTree(dump(tree.root())).root());
-}
-
 void check_size(const std::vector<LabelEntry>& entries) {
   if (entries.size() > Volume::kMostLabels) {
     throw_unusable("The file has " + std::to_string(entries.size()) + " labels. At most " +

@@ -44,12 +44,17 @@ Volume VolumeLibrary::import_file(const std::filesystem::path& upload,
                                   const process::ImportOptions& options, const std::string& party,
                                   const store::ScratchFolder& scratch,
                                   const std::stop_token& cancelled) {
-  return runner_.run({.source = upload,
-                      .scratch = scratch.path(),
-                      .target = canonical_in(scratch),
-                      .options = options,
-                      .limits = limits_},
-                     party, cancelled);
+  try {
+    return runner_.run({.source = upload,
+                        .scratch = scratch.path(),
+                        .target = canonical_in(scratch),
+                        .options = options,
+                        .limits = limits_},
+                       party, cancelled);
+  } catch (const Error&) {
+    folder_.check_is_there();  // otherwise the file is not to blame
+    throw;
+  }
 }
 
 std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume volume,

@@ -175,10 +175,14 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
     log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, end.what());
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kOutOfSpace) fault = Fault::kFullDisk;
-    if (error.code() == ErrorCode::kUnavailable) fault = Fault::kOther;
+    // While the storage is missing, an internal error is the storage's.
+    const bool is_internal = error.code() == ErrorCode::kInternal;
+    if (error.code() == ErrorCode::kUnavailable || (is_internal && !blobs_.responds())) {
+      fault = Fault::kOther;
+    }
     if (error.code() != ErrorCode::kCancelled) {
       if (fault == Fault::kNone) outcome.error = to_problem(error, path);
-      outcome.may_retry = error.code() == ErrorCode::kInternal;
+      outcome.may_retry = is_internal;
       log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
     }
   } catch (const std::bad_alloc&) {

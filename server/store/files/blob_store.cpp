@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "base/files.h"
+#include "base/held_folder.h"
 #include "base/hex.h"
 #include "base/ids.h"
 #include "base/log.h"
@@ -74,6 +75,7 @@ class FileReader : public BlobReader {
 }  // namespace
 
 bool FileBlobStore::is_there() const {
+  if (folders_.data != nullptr) return folders_.data->is_there();
   const std::string name = [&] {
     const Lock lock(mark_mutex_);
     return name_;
@@ -96,21 +98,25 @@ bool FileBlobStore::is_there() const {
 }
 
 void FileBlobStore::check_is_there() const {
-  if (is_there()) return;
-  throw Error(ErrorCode::kUnavailable,
-              "the storage of volumes and meshes is missing; nothing is lost");
+  if (!is_there()) throw missing_folder();
+}
+
+bool FileBlobStore::works() const {
+  if (folders_.data != nullptr) return folders_.data->responds();
+  return is_there() && can_write_in(folders_.holds);
 }
 
 template <class Read>
 auto FileBlobStore::read_in_folder(const Read& read) const {
+  if (!holds_) check_is_there();  // a shared folder's mark takes long to read
   try {
     return read();
   } catch (const Error& error) {
     const bool may_be_missing =
         error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kInternal;
-    if (!holds_ || !may_be_missing) throw;
+    if (!may_be_missing) throw;
   }
-  check_is_there();
+  if (!works()) throw missing_folder();
   return read();
 }
 
@@ -120,9 +126,9 @@ auto FileBlobStore::write_in_folder(const Write& write) const {
     return write();
   } catch (const Error& error) {
     const bool is_missing = error.code() == ErrorCode::kNotFound;
-    if (!holds_ || (!is_missing && error.code() != ErrorCode::kInternal)) throw;
-    check_is_there();
-    if (!is_missing) throw;
+    if (!is_missing && error.code() != ErrorCode::kInternal) throw;
+    if (!works()) throw missing_folder();
+    if (!holds_ || !is_missing) throw;
   }
   throw Error(ErrorCode::kUnavailable,
               "the storage of volumes and meshes was missing for a moment: try again");
@@ -157,8 +163,8 @@ class FileBlobStore::Writer : public BlobWriter {
 
   Blob store(const std::stop_token& /*stop*/) override {
     const std::string key = to_hex(digest_.finish());
-    // Another folder may be in the place of the shared one: nothing must be stored there.
-    if (store_.holds_) store_.check_is_there();
+    // Another folder may be in the place of this one, where nothing would be found again.
+    store_.check_is_there();
     store_.believe(
         key, store_.write_in_folder([&] { return store_.publish_as(path_, file_, key, bytes_); }));
     is_committed_ = true;
@@ -208,7 +214,7 @@ FileBlobStore::FileBlobStore(BlobFolders folders, Reserve& reserve)
 
 std::uint64_t FileBlobStore::counted_bytes() const {
   std::uint64_t bytes = 0;
-  for (const std::string& key : keys()) bytes += size_of(path_of(key));
+  for (const std::string& key : keys()) bytes += size_of(place_of(key));
   for (const auto& entry : std::filesystem::directory_iterator(folders_.quarantine)) {
     bytes += size_of(entry.path());
   }
@@ -216,18 +222,10 @@ std::uint64_t FileBlobStore::counted_bytes() const {
 }
 
 bool FileBlobStore::responds() const {
-  if (!holds_) return true;
   constexpr std::chrono::seconds kForHowLong{2};
   constexpr std::chrono::seconds kPatience{5};
-  return health_.passes(kForHowLong, kPatience, [this] {
-    try {
-      holds_->held(std::chrono::nanoseconds(0));
-      return is_there();
-    } catch (const Error&) {
-      is_there();  // for the log
-      return false;
-    }
-  });
+  if (!holds_ && !is_there()) return false;
+  return health_.passes(kForHowLong, kPatience, [this] { return works(); });
 }
 
 bool FileBlobStore::is_empty() const {
@@ -247,7 +245,7 @@ std::string FileBlobStore::mark() const {
 }
 
 void FileBlobStore::set_mark(const std::string& text) {
-  if (holds_) check_is_there();
+  check_is_there();
   const ScratchFolder scratch(folders_.drafts);
   const std::filesystem::path draft = scratch.path() / kMark;
   {
@@ -282,6 +280,7 @@ std::uint64_t FileBlobStore::capacity() const {
 }
 
 std::unique_ptr<BlobWriter> FileBlobStore::begin(const std::string& owner) {
+  check_is_there();
   return std::make_unique<Writer>(*this, owner);
 }
 
@@ -291,12 +290,14 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob,
     copy_in(file, blob, owner, stop);
     return;
   }
+  check_is_there();
   reserve_.check_room();
   // An existing blob is replaced, so only the difference takes room.
   const std::uint64_t more = blob.bytes - std::min(blob.bytes, size(blob.key).value_or(0));
   room_.take(more, owner);
   try {
-    believe(blob.key, publish_as(file, File::open(file), blob.key, more));
+    believe(blob.key,
+            write_in_folder([&] { return publish_as(file, File::open(file), blob.key, more); }));
   } catch (...) {
     room_.finish(more, owner);
     room_.give(more);
@@ -390,18 +391,20 @@ std::optional<std::uint64_t> FileBlobStore::size_now(const std::string& key) con
 }
 
 void FileBlobStore::erase(const std::string& key) {
+  if (!holds_) check_is_there();
   const std::filesystem::path place = found(key);
   const std::uint64_t bytes = size_of(place);
-  std::error_code ignored;
-  if (std::filesystem::remove(place, ignored)) {
+  std::error_code error;
+  if (std::filesystem::remove(place, error)) {
     room_.give(bytes);
-  } else if (holds_) {
-    check_is_there();
+    return;
   }
+  if (holds_) check_is_there();
+  if (error) throw_system_error("erasing a file", error.value());
 }
 
 std::filesystem::path FileBlobStore::found(const std::string& key) const {
-  const std::filesystem::path place = path_of(key);
+  const std::filesystem::path place = place_of(key);
   std::error_code error;
   if (std::filesystem::exists(place, error)) return place;
   if (error) throw_system_error("finding a file", error.value());
@@ -411,6 +414,10 @@ std::filesystem::path FileBlobStore::found(const std::string& key) const {
 }
 
 std::filesystem::path FileBlobStore::path_of(const std::string& key) const {
+  return for_other_process(place_of(key));
+}
+
+std::filesystem::path FileBlobStore::place_of(const std::string& key) const {
   return folders_.blobs / key.substr(0, kPrefix) / key;
 }
 
@@ -419,7 +426,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   // The times of written files are coarse. An exact time makes any later write within the same tick
   // change it.
   touch(path);
-  const std::filesystem::path place = path_of(key);
+  const std::filesystem::path place = place_of(key);
   make_folder_for(place);
   const std::uint64_t bytes = size_of(path);
   const std::string hold = holds_ ? holds_->hold(key) : "";

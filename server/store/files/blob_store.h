@@ -36,7 +36,7 @@ class FileBlobStore : public BlobStore {
     room_.limit(max_bytes, std::move(make));
   }
 
-  // For a shared folder: creates and removes a file, and compares the mark.
+  // Creates and removes a file, and compares a shared folder's mark.
   bool responds() const override;
   bool is_shared() const override { return holds_.has_value(); }
   bool is_empty() const override;
@@ -68,7 +68,7 @@ class FileBlobStore : public BlobStore {
   // The keys of all blobs outside the quarantine.
   std::vector<std::string> keys() const;
 
-  // The place of a blob, whether it exists or not.
+  // The place of a blob, whether it exists or not, as any process finds it.
   std::filesystem::path path_of(const std::string& key) const;
 
  private:
@@ -81,17 +81,20 @@ class FileBlobStore : public BlobStore {
     Steady when;
   };
 
-  // False if a shared folder is missing or another one is in its place: it may not be mounted. The
-  // log says once when it is missing and once when it is back.
+  // False if the folder is missing or another one is in its place: it may not be mounted. The log
+  // says once when it is missing and once when it is back.
   bool is_there() const;
   // Throws Error kUnavailable unless is_there().
   void check_is_there() const;
-  // Returns the result of `read`. If that fails in a shared folder, checks that the folder is there
-  // and reads once more, because the folder may have been missing for a moment.
+  std::filesystem::path place_of(const std::string& key) const;
+  // True if is_there() and files can be written.
+  bool works() const;
+  // Returns the result of `read`. If that fails, checks that the folder is there and reads once
+  // more, because a shared folder may have been missing for a moment.
   template <class Read>
   auto read_in_folder(const Read& read) const;
-  // Returns the result of `write`. In a shared folder, a missing file means that the folder is
-  // missing: throws Error kUnavailable.
+  // Returns the result of `write`. If that fails because the folder is missing, throws Error
+  // kUnavailable. In a shared folder, a missing file means that the folder is missing.
   template <class Write>
   auto write_in_folder(const Write& write) const;
   std::optional<std::uint64_t> size_now(const std::string& key) const;

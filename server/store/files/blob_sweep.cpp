@@ -77,9 +77,9 @@ bool FileBlobStore::take_out(const std::string& key, std::chrono::nanoseconds ol
 }
 
 bool FileBlobStore::put_aside(const std::string& key) {
-  touch(path_of(key));  // records when it entered the quarantine
+  touch(place_of(key));  // records when it entered the quarantine
   try {
-    move_to(path_of(key), folders_.quarantine / key);
+    move_to(place_of(key), folders_.quarantine / key);
   } catch (const Error& error) {
     // Another daemon on this folder was faster.
     if (!holds_ || error.code() != ErrorCode::kNotFound) throw;
@@ -97,7 +97,7 @@ std::size_t FileBlobStore::look_again(std::span<const std::string> keys,
   for (const std::string& key : keys) {
     if (!held_now.contains(key) && !names(key)) continue;
     std::error_code absent;  // it was requested and is already back
-    std::filesystem::rename(folders_.quarantine / key, path_of(key), absent);
+    std::filesystem::rename(folders_.quarantine / key, place_of(key), absent);
     ++back;
   }
   return back;
@@ -148,7 +148,7 @@ std::size_t FileBlobStore::empty_quarantine(Time before, const Names& names) {
     if (since >= before.time_since_epoch()) continue;
     const Lock lock(places_);
     if (names(entry.path().filename())) {
-      std::filesystem::rename(entry.path(), path_of(entry.path().filename()), gone);
+      std::filesystem::rename(entry.path(), place_of(entry.path().filename()), gone);
       continue;
     }
     if (!std::filesystem::remove(entry.path(), gone)) continue;
@@ -165,7 +165,7 @@ std::vector<std::string> FileBlobStore::keys() const {
   std::filesystem::recursive_directory_iterator entry(folders_.blobs, gone);
   for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
     const std::string key = entry->path().filename();
-    if (entry->is_regular_file(gone) && path_of(key) == entry->path()) keys.push_back(key);
+    if (entry->is_regular_file(gone) && place_of(key) == entry->path()) keys.push_back(key);
   }
   return keys;
 }

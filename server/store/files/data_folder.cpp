@@ -12,6 +12,7 @@
 
 #include "base/files.h"
 #include "base/ids.h"
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/store/files/files.h"
 
@@ -54,7 +55,25 @@ bool locks_soon(int descriptor) {
   return true;
 }
 
+// Creates the folder if it is missing.
+std::filesystem::path made(const std::filesystem::path& root) {
+  std::error_code error;
+  // The contents may identify patients. The rights of an existing folder stay as they are.
+  if (std::filesystem::create_directories(root, error)) {
+    std::filesystem::permissions(root, std::filesystem::perms::owner_all, error);
+  }
+  if (error) throw Error(ErrorCode::kInternal, kDataFolder + (": " + error.message()));
+  if (::faccessat(AT_FDCWD, root.c_str(), R_OK | W_OK | X_OK, AT_EACCESS) != 0) {
+    throw_system_error(kDataFolder, errno);
+  }
+  return root;
+}
+
 }  // namespace
+
+Error missing_folder() {
+  return {ErrorCode::kUnavailable, "the storage of volumes and meshes is missing; nothing is lost"};
+}
 
 BlobFolders shared_blob_folders(const std::filesystem::path& root) {
   std::error_code error;
@@ -75,39 +94,53 @@ BlobFolders shared_blob_folders(const std::filesystem::path& root) {
 }
 
 DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve)
-    : root_(root) {
+    : folder_(made(root)) {
   std::error_code error;
-  // The contents may identify patients. The rights of an existing folder stay as they are.
-  if (std::filesystem::create_directories(root_, error)) {
-    std::filesystem::permissions(root_, std::filesystem::perms::owner_all, error);
+  if (std::filesystem::exists(this->root() / kUnfinishedRestore, error)) {
+    throw Error(ErrorCode::kUnavailable,
+                std::filesystem::canonical(root).string() + ' ' + kRestoreAgain);
   }
-  if (!error) root_ = std::filesystem::canonical(root_, error);
-  if (error) throw Error(ErrorCode::kInternal, kDataFolder + (": " + error.message()));
-
-  if (std::filesystem::exists(root_ / kUnfinishedRestore, error)) {
-    throw Error(ErrorCode::kUnavailable, root_.string() + ' ' + kRestoreAgain);
-  }
-  lock_ = ::open((root_ / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  if (lock_ < 0) {
+  lock_ = Descriptor(::open((this->root() / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  if (lock_.number() < 0) {
     throw Error(ErrorCode::kInternal, std::string(kDataFolder) + ": " + std::strerror(errno));
   }
-  if (!locks_soon(lock_)) {
-    ::close(lock_);
+  if (!locks_soon(lock_.number())) {
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }
-  check_access(root_);
+  check_access(this->root());
   std::filesystem::remove_all(scratch());
   // Before anything is written: on a full disk this frees the necessary space.
-  reserve_ =
-      std::make_unique<Reserve>(root_ / "reserve", reserve.value_or(Reserve::usual_bytes(root_)));
+  reserve_ = std::make_unique<Reserve>(this->root() / "reserve",
+                                       reserve.value_or(Reserve::usual_bytes(this->root())));
   make_folders(kDataFolder, {blobs(), quarantine(), scratch(), erasing()});
-  sync_folder(root_);
+  sync_folder(this->root());
 }
 
-DataFolder::~DataFolder() { ::close(lock_); }
+bool DataFolder::is_there() const {
+  const bool is = folder_.is_at_place();
+  const bool was_missing = is_missing_.exchange(!is);
+  if (!is && !was_missing) {
+    log_error(
+        "the storage of volumes and meshes is missing: the data folder is not at its place, "
+        "another "
+        "folder is there, or it cannot be written to. Jobs wait until it is back");
+  }
+  if (is && was_missing) log_info("the storage of volumes and meshes is back");
+  return is;
+}
+
+void DataFolder::check_is_there() const {
+  if (!is_there()) throw missing_folder();
+}
+
+bool DataFolder::responds() const { return is_there() && can_write_in(root()); }
+
+BlobFolders DataFolder::blob_folders() const {
+  return {.blobs = blobs(), .quarantine = quarantine(), .drafts = scratch(), .data = this};
+}
 
 std::string DataFolder::name() const {
-  const std::filesystem::path place = root_ / "name";
+  const std::filesystem::path place = root() / "name";
   if (!std::filesystem::exists(place)) {
     const std::filesystem::path draft = scratch() / random_hex(8);
     const std::string name = random_hex(16);
@@ -115,17 +148,17 @@ std::string DataFolder::name() const {
     file.write(std::as_bytes(std::span(name)));
     file.sync();
     move_to(draft, place);
-    sync_folder(root_);
+    sync_folder(root());
   }
   return read_whole(place);
 }
 
 BlobFolders DataFolder::cache_folders() const {
-  const std::filesystem::path cache = root_ / "cache";
-  const BlobFolders folders = {.blobs = cache / "blobs",
-                               .quarantine = cache / "quarantine",
-                               .drafts = scratch(),
-                               .outlive_crashes = false};
+  const std::filesystem::path cache = root() / "cache";
+  BlobFolders folders = blob_folders();
+  folders.blobs = cache / "blobs";
+  folders.quarantine = cache / "quarantine";
+  folders.outlive_crashes = false;
   make_folders(kDataFolder, {folders.blobs, folders.quarantine});
   return folders;
 }

@@ -1,11 +1,15 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "base/descriptor.h"
+#include "base/error.h"
+#include "base/held_folder.h"
 #include "server/store/files/reserve.h"
 
 namespace isomesh::store {
@@ -16,6 +20,11 @@ inline constexpr const char* kUnfinishedRestore = "restoring";
 inline constexpr const char* kRestoreAgain =
     "was not restored completely: empty it and restore again";
 
+// Error kUnavailable: a folder is missing for a while, or cannot be written to.
+Error missing_folder();
+
+class DataFolder;
+
 // The folders of a FileBlobStore.
 struct BlobFolders {
   std::filesystem::path blobs;       // finished files, by digest
@@ -23,6 +32,7 @@ struct BlobFolders {
   std::filesystem::path drafts;      // unfinished files; on the same file system as the blobs
   std::filesystem::path holds = {};  // only for a shared folder; see FolderHolds
   bool outlive_crashes = true;       // sync each file before it becomes a blob
+  const DataFolder* data = nullptr;  // the data folder that has them; null for a shared folder
 };
 
 // The blob folders below `root`, a folder that several daemons may share. `root` must exist,
@@ -31,7 +41,9 @@ struct BlobFolders {
 BlobFolders shared_blob_folders(const std::filesystem::path& root);
 
 // The folder with all of a daemon's data. Holds a lock, so a second daemon cannot use the same
-// folder. Thread safe.
+// folder. Holds the folder open, and all paths lead into that one: another folder in its place,
+// such as that of a second daemon, receives nothing. The paths are valid in this process only (see
+// for_other_process). Thread safe.
 class DataFolder {
  public:
   // Creates missing folders and empties the scratch folder, which may have unfinished files of a
@@ -39,30 +51,41 @@ class DataFolder {
   // size of the disk. Throws Error kUnavailable if another process has the folder or its restore
   // did not finish; kOutOfSpace or kInternal otherwise.
   explicit DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve = 0);
-  ~DataFolder();
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;
 
-  std::filesystem::path blobs() const { return root_ / "blobs"; }  // finished files, by digest
-  BlobFolders blob_folders() const { return {blobs(), quarantine(), scratch()}; }
+  // False while the folder is not at its place or cannot be written to: it was renamed or
+  // unmounted, is mounted read-only, or another folder is in its place. The log says so once, and
+  // once when it is back. Fast.
+  bool is_there() const;
+  // Throws Error kUnavailable unless is_there().
+  void check_is_there() const;
+  // As is_there(), but also tries to write, because a disk may fail without going away.
+  bool responds() const;
+
+  std::filesystem::path blobs() const { return root() / "blobs"; }  // finished files, by digest
+  BlobFolders blob_folders() const;
   // Folders for local copies of remote blobs. Created on the first call.
   BlobFolders cache_folders() const;
   // Unnamed blobs, before they are removed for good.
-  std::filesystem::path quarantine() const { return root_ / "quarantine"; }
-  std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
-  std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
+  std::filesystem::path quarantine() const { return root() / "quarantine"; }
+  std::filesystem::path records() const { return root() / "isomesh.sqlite"; }  // the database
+  std::filesystem::path scratch() const { return root() / "scratch"; }         // unfinished files
   // Empty files, named like the blobs of deleted volumes that have not been erased yet.
-  std::filesystem::path erasing() const { return root_ / "erasing"; }
+  std::filesystem::path erasing() const { return root() / "erasing"; }
   // Multipart uploads, which outlive the process. Created by their owner.
-  std::filesystem::path uploads() const { return root_ / "uploads"; }
+  std::filesystem::path uploads() const { return root() / "uploads"; }
   Reserve& reserve() const { return *reserve_; }
 
   // A unique name, generated on the first call. Throws Error kOutOfSpace or kInternal.
   std::string name() const;
 
  private:
-  std::filesystem::path root_;
-  int lock_ = -1;
+  const std::filesystem::path& root() const { return folder_.path(); }
+
+  const HeldFolder folder_;
+  mutable std::atomic<bool> is_missing_ = false;  // by the last look
+  Descriptor lock_;
   std::unique_ptr<Reserve> reserve_;
 };
 

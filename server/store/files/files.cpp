@@ -13,6 +13,7 @@
 
 #include "base/descriptor.h"
 #include "base/error.h"
+#include "base/ids.h"
 
 namespace isomesh::store {
 
@@ -81,6 +82,18 @@ void touch(const std::filesystem::path& file) {
   ::clock_gettime(CLOCK_REALTIME, &now);
   const std::array<timespec, 2> times = {now, now};
   ::utimensat(AT_FDCWD, file.c_str(), times.data(), 0);
+}
+
+bool can_write_in(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / ("probe-" + random_hex(8));
+  try {
+    File::create(file);
+  } catch (const Error& error) {
+    return error.code() == ErrorCode::kOutOfSpace || error.code() == ErrorCode::kUnavailable;
+  }
+  std::error_code failure;
+  std::filesystem::remove(file, failure);
+  return !failure;
 }
 
 void sync_folder(const std::filesystem::path& folder) {

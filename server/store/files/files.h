@@ -52,6 +52,10 @@ std::uint64_t size_of(const std::filesystem::path& file);
 // the file is missing.
 void touch(const std::filesystem::path& file);
 
+// Creates and removes a file in a folder. True if that works, or fails only for lack of space or
+// descriptors.
+bool can_write_in(const std::filesystem::path& folder);
+
 // Makes new names and renames in a folder survive a crash.
 void sync_folder(const std::filesystem::path& folder);
 

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/log.h"
+#include "proto/error.h"
+
 namespace isomesh::store {
 
 BlobCache::BlobCache(const BlobFolders& folders, Reserve& reserve, std::uint64_t most_bytes)
@@ -45,8 +48,13 @@ void BlobCache::erase(const std::string& key) {
   if (found->second.uses == 0) copies_.erase(found);
 }
 
+// Throws nothing, because the end of a copy's use may come here. The next start finds what is left.
 void BlobCache::remove(const std::string& key, Copy& copy) {
-  files_.erase(key);
+  try {
+    files_.erase(key);
+  } catch (const Error& error) {
+    log_warning("a copy in the cache could not be removed: {}", error.what());
+  }
   bytes_ -= copy.bytes;
   copy.bytes = 0;
 }

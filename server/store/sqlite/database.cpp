@@ -253,12 +253,15 @@ void check_has_trail(Connection& connection) {
 
 Database::Database(const DataFolder& folder)
     : folder_(folder), writer_(folder.records(), migrated(folder.records())) {
+  const auto disk_responds = [&folder] { return folder.responds(); };
   for (auto& reader : readers_) {
     reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);
     // SQLite opens its files at the first read, when there may be no descriptor left.
     const Reading reading(*reader);
     reading->query("SELECT count(*) FROM sqlite_schema").next();
+    reader->know_disk(disk_responds);
   }
+  writer_.know_disk(disk_responds);
   writer_.know_newest(newest_us_);
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }

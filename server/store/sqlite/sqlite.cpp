@@ -9,6 +9,8 @@
 #include <sqlite3.h>
 
 #include "proto/error.h"
+#include "proto/json_tree.h"
+#include "server/store/files/data_folder.h"
 #include "server/store/microseconds.h"
 #include "server/store/sql/names.h"
 
@@ -16,22 +18,6 @@ namespace isomesh::store {
 namespace {
 
 constexpr int kBusyTimeoutMs = 10'000;
-Error error_of(sqlite3* handle, int code) {
-  const int primary = code & 0xFF;
-  // Most I/O errors of SQLite are writes without space, too.
-  if (primary == SQLITE_FULL || code == SQLITE_IOERR_WRITE || code == SQLITE_IOERR_SHMSIZE) {
-    return {ErrorCode::kOutOfSpace, "the data folder has no space left"};
-  }
-  const int system = handle == nullptr ? 0 : sqlite3_system_errno(handle);
-  const bool is_short = primary == SQLITE_CANTOPEN && (system == EMFILE || system == ENFILE);
-  if (primary == SQLITE_NOMEM || code == SQLITE_IOERR_NOMEM || is_short) {
-    return {ErrorCode::kUnavailable, "the service is out of file descriptors or memory"};
-  }
-  const std::string reason = handle == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(handle);
-  return {ErrorCode::kInternal, "the database: " + reason};
-}
-
-[[noreturn]] void fail(sqlite3* handle, int code) { throw error_of(handle, code); }
 
 // Locks the mutex; `coming` counts the threads that wait for it.
 Mutex& counted(Mutex& mutex, std::atomic<std::size_t>& coming) {
@@ -42,8 +28,9 @@ Mutex& counted(Mutex& mutex, std::atomic<std::size_t>& coming) {
 // A prepared statement in use. Clears its parameters on destruction.
 class Statement : public Rows::Source {
  public:
-  Statement(sqlite3_stmt* statement, std::span<const Parameter> parameters)
-      : statement_(statement) {
+  Statement(const Connection& connection, sqlite3_stmt* statement,
+            std::span<const Parameter> parameters)
+      : connection_(connection), statement_(statement) {
     int number = 0;
     for (const Parameter& parameter : parameters) bind(++number, parameter);
   }
@@ -58,8 +45,7 @@ class Statement : public Rows::Source {
     const int code = sqlite3_step(statement_);
     if (code == SQLITE_ROW) return true;
     if (code == SQLITE_DONE) return false;
-    sqlite3* handle = sqlite3_db_handle(statement_);
-    fail(handle, sqlite3_extended_errcode(handle));
+    throw connection_.last_error();
   }
 
   int type(int column) const { return sqlite3_column_type(statement_, column); }
@@ -88,6 +74,7 @@ class Statement : public Rows::Source {
     }
   }
 
+  const Connection& connection_;
   sqlite3_stmt* statement_;
 };
 
@@ -158,7 +145,7 @@ Connection::Connection(const std::filesystem::path& path, Mode mode) {
   // The connection's own mutex serialises threads.
   const int code = sqlite3_open_v2(path.c_str(), &handle_, access | SQLITE_OPEN_NOMUTEX, nullptr);
   try {
-    if (code != SQLITE_OK) fail(handle_, code);
+    if (code != SQLITE_OK) throw error_of(code);
     sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
     sqlite3_create_function_v2(handle_, "isomesh_now", 0, SQLITE_UTF8, nullptr, give_now, nullptr,
                                nullptr, nullptr);
@@ -180,12 +167,12 @@ void Connection::know_newest(const std::atomic<std::int64_t>& newest_us) {
   auto* given = const_cast<std::atomic<std::int64_t>*>(&newest_us);
   const int code = sqlite3_create_function_v2(handle_, "isomesh_kept", 1, SQLITE_UTF8, given,
                                               give_kept, nullptr, nullptr, nullptr);
-  if (code != SQLITE_OK) fail(handle_, code);
+  if (code != SQLITE_OK) throw error_of(code);
 }
 
 void Connection::script(const char* sql) {
   const int code = sqlite3_exec(handle_, with_numbers(sql).c_str(), nullptr, nullptr, nullptr);
-  if (code != SQLITE_OK) fail(handle_, sqlite3_extended_errcode(handle_));
+  if (code != SQLITE_OK) throw last_error();
 }
 
 void Connection::set_durability(Durability durability) {
@@ -223,8 +210,26 @@ void Connection::roll_back() noexcept {
   if (has_open_transaction()) sqlite3_exec(handle_, "ROLLBACK", nullptr, nullptr, nullptr);
 }
 
-Error Connection::last_error() const {
-  return error_of(handle_, sqlite3_extended_errcode(handle_));
+Error Connection::last_error() const { return error_of(sqlite3_extended_errcode(handle_)); }
+
+Error Connection::error_of(int code) const {
+  const int primary = code & 0xFF;
+  const bool is_disks = primary == SQLITE_IOERR || primary == SQLITE_READONLY;
+  if (is_disks && disk_responds_ && !disk_responds_()) return missing_folder();
+  // Most I/O errors of SQLite are writes without space, too.
+  if (primary == SQLITE_FULL || code == SQLITE_IOERR_WRITE || code == SQLITE_IOERR_SHMSIZE) {
+    return {ErrorCode::kOutOfSpace, "the data folder has no space left"};
+  }
+  const int system = handle_ == nullptr ? 0 : sqlite3_system_errno(handle_);
+  const bool is_short = primary == SQLITE_CANTOPEN && (system == EMFILE || system == ENFILE);
+  if (primary == SQLITE_NOMEM || code == SQLITE_IOERR_NOMEM || is_short) {
+    return {ErrorCode::kUnavailable, "the service is out of file descriptors or memory"};
+  }
+  const std::string reason = handle_ == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(handle_);
+  // It may quote what a damaged database holds.
+  const std::string detail = "the database: " + valid_utf8(reason);
+  if (primary != SQLITE_CORRUPT) return {ErrorCode::kInternal, detail};
+  return {ErrorCode::kInternal, detail, {{"database", "is damaged: restore it from a backup"}}};
 }
 
 void Connection::end_batch(std::optional<Error> failure) noexcept {
@@ -244,19 +249,19 @@ void Connection::end_batch(std::optional<Error> failure) noexcept {
 }
 
 Rows Connection::ask(std::string_view sql, std::span<const Parameter> parameters) {
-  return Rows(std::make_unique<Statement>(prepared(sql), parameters));
+  return Rows(std::make_unique<Statement>(*this, prepared(sql), parameters));
 }
 
 Rows Connection::take(std::string_view sql, std::span<const Parameter> parameters) {
   sqlite3_stmt* const prepared_statement = prepared(sql);
-  Statement statement(prepared_statement, parameters);
+  Statement statement(*this, prepared_statement, parameters);
   auto taken = std::make_unique<Taken>(prepared_statement);
   while (statement.next()) taken->add(statement);
   return Rows(std::move(taken));
 }
 
 std::size_t Connection::tell(std::string_view sql, std::span<const Parameter> parameters) {
-  Statement statement(prepared(sql), parameters);
+  Statement statement(*this, prepared(sql), parameters);
   while (statement.next()) {
   }
   return static_cast<std::size_t>(sqlite3_changes(handle_));
@@ -269,7 +274,7 @@ sqlite3_stmt* Connection::prepared(std::string_view sql) {
   sqlite3_stmt* statement = nullptr;
   const int code = sqlite3_prepare_v3(handle_, text.data(), static_cast<int>(text.size()),
                                       SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
-  if (code != SQLITE_OK) fail(handle_, code);
+  if (code != SQLITE_OK) throw error_of(code);
   return statements_[std::string(sql)] = statement;
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -62,6 +63,13 @@ class Connection : public SqlConnection {
   // Sets the newest certain time for `isomesh_kept`. `newest_us` must outlive this object.
   void know_newest(const std::atomic<std::int64_t>& newest_us);
 
+  // Sets a function that returns false if the disk of the file is missing or cannot be written to.
+  // Errors of the disk are Error kUnavailable then.
+  void know_disk(std::function<bool()> responds) { disk_responds_ = std::move(responds); }
+
+  // The error of the last call.
+  Error last_error() const;
+
   // Runs several statements without parameters.
   void script(const char* sql);
 
@@ -96,13 +104,14 @@ class Connection : public SqlConnection {
 
   // For holders of the mutex.
   void end_batch(std::optional<Error> failure = std::nullopt) noexcept;
-  Error last_error() const;
+  Error error_of(int code) const;
 
   static int look_at_log(void* connection, sqlite3* handle, const char* name, int pages);
   sqlite3_stmt* prepared(std::string_view sql);
 
   sqlite3* handle_ = nullptr;
   int log_pages_ = 0;
+  std::function<bool()> disk_responds_;
   Mutex mutex_;
   std::atomic<int> readings_ = 0;
   Durability durability_ = Durability::kFull;

@@ -166,6 +166,22 @@ TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
   EXPECT_EQ(jobs_.account(id).attempts, 1);
 }
 
+// So does the data folder: while another is in its place, too.
+TEST_F(WorkersTest, AJobWaitsUnchargedForADataFolderThatIsMovedAway) {
+  const Volume volume = add_sphere();
+  const std::filesystem::path place = folder_ / "data";
+  std::filesystem::rename(place, folder_ / "elsewhere");
+  std::filesystem::create_directory(place);
+  const std::string id = submit(parameters_of(volume, 0));
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
+  EXPECT_TRUE(eventually([&] { return is_put_back_uncharged(id); }));
+  EXPECT_TRUE(std::filesystem::is_empty(place));
+  std::filesystem::remove(place);
+  std::filesystem::rename(folder_ / "elsewhere", place);
+  EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kSucceeded);
+  EXPECT_EQ(jobs_.account(id).attempts, 1);
+}
+
 TEST_F(WorkersTest, AJobWhoseStorageFailsWhileTheDaemonEndsIsPutBackUncharged) {
   const Volume volume = add_sphere();
   for (const ErrorCode code : {ErrorCode::kUnavailable, ErrorCode::kOutOfSpace}) {

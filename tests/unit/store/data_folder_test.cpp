@@ -5,9 +5,11 @@
 #include <string>
 #include <thread>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 
@@ -126,6 +128,32 @@ TEST(DataFolder, WithFilesOfAnotherUserIsRefusedWithTheirName) {
   EXPECT_STREQ(error->what(),
                "the data folder: this user must be able to write to blobs/identity: Permission "
                "denied");
+}
+
+TEST(DataFolder, ThatIsAwayIsMissingUntilItIsBack) {
+  const TemporaryFolder parent;
+  const DataFolder folder(parent / "data");
+  EXPECT_TRUE(folder.responds());
+  start_log(LogFormat::kText, LogLevel::kInfo);
+  testing::internal::CaptureStderr();
+  std::filesystem::rename(parent / "data", parent / "away");
+  EXPECT_FALSE(folder.responds());
+  std::optional<DataFolder> second(std::in_place, parent / "data");
+  EXPECT_EQ(test::code_thrown_by([&] { folder.check_is_there(); }), ErrorCode::kUnavailable);
+  const auto files = test::files_below(parent / "data");
+  test::write_file(folder.scratch() / "file", "of the first");
+  folder.name();
+  EXPECT_EQ(test::files_below(parent / "data"), files);
+  EXPECT_EQ(test::read_file(parent / "away/scratch/file"), "of the first");
+  EXPECT_TRUE(second->responds());
+  second.reset();
+  std::filesystem::remove_all(parent / "data");
+  std::filesystem::rename(parent / "away", parent / "data");
+  EXPECT_TRUE(folder.responds());
+  const std::string log = testing::internal::GetCapturedStderr();
+  start_log(LogFormat::kText, LogLevel::kOff);
+  EXPECT_THAT(log, testing::MatchesRegex("[^\n]* error [^\n]* is missing[^\n]*\n"
+                                         "[^\n]* info [^\n]* is back[^\n]*\n"));
 }
 
 TEST(ScratchFolder, GoesWithAllThatItHolds) {

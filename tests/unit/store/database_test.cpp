@@ -38,6 +38,21 @@ TEST_F(DatabaseTest, ReadersReadSideBySide) {
   EXPECT_TRUE(volumes.list(std::nullopt, "", 10, ListOrder::kOldestFirst).empty());
 }
 
+// As on a disk that became read-only.
+TEST_F(DatabaseTest, AnErrorOfADiskThatIsMissingMayPass) {
+  { const Database database(data_); }
+  Connection connection(data_.records(), Connection::Mode::kRead);
+  const auto code = [&] {
+    return test::code_thrown_by([&] { connection.run("DELETE FROM volumes"); });
+  };
+  EXPECT_EQ(code(), ErrorCode::kInternal);
+  bool responds = true;
+  connection.know_disk([&] { return responds; });
+  EXPECT_EQ(code(), ErrorCode::kInternal);
+  responds = false;
+  EXPECT_EQ(code(), ErrorCode::kUnavailable);
+}
+
 TEST_F(DatabaseTest, OfAnOlderVersionSaysThatItsAuditTrailHasAnotherForm) {
   { const Database database(data_); }
   Connection connection(data_.records(), Connection::Mode::kWrite);

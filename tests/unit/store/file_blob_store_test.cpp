@@ -197,8 +197,11 @@ class MovedAway : public SharedFolder, public testing::WithParamInterface<const 
     if (instead == "Another") {
       std::filesystem::create_directory(shared());
       FileBlobStore(shared_blob_folders(shared()), data_.reserve()).set_mark("another 1\n");
+      const DataFolder of_another_daemon(shared());
     }
   }
+
+  void check_is_unavailable_until_back(FileBlobStore& blobs);
 
   void move_back() {
     std::filesystem::remove_all(shared());
@@ -217,6 +220,16 @@ INSTANTIATE_TEST_SUITE_P(Instead, MovedAway, testing::Values("Nothing", "Empty",
 
 TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
   FileBlobStore blobs(shared_blob_folders(shared()), data_.reserve());
+  check_is_unavailable_until_back(blobs);
+}
+
+TEST_P(MovedAway, ADataFolderIsUnavailableUntilItIsBack) {
+  const DataFolder data(shared());
+  FileBlobStore blobs(data);
+  check_is_unavailable_until_back(blobs);
+}
+
+void MovedAway::check_is_unavailable_until_back(FileBlobStore& blobs) {
   blobs.set_mark("ours 1\n");
   store_hello(blobs);
   const auto begun = blobs.begin("");
@@ -234,7 +247,11 @@ TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
       [&] { blobs.erase_unnamed(std::span(&key, 1), later, nothing); },
       [&] { store_hello(blobs); },
       [&] { begun->commit(); },
+      [&] {
+        blobs.adopt(folder_ / "file", {kHello, 5}, "", {});
+      },
       [&] { blobs.set_mark("ours 2\n"); }};
+  test::write_file(folder_ / "file", "hello");
   start_log(LogFormat::kText, LogLevel::kInfo);
   testing::internal::CaptureStderr();
   move_away();
@@ -249,6 +266,7 @@ TEST_P(MovedAway, IsUnavailableUntilItIsBack) {
   EXPECT_FALSE(blobs.responds());
   EXPECT_EQ(files(), before);
   move_back();
+  EXPECT_EQ(test::read_file(folder_ / "file"), "hello");
   EXPECT_EQ(blobs.open(key)->size(), 5U);
   EXPECT_TRUE(blobs.is_intact(key, {}));
   EXPECT_EQ(store_hello(blobs), key);
