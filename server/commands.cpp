@@ -11,6 +11,7 @@
 #include "base/command_line/completion.h"
 #include "base/command_line/manual.h"
 #include "base/log.h"
+#include "proto/json_tree.h"
 #include "server/options.h"
 #include "server/record_stores.h"
 #include "server/store/files/data_folder.h"
@@ -153,7 +154,7 @@ struct Commands::State {
         [this] {
           if (verify) return verify_trail();
           read_audit_trail(options, after,
-                           [](std::string_view line) { std::cout << line << '\n'; });
+                           [](std::string_view line) { std::cout << valid_utf8(line) << '\n'; });
           std::cout.flush();
           if (!std::cout) {
             throw Error(ErrorCode::kInternal,

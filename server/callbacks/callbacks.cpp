@@ -12,6 +12,7 @@
 #include "base/curl.h"
 #include "base/log.h"
 #include "base/mutex.h"
+#include "proto/json_tree.h"
 #include "server/callbacks/signature.h"
 
 namespace isomesh::callbacks {
@@ -119,6 +120,7 @@ class Callbacks::Sender {
   void begin(store::Delivery delivery) {
     const auto reach = targets_.reach_of(delivery.url);
     if (!reach) return give_up(delivery, "the receiver is no longer allowed");
+    if (!is_json(delivery.body)) return give_up(delivery, "its record is damaged");
     auto attempt = std::make_unique<Attempt>();
     attempt->delivery = std::move(delivery);
     attempt->reach = *reach;
@@ -218,9 +220,9 @@ class Callbacks::Sender {
   // repeated simultaneously.
   milliseconds delay_after(int attempts) {
     constexpr int kMostDoublings = 20;
-    const milliseconds whole =
-        std::min(options_.first_delay * (std::int64_t{1} << std::min(attempts, kMostDoublings)),
-                 options_.longest_delay);
+    const milliseconds whole = std::min(
+        options_.first_delay * (std::int64_t{1} << std::clamp(attempts, 0, kMostDoublings)),
+        options_.longest_delay);
     return milliseconds(
         std::uniform_int_distribution<std::int64_t>(whole.count() / 2, whole.count())(random_));
   }

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "proto/json_tree.h"
 #include "server/codec/provenance_json.h"
 
 namespace isomesh::codec {
@@ -312,7 +313,7 @@ std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout
   for (const Json& level : nodes.levels()) all.push_back(level);
   if (!nodes.levels().empty()) gltf["extensionsUsed"].push_back(kLodExtension);
   gltf["nodes"] = all;
-  return gltf.dump();
+  return dump(gltf);
 }
 
 }  // namespace isomesh::codec

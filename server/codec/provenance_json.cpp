@@ -4,6 +4,7 @@
 
 #include "proto/json.h"
 #include "proto/json_text.h"
+#include "proto/json_tree.h"
 
 namespace isomesh::codec {
 
@@ -30,7 +31,7 @@ Json provenance_json(const Provenance& provenance) {
 }
 
 std::string provenance_text(const Provenance& provenance) {
-  return provenance_json(provenance).dump();
+  return dump(provenance_json(provenance));
 }
 
 std::string provenance_for_xml(const Provenance& provenance) {

@@ -1,5 +1,6 @@
 #include "server/store/audit_trail.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/sha256.h"
@@ -68,8 +69,9 @@ std::string audit_line(std::uint64_t number, const std::string& at, const std::s
   json_values::assign(json_values::member(head.root(), "id"), number);
   json_values::assign(json_values::member(head.root(), "at"), std::string_view(at));
   std::string text = dump(head.root());
+  // Damage may have emptied it. The line is not JSON then, as with other damage.
   text.back() = ',';
-  return text + record.substr(1);
+  return text.append(record, std::min<std::size_t>(1, record.size()));
 }
 
 }  // namespace isomesh::store

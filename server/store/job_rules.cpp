@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "base/clock.h"
-#include "base/log.h"
 #include "base/sha256.h"
 #include "base/share.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/json_values.h"
+#include "server/store/damaged_records.h"
 #include "server/store/microseconds.h"
 
 namespace isomesh::store {
@@ -63,9 +63,7 @@ std::optional<Job> readable_job(const std::string& record, const std::string& id
   } catch (const Error&) {
     // Logged below, as a record of another job is.
   }
-  if (!is_newer) {
-    log_error("the record of job {} is damaged: no version of this service wrote it", id);
-  }
+  if (!is_newer) report_damaged("job", id);
   return std::nullopt;
 }
 

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "base/clock.h"
-#include "base/log.h"
 #include "proto/error.h"
+#include "server/store/damaged_records.h"
 
 namespace isomesh::store {
 
@@ -17,7 +17,7 @@ std::optional<Order> readable_order(const std::string& record, const std::string
   } catch (const Error&) {
     // Logged below, as a record of another order is.
   }
-  log_error("the record of order {} is damaged: no version of this service wrote it", id);
+  report_damaged("order", id);
   return std::nullopt;
 }
 

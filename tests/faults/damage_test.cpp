@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <string>
 
+#include "proto/json_tree.h"
 #include "tests/api/problems.h"
 #include "tests/faults/fixture.h"
 
@@ -155,12 +156,34 @@ TEST_F(Damage, ABrokenRecordHidesNoOtherVolume) {
     EXPECT_THAT(listed.body, HasSubstr(whole.id)) << query;
     EXPECT_THAT(listed.body, testing::Not(HasSubstr(broken.id))) << query;
   }
-  EXPECT_THAT(daemon().errors(), HasSubstr("the record of volume " + broken.id + " is damaged"));
+  const std::string told = "the record of volume " + broken.id + " is damaged";
+  const std::string log = daemon().errors();
+  ASSERT_THAT(log, HasSubstr(told));
+  EXPECT_EQ(log.find(told), log.rfind(told)) << "it is logged once";
   const Answer alone = daemon().get("/v1/volumes/" + broken.id);
   EXPECT_EQ(alone.status, 500);
   EXPECT_THAT(alone.body, HasSubstr("the record of this volume is damaged"));
   EXPECT_EQ(daemon().send("DELETE", "/v1/volumes/" + broken.id).status, 204);
   EXPECT_EQ(daemon().get("/v1/volumes/" + broken.id).status, 404);
+}
+
+// SQLite quotes it.
+TEST_F(Damage, OfTheDatabaseIsToldInUtf8) {
+  start();
+  EXPECT_EQ(daemon().stop(), 0);
+  const std::filesystem::path file = folder_ / "data/isomesh.sqlite";
+  std::string bytes = read_file(file);
+  const std::string table = "tablevolumesvolumes";
+  const std::size_t place = bytes.find(table);
+  ASSERT_NE(place, std::string::npos);
+  bytes[place + 6] = '\xEF';
+  write_file(file, bytes);
+  for (const char* format : {"text", "json"}) {
+    const Finished refused = refused_start(folder_ / "data", {"--log-format", format});
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_THAT(refused.errors, HasSubstr("malformed database schema"));
+    EXPECT_EQ(valid_utf8(refused.errors), refused.errors);
+  }
 }
 
 }  // namespace

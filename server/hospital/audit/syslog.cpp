@@ -1,13 +1,13 @@
 #include "server/hospital/audit/syslog.h"
 
 #include <algorithm>
-#include <limits>
+#include <charconv>
 #include <string>
+#include <system_error>
 
 #include "base/error.h"
 #include "base/log.h"
 #include "base/mutex.h"
-#include "proto/json_tree.h"
 
 namespace isomesh::audit {
 namespace {
@@ -22,9 +22,25 @@ constexpr milliseconds kLastWord{2'000};  // time to send the entry about the en
 // The mark is set after this many entries, to limit repetition after a lost connection.
 constexpr std::size_t kMostUnmarked = 100;
 
+// The beginning of a line is not what was stored, so it is whole also in a damaged entry.
 std::uint64_t number_of(std::string_view entry) {
-  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
-  return json_values::whole(json_values::existing(JsonTree(entry).root(), "id"), kMost);
+  constexpr std::string_view kBefore = "{\"id\":";
+  std::uint64_t number = 0;
+  entry.remove_prefix(std::min(kBefore.size(), entry.size()));
+  const auto end = std::from_chars(entry.data(), entry.data() + entry.size(), number);
+  if (end.ec != std::errc()) throw Error(ErrorCode::kInternal, "an entry has no number");
+  return number;
+}
+
+// Empty for a damaged entry, which must not hold up those after it.
+std::string frame_of(std::string_view entry, const AuditSource& source) {
+  try {
+    return syslog_frame(entry, source);
+  } catch (const Error& error) {
+    log_error("entry {} of the audit trail is not sent to its collector: {}", number_of(entry),
+              error.what());
+    return "";
+  }
 }
 
 }  // namespace
@@ -79,9 +95,10 @@ void SyslogSender::send_new(const std::stop_token& stop) {
     unmarked = 0;
   };
   trail_.read(last, [&](std::string_view entry) {
+    const std::string frame = frame_of(entry, source_);
     if (connection_ && unmarked == 0 && !connection_->is_open()) connection_.reset();
     if (!connection_) connection_ = std::make_unique<TlsClient>(server_, kTimeout, stop);
-    connection_->send(syslog_frame(entry, source_));
+    if (!frame.empty()) connection_->send(frame);
     last = number_of(entry);
     if (++unmarked == kMostUnmarked) mark();
   });

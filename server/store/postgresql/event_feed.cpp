@@ -32,9 +32,9 @@ Event event_of(const Rows& row, const std::string& node) {
   return {.id = number_of(row.integer(0), row.integer(1)),
           .owner = row.text(2),
           .job = row.text(3),
-          .kind = static_cast<EventKind>(row.integer(4)),
-          .state = static_cast<JobState>(row.integer(5)),
-          .stage = static_cast<Stage>(row.integer(6)),
+          .kind = row.choice(4, EventKind::kDone),
+          .state = row.choice(5, JobState::kCancelled),
+          .stage = row.choice(6, Stage::kDone),
           .progress = row.real(7),
           .is_elsewhere = row.text(8) != node};
 }
@@ -103,7 +103,7 @@ void EventFeed::look_at_runs() {
       run = before->second;
     }
     if (!rows.is_null(3)) {
-      const auto stage = static_cast<Stage>(rows.integer(3));
+      const auto stage = rows.choice(3, Stage::kDone);
       const double share = rows.real(4);
       const bool is_other_stage = stage != run.stage;
       if (is_other_stage || share != run.share) {

@@ -200,7 +200,12 @@ void PostgresJobStore::adopt(const Rows& older) {
     JobSpec spec;
     spec.owner = older.text(3);
     spec.parameters = job->parameters;
-    asked = database_.read([&](SqlConnection& connection) { return look_up(connection, spec); });
+    // A volume with a damaged record fails its own jobs only.
+    try {
+      asked = database_.read([&](SqlConnection& connection) { return look_up(connection, spec); });
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kInternal || error.fields().empty()) throw;
+    }
   }
   const auto key = asked ? std::optional(asked->result_key) : std::nullopt;
   database_.run(Change::kRepeatable,

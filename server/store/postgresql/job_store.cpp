@@ -11,6 +11,18 @@
 #include "server/store/postgresql/held_task.h"
 
 namespace isomesh::store::postgresql {
+namespace {
+
+// Damaged times must not hide the job.
+Timing readable_timing(const std::string& record) {
+  try {
+    return timing_from_record(record);
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+}  // namespace
 
 PostgresJobStore::PostgresJobStore(Database& database, BlobStore& blobs, JobStoreOptions options)
     : SqlJobStore(database, blobs, std::move(options),
@@ -92,16 +104,16 @@ std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::str
 
 PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
   Row row = read_row(rows, 12, rows.integer(16) > options_.job_version);
-  row.job.state = static_cast<JobState>(rows.integer(6));
-  if (!rows.is_null(7)) row.job.waiting_for = static_cast<WaitingFor>(rows.integer(7));
+  row.job.state = rows.choice(6, JobState::kCancelled);
+  if (!rows.is_null(7)) row.job.waiting_for = rows.choice(7, WaitingFor::kDisk);
   if (row.job.state != JobState::kRunning || rows.is_null(8)) return row;
   row.job.stage = Stage::kLoad;
   row.job.started = timestamp_of_us(rows.integer(8));
   if (!rows.is_null(9)) {
-    row.job.stage = static_cast<Stage>(rows.integer(9));
+    row.job.stage = rows.choice(9, Stage::kDone);
     row.job.progress = rows.real(10);
     // Daemons of the first version write no timings.
-    if (!rows.is_null(11)) row.job.timing = timing_from_record(rows.text(11));
+    if (!rows.is_null(11)) row.job.timing = readable_timing(rows.text(11));
   }
   row.job.timing.queue = milliseconds_between(row.accepted, rows.integer(8));
   return row;

@@ -4,8 +4,10 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/store/damaged_records.h"
 #include "server/store/job_rules.h"
 #include "server/store/sql/expiry.h"
+#include "server/store/sql/undamaged_rows.h"
 
 namespace isomesh::store {
 
@@ -31,6 +33,13 @@ JobAccount SqlJobStore::account(const std::string& id) const {
 
 std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState> state,
                                    const std::string& after, std::size_t limit) const {
+  return list_despite_damage(
+      "jobs", [&] { return list_after(viewer, state, after, limit); },
+      [&] { return undamaged_after(viewer, state, after, limit); });
+}
+
+std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, std::optional<JobState> state,
+                                         const std::string& after, std::size_t limit) const {
   std::vector<Job> jobs;
   std::string last = after;
   // Repeats only if damaged records were skipped, because fewer than `limit` jobs mean the end of
@@ -53,6 +62,24 @@ std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState>
   return jobs;
 }
 
+std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, std::optional<JobState> state,
+                                              const std::string& after, std::size_t limit) const {
+  std::map<std::string, Job> found;
+  const auto take = [&](const Rows& rows) {
+    const Row row = row_of(rows);
+    if (row.is_damaged || (!after.empty() && row.job.id >= after)) return;
+    found.emplace(row.job.id, with_progress(row));
+    if (found.size() > limit) found.erase(found.begin());
+  };
+  read_undamaged(records_,
+                 select_ + "WHERE (?1 IS NULL OR j.owner = ?1) AND (?2 IS NULL OR j.state = ?2)",
+                 "j.id", "j.id DESC", take, viewer, state);
+  std::vector<Job> jobs;
+  for (auto& [id, job] : found) jobs.push_back(std::move(job));
+  std::ranges::reverse(jobs);
+  return jobs;
+}
+
 QueueDepth SqlJobStore::depth(const Viewer& viewer) const {
   const std::string mine = viewer ? " AND owner = ?1" : " AND ?1 IS NULL";
   Rows rows = records_.query(
@@ -68,10 +95,12 @@ QueueDepth SqlJobStore::depth(const Viewer& viewer) const {
   QueueDepth depth;
   while (rows.next()) {
     const std::string what = rows.text(0);
+    // A damaged number counts as the last priority.
+    const std::size_t priority = std::min(rows.count(1), depth.queued.size() - 1);
     std::size_t& count = what == "running"   ? depth.running
                          : what == "waiting" ? depth.waiting_for_disk
-                                             : depth.queued.at(rows.count(1));
-    count = rows.count(2);
+                                             : depth.queued[priority];
+    count += rows.count(2);
   }
   return depth;
 }
@@ -109,9 +138,9 @@ SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns, bool is_ne
   row.attempts = static_cast<int>(rows.integer(4));
   row.fence = static_cast<std::uint64_t>(rows.integer(5));
   const JobColumns known = {.id = rows.text(columns),
-                            .state = static_cast<JobState>(rows.integer(columns + 1)),
+                            .state = rows.choice(columns + 1, JobState::kCancelled),
                             .volume = rows.text(columns + 2),
-                            .priority = static_cast<Priority>(rows.integer(columns + 3)),
+                            .priority = rows.choice(columns + 3, Priority::kBulk),
                             .accepted_us = row.accepted};
   row.is_newer = is_newer;
   if (is_newer) row.record = rows.text(0);
@@ -149,10 +178,11 @@ std::optional<SqlJobStore::Asked> SqlJobStore::look_up(SqlConnection& connection
   Rows row = connection.query("SELECT record FROM volumes WHERE owner = ?1 AND id = ?2", spec.owner,
                               spec.parameters.volume);
   if (!row.next()) return std::nullopt;
-  const Volume volume = volume_from_record(row.text(0));
-  return Asked{.result_key = result_key(spec.parameters.volume, volume.notes, spec.parameters,
+  const auto volume = readable_volume(row.text(0), spec.parameters.volume);
+  if (!volume) throw_damaged_volume("volume");
+  return Asked{.result_key = result_key(spec.parameters.volume, volume->notes, spec.parameters,
                                         options_.mesher_version),
-               .cost_us = turn_cost_us(options_.expected_ms(volume, spec.parameters))};
+               .cost_us = turn_cost_us(options_.expected_ms(*volume, spec.parameters))};
 }
 
 void SqlJobStore::throw_no_volume_of(SqlConnection& connection, const JobSpec& spec) {

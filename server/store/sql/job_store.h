@@ -126,6 +126,11 @@ class SqlJobStore : public JobStore {
   std::map<std::string, Live> live_ ISOMESH_GUARDED_BY(live_mutex_);  // of running jobs
 
  private:
+  std::vector<Job> list_after(const Viewer& viewer, std::optional<JobState> state,
+                              const std::string& after, std::size_t limit) const;
+  // The same from a table with damaged pages.
+  std::vector<Job> undamaged_after(const Viewer& viewer, std::optional<JobState> state,
+                                   const std::string& after, std::size_t limit) const;
   // True if the job failed because of a damaged volume that is intact now.
   bool is_repaired(const Job& job) const;
   // True if the files of a job that succeeded are there and intact.

@@ -1,13 +1,14 @@
 #include "server/store/sql/order_store.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 
-#include "base/log.h"
 #include "proto/error.h"
 #include "server/store/microseconds.h"
 #include "server/store/order_rules.h"
 #include "server/store/sql/outbox.h"
+#include "server/store/sql/undamaged_rows.h"
 
 namespace isomesh::store {
 namespace {
@@ -32,7 +33,7 @@ OrderRecord record_of(const Rows& row) {
   record.owner = row.text(0);
   auto order = readable_order(row.text(1), row.text(3));
   auto work = readable_work(row.text(2));
-  if (order && !work) log_error("the work of order {} is damaged", order->id);
+  if (order && !work) report_damaged("order", order->id);
   record.is_damaged = !order || !work;
   if (!record.is_damaged) {
     record.order = *std::move(order);
@@ -40,7 +41,7 @@ OrderRecord record_of(const Rows& row) {
     return record;
   }
   record.order.id = row.text(3);
-  record.order.state = static_cast<OrderState>(row.integer(4));
+  record.order.state = row.choice(4, OrderState::kCancelled);
   if (!row.text(5).empty()) record.order.rule = row.text(5);
   record.order.created = timestamp_of(from_us(row.integer(6)));
   record.work.begun = record.order.created;
@@ -115,7 +116,7 @@ std::optional<LastOrder> last_of(SqlConnection& connection, const WatchedSeries&
   if (!row.next()) return std::nullopt;
   LastOrder last = {.instances = static_cast<std::uint32_t>(row.integer(0))};
   if (row.is_null(1)) return last;
-  last.state = static_cast<OrderState>(row.integer(1));
+  last.state = row.choice(1, OrderState::kCancelled);
   if (!is_final(*last.state)) return last;
   last.order = readable_order(row.text(2), row.text(3));
   if (auto work = readable_work(row.text(4))) last.contents = std::move(work->contents);
@@ -227,6 +228,13 @@ Order SqlOrderStore::get(const Viewer& viewer, const std::string& id) const {
 
 std::vector<Order> SqlOrderStore::list(const Viewer& viewer, const OrderFilter& filter,
                                        const std::string& after, std::size_t limit) const {
+  return list_despite_damage(
+      "orders", [&] { return list_after(viewer, filter, after, limit); },
+      [&] { return undamaged_after(viewer, filter, after, limit); });
+}
+
+std::vector<Order> SqlOrderStore::list_after(const Viewer& viewer, const OrderFilter& filter,
+                                             const std::string& after, std::size_t limit) const {
   std::vector<Order> orders;
   std::string last = after;
   // Repeats only if damaged records were skipped, because fewer than `limit` orders mean the end of
@@ -245,6 +253,26 @@ std::vector<Order> SqlOrderStore::list(const Viewer& viewer, const OrderFilter& 
     }
     is_over = left > 0;
   }
+  return orders;
+}
+
+std::vector<Order> SqlOrderStore::undamaged_after(const Viewer& viewer, const OrderFilter& filter,
+                                                  const std::string& after,
+                                                  std::size_t limit) const {
+  std::map<std::string, Order> found;
+  const auto take = [&](const Rows& rows) {
+    const std::string id = rows.text(1);
+    auto order = after.empty() || id < after ? readable_order(rows.text(0), id) : std::nullopt;
+    if (order) found.emplace(id, *std::move(order));
+    if (found.size() > limit) found.erase(found.begin());
+  };
+  read_undamaged(database_,
+                 "SELECT record, id FROM orders WHERE (?1 IS NULL OR owner = ?1) AND (?2 IS NULL "
+                 "OR state = ?2) AND (?3 IS NULL OR rule = ?3)",
+                 "id", "id DESC", take, viewer, filter.state, filter.rule);
+  std::vector<Order> orders;
+  for (auto& [id, order] : found) orders.push_back(std::move(order));
+  std::ranges::reverse(orders);
   return orders;
 }
 
@@ -336,7 +364,7 @@ OrderCounts SqlOrderStore::counts() const {
     Rows rows =
         connection.query("SELECT state, coalesce(rule, ''), count(*) FROM orders GROUP BY 1, 2");
     while (rows.next()) {
-      counts.by_state_and_rule[{static_cast<OrderState>(rows.integer(0)), rows.text(1)}] =
+      counts.by_state_and_rule[{rows.choice(0, OrderState::kCancelled), rows.text(1)}] +=
           rows.count(2);
     }
     Rows oldest = connection.query("SELECT min(created) FROM orders WHERE state < {order.final}");

@@ -41,6 +41,12 @@ class SqlOrderStore : public OrderStore {
   std::size_t forget(Time before) override;
 
  private:
+  std::vector<Order> list_after(const Viewer& viewer, const OrderFilter& filter,
+                                const std::string& after, std::size_t limit) const;
+  // The same from a table with damaged pages.
+  std::vector<Order> undamaged_after(const Viewer& viewer, const OrderFilter& filter,
+                                     const std::string& after, std::size_t limit) const;
+
   SqlDatabase& database_;
   const IsOurs is_ours_;
 };

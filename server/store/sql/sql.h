@@ -83,6 +83,13 @@ class Rows {
   std::size_t count(int column) const { return static_cast<std::size_t>(integer(column)); }
   double real(int column) const { return source_->real(column); }
   std::string text(int column) const { return source_->text(column); }
+  // The number of an enumerator from 0 to `last`; a damaged number is taken for `last`.
+  template <class Enum>
+  Enum choice(int column, Enum last) const {
+    const std::int64_t number = integer(column);
+    const bool is_known = number >= 0 && number < static_cast<std::int64_t>(last);
+    return is_known ? static_cast<Enum>(number) : last;
+  }
 
  private:
   std::unique_ptr<Source> source_;

@@ -1,13 +1,16 @@
 #include "server/store/sql/volume_store.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <utility>
 
-#include "base/log.h"
 #include "proto/json.h"
+#include "server/store/damaged_records.h"
 #include "server/store/microseconds.h"
 #include "server/store/sql/expiry.h"
+#include "server/store/sql/undamaged_rows.h"
 
 namespace isomesh::store {
 namespace {
@@ -24,22 +27,7 @@ struct Records {
   std::string listed;
 };
 
-// Empty if the record is unreadable because of damage or a manual change. Such a record must not
-// hide the others.
-std::optional<Volume> readable(const std::string& record, const std::string& id) {
-  try {
-    return volume_from_record(record);
-  } catch (const Error&) {
-    log_error("the record of volume {} is damaged: no version of this service wrote it", id);
-    return std::nullopt;
-  }
-}
-
-[[noreturn]] void throw_damaged() {
-  constexpr const char* kReason =
-      "the record of this volume is damaged: restore it from a backup, or delete the volume";
-  throw Error(ErrorCode::kInternal, kReason, {{"id", kReason}});
-}
+[[noreturn]] void throw_damaged() { throw_damaged_volume("id"); }
 
 // Empty if there is none. Throws Error kInternal if the record is damaged.
 std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, const std::string& id,
@@ -50,7 +38,7 @@ std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, cons
           lock,
       id, viewer);
   if (!row.next()) return std::nullopt;
-  auto volume = readable(row.text(0), id);
+  auto volume = readable_volume(row.text(0), id);
   if (!volume) throw_damaged();
   return volume;
 }
@@ -80,9 +68,17 @@ std::optional<Volume> use(SqlConnection& connection, const std::string& owner,
       "record)",
       owner, id);
   if (!known.next()) return std::nullopt;
-  auto volume = readable(known.text(0), id);
+  auto volume = readable_volume(known.text(0), id);
   if (!volume) throw_damaged();
   return volume;
+}
+
+// Empty if the record is damaged. The place of the next page follows from the record's time.
+std::optional<Volume> readable_at(const VolumePlace& place, const std::string& record) {
+  auto volume = readable_volume(record, place.id);
+  if (!volume || us_of_timestamp(volume->created) == place.created) return volume;
+  report_damaged("volume", place.id);
+  return std::nullopt;
 }
 
 bool insert(SqlConnection& connection, const std::string& owner, const Volume& volume,
@@ -98,6 +94,14 @@ bool insert(SqlConnection& connection, const std::string& owner, const Volume& v
 }
 
 }  // namespace
+
+VolumePlace::VolumePlace(const std::string& cursor, ListOrder order)
+    : created(order == ListOrder::kNewestFirst ? std::numeric_limits<std::int64_t>::max() : -1) {
+  if (cursor.empty()) return;
+  const std::size_t space = cursor.find(' ');
+  created = us_of_timestamp(cursor.substr(0, space));
+  if (space != std::string::npos) id = cursor.substr(space + 1);
+}
 
 std::pair<Volume, bool> SqlVolumeStore::add(const std::string& owner, const Volume& volume) {
   const Records records(volume);
@@ -145,28 +149,51 @@ bool SqlVolumeStore::contains(const Viewer& viewer, const std::string& id) const
 
 std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string& after,
                                          std::size_t limit, ListOrder order) const {
-  const std::size_t space = after.find(' ');
-  std::string id = space == std::string::npos ? "" : after.substr(space + 1);
-  const bool is_descending = order == ListOrder::kNewestFirst;
-  const std::int64_t beginning = is_descending ? std::numeric_limits<std::int64_t>::max() : -1;
-  std::int64_t created = after.empty() ? beginning : us_of_timestamp(after.substr(0, space));
-  const std::string select = std::string("SELECT record, created, id FROM volumes WHERE ") +
-                             (viewer ? "owner = ?1" : "?1 IS NULL") + " AND (created, id) " +
-                             (is_descending ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
-                                            : "> (?2, ?3) ORDER BY created, id LIMIT ?4");
+  const VolumePlace place(after, order);
+  return list_despite_damage(
+      "volumes", [&] { return list_after(place, viewer, limit, order); },
+      [&] { return undamaged_after(place, viewer, limit, order); });
+}
+
+std::vector<Volume> SqlVolumeStore::list_after(VolumePlace place, const Viewer& viewer,
+                                               std::size_t limit, ListOrder order) const {
+  const std::string select =
+      std::string("SELECT record, created, id FROM volumes WHERE ") +
+      (viewer ? "owner = ?1" : "?1 IS NULL") + " AND (created, id) " +
+      (order == ListOrder::kNewestFirst ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
+                                        : "> (?2, ?3) ORDER BY created, id LIMIT ?4");
   std::vector<Volume> volumes;
   // Repeats only if unreadable records were skipped, because fewer than `limit` records mean the
   // end of the list.
   for (bool is_over = false; !is_over && volumes.size() < limit;) {
     std::size_t left = std::min<std::size_t>(limit - volumes.size(), 1 << 30);
-    Rows rows = database_.query(select, viewer, created, id, left);
+    Rows rows = database_.query(select, viewer, place.created, place.id, left);
     for (; rows.next(); --left) {
-      created = rows.integer(1);
-      id = rows.text(2);
-      if (auto volume = readable(rows.text(0), id)) volumes.push_back(*std::move(volume));
+      place = {rows.integer(1), rows.text(2)};
+      if (auto volume = readable_at(place, rows.text(0))) volumes.push_back(*std::move(volume));
     }
     is_over = left > 0;
   }
+  return volumes;
+}
+
+std::vector<Volume> SqlVolumeStore::undamaged_after(const VolumePlace& place, const Viewer& viewer,
+                                                    std::size_t limit, ListOrder order) const {
+  const bool is_descending = order == ListOrder::kNewestFirst;
+  std::map<VolumePlace, Volume> found;
+  const auto take = [&](const Rows& rows) {
+    const VolumePlace at = {rows.integer(1), rows.text(2)};
+    if (is_descending ? at >= place : at <= place) return;
+    auto volume = readable_at(at, rows.text(0));
+    if (volume) found.emplace(at, *std::move(volume));
+    if (found.size() > limit) found.erase(is_descending ? found.begin() : std::prev(found.end()));
+  };
+  read_undamaged(database_,
+                 "SELECT record, created, id FROM volumes WHERE (?1 IS NULL OR owner = ?1)",
+                 "owner, id", "owner DESC, id DESC", take, viewer);
+  std::vector<Volume> volumes;
+  for (auto& [at, volume] : found) volumes.push_back(std::move(volume));
+  if (is_descending) std::ranges::reverse(volumes);
   return volumes;
 }
 

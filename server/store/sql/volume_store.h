@@ -1,5 +1,7 @@
 #pragma once
 
+#include <compare>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,6 +11,19 @@
 #include "server/store/volume_store.h"
 
 namespace isomesh::store {
+
+// The place of a volume in lists.
+struct VolumePlace {
+  VolumePlace(std::int64_t created_us, std::string volume)
+      : created(created_us), id(std::move(volume)) {}
+  // The place after which a list begins: that of cursor_of(), or the list's beginning if empty.
+  VolumePlace(const std::string& cursor, ListOrder order);
+
+  std::int64_t created = 0;  // microseconds since 1970
+  std::string id;
+
+  auto operator<=>(const VolumePlace&) const = default;
+};
 
 // Volumes in a database, which must outlive this object.
 class SqlVolumeStore : public VolumeStore {
@@ -30,6 +45,12 @@ class SqlVolumeStore : public VolumeStore {
   OwnedBytes owned_bytes() const override;
 
  private:
+  std::vector<Volume> list_after(VolumePlace place, const Viewer& viewer, std::size_t limit,
+                                 ListOrder order) const;
+  // The same from a table with damaged pages.
+  std::vector<Volume> undamaged_after(const VolumePlace& place, const Viewer& viewer,
+                                      std::size_t limit, ListOrder order) const;
+
   SqlDatabase& database_;
 };
 

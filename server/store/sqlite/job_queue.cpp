@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/ids.h"
 #include "proto/json.h"
+#include "server/store/damaged_records.h"
 #include "server/store/sql/outbox.h"
 #include "server/store/sqlite/job_rows.h"
 #include "server/store/sqlite/job_store.h"
@@ -82,13 +83,59 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
 
 std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
                                            std::chrono::milliseconds lease) {
+  std::string considered;
+  try {
+    return claim_next(worker, lease, considered);
+  } catch (const Error& error) {
+    // SQLite writes nothing more in this transaction. The next one leaves the job out.
+    const bool is_damaged = error.code() == ErrorCode::kInternal && !error.fields().empty();
+    if (is_damaged) considered.empty() ? leave_out_unreadable() : leave_out(considered);
+    throw;
+  }
+}
+
+void SqliteJobStore::leave_out_unreadable() {
+  const std::string known = unclaimable();
+  std::vector<std::string> queued;
+  {
+    const Reading reading(database_.reader());
+    // An index has all of this.
+    Rows rows = reading->query("SELECT id FROM jobs WHERE state = {job.queued}");
+    while (rows.next()) queued.push_back(rows.text(0));
+  }
+  for (const std::string& id : queued) {
+    if (known.find(id + '\n') != std::string::npos) continue;
+    try {
+      const Reading reading(database_.reader());
+      if (find(reading.connection(), std::nullopt, id)) continue;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kInternal) throw;
+    }
+    leave_out(id);
+  }
+}
+
+void SqliteJobStore::leave_out(const std::string& id) {
+  report_damaged("job", id);
+  const Lock lock(live_mutex_);
+  unclaimable_ += id + '\n';
+}
+
+std::string SqliteJobStore::unclaimable() const {
+  const Lock lock(live_mutex_);
+  return unclaimable_;
+}
+
+std::optional<Lease> SqliteJobStore::claim_next(const std::string& worker,
+                                                std::chrono::milliseconds lease,
+                                                std::string& considered) {
   // If a power failure reverts a claim, the job is queued again and its worker is gone anyway.
   Change change(*this, Durability::kProcess);
   const std::int64_t now = now_us();
-  auto next = take_next(change, now);
+  auto next = take_next(change, now, considered);
   while (next && next->is_damaged) {
     end(change, *next, JobState::kFailed);
-    next = take_next(change, now);
+    next = take_next(change, now, considered);
   }
   if (!next) {
     change.commit();
@@ -122,27 +169,41 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
 }
 
-std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std::int64_t now) {
+std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std::int64_t now,
+                                                             std::string& considered) {
+  const std::string left_out = unclaimable();
+  considered.clear();
   std::string id;
   std::int64_t start_tag = 0;
   {
     Rows query = change->query(
-        "WITH heads AS MATERIALIZED (SELECT q.priority, q.start_tag, (SELECT j.id FROM jobs j "
-        "WHERE j.state = {job.queued} AND j.priority = q.priority AND j.owner = q.owner AND "
-        "j.not_before NOT "
-        "BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS (SELECT 1 FROM jobs r WHERE r.owner = j.owner "
-        "AND r.result_key = j.result_key AND r.state = {job.running}) ORDER BY j.id LIMIT 1) AS "
-        "job FROM "
-        "queued_owners q) SELECT job, start_tag FROM heads WHERE job IS NOT NULL ORDER BY "
-        "priority, start_tag, job LIMIT 1",
-        now, kLongestWaitUs);
+        std::string(
+            "WITH heads AS MATERIALIZED (SELECT q.priority, q.start_tag, (SELECT j.id FROM jobs j "
+            "WHERE j.state = {job.queued} AND j.priority = q.priority AND j.owner = q.owner AND "
+            "j.not_before NOT "
+            "BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS (SELECT 1 FROM jobs r WHERE r.owner = "
+            "j.owner "
+            "AND r.result_key = j.result_key AND r.state = {job.running}) ") +
+            // A separate text, because the usual one is called often.
+            (left_out.empty() ? "AND ?3 = '' " : "AND instr(?3, j.id || char(10)) = 0 ") +
+            "ORDER BY j.id LIMIT 1) AS job FROM "
+            "queued_owners q) SELECT job, start_tag FROM heads WHERE job IS NOT NULL ORDER BY "
+            "priority, start_tag, job LIMIT 1",
+        now, kLongestWaitUs, left_out);
     if (query.next()) {
       id = query.text(0);
       start_tag = query.integer(1);
     }
   }
   std::optional<Row> row;
-  if (!id.empty()) row = find(change.connection(), std::nullopt, id);
+  if (!id.empty()) {
+    considered = id;
+    row = find(change.connection(), std::nullopt, id);
+    if (!row) {  // the index is damaged
+      leave_out(id);
+      return take_next(change, now, considered);
+    }
+  }
   // No job of a higher priority is ready, or none at all.
   constexpr int kAfterAll = static_cast<int>(Priority::kBulk) + 1;
   const int priority = row ? static_cast<int>(row->job.parameters.priority) : kAfterAll;

@@ -45,7 +45,15 @@ class SqliteJobStore : public SqlJobStore {
   void close_events() override { log_.close(); }
 
   // Selects the next job to run and charges its owner's turn.
-  std::optional<Row> take_next(Change& change, std::int64_t now);
+  std::optional<Row> take_next(Change& change, std::int64_t now, std::string& considered);
+  // As claim(). `considered` becomes the job that was selected last.
+  std::optional<Lease> claim_next(const std::string& worker, std::chrono::milliseconds lease,
+                                  std::string& considered);
+  // Never selects that job again, because its rows in the database are damaged.
+  void leave_out(const std::string& id);
+  // The same for all queued jobs that cannot be read.
+  void leave_out_unreadable();
+  std::string unclaimable() const;
   // The run's job with its last progress. Empty if the lease is lost.
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
   // The job submitted before with the same key.
@@ -68,6 +76,8 @@ class SqliteJobStore : public SqlJobStore {
 
   Database& database_;
   EventLog log_;
+  // Ids of jobs that were left out, each with a line break.
+  std::string unclaimable_ ISOMESH_GUARDED_BY(live_mutex_);
 };
 
 }  // namespace isomesh::store

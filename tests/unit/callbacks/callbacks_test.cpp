@@ -143,6 +143,23 @@ TEST_F(CallbacksTest, AreGivenUpWhenTheyAreOldOrUnwanted) {
   EXPECT_TRUE(elsewhere.received().empty());
 }
 
+// A receiver could not read it, and others wait for no one.
+TEST_F(CallbacksTest, ADamagedOneIsGivenUpAndHoldsUpNoOther) {
+  const Receiver receiver;
+  ended("damaged", receiver.url());
+  ended("other", receiver.url());
+  database_.writer().script(
+      "UPDATE callbacks SET body = substr(body, 1, 20) || x'ff' || substr(body, 21), attempts = -7 "
+      "WHERE job = 'damaged'");
+  database_.writer().script("UPDATE callbacks SET attempts = -7");
+  const CallbackTargets targets({receiver.url()});
+  const Callbacks callbacks(outbox_, targets, options(), observer());
+  EXPECT_TRUE(is_over("damaged"));
+  EXPECT_TRUE(is_over("other"));
+  EXPECT_EQ(receiver.received().size(), 1U);
+  EXPECT_TRUE(reasons_.contains("its record is damaged"));
+}
+
 TEST_F(CallbacksTest, FollowNoRedirect) {
   const Receiver receiver({302, 204});
   const CallbackTargets targets({receiver.url()});

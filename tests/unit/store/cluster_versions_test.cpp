@@ -115,6 +115,12 @@ TEST_F(ClusterVersionsTest, ADamagedJobOfAnOlderNodeFailsAtANewerOne) {
   EXPECT_EQ(newer().jobs.get("", id).state, JobState::kFailed);
 }
 
+TEST_F(ClusterVersionsTest, ADamagedVolumeOfAnOlderJobHoldsUpNoOther) {
+  const std::string id = submit();
+  ask("UPDATE volumes SET record = '#'");
+  EXPECT_EQ(newer().claimed().id, id) << "its run finds out what its volume is";
+}
+
 // Its mesh is the same, but not all that was asked for.
 TEST_F(ClusterVersionsTest, ANewerJobDoesNotEndWithAnOlderOneLikeIt) {
   newer_.emplace(url_, "newer", blobs_, of_next_version("test"));

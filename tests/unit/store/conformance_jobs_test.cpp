@@ -202,6 +202,19 @@ TEST_P(JobConformance, ADamagedRecordHidesAndBlocksNoOther) {
   EXPECT_FALSE(can_claim());
 }
 
+TEST_P(JobConformance, ADamagedPriorityOrStateIsOneOfThoseThatThereAre) {
+  const std::string id = submit().id;
+  const std::string next = submit().id;
+  database().run(Change::kRepeatable, "UPDATE jobs SET priority = 77 WHERE id = ?1", id);
+  EXPECT_EQ(jobs().depth("").all_queued(), 2U);
+  EXPECT_EQ(jobs().list("", std::nullopt, "", 9).size(), 2U);
+  database().run(Change::kRepeatable, "UPDATE jobs SET state = 77 WHERE id = ?1", id);
+  damage("jobs", id);
+  EXPECT_EQ(jobs().depth("").all_queued(), 1U);
+  EXPECT_EQ(jobs().cancel("", id).state, JobState::kCancelled);
+  EXPECT_EQ(claimed().id, next);
+}
+
 TEST_P(JobConformance, ADamagedRecordIsCancelledAndFreesItsVolume) {
   const std::string queued = submit().id;
   damage("jobs", queued);

@@ -316,6 +316,11 @@ TEST(AuditRecord, HasThePeerOfARefusedLogin) {
   EXPECT_EQ(audit_record({.event = AuditEvent::kStart}).find("unlisted"), std::string::npos);
 }
 
+TEST(AuditLine, OfAnEmptiedRecordHoldsUpNoOther) {
+  EXPECT_EQ(audit_line(7, "then", ""), R"({"id":7,"at":"then",)");
+  EXPECT_EQ(audit_line(7, "then", "{}"), R"({"id":7,"at":"then",})");
+}
+
 TEST_P(OrderConformance, TheAuditTrailGrowsInOrder) {
   audit().add({.event = AuditEvent::kStart});
   audit().add({.event = AuditEvent::kTransferred,

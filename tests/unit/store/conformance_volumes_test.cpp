@@ -137,6 +137,40 @@ TEST_P(VolumeConformance, ListsTheOldestFirstInPages) {
   EXPECT_EQ(order(cursor_of(second), 9, ListOrder::kNewestFirst), "cc");
 }
 
+// Whatever the damage is: the others are listed, with the places of the pages that they had.
+TEST_P(VolumeConformance, ADamagedRecordHidesNoOther) {
+  for (const char* damaged :
+       {"'#' || substr(record, 2)", "''", "replace(record, '\"id\":\"bb\"', '\"id\":\"bc\"')",
+        "replace(record, '\"created\":\"2024', '\"created\":\"2025')",
+        "replace(record, '\"type\":\"int16\"', '\"type\":\"int17\"')",
+        "replace(record, '\"bytes\":120', '\"bytes\":-20')"}) {
+    volumes().add("", volume_of("cc", "2024-01-01T00:00:00.000Z"));
+    volumes().add("", volume_of("bb", "2024-02-01T00:00:00.000Z"));
+    volumes().add("", volume_of("aa", "2024-03-01T00:00:00.000Z"));
+    database().run(Change::kRepeatable,
+                   std::string("UPDATE volumes SET record = ") + damaged + " WHERE id = 'bb'");
+    EXPECT_EQ(order(), "ccaa") << damaged;
+    EXPECT_EQ(order("", 1), "cc") << damaged;
+    EXPECT_EQ(order(cursor_of(volume_of("cc", "2024-01-01T00:00:00.000Z")), 1), "aa") << damaged;
+    EXPECT_EQ(order("", 9, ListOrder::kNewestFirst), "aacc") << damaged;
+    for (const char* id : {"aa", "bb", "cc"}) volumes().erase("", id);
+  }
+}
+
+TEST_P(VolumeConformance, ADamagedRecordSaysSoToWhoNeedsIt) {
+  volumes().add("", volume_of("bb"));
+  damage("volumes", "bb");
+  JobParameters parameters;
+  parameters.volume = "bb";
+  const Error fetched = test::error_of([&] { volumes().get("", "bb"); });
+  const Error submitted = test::error_of([&] { jobs().submit({"", parameters, "", ""}); });
+  ASSERT_EQ(fetched.fields().size(), 1U);
+  ASSERT_EQ(submitted.fields().size(), 1U);
+  EXPECT_EQ(fetched.fields()[0].field, "id");
+  EXPECT_EQ(submitted.fields()[0].field, "volume");
+  EXPECT_THAT(submitted.fields()[0].message, testing::HasSubstr("damaged"));
+}
+
 TEST_P(VolumeConformance, ErasesOnce) {
   volumes().add("", volume_of("aa"));
   volumes().erase("", "aa");

@@ -118,6 +118,7 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
                                 ", 2) WHERE " + key + " = ?1",
                             id);
   }
+  store::SqlDatabase& database() { return engine_->database(); }
   void restart() { engine_->restart(); }
   void lose_power() { engine_->lose_power(); }
 

@@ -1,0 +1,123 @@
+// One wrong byte in the file of SQLite's database, in the cell of a record.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "proto/json.h"
+#include "server/store/files/blob_store.h"
+#include "server/store/job_rules.h"
+#include "server/store/sql/volume_store.h"
+#include "server/store/sqlite/database.h"
+#include "server/store/sqlite/identity.h"
+#include "server/store/sqlite/job_store.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+
+namespace isomesh::store {
+namespace {
+
+// Before a row's key in its cell are its length and the types of its columns.
+constexpr std::size_t kHeaderBytes = 16;
+
+class FlippedBytes : public testing::Test {
+ protected:
+  static constexpr std::size_t kRows = 5;
+
+  FlippedBytes() {
+    Database database(data_);
+    SqlVolumeStore volumes(database);
+    for (std::size_t n = 0; n < kRows; ++n) volumes.add("", volume(n));
+    FileBlobStore blobs(data_);
+    SqliteJobStore jobs(database, blobs, {});
+    for (std::size_t n = 0; n < kRows; ++n) {
+      JobParameters parameters;
+      parameters.volume = volume(n).id;
+      jobs_.push_back(job_of(jobs.submit({"", parameters, "", ""})).id);
+    }
+  }
+
+  static Volume volume(std::size_t number) {
+    Volume volume;
+    volume.id = "volume-" + std::string(40, static_cast<char>('a' + number));
+    volume.created = "2024-01-01T00:00:0" + std::to_string(number) + ".000Z";
+    return volume;
+  }
+
+  // Calls `check(database, offset)` with each byte of the row wrong in turn, but for those of its
+  // key. By the key, and the header before it, SQLite finds the way to other rows.
+  template <class Check>
+  void for_each_flip(const std::string& key, const std::string& record, const Check& check) {
+    const std::string whole = test::read_file(data_.records());
+    const std::size_t end = whole.find(record) + record.size();
+    ASSERT_LT(end, whole.size()) << record;
+    const std::size_t begin = whole.rfind(key, end - record.size());
+    ASSERT_NE(begin, std::string::npos);
+    for (std::size_t at = begin - kHeaderBytes; at < end; ++at) {
+      if (at == begin) at += key.size();
+      for (const int flip : {0x01, 0x80}) {
+        std::string flipped = whole;
+        flipped[at] = static_cast<char>(flipped[at] ^ flip);
+        test::write_file(data_.records(), flipped);
+        Database database(data_);
+        check(database, at - begin + kHeaderBytes);
+      }
+      // Most of a record is alike.
+      if (at > begin + key.size() + kHeaderBytes) at += 6;
+    }
+    test::write_file(data_.records(), whole);
+  }
+
+  // How many rows are found whatever the byte at that offset is.
+  static std::size_t least_of(std::size_t offset) { return offset < kHeaderBytes ? 0 : kRows - 1; }
+
+  test::TemporaryFolder folder_{test::fast_place()};
+  DataFolder data_{folder_ / "data"};
+  std::vector<std::string> jobs_;
+};
+
+TEST_F(FlippedBytes, OfAVolumeHideNoOther) {
+  std::size_t hidden = 0;
+  for_each_flip(volume(2).id, to_record(volume(2)), [&](Database& database, std::size_t offset) {
+    const SqlVolumeStore volumes(database);
+    for (const ListOrder order : {ListOrder::kOldestFirst, ListOrder::kNewestFirst}) {
+      const auto listed = volumes.list("", "", 9, order);
+      hidden += listed.size() < kRows ? 1 : 0;
+      EXPECT_GE(listed.size(), least_of(offset)) << offset;
+    }
+  });
+  EXPECT_GT(hidden, 0U) << "the flips damage a record";
+}
+
+TEST_F(FlippedBytes, OfAJobHideNoOtherAndDoNotStopTheQueue) {
+  std::string record;
+  {
+    Database database(data_);
+    FileBlobStore blobs(data_);
+    record = to_record(SqliteJobStore(database, blobs, {}).get("", jobs_[2]));
+  }
+  std::size_t hidden = 0;
+  for_each_flip(jobs_[2], record, [&](Database& database, std::size_t offset) {
+    FileBlobStore blobs(data_);
+    SqliteJobStore jobs(database, blobs, {});
+    const std::size_t listed = jobs.list("", std::nullopt, "", 9).size();
+    hidden += listed < kRows ? 1 : 0;
+    EXPECT_GE(listed, least_of(offset)) << offset;
+    // The first claim that meets an unreadable row fails, and no later one.
+    std::size_t claimed = 0;
+    for (std::size_t n = 0; n < kRows + 3; ++n) {
+      try {
+        claimed += jobs.claim("worker", std::chrono::hours(1)) ? 1 : 0;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kInternal);
+      }
+    }
+    EXPECT_GE(claimed, least_of(offset)) << offset;
+  });
+  EXPECT_GT(hidden, 0U) << "the flips damage a record";
+}
+
+}  // namespace
+}  // namespace isomesh::store
