@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/source/header_fields.h"
+#include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
 namespace {
@@ -28,16 +29,17 @@ bool is_type(std::string_view line) {
 }
 
 // Each attribute has three lines, then its value up to the next attribute.
-HeaderTexts read_attributes(std::string_view text) {
+HeaderTexts read_attributes(const InputFile& file) {
   HeaderTexts attributes;
   std::string* value = nullptr;
-  for (const std::string_view line : lines(text)) {
-    if (is_type(line)) {
+  LineReader lines(file, {.header = "The AFNI header"});
+  while (const auto line = lines.next_filled()) {
+    if (is_type(*line)) {
       value = nullptr;
-    } else if (const auto name = value_in(line, "name"); name && value == nullptr) {
+    } else if (const auto name = value_in(*line, "name"); name && value == nullptr) {
       value = &attributes[std::string(*name)];
-    } else if (value != nullptr && !value_in(line, "count")) {
-      *value += (value->empty() ? "" : "\n") + std::string(line);
+    } else if (value != nullptr && !value_in(*line, "count")) {
+      *value += (value->empty() ? "" : "\n") + std::string(*line);
     }
   }
   return attributes;
@@ -172,7 +174,7 @@ bool is_afni(std::string_view head) {
 SourceVolume parse_afni(const InputFile& file, const Companions& companions,
                         const ImportOptions& options) {
   const std::string name = brick_name(companions);
-  const HeaderTexts attributes = read_attributes(file.text(0, kBeginningBytes));
+  const HeaderTexts attributes = read_attributes(file);
   SourceVolume volume = describe(attributes, options);
   if (name.ends_with(".gz")) volume.encoding = Encoding::kDeflate;
   if (name.ends_with(".bz2")) volume.encoding = Encoding::kBzip2;
@@ -185,10 +187,9 @@ std::vector<std::string> afni_data_names(const InputFile& /*file*/, const Compan
 }
 
 MostBytes most_afni_bytes(const InputFile& beginning, const ImportTask& task) {
-  const SourceVolume volume =
-      describe(read_attributes(beginning.text(0, kBeginningBytes)), task.options);
+  const SourceVolume volume = describe(read_attributes(beginning), task.options);
   check_limits(volume, task.limits);
-  return {.file = kBeginningBytes + kHeadroomBytes,
+  return {.file = kMostTextHeaderBytes + kHeadroomBytes,
           .data = volume.most_encoded_bytes() + kHeadroomBytes};
 }
 

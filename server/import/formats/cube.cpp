@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
+#include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
 namespace {
@@ -16,27 +17,6 @@ namespace {
 constexpr double kAngstromPerBohr = 0.529177210903;  // CODATA 2018
 constexpr std::int64_t kMostAtoms = 1'000'000;
 constexpr std::uint64_t kMostValues = 10'000;
-
-// Takes lines from the front of a text.
-class LineReader {
- public:
-  explicit LineReader(std::string_view text) : text_(text) {}
-
-  // Empty if the text ends before the line does.
-  std::optional<std::string_view> next() {
-    const std::size_t end = text_.find('\n', at_);
-    if (end == std::string_view::npos) return std::nullopt;
-    const std::string_view line = text_.substr(at_, end - at_);
-    at_ = end + 1;
-    return line;
-  }
-
-  std::size_t offset() const { return at_; }
-
- private:
-  std::string_view text_;
-  std::size_t at_ = 0;
-};
 
 // A count and a vector, and for the atoms maybe the number of values at a point.
 struct CountLine {
@@ -72,13 +52,13 @@ struct CubeHeader {
 };
 
 std::optional<CubeHeader> read_cube_header(LineReader& lines) {
-  lines.next();
-  lines.next();
-  const auto atoms = count_line(lines.next(), true);
+  lines.next_ended();
+  lines.next_ended();
+  const auto atoms = count_line(lines.next_ended(), true);
   if (!atoms || std::abs(atoms->count) > kMostAtoms) return std::nullopt;
   CubeHeader header{*atoms, {}};
   for (CountLine& axis : header.axes) {
-    const auto line = count_line(lines.next(), false);
+    const auto line = count_line(lines.next_ended(), false);
     if (!line || line->count == 0) return std::nullopt;
     axis = *line;
   }
@@ -90,7 +70,7 @@ std::optional<CubeHeader> read_cube_header(LineReader& lines) {
 std::uint64_t read_orbitals(LineReader& lines) {
   std::optional<std::uint64_t> count;
   for (std::uint64_t found = 0; !count || found < *count;) {
-    const auto line = lines.next();
+    const auto line = lines.next_ended();
     if (!line) throw_unusable("The cube file ends within its list of orbitals.");
     auto parts = words(*line);
     if (!count) {
@@ -110,10 +90,7 @@ std::uint64_t read_orbitals(LineReader& lines) {
 
 std::uint64_t skip_atoms(LineReader& lines, const CountLine& atoms) {
   for (std::int64_t atom = 0; atom < std::abs(atoms.count); ++atom) {
-    if (!lines.next()) {
-      throw_unusable("The cube file ends within its list of atoms, or the list is longer than " +
-                     std::to_string(kBeginningBytes) + " bytes.");
-    }
+    if (!lines.next_ended()) throw_unusable("The cube file ends within its list of atoms.");
   }
   return atoms.count < 0 ? read_orbitals(lines) : atoms.values;
 }
@@ -140,8 +117,7 @@ bool is_cube(std::string_view head) {
 
 SourceVolume parse_cube(const InputFile& file, const Companions& /*companions*/,
                         const ImportOptions& options) {
-  const std::string text = file.text(0, kBeginningBytes);
-  LineReader lines(text);
+  LineReader lines(file, {.header = "The header of the cube file"});
   const auto header = read_cube_header(lines);
   if (!header) throw_unusable("The header of the cube file is damaged.");
   SourceVolume volume;

@@ -12,6 +12,7 @@ namespace {
 constexpr std::int64_t kLargestNumber = 1'000'000'000;
 constexpr std::int64_t kMostFiles = 65'536;
 constexpr std::size_t kWidestNumber = 9;
+constexpr std::size_t kLongestPattern = 4096;  // there is a copy of it for each file
 
 [[noreturn]] void throw_no_pattern(std::string_view said) {
   throw_unusable("The header names its data files by " + in_quotes(said) +
@@ -33,6 +34,7 @@ struct Pattern {
 };
 
 std::optional<Pattern> parse_pattern(std::string_view text) {
+  if (text.size() > kLongestPattern) return std::nullopt;
   const std::size_t percent = text.find('%');
   const std::size_t letter = text.find_first_not_of("0123456789", percent + 1);
   if (percent == text.npos || letter == text.npos) return std::nullopt;

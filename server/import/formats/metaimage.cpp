@@ -12,6 +12,7 @@
 #include "server/import/formats/file_pattern.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/source/header_fields.h"
+#include "server/import/source/line_reader.h"
 #include "server/import/source/reader.h"
 #include "server/import/source/source.h"
 
@@ -51,17 +52,13 @@ void add_field(HeaderTexts& fields, std::string_view line) {
   }
 }
 
-MetaHeader read_meta_header(const std::string& text) {
+MetaHeader read_meta_header(const InputFile& file) {
   MetaHeader header;
-  std::size_t next = 0;
-  while (next < text.size()) {
-    const std::size_t end = std::min(text.find('\n', next), text.size());
-    const std::string_view line = std::string_view(text).substr(next, end - next);
-    next = std::min(end + 1, text.size());
-    if (trimmed(line).empty()) continue;
-    add_field(header.fields, line);
+  LineReader lines(file, {.header = "The MetaImage header"});
+  while (const auto line = lines.next_filled()) {
+    add_field(header.fields, *line);
     if (header.fields.contains(kLastKey)) {
-      header.bytes = next;
+      header.bytes = lines.offset();
       return header;
     }
   }
@@ -102,9 +99,8 @@ std::vector<std::string> data_names(const InputFile& file, const MetaHeader& hea
   const std::string_view said = value_of(header.fields, kLastKey);
   if (is_file_pattern(said)) return expand_file_pattern(whole_pattern(said, header.fields));
   if (!said.starts_with("LIST")) return {std::string(said)};
-  const std::string text = file.text(header.bytes, kMostTextHeaderBytes);
-  const auto names = lines(text);
-  return {names.begin(), names.end()};
+  LineReader lines(file, {.header = "The MetaImage header's list of files"}, header.bytes);
+  return rest_of(lines);
 }
 
 Skip data_skip(const HeaderTexts& fields) {
@@ -354,13 +350,13 @@ bool is_metaimage(std::string_view head) {
 
 std::vector<std::string> metaimage_data_names(const InputFile& file,
                                               const Companions& /*companions*/) {
-  const MetaHeader header = read_meta_header(file.text(0, kMostTextHeaderBytes));
+  const MetaHeader header = read_meta_header(file);
   return is_detached(header.fields) ? data_names(file, header) : std::vector<std::string>();
 }
 
 SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
                              const ImportOptions& options) {
-  const MetaHeader header = read_meta_header(file.text(0, kMostTextHeaderBytes));
+  const MetaHeader header = read_meta_header(file);
   const HeaderTexts& fields = header.fields;
   const std::string_view object = value_of(fields, "ObjectType");
   if (!object.empty() && object != "Image") {
@@ -384,7 +380,7 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
 
 MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::uint64_t kMostSkipped = std::uint64_t{64} << 20;
-  const MetaHeader header = read_meta_header(beginning.text(0, kMostTextHeaderBytes));
+  const MetaHeader header = read_meta_header(beginning);
   const HeaderTexts& fields = header.fields;
   const SourceVolume volume = samples_of(fields, sizes_of(fields), task.options);
   check_limits(volume, task.limits);

@@ -12,6 +12,7 @@
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/nrrd_segments.h"
 #include "server/import/formats/nrrd_space.h"
+#include "server/import/source/line_reader.h"
 #include "server/import/source/reader.h"
 
 namespace isomesh::import {
@@ -57,25 +58,23 @@ bool names_list(const NrrdFields& fields) {
   return found != fields.end() && found->second.starts_with("LIST");
 }
 
-NrrdHeader read_nrrd_header(const std::string& text) {
+NrrdHeader read_nrrd_header(const InputFile& file) {
   NrrdHeader header;
-  std::size_t next = 0;
+  LineReader lines(file, {.header = "The NRRD header"});
   for (bool first = true;; first = false) {
-    const std::size_t end = text.find('\n', next);
+    header.bytes = lines.offset();
     // Only a detached header may end with its file.
-    if (end == std::string::npos || names_list(header.fields)) {
-      header.bytes = next;
+    auto line = names_list(header.fields) ? std::nullopt : lines.next_ended();
+    if (!line) {
       if (header.fields.contains(kDataFile)) return header;
       break;
     }
-    std::string_view line = std::string_view(text).substr(next, end - next);
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    next = end + 1;
-    if (line.empty()) {
-      header.bytes = next;
+    if (line->ends_with('\r')) line->remove_suffix(1);
+    if (line->empty()) {
+      header.bytes = lines.offset();
       return header;
     }
-    if (!first && !line.starts_with('#')) add_line(header.fields, line);
+    if (!first && !line->starts_with('#')) add_line(header.fields, *line);
   }
   throw_unusable("The NRRD header has no end: the empty line after it is missing.");
 }
@@ -153,21 +152,17 @@ bool is_big_endian(const NrrdFields& fields, StoredType type, Encoding encoding)
   return false;
 }
 
-std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t lines) {
-  constexpr std::size_t kHeaderPieceBytes = std::size_t{1} << 16;
-  while (lines > 0) {
-    const std::string piece = file.text(offset, kHeaderPieceBytes);
+// Lines of another format, which may be of any number and length, so they are never held whole.
+std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t count) {
+  LineReader lines(file, {}, offset);
+  while (count > 0) {
+    const std::string_view piece = lines.view();
     if (piece.empty()) throw_unusable("The file ends within the lines that its header skips.");
-    std::size_t begin = 0;
-    for (std::size_t end = 0; lines > 0 && end != std::string::npos;) {
-      end = piece.find('\n', begin);
-      if (end == std::string::npos) break;
-      begin = end + 1;
-      --lines;
-    }
-    offset += lines > 0 ? piece.size() : begin;
+    const std::size_t end = piece.find('\n');
+    if (end != piece.npos) --count;
+    lines.drop(end == piece.npos ? piece.size() : end + 1);
   }
-  return offset;
+  return lines.offset();
 }
 
 std::int64_t skip_field(const NrrdFields& fields, std::string_view name) {
@@ -221,9 +216,8 @@ std::vector<std::string> data_names(const InputFile& file, const NrrdHeader& hea
     if (is_file_pattern(said)) return expand_file_pattern(said);
     return {std::string(said)};
   }
-  const std::string text = file.text(header.bytes, kMostTextHeaderBytes);
-  const auto names = lines(text);
-  return {names.begin(), names.end()};
+  LineReader lines(file, {.header = "The NRRD header's list of files"}, header.bytes);
+  return rest_of(lines);
 }
 
 // A NIfTI file used as data begins with its own header, which some headers ignore.
@@ -287,13 +281,13 @@ bool is_nrrd(std::string_view head) {
 }
 
 std::vector<std::string> nrrd_data_names(const InputFile& file, const Companions& /*companions*/) {
-  const NrrdHeader header = read_nrrd_header(file.text(0, kMostTextHeaderBytes));
+  const NrrdHeader header = read_nrrd_header(file);
   return header.fields.contains(kDataFile) ? data_names(file, header) : std::vector<std::string>();
 }
 
 SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
                         const ImportOptions& options) {
-  const NrrdHeader header = read_nrrd_header(file.text(0, kMostTextHeaderBytes));
+  const NrrdHeader header = read_nrrd_header(file);
   const NrrdFields& fields = header.fields;
   const NrrdSizes sizes = nrrd_sizes(fields, axis_sizes(fields));
   SourceVolume volume = samples_of(fields, sizes, options);
@@ -310,7 +304,7 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
 
 MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::int64_t kMostSkipped = std::int64_t{64} << 20;
-  const NrrdHeader header = read_nrrd_header(beginning.text(0, kMostTextHeaderBytes));
+  const NrrdHeader header = read_nrrd_header(beginning);
   const NrrdFields& fields = header.fields;
   const SourceVolume volume =
       samples_of(fields, nrrd_sizes(fields, axis_sizes(fields)), task.options);

@@ -12,6 +12,7 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
+#include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
 namespace {
@@ -88,14 +89,15 @@ void add_general(std::string_view line, General& general) {
   general.emplace(lower(trimmed(line.substr(1, colon - 1))), trimmed(line.substr(colon + 1)));
 }
 
-ParHeader read_par_header(std::string_view text) {
+ParHeader read_par_header(const InputFile& file) {
   ParHeader header;
-  for (const std::string_view line : lines(text)) {
-    if (line.front() == '#') continue;
-    if (line.front() == '.') {
-      add_general(line, header.general);
+  LineReader lines(file, {.header = "The PAR header", .bytes = kMostParBytes});
+  while (const auto line = lines.next_filled()) {
+    if (line->front() == '#') continue;
+    if (line->front() == '.') {
+      add_general(*line, header.general);
     } else {
-      header.rows.push_back(image_row(line));
+      header.rows.push_back(image_row(*line));
     }
   }
   if (header.rows.empty()) throw_unusable("The PAR header describes no image.");
@@ -322,7 +324,7 @@ bool is_par(std::string_view head) {
 SourceVolume parse_par(const InputFile& file, const Companions& companions,
                        const ImportOptions& options) {
   const std::filesystem::path path = companion(rec_name(companions), companions);
-  Described described = describe(read_par_header(file.text(0, kMostParBytes)), options);
+  Described described = describe(read_par_header(file), options);
   const std::uint64_t bytes = described.slice_bytes();
   const std::uint64_t size = InputFile(path).size();
   const bool is_converted = differ(described.slices);
@@ -341,7 +343,12 @@ std::vector<std::string> par_data_names(const InputFile& /*file*/, const Compani
 }
 
 MostBytes most_par_bytes(const InputFile& beginning, const ImportTask& task) {
-  const ParHeader header = read_par_header(beginning.text(0, kMostParBytes));
+  // The images that follow are not known yet.
+  if (beginning.size() >= kBeginningBytes) {
+    return {.file = kMostParBytes + kHeadroomBytes,
+            .data = task.limits.max_sample_bytes + kHeadroomBytes};
+  }
+  const ParHeader header = read_par_header(beginning);
   const Described described = describe(header, task.options);
   check_limits(described.volume, task.limits);
   // The REC also has the images of the volumes that were not chosen.

@@ -53,8 +53,15 @@ class VtiParser : public XmlHandler {
 
   void start_element(std::string_view name, const XmlAttributes& pairs) override {
     constexpr std::size_t kDeepest = 32;
+    constexpr std::size_t kMostElements = 100'000;
+    // Longer than any name that is looked for. Each element costs a copy of the names around it.
+    constexpr std::size_t kLongestName = 64;
     if (path_.size() >= kDeepest) throw_unusable("The VTK file's elements are nested too deeply.");
-    path_.emplace_back(name);
+    if (++elements_ > kMostElements) {
+      throw_unusable("The VTK file has more than the " + std::to_string(kMostElements) +
+                     " elements that are supported.");
+    }
+    path_.emplace_back(name.substr(0, kLongestName));
     HeaderTexts attributes;
     pairs.for_each([&](const char* key, const char* value) { attributes.emplace(key, value); });
     const std::string place = joined_path();
@@ -119,6 +126,7 @@ class VtiParser : public XmlHandler {
   const Until until_;
   VtiDocument document_;
   std::vector<std::string> path_;
+  std::size_t elements_ = 0;
   XmlReader reader_{*this};
 };
 

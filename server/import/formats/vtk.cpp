@@ -6,13 +6,12 @@
 #include <utility>
 
 #include "base/text.h"
+#include "server/import/source/line_reader.h"
 #include "server/import/source/names.h"
 #include "server/import/source/reader.h"
 
 namespace isomesh::import {
 namespace {
-
-constexpr std::size_t kLongestLine = 4096;
 
 [[noreturn]] void throw_damaged_array() {
   throw_unusable("The VTK file's list of arrays is damaged or truncated.");
@@ -21,7 +20,9 @@ constexpr std::size_t kLongestLine = 4096;
 class Scanner {
  public:
   Scanner(const InputFile& file, std::uint64_t offset, bool is_text)
-      : file_(file), next_(offset), is_text_(is_text) {}
+      : file_bytes_(file.size()),
+        lines_(file, {.header = "The VTK file's list of arrays"}, offset),
+        is_text_(is_text) {}
 
   std::vector<VtkArray> arrays();
 
@@ -35,9 +36,9 @@ class Scanner {
   std::optional<std::vector<std::string>> next_filled_line();
   static std::uint64_t number(const std::string& word);
 
-  const InputFile& file_;
-  std::uint64_t next_;
-  bool is_text_;
+  const std::uint64_t file_bytes_;
+  LineReader lines_;
+  const bool is_text_;
   bool is_of_cells_ = false;
   std::uint64_t tuples_ = 0;
   std::vector<VtkArray> arrays_;
@@ -50,16 +51,10 @@ std::uint64_t Scanner::number(const std::string& word) {
 }
 
 std::optional<std::vector<std::string>> Scanner::next_line() {
-  const std::string piece = file_.text(next_, kLongestLine);
-  if (piece.empty()) return std::nullopt;
-  const std::size_t end = piece.find('\n');
-  if (end == std::string::npos && piece.size() == kLongestLine) throw_damaged_array();
-  next_ += std::min(end, piece.size() - 1) + 1;
-  std::vector<std::string> parts;
-  for (const std::string_view word : words(std::string_view(piece).substr(0, end))) {
-    parts.emplace_back(word);
-  }
-  return parts;
+  const auto line = lines_.next();
+  if (!line) return std::nullopt;
+  const auto parts = words(*line);
+  return std::vector<std::string>(parts.begin(), parts.end());
 }
 
 std::optional<std::vector<std::string>> Scanner::next_filled_line() {
@@ -70,8 +65,7 @@ std::optional<std::vector<std::string>> Scanner::next_filled_line() {
 }
 
 std::vector<VtkArray> Scanner::arrays() {
-  constexpr std::size_t kMostArrays = 1000;
-  while (arrays_.size() < kMostArrays) {
+  for (;;) {
     const auto parts = next_filled_line();
     if (!parts) return std::move(arrays_);
     const std::string keyword = lower(parts->front());
@@ -90,7 +84,6 @@ std::vector<VtkArray> Scanner::arrays() {
         !arrays_.empty() && arrays_.back().is_scalars && !arrays_.back().is_of_cells;
     if (is_found) return std::move(arrays_);
   }
-  throw_damaged_array();
 }
 
 void Scanner::read_attribute(const std::vector<std::string>& parts) {
@@ -105,9 +98,9 @@ void Scanner::read_attribute(const std::vector<std::string>& parts) {
     array.is_scalars = true;
     if (parts.size() > 3) array.components = number(parts[3]);
     // The table is named on a line of its own, which some writers leave out.
-    const std::uint64_t here = next_;
+    const std::uint64_t here = lines_.offset();
     const auto table = next_filled_line();
-    if (!table || lower(table->front()) != "lookup_table") next_ = here;
+    if (!table || lower(table->front()) != "lookup_table") lines_.move_to(here);
   } else if (keyword == "vectors" || keyword == "normals") {
     array.components = 3;
   } else if (keyword == "tensors") {
@@ -143,8 +136,13 @@ void Scanner::read_field(std::uint64_t count) {
 }
 
 void Scanner::add(VtkArray array) {
+  constexpr std::size_t kMostArrays = 1000;
+  if (arrays_.size() == kMostArrays) {
+    throw_unusable("The VTK file has more than the " + std::to_string(kMostArrays) +
+                   " arrays that are supported.");
+  }
   array.is_of_cells = is_of_cells_;
-  array.offset = next_;
+  array.offset = lines_.offset();
   arrays_.push_back(array);
   if (!array.is_scalars || array.is_of_cells) skip(array);
 }
@@ -158,23 +156,22 @@ void Scanner::skip(const VtkArray& array) {
                    " before its samples, which is not supported.");
   }
   const std::uint64_t bytes = numbers * bytes_per_sample(*type);
-  if (numbers > file_.size() || bytes > file_.size() - std::min(next_, file_.size())) {
-    throw_damaged_array();
-  }
-  next_ += bytes;
+  const std::uint64_t left = file_bytes_ - std::min(lines_.offset(), file_bytes_);
+  if (numbers > file_bytes_ || bytes > left) throw_damaged_array();
+  lines_.move_to(lines_.offset() + bytes);
 }
 
 void Scanner::skip_words(std::uint64_t count) {
   bool is_in_word = false;
   while (count > 0 || is_in_word) {
-    const std::string piece = file_.text(next_, kPieceBytes);
+    const std::string_view piece = lines_.view();
     if (piece.empty()) throw_damaged_array();
     std::size_t at = 0;
     for (; at < piece.size() && (count > 0 || is_in_word); ++at) {
       const bool was_in_word = std::exchange(is_in_word, !is_space(piece[at]));
       if (is_in_word && !was_in_word) --count;
     }
-    next_ += at;
+    lines_.drop(at);
   }
 }
 

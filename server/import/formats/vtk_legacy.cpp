@@ -11,12 +11,13 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/vtk.h"
+#include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
 namespace {
 
 constexpr std::string_view kFirstLine = "# vtk DataFile Version ";
-constexpr std::size_t kMostLegacyHeaderBytes = std::size_t{1} << 16;
+constexpr std::uint64_t kMostLegacyHeaderBytes = std::uint64_t{1} << 16;
 
 struct LegacyHeader {
   bool is_text = false;
@@ -75,23 +76,21 @@ void read_line(std::string_view line, const std::vector<std::string_view>& parts
   read_kind(lower(line), parts, header);
 }
 
-LegacyHeader read_legacy_header(std::string_view text) {
+LegacyHeader read_legacy_header(const InputFile& file) {
   LegacyHeader header;
-  std::size_t line = 0;
-  for (std::size_t next = 0;; ++line) {
-    const std::size_t end = text.find('\n', next);
-    if (end == std::string_view::npos) break;
-    const std::string_view whole = trimmed(text.substr(next, end - next));
+  LineReader lines(file, {.header = "The VTK file's header", .bytes = kMostLegacyHeaderBytes});
+  lines.next_ended();
+  lines.next_ended();  // the title
+  header.bytes = lines.offset();
+  while (const auto line = lines.next_ended()) {
+    const std::string_view whole = trimmed(*line);
     const auto parts = words(whole);
-    if (line >= 2 && !parts.empty()) {
+    if (!parts.empty()) {
       const std::string keyword = lower(parts[0]);
-      if (keyword == "point_data" || keyword == "cell_data") {
-        header.bytes = next;
-        return header;
-      }
+      if (keyword == "point_data" || keyword == "cell_data") return header;
       read_line(whole, parts, header);
     }
-    next = end + 1;
+    header.bytes = lines.offset();
   }
   throw_unusable("The VTK file has neither point data nor cell data.");
 }
@@ -171,7 +170,7 @@ bool may_hold_structured_points(std::string_view head) {
 
 SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*companions*/,
                               const ImportOptions& options) {
-  const LegacyHeader header = read_legacy_header(file.text(0, kMostLegacyHeaderBytes));
+  const LegacyHeader header = read_legacy_header(file);
   const auto arrays = vtk_arrays(file, header.bytes, header.is_text);
   std::vector<const VtkArray*> found = scalars_of(arrays, false);
   if (found.empty()) found = scalars_of(arrays, true);
@@ -191,8 +190,7 @@ SourceVolume parse_vtk_legacy(const InputFile& file, const Companions& /*compani
 }
 
 MostBytes most_vtk_legacy_bytes(const InputFile& beginning, const ImportTask& task) {
-  return most_vtk_bytes(
-      volume_dims(read_legacy_header(beginning.text(0, kMostLegacyHeaderBytes)).points), task);
+  return most_vtk_bytes(volume_dims(read_legacy_header(beginning).points), task);
 }
 
 }  // namespace isomesh::import

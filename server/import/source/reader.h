@@ -19,9 +19,6 @@ namespace isomesh::import {
 // The number of leading bytes that identify a format.
 inline constexpr std::size_t kSniffBytes = 4096;
 
-// The longest header of lines that name a field and its value.
-inline constexpr std::size_t kMostTextHeaderBytes = std::size_t{1} << 20;
-
 // Room for headers, and for trailing bytes of some programs.
 inline constexpr std::uint64_t kHeadroomBytes = std::uint64_t{1} << 20;
 
