@@ -14,10 +14,12 @@ std::string dump(const Json& json) {
 }
 
 std::string valid_utf8(std::string_view text) {
-  return Json::parse(dump(Json(text))).get<std::string>();
+  return parse_json<Json>(dump(Json(text))).get<std::string>();
 }
 
-bool is_json(std::string_view text) { return Json::accept(text); }
+bool is_json(std::string_view text) {
+  return !parse_json<Json>(text, nullptr, false).is_discarded();
+}
 
 JsonTree::JsonTree() : root_(std::make_unique<Json>()) {}
 

@@ -58,8 +58,9 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "looks-like-labels",
      .meaning =
          "The file describes labels, or the samples look like labels: few whole values in flat "
-         "regions. A job with `labels` meshes each label. An iso-value makes one surface "
-         "around all samples above it."},
+         "regions, or only 0 and one larger whole value, as in a mask. A job with `labels` meshes "
+         "each label. An iso-value makes one surface around all samples above it, and small "
+         "structures of a mask lose volume."},
     {.code = NoteCode::kFrameOfReference,
      .name = "frame-of-reference",
      .meaning =

@@ -20,7 +20,7 @@ enum class NoteCode {
   kTrailingBytes,        // the data is longer than the header says
   kValuesRescaled,       // by a slope that other programs ignore
   kDuplicateFile,        // a file occurs twice and was used once
-  kLooksLikeLabels,      // declared, or few whole values in flat regions: a job's `labels` suits it
+  kLooksLikeLabels,      // declared, few whole values in flat regions, or a mask: `labels` suits it
   kFrameOfReference,     // DICOM: slices do not share one frame of reference
   kEmptyPlanes,          // DICOM: frames missing from a segmentation; filled with zeros
   kDistanceAssumed,      // DICOM: no distance between slices; taken from the thickness

@@ -112,6 +112,7 @@ std::vector<Table> tables_beside(const Companions& companions) {
 bool is_label_table(const std::filesystem::path& path) { return !labels_of(path).empty(); }
 
 void take_labels_beside(const Companions& companions, Volume& volume) {
+  if (!is_integer(volume.type)) return;
   const auto note =
       std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
   if (!volume.labels.empty() || note == volume.notes.end()) return;

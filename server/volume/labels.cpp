@@ -1,6 +1,7 @@
 #include "server/volume/labels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <type_traits>
@@ -100,6 +101,20 @@ std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::si
   return values.count();
 }
 
+template <class Sample>
+bool has_only(std::span<const Sample> samples, Sample one, Sample other) {
+  // Blocks end early for most volumes, and are long enough for the compiler to vectorise them.
+  constexpr std::size_t kBlock = 4096;
+  for (std::size_t begin = 0; begin < samples.size(); begin += kBlock) {
+    bool has_more = false;
+    for (const Sample value : samples.subspan(begin, std::min(kBlock, samples.size() - begin))) {
+      has_more |= (value != one) & (value != other);
+    }
+    if (has_more) return false;
+  }
+  return true;
+}
+
 // The smallest and the largest sample. Empty if one is no whole number, or no 32-bit integer.
 template <class Sample>
 std::optional<std::pair<std::int64_t, std::int64_t>> whole_range(std::span<const Sample> samples) {
@@ -155,6 +170,21 @@ std::optional<SampleType> whole_type(std::span<const std::byte> samples, SampleT
     if (fits) return each;
   }
   return std::nullopt;
+}
+
+std::optional<std::int64_t> mask_value(std::span<const std::byte> samples, SampleType type,
+                                       const std::array<double, 2>& range) {
+  constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
+  const auto [low, high] = range;
+  if (low != 0 || !(high > 0 && high <= kMost) || high != std::floor(high)) return std::nullopt;
+  const bool is_mask = with_sample(type, [&](auto sample) {
+    using Sample = decltype(sample);
+    const auto* first = reinterpret_cast<const Sample*>(samples.data());
+    return has_only(std::span(first, samples.size() / sizeof(Sample)), Sample{0},
+                    static_cast<Sample>(high));
+  });
+  if (!is_mask) return std::nullopt;
+  return static_cast<std::int64_t>(high);
 }
 
 std::optional<std::size_t> label_count(std::span<const std::byte> samples, SampleType type,

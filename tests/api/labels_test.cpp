@@ -12,6 +12,7 @@
 #include "proto/json.h"
 #include "tests/api/daemon.h"
 #include "tests/api/problems.h"
+#include "tests/support/files.h"
 #include "tests/support/process.h"
 
 namespace isomesh {
@@ -20,6 +21,7 @@ namespace {
 using namespace test;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 // Two balls that touch, of the labels 3 and 7.
 RawUpload two_balls() {
@@ -60,6 +62,27 @@ class LabelsTest : public testing::Test {
   const RawUpload balls_ = two_balls();
   const Volume volume_ = upload(daemon_, balls_);
 };
+
+TEST_F(LabelsTest, AMaskAtAnIsoValueIsAdvisedToUseLabels) {
+  const TemporaryFolder folder;
+  std::string samples(1000, '\0');
+  for (const std::size_t at : {444, 445, 454, 455, 544, 545, 554, 555}) samples[at] = '\1';
+  write_file(folder / "mask.nrrd",
+             "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 10 10 10\nspacings: 1 1 1\n"
+             "encoding: raw\n\n" +
+                 samples);
+  const auto errors_of = [&](const std::string& option, const std::string& value) {
+    const Finished made =
+        daemon_.command({"mesh", folder / "mask.nrrd", option, value, "-o", folder / "mask.glb"});
+    EXPECT_EQ(made.status, 0) << made.errors;
+    return made.errors;
+  };
+  const std::string told = errors_of("--iso", "0.5");
+  EXPECT_THAT(told, HasSubstr("note: The samples are a mask: each is 0 or 1."));
+  EXPECT_THAT(told, HasSubstr("--labels all"));
+  EXPECT_THAT(told, HasSubstr("(looks-like-labels)"));
+  EXPECT_THAT(errors_of("--labels", "1"), Not(HasSubstr("looks-like-labels")));
+}
 
 TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {
   const Job job = made(R"("labels": "all", "close": true, "formats": ["glb", "stl"],

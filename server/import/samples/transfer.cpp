@@ -130,11 +130,26 @@ void note_stored_type(const SampleLayout& layout, Volume& volume) {
                   std::string(to_string(volume.type)) + '.';
 }
 
+// A mask has no grey values that would tell where between two samples its surface lies.
+Note mask_note(std::int64_t value, SampleType type) {
+  const std::string what =
+      "The samples are a mask: each is 0 or " + std::to_string(value) +
+      ". At an iso-value, small structures lose volume. With \"labels\": \"all\" they keep it";
+  return note_of(
+      NoteCode::kLooksLikeLabels,
+      what + (is_integer(type) ? "."
+                               : ", but the samples are " + std::string(to_string(type)) +
+                                     ". Labels need a file of whole numbers."));
+}
+
 // Declared labels are certain; otherwise the samples may look like labels. Only integers are
 // labels.
 void note_labels(std::span<const std::byte> samples, Volume& volume) {
-  if (!is_integer(volume.type)) return;
   const std::size_t told = volume.labels.size();
+  const auto mask =
+      told > 0 ? std::nullopt : volume::mask_value(samples, volume.type, volume.range);
+  if (mask) volume.notes.push_back(mask_note(*mask, volume.type));
+  if (mask || !is_integer(volume.type)) return;
   const auto values = volume::label_count(samples, volume.type, volume.dims);
   if (told == 0 && !values) return;
   const std::string what =
@@ -205,8 +220,8 @@ Volume finish(CanonicalWriter& writer, Volume volume) {
         note_of(NoteCode::kNonFiniteSamples,
                 count + ". At iso-values above the smallest sample they lie outside the surface."));
   }
-  note_labels(writer.samples(), volume);
   volume.range = statistics.range;
+  note_labels(writer.samples(), volume);
   volume.suggested_iso = statistics.otsu;
   volume.bytes = writer.samples().size();
   return volume;

@@ -244,9 +244,38 @@ TEST(ForeignSamples, OfFewWholeValuesInRegionsLookLikeLabels) {
   for (const char value : {0, 1, 2, 5}) labels += std::string(12, value);
   EXPECT_THAT(codes_of(import_bytes(nifti({.dim = {3, 6, 2, 4, 1, 1, 1, 1}}, labels))),
               ElementsAre("looks-like-labels"));
-  const std::string mask = std::string(12, '\0') + std::string(12, '\1');
-  EXPECT_THAT(codes_of(import_bytes(nifti({}, mask))), IsEmpty());
   EXPECT_THAT(codes_of(import_bytes(nifti({}, kSamples))), IsEmpty());
+}
+
+TEST(ForeignSamples, OfAMaskLookLikeOneLabel) {
+  const auto outcome = [](const std::string& values, NiftiFields fields = {}) {
+    std::string samples(24, values.front());
+    for (std::size_t at = 5; at < 24; at += 7) samples[at] = values.back();
+    return import_bytes(nifti(fields, samples));
+  };
+  const Outcome mask = outcome({'\0', '\xff'});
+  ASSERT_THAT(codes_of(mask), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(mask.volume.notes[0].detail, HasSubstr("each is 0 or 255."));
+  EXPECT_THAT(mask.volume.notes[0].detail, HasSubstr("\"labels\": \"all\""));
+  EXPECT_THAT(codes_of(outcome({'\1', '\0'})), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(codes_of(outcome({'\1', '\2'})), IsEmpty());
+  EXPECT_THAT(codes_of(outcome({'\0', '\0'})), IsEmpty());
+  // Signed: the larger value is 0.
+  EXPECT_THAT(codes_of(outcome({'\0', '\xff'}, {.datatype = 256})), IsEmpty());
+}
+
+// Labels need integers, and the note must not advise what is rejected.
+TEST(ForeignSamples, OfAMaskOfFloatsStayFloats) {
+  std::vector<float> samples(24, 0);
+  samples[7] = samples[8] = 1;
+  const Outcome mask = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)));
+  EXPECT_EQ(mask.volume.type, SampleType::kFloat32);
+  ASSERT_THAT(codes_of(mask), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(mask.volume.notes[0].detail,
+              HasSubstr("but the samples are float32. Labels need a file of whole numbers."));
+  samples[9] = 0.5;
+  EXPECT_THAT(codes_of(import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)))),
+              IsEmpty());
 }
 
 // Four regions of these values, as samples of the type.
@@ -299,7 +328,9 @@ TEST(ForeignSamples, Of64BitsBecomeIntegersThatFit) {
   EXPECT_THAT(labels.volume.notes[0].detail, HasSubstr("64-bit integers in the file"));
   const Outcome mask = regions<std::uint64_t>({0, 0, 1, 1});
   EXPECT_EQ(mask.volume.type, SampleType::kUint8);
-  EXPECT_THAT(codes_of(mask), IsEmpty());
+  ASSERT_THAT(codes_of(mask), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(mask.volume.notes[0].detail, HasSubstr("each is 0 or 1."));
+  EXPECT_THAT(mask.volume.notes[0].detail, HasSubstr("64-bit integers in the file"));
   EXPECT_EQ(regions<std::uint64_t>({0, 0, 1, std::uint64_t{1} << 32}).volume.type,
             SampleType::kFloat64);
 }

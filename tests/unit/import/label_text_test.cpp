@@ -164,6 +164,16 @@ TEST(LabelsBeside, AreThoseOfTheTableInItsFolder) {
               HasSubstr("The names of the labels are from \"seg.txt\"."));
 }
 
+TEST(LabelsBeside, AreThoseOfAMaskOfWholeNumbers) {
+  std::vector<float> samples(24, 0);
+  samples[7] = samples[8] = 1;
+  const std::vector<std::uint8_t> whole(samples.begin(), samples.end());
+  const Member table = {"mask.txt", "1 liver\n"};
+  EXPECT_THAT(labels_in({{"mask.nii", nifti({}, bytes_of(whole))}, table}), SizeIs(1));
+  const std::string floats = nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples));
+  EXPECT_THAT(labels_in({{"mask.nii", floats}, table}), IsEmpty());
+}
+
 TEST(LabelsBeside, AreNotThoseOfAnotherVolume) {
   const std::vector<Member> members = {
       {"a.nii", label_volume()}, {"b.nii", label_volume() + '\0'}, {"a.txt", std::string(kTable)}};

@@ -1,5 +1,6 @@
 #include "server/volume/labels.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <random>
@@ -104,6 +105,38 @@ TEST(Labels, OfFloatsAreWholeNumbers) {
   EXPECT_EQ(labels_of(samples, {9, 1, 1}), 3U);
   samples[8] = 2.5;
   EXPECT_EQ(labels_of(samples, {9, 1, 1}), std::nullopt);
+}
+
+template <class Sample>
+std::optional<std::int64_t> mask_of(const std::vector<Sample>& samples) {
+  const auto [low, high] = std::ranges::minmax(samples);
+  return mask_value(std::as_bytes(std::span(samples)), kTypeOf<Sample>,
+                    {static_cast<double>(low), static_cast<double>(high)});
+}
+
+TYPED_TEST(LabelCount, AMaskIsZeroAndOneLargerValue) {
+  std::vector<TypeParam> samples(10'000, 0);
+  EXPECT_EQ(mask_of(samples), std::nullopt) << "all samples are equal";
+  samples[9'000] = 1;
+  EXPECT_EQ(mask_of(samples), 1);
+  samples[9'999] = 2;
+  EXPECT_EQ(mask_of(samples), std::nullopt) << "a third value";
+  samples[9'000] = 2;
+  EXPECT_EQ(mask_of(samples), 2);
+  const TypeParam largest = std::numeric_limits<TypeParam>::max();
+  samples[9'000] = samples[9'999] = largest;
+  EXPECT_EQ(mask_of(samples), largest);
+  std::ranges::replace(samples, TypeParam{0}, TypeParam{1});
+  EXPECT_EQ(mask_of(samples), std::nullopt) << "no 0";
+}
+
+TEST(Mask, OfFloatsHasAWholeValue) {
+  EXPECT_EQ(mask_of(std::vector<float>{0, 1, -0.0F, 1}), 1);
+  EXPECT_EQ(mask_of(std::vector<float>{0, 255}), 255);
+  EXPECT_EQ(mask_of(std::vector<float>{0, 0.5}), std::nullopt);
+  EXPECT_EQ(mask_of(std::vector<float>{0, 1, 0.5}), std::nullopt);
+  EXPECT_EQ(mask_of(std::vector<float>{0, 1e30F}), std::nullopt);
+  EXPECT_EQ(mask_of(std::vector<std::int16_t>{-1000, 0}), std::nullopt) << "0 is the larger one";
 }
 
 template <class Sample>
