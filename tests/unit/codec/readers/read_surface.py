@@ -17,10 +17,13 @@ def by_vtk(path):
 
     is_xml = path.endswith('.vtp')
     reader = vtkXMLPolyDataReader() if is_xml else vtkPolyDataReader()
+    said = []  # an exception does not leave VTK's observers
     for event in ('ErrorEvent', 'WarningEvent'):
-        reader.AddObserver(event, lambda *_: sys.exit(f'VTK: {event}'))
+        reader.AddObserver(event, lambda _, told: said.append(told))
     reader.SetFileName(path)
     reader.Update()
+    if said:
+        sys.exit(f'VTK: {said}')
     surface = reader.GetOutput()
     told = {}
     if is_xml:
@@ -70,4 +73,5 @@ def main(path, out):
         file.write(text)
 
 
-main(*sys.argv[1:])
+if __name__ == '__main__':
+    main(*sys.argv[1:])
