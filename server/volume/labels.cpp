@@ -103,14 +103,16 @@ std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::si
 
 template <class Sample>
 bool has_only(std::span<const Sample> samples, Sample one, Sample other) {
-  // Blocks end early for most volumes, and are long enough for the compiler to vectorise them.
-  constexpr std::size_t kBlock = 4096;
+  // As above. Most volumes end in the first block with anything.
+  constexpr std::size_t kBlock = 255;
   for (std::size_t begin = 0; begin < samples.size(); begin += kBlock) {
-    bool has_more = false;
-    for (const Sample value : samples.subspan(begin, std::min(kBlock, samples.size() - begin))) {
-      has_more |= (value != one) & (value != other);
+    const std::size_t count = std::min(kBlock, samples.size() - begin);
+    const Sample* const at = samples.data() + begin;
+    std::uint8_t found = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      found += std::uint8_t{at[i] == one} | std::uint8_t{at[i] == other};
     }
-    if (has_more) return false;
+    if (found != count) return false;
   }
   return true;
 }
