@@ -178,8 +178,13 @@ bool Child::reap(bool waiting) {
   return reaped_ = found != 0;
 }
 
+bool is_out_of_time(const std::optional<int>& status) {
+  return status && WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXCPU;
+}
+
 std::string how_it_ended(const std::optional<int>& status) {
   if (!status) return "without a response";
+  if (is_out_of_time(status)) return "because it took too much processor time";
   if (!WIFSIGNALED(*status)) return "with status " + std::to_string(WEXITSTATUS(*status));
   const char* const known = ::sigdescr_np(WTERMSIG(*status));
   std::string name = known == nullptr ? "unknown" : known;

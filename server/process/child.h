@@ -92,8 +92,11 @@ class Child {
   bool reaped_ = false;
 };
 
-// "with signal 9 (killed)", "with status 1", "without a response": from a waitpid status, or none.
-// Ends a sentence.
+// True if a waitpid status says that the process had no processor time left (Confinement::time).
+bool is_out_of_time(const std::optional<int>& status);
+
+// "with signal 9 (killed)", "with status 1", "without a response", "because it took too much
+// processor time": from a waitpid status, or none. Ends a sentence.
 std::string how_it_ended(const std::optional<int>& status);
 
 // A program: its file, and the name of its processes.

@@ -42,14 +42,6 @@ void require(bool done, std::string_view call) {
 
 // --- Limits --------------------------------------------------------------------------------------
 
-void limit(__rlimit_resource resource, std::uint64_t most) {
-  rlimit bounds = {};
-  require(::getrlimit(resource, &bounds) == 0, "getrlimit");
-  bounds.rlim_max = std::min<rlim_t>(bounds.rlim_max, most);
-  bounds.rlim_cur = bounds.rlim_max;
-  require(::setrlimit(resource, &bounds) == 0, "setrlimit");
-}
-
 std::uint64_t sum(std::initializer_list<std::uint64_t> numbers) {
   std::uint64_t total = 0;
   for (const std::uint64_t number : numbers) {
@@ -59,10 +51,21 @@ std::uint64_t sum(std::initializer_list<std::uint64_t> numbers) {
   return total;
 }
 
+// With `grace`, a process that reaches `most` is first told by a signal.
+void limit(__rlimit_resource resource, std::uint64_t most, std::uint64_t grace = 0) {
+  rlimit bounds = {};
+  require(::getrlimit(resource, &bounds) == 0, "getrlimit");
+  bounds.rlim_cur = std::min<rlim_t>(bounds.rlim_max, most);
+  bounds.rlim_max = std::min<rlim_t>(bounds.rlim_max, sum({most, grace}));
+  require(::setrlimit(resource, &bounds) == 0, "setrlimit");
+}
+
 void limit_resources(const Confinement& confinement) {
   constexpr std::uint64_t kPrograms = std::uint64_t{512} << 20;  // code, libraries, the stack
   limit(RLIMIT_FSIZE, confinement.file_bytes);
-  limit(RLIMIT_CPU, static_cast<std::uint64_t>(confinement.time.count()));
+  // SIGXCPU ends the process, and says why: at the limit itself it would be killed like any other.
+  constexpr std::uint64_t kGraceSeconds = 1;
+  limit(RLIMIT_CPU, static_cast<std::uint64_t>(confinement.time.count()), kGraceSeconds);
   // With the signal ignored, a write beyond the limit fails with EFBIG, which can be reported.
   std::signal(SIGXFSZ, SIG_IGN);
   if constexpr (kLimitMemory) {

@@ -15,7 +15,7 @@ struct Confinement {
   // Private memory only: the canonical file is mapped, and may be larger than the memory.
   std::uint64_t memory_bytes = 0;
   std::uint64_t file_bytes = 0;  // of each file, and of all mapped files together
-  std::chrono::seconds time{0};  // CPU time
+  std::chrono::seconds time{0};  // CPU time; is_out_of_time() tells that it was used up
 };
 
 // Drops all rights that are not needed before the process knows its input. It cannot gain

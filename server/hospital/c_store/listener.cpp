@@ -39,9 +39,8 @@ class Lines {
     const auto deadline = Clock::now() + kLongestObject;
     std::size_t end = std::string::npos;
     while ((end = text_.find('\n')) == std::string::npos) {
-      if (stop.stop_requested() || Clock::now() >= deadline || text_.size() > kLongestLine) {
-        return "";
-      }
+      is_late_ = Clock::now() >= deadline;
+      if (stop.stop_requested() || is_late_ || text_.size() > kLongestLine) return "";
       pollfd waiting = {child_.socket().number(), POLLIN, 0};
       if (::poll(&waiting, 1, static_cast<int>(process::kLook.count())) <= 0) continue;
       std::array<char, kLongestLine> piece = {};
@@ -55,9 +54,13 @@ class Lines {
     return line;
   }
 
+  // True if the last line was empty because nothing came for too long.
+  bool is_late() const { return is_late_; }
+
  private:
   const process::Child& child_;
   std::string text_;
+  bool is_late_ = false;
 };
 
 std::vector<std::string> titles_of(const orders::DimseSettings& settings) {
@@ -236,6 +239,10 @@ void DimseListener::receive(Association& association, Transfers& transfers) {
   // The process ended abnormally, perhaps because of its input, so the prepared copies are replaced
   // too.
   services_.processes.renew();
+  if (lines.is_late()) {
+    log_error("an association took too long: nothing came for {} minutes", kLongestObject.count());
+    return;
+  }
   log_error("the process of an association ended {}",
             process::how_it_ended(child.ended_within(std::chrono::seconds(2))));
 }

@@ -14,6 +14,7 @@ using process::DimseEnd;
 // A response has a few bytes. A peer may be slow as long as it makes progress.
 constexpr std::size_t kMostResponseBytes = 4096;
 constexpr std::chrono::hours kLongest{24};
+constexpr std::chrono::seconds kEnd{2};  // for a process to exit after it closed its socket
 
 std::string hex_of(std::uint16_t status) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
@@ -60,9 +61,21 @@ void check_sent(const process::DimseSent& sent, std::string_view sop_class) {
   throw PacsFailure(PacsFault::kUnreadable, "the response of the PACS cannot be read");
 }
 
-process::DimseSent sent_of(const process::Output& output) {
+[[noreturn]] void throw_too_long(const std::string& limit) {
+  throw PacsFailure(PacsFault::kTimeout,
+                    "sending the object took too long: it ended after " + limit);
+}
+
+process::DimseSent sent_of(const process::Output& output, process::Child& child) {
   using Ending = process::Output::Ending;
   if (output.ending == Ending::kStopped) throw Error(ErrorCode::kCancelled, "stopped");
+  if (output.ending == Ending::kTooLong) {
+    throw_too_long(std::to_string(kLongest.count()) + " hours");
+  }
+  if (output.ending == Ending::kClosed && output.text.empty() &&
+      process::is_out_of_time(child.ended_within(kEnd))) {
+    throw_too_long("all of its processor time");
+  }
   if (output.ending != Ending::kClosed || !output.text.ends_with('\n')) {
     return {.end = DimseEnd::kUnreadable, .status = 0};
   }
@@ -102,7 +115,7 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
   child.send(process::to_line(order), peer.number());
   const process::Output output =
       child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
-  const process::DimseSent sent = sent_of(output);
+  const process::DimseSent sent = sent_of(output, child);
   if (sent.end == DimseEnd::kUnreadable) processes_.renew();
   check_sent(sent, object.sop_class);
 }

@@ -26,6 +26,26 @@ std::string while_reading(const process::ImportReport& report) {
   return report.reading.empty() ? "" : " while reading " + report.reading;
 }
 
+// `limit` as in "20 seconds of processor time"; `advice` is a sentence.
+[[noreturn]] void refuse_slow(const std::string& limit, const std::string& advice,
+                              const process::ImportReport& report) {
+  const std::string what =
+      "The import took too long: it ended after " + limit + while_reading(report);
+  log_error("{}", what);
+  throw ImportTookTooLong(what + ". " + advice);
+}
+
+// A small upload has less time than others.
+[[noreturn]] void refuse_busy(std::chrono::seconds time, std::chrono::seconds most,
+                              const process::ImportReport& report) {
+  const std::string advice =
+      time < most
+          ? "That is the limit for an upload of this size. If the file is compressed, send it "
+            "uncompressed: a larger upload has more time."
+          : "Send a smaller file, or have the server allow more time (--import-seconds).";
+  refuse_slow(std::to_string(time.count()) + " seconds of processor time", advice, report);
+}
+
 [[noreturn]] void refuse_dead(const std::string& how, const process::ImportReport& report) {
   const std::string what = "The import ended " + how + while_reading(report);
   log_error("{}", what);
@@ -105,7 +125,7 @@ Volume ImportRunner::run(const process::ImportTask& task, const std::string& par
   const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
   const std::string message = process::to_message(process::ImportOrder{task, bounds});
   return until_stopped(cancelled, [&](const std::stop_token& stop) {
-    return volume_of(report_of(message, party, stop), task);
+    return volume_of(report_of(message, bounds, party, stop), task);
   });
 }
 
@@ -113,25 +133,30 @@ process::PeersResponse ImportRunner::read_response(const std::filesystem::path& 
   const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
   try {
     process::ImportReport report = until_stopped({}, [&](const std::stop_token& stop) {
-      return report_of(process::to_message(process::ResponseOrder{{file}, bounds}), "", stop);
+      return report_of(process::to_message(process::ResponseOrder{{file}, bounds}), bounds, "",
+                       stop);
     });
     if (report.error) throw *report.error;
     if (!report.response) throw_lying();
     return *std::move(report.response);
+  } catch (const ImportTookTooLong&) {
+    throw Error(ErrorCode::kPacsUnreachable, "reading the response of the PACS took too long");
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
     throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS cannot be read");
   }
 }
 
-process::ImportReport ImportRunner::report_of(const std::string& message, const std::string& party,
+process::ImportReport ImportRunner::report_of(const std::string& message,
+                                              const process::ImportBounds& bounds,
+                                              const std::string& party,
                                               const std::stop_token& stop) {
   const ImportPlaces::Place place = places_.take(party, stop);
   const auto deadline = Clock::now() + options_.bounds.time;
   // A process that died while idle has not touched the file. Several in a row are a defect.
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
-    if (auto report = run_in(prepared_.take(deadline, stop), message, stop))
+    if (auto report = run_in(prepared_.take(deadline, stop), message, bounds, stop))
       return *std::move(report);
     log_warning("a prepared import process ended before its import began; another one takes over");
   }
@@ -140,6 +165,7 @@ process::ImportReport ImportRunner::report_of(const std::string& message, const 
 
 std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
                                                           const std::string& message,
+                                                          const process::ImportBounds& bounds,
                                                           const std::stop_token& stop) {
   using Ending = process::Output::Ending;
   child.send_last(message);
@@ -148,13 +174,17 @@ std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
   if (output.ending == Ending::kStopped) throw_ending();
   process::ImportReport report = process::report_from(output.text);
   if (output.ending == Ending::kTooLong) {
-    refuse_dead("after " + std::to_string(options_.bounds.time.count()) + " seconds", report);
+    refuse_slow(std::to_string(options_.bounds.time.count()) + " seconds",
+                "Send it again when the server has less to do, or have the server allow more time "
+                "(--import-seconds).",
+                report);
   }
   const bool is_answered = report.volume || report.response || report.error;
   if (output.ending == Ending::kTooMuch || !is_answered) {
     const auto status = child.ended_within(kEnd);
     if (output.ending == Ending::kClosed && !report.begun) return std::nullopt;
     prepared_.renew();
+    if (process::is_out_of_time(status)) refuse_busy(bounds.time, options_.bounds.time, report);
     refuse_dead(process::how_it_ended(status), report);
   }
   // The process must have ended before the file is checked; otherwise it could still change the

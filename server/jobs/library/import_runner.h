@@ -24,6 +24,12 @@ struct RunnerOptions {
 // if it is malicious. Honest uploads are read at many megabytes per second.
 process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
 
+// The process was ended because it took too long. The text says after how long, and what to do.
+class ImportTookTooLong : public Error {
+ public:
+  explicit ImportTookTooLong(const std::string& text) : Error(ErrorCode::kUnusableVolume, text) {}
+};
+
 [[noreturn]] void throw_cancelled();
 [[noreturn]] void throw_ending();
 
@@ -36,8 +42,8 @@ class ImportRunner {
   // is (ImportPlaces). The process has ended
   // when this returns or throws, and leaves files only in the scratch folder. The returned volume
   // has been compared with the canonical file. Throws what import_volume throws; Error
-  // kUnusableVolume if the process crashes or exceeds its bounds; kUnavailable after stop();
-  // kCancelled after a stop request to `cancelled`.
+  // kUnusableVolume if the process crashes or exceeds its bounds, as ImportTookTooLong if it took
+  // too long; kUnavailable after stop(); kCancelled after a stop request to `cancelled`.
   Volume run(const process::ImportTask& task, const std::string& party = {},
              const std::stop_token& cancelled = {});
 
@@ -68,10 +74,11 @@ class ImportRunner {
  private:
   // Sends `message` to a process and returns its report. The process has ended when this returns.
   // Throws as run() does if the report has neither a result nor an error.
-  process::ImportReport report_of(const std::string& message, const std::string& party,
-                                  const std::stop_token& stop);
+  process::ImportReport report_of(const std::string& message, const process::ImportBounds& bounds,
+                                  const std::string& party, const std::stop_token& stop);
   // Returns nothing if the process ended before it began its work.
   std::optional<process::ImportReport> run_in(process::Child child, const std::string& message,
+                                              const process::ImportBounds& bounds,
                                               const std::stop_token& stop);
 
   const RunnerOptions options_;

@@ -47,6 +47,7 @@ void work(const JobOrder& order) {
   say(to_line(JobProgress{.stage = Stage::kEncode, .share = 0.5, .timing = {}}));
   if (order.iso == test::kKilled) die();
   if (order.iso == test::kExits) std::_Exit(3);
+  if (order.iso == test::kRunsOutOfTime) std::raise(SIGXCPU);
   if (order.iso == test::kIsDeaf) ::sleep(3600);
   if (order.iso == test::kTalksNonsense) say("nonsense\n");
   if (order.iso == test::kMakesAnotherFile) say(to_line(JobPiece{.file = 1, .bytes = 1}));

@@ -13,5 +13,6 @@ inline constexpr double kAnswersAnotherOrder = 6;
 inline constexpr double kNeverBegins = 7;  // but ends
 inline constexpr double kTalksForEver = 8;
 inline constexpr double kDiesInAFile = 9;  // before the bytes that it has announced
+inline constexpr double kRunsOutOfTime = 10;
 
 }  // namespace isomesh::test

@@ -25,6 +25,7 @@ using process::ImportTask;
 using std::chrono::seconds;
 using test::TemporaryFolder;
 using testing::HasSubstr;
+using testing::Not;
 
 // Runs the program that misbehaves as the upload says; what came of it is an error.
 class Faulty {
@@ -68,8 +69,38 @@ TEST(ImportRunner, ACrashIsOneRefusedUpload) {
 }
 
 TEST(ImportRunner, AHangEndsWithItsTime) {
-  expect_refused(Faulty(seconds(10)).run("hang"), "after 10 seconds while reading nifti");
+  const Error error = Faulty(seconds(10)).run("hang");
+  expect_refused(error, "The import took too long: it ended after 10 seconds while reading nifti.");
+  EXPECT_THAT(error.what(), HasSubstr("--import-seconds"));
+  EXPECT_THAT(error.what(), Not(HasSubstr("malicious")));
   expect_refused(Faulty().run("close and hang"), "ended without a response while reading nifti");
+}
+
+TEST(ImportRunner, AnImportThatTookTooLongSaysSoAndWhatToDo) {
+  const auto expect_slow = [](const Error& error, const std::string& limit,
+                              const std::string& advice) {
+    expect_refused(error, "The import took too long: it ended after " + limit);
+    EXPECT_THAT(error.what(), HasSubstr(advice));
+    EXPECT_THAT(error.what(), Not(HasSubstr("malicious")));
+  };
+  expect_slow(Faulty().run("run out of time"), "20 seconds of processor time while reading nifti",
+              "send it uncompressed");
+  expect_slow(Faulty(seconds(20)).run("run out of time"),
+              "20 seconds of processor time while reading nifti", "--import-seconds");
+  expect_refused(Faulty().run("crash"), "the file is damaged or malicious");
+}
+
+TEST(ImportRunner, AResponseThatTookTooLongSaysSo) {
+  Faulty faulty;
+  const TemporaryFolder folder;
+  test::write_file(folder / "response", "run out of time");
+  try {
+    faulty.runner().read_response(folder / "response");
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kPacsUnreachable);
+    EXPECT_STREQ(error.what(), "reading the response of the PACS took too long");
+  }
 }
 
 TEST(ImportRunner, ACrowdOfWordsIsCutOff) { expect_refused(Faulty().run("chatter"), "ended"); }

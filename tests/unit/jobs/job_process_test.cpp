@@ -213,6 +213,9 @@ TEST_F(JobProcessTest, SaysHowAProcessEnded) {
   EXPECT_STREQ(error->what(), "The job process ended with status 3 in the stage \"encode\".");
   EXPECT_THAT(refusal(faulty_, order_of(sphere, test::kDiesInAFile))->what(),
               HasSubstr("with signal 9 (killed)"));
+  EXPECT_STREQ(refusal(faulty_, order_of(sphere, test::kRunsOutOfTime))->what(),
+               "The job process ended because it took too much processor time in the stage "
+               "\"encode\".");
 }
 
 TEST_F(JobProcessTest, BelievesNothingThatIsNotAsAgreed) {

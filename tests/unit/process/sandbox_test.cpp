@@ -170,7 +170,20 @@ TEST_F(Sandbox, EndsAProcessThatTakesTooMuchOfTheProcessor) {
     while (true) ++turns;
     return true;
   });
-  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_TRUE(is_out_of_time(status)) << how_it_ended(status);
+}
+
+TEST_F(Sandbox, TellsTheEndOfTheTimeFromOtherEnds) {
+  const auto status_of_signal = [this](int signal) {
+    return status_of([signal] { return std::raise(signal) == 0; });
+  };
+  const int late = status_of_signal(SIGXCPU);
+  EXPECT_TRUE(is_out_of_time(late));
+  EXPECT_EQ(how_it_ended(late), "because it took too much processor time");
+  const int killed = status_of_signal(SIGKILL);
+  EXPECT_FALSE(is_out_of_time(killed));
+  EXPECT_EQ(how_it_ended(killed), "with signal 9 (killed)");
+  EXPECT_FALSE(is_out_of_time(std::nullopt));
 }
 
 TEST_F(Sandbox, SaysWhenAFolderCannotBeAllowed) {
