@@ -429,7 +429,8 @@ TEST(JobBody, RefusesHalfOfASurrogatePairByItsMember) {
 // Text that the parser cannot read stays unreadable.
 // The JSON library takes one for the end of the text.
 TEST(JobBody, RefusesNulBytesAnywhere) {
-  const std::string body = body_with(R"("label_names": {"3": "liver"})");
+  const std::string body = body_with(R"("draco": {"speed": 3})");
+  EXPECT_EQ(code_thrown_by([&] { parse_job_parameters(body); }), std::nullopt);
   for (std::size_t at = 0; at <= body.size(); ++at) {
     for (const std::string& more : {std::string(1, '\0'), std::string("\0{\"evil\": 1}", 12)}) {
       const std::string with_nul = body.substr(0, at) + more + body.substr(at);
