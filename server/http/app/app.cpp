@@ -118,8 +118,7 @@ std::optional<Continuation> checked_answer(App& app, Request& request, Response&
 void answer_failure(const App& app, const Request& request, Response& response,
                     const Error& error) {
   log_error("{} {} failed: {}", request.method, request.path, error.what());
-  answer_problem(request, response,
-                 app.services.folder.responds() ? error : store::missing_folder());
+  answer_problem(request, response, app.services.folder.works() ? error : store::missing_folder());
 }
 
 // Converts exceptions of `run` to a problem. Clients see the text of an Error only.

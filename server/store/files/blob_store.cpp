@@ -102,7 +102,7 @@ void FileBlobStore::check_is_there() const {
 }
 
 bool FileBlobStore::works() const {
-  if (folders_.data != nullptr) return folders_.data->responds();
+  if (folders_.data != nullptr) return folders_.data->works();
   return is_there() && can_write_in(folders_.holds);
 }
 

@@ -133,7 +133,13 @@ void DataFolder::check_is_there() const {
   if (!is_there()) throw missing_folder();
 }
 
-bool DataFolder::responds() const { return is_there() && can_write_in(root()); }
+bool DataFolder::works() const { return is_there() && can_write_in(root()); }
+
+bool DataFolder::responds() const {
+  constexpr std::chrono::seconds kForHowLong{2};
+  constexpr std::chrono::seconds kPatience{5};
+  return is_there() && health_.passes(kForHowLong, kPatience, [this] { return works(); });
+}
 
 BlobFolders DataFolder::blob_folders() const {
   return {.blobs = blobs(), .quarantine = quarantine(), .drafts = scratch(), .data = this};

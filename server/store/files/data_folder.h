@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/held_folder.h"
 #include "server/store/files/reserve.h"
+#include "server/store/health_check.h"
 
 namespace isomesh::store {
 
@@ -61,6 +62,9 @@ class DataFolder {
   // Throws Error kUnavailable unless is_there().
   void check_is_there() const;
   // As is_there(), but also tries to write, because a disk may fail without going away.
+  bool works() const;
+  // As works(), for those who ask often: remembers the result for 2 s, because writing may take
+  // long.
   bool responds() const;
 
   std::filesystem::path blobs() const { return root() / "blobs"; }  // finished files, by digest
@@ -85,6 +89,7 @@ class DataFolder {
 
   const HeldFolder folder_;
   mutable std::atomic<bool> is_missing_ = false;  // by the last look
+  mutable HealthCheck health_;
   Descriptor lock_;
   std::unique_ptr<Reserve> reserve_;
 };

@@ -253,7 +253,7 @@ void check_has_trail(Connection& connection) {
 
 Database::Database(const DataFolder& folder)
     : folder_(folder), writer_(folder.records(), migrated(folder.records())) {
-  const auto disk_responds = [&folder] { return folder.responds(); };
+  const auto disk_responds = [&folder] { return folder.works(); };
   for (auto& reader : readers_) {
     reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);
     // SQLite opens its files at the first read, when there may be no descriptor left.
