@@ -19,7 +19,7 @@ struct BlobOptions {
   std::filesystem::path authorities;             // file of certificates; empty: the system's
 };
 
-// What the log calls the store: "data", "folder" or "s3".
+// The name of the store in the log: "data", "folder" or "s3".
 std::string_view kind_of(const BlobOptions& options);
 
 // Throws Error kInvalidParameter for errors that can be found without opening the store.

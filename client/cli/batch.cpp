@@ -92,7 +92,7 @@ std::string short_name(std::string_view name, int count, std::size_t longest = k
   return std::string(beginning(whole, longest - end.size())) + end;
 }
 
-// Where an input or a member lies, and its name without suffixes.
+// The folder of an input or a member, and its name without suffixes.
 struct Place {
   fs::path folder;
   fs::path file;

@@ -62,7 +62,7 @@ bool is_by_name(const std::vector<Output>& outputs);
 
 // True if the path has "{folder}" in it.
 bool has_folder(const std::string& path);
-// Where the first placeholder of the path begins; npos if there is none.
+// The place in the path where its first placeholder begins; npos if there is none.
 std::size_t first_placeholder(const std::string& path);
 
 // Replaces "{name}" and "{folder}". In a path with "{folder}", "{name}" is the file's own name. A

@@ -80,7 +80,7 @@ int create(const std::filesystem::path& path, int flags, const std::filesystem::
   return file;
 }
 
-// Where the kernel shows the file, so that it can be given a name.
+// The path by which the kernel shows the file, so that it can be given a name.
 std::string place_of(int file) { return "/proc/self/fd/" + std::to_string(file); }
 
 // None if the file system or the machine does not have such files.

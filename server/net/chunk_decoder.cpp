@@ -104,7 +104,7 @@ ChunkDecoder::State ChunkDecoder::after(char c) {
   }
 }
 
-// What may follow a size, a name and a value.
+// The bytes that may follow a size, a name and a value.
 ChunkDecoder::State ChunkDecoder::after_part(char c) {
   if (c == ';') return State::kExtension;
   if (c == '\r') return State::kSizeEnd;

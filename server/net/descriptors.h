@@ -4,7 +4,7 @@
 
 namespace isomesh::net {
 
-// What a daemon needs at the least: about 40 for itself, 64 for connections_within() of them and
+// A daemon needs at least this many: about 40 for itself, 64 for connections_within() of them and
 // their files, and the rest for its processes.
 inline constexpr std::size_t kFewestDescriptors = 128;
 

@@ -1,4 +1,4 @@
-// What a start needs, refuses and tells.
+// The needs of a start, what it refuses, and what it tells.
 #include <deque>
 #include <filesystem>
 #include <regex>

@@ -39,7 +39,7 @@ bool asks_to_come_again(const Answer& answer) {
   return is_problem(answer, ErrorCode::kUnavailable) && !answer.header("retry-after").empty();
 }
 
-// What a client needs the folder for.
+// Each use of the folder by a client.
 void expect_all_to_wait(const Daemon& daemon, const std::string& mesh, const std::string& parts) {
   EXPECT_TRUE(asks_to_come_again(daemon.get("/readyz")));
   EXPECT_TRUE(asks_to_come_again(post_volume(daemon)));

@@ -237,7 +237,7 @@ double accepted_weight(const Request& request, std::string_view type, std::strin
     const int fit = fit_of(range, header_parameter(each, "version"), type, version);
     const std::string given = header_parameter(each, "q");
     const double q = given.empty() ? 1 : number_of(given).value_or(0);
-    // Of ranges that fit equally well, the one with the greatest weight counts.
+    // The greatest weight counts among ranges that fit equally well.
     if (fit < best || (fit == best && q <= weight)) continue;
     best = fit;
     weight = fit == 0 ? 0 : q;

@@ -31,7 +31,7 @@ class LineReader {
   LineReader(const InputFile& file, const LineLimits& limits, std::uint64_t offset = 0)
       : file_(&file), limits_(limits), start_(offset) {}
 
-  // Of a text in memory, without limits.
+  // Reads a text in memory, without limits.
   explicit LineReader(std::string_view text)
       : limits_({.header = {}, .bytes = text.size(), .lines = text.size()}), buffer_(text) {}
 

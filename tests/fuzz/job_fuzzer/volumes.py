@@ -157,7 +157,7 @@ class Volume:
     def bytes(self):
         return self.samples.tobytes()
 
-    # What a Maker asks of the world.
+    # The values that a Maker needs of the volume.
 
     def number(self):
         """An iso-value: at, between, beside or beyond the samples."""

@@ -23,7 +23,7 @@ type Asked = [method: string, path: string, body: unknown, key: string | null];
 
 const daemon = new Daemon('first');
 let client: Client;
-// What the server sends in place of its response, as long as it is asked for the first so many times.
+// The response that the server sends instead, to the first requests of that number.
 let refusal: { status: number; headers: Record<string, string>; times: number };
 let asked: Asked[];
 let refused: Map<string, number>;

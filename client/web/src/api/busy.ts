@@ -1,6 +1,6 @@
 // Busy servers: how long they ask a client to wait, and how long it waits.
 
-// What is read of Headers, which not every project has as a type.
+// The part of Headers that is read here; not every project has that type.
 export interface HeaderValues {
   get(name: string): string | null;
 }
