@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace isomesh::mesh {
 namespace {
@@ -67,19 +68,37 @@ bool TriangleReach::plane_meets(const Point& centre, double half_side) const {
 
 bool TriangleReach::meets(const Point& centre, double half_side) const {
   if (!plane_meets(centre, half_side)) return false;
-  const Corners from = {minus(corners_[0], centre), minus(corners_[1], centre),
-                        minus(corners_[2], centre)};
-  for (const Point& edge : edges_) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::size_t u = (axis + 1) % 3;
-      const std::size_t v = (axis + 2) % 3;
-      const double reach = half_side * (std::abs(edge[u]) + std::abs(edge[v]));
-      const auto along = [&](const Point& p) { return edge[u] * p[v] - edge[v] * p[u]; };
-      const auto [low, high] = std::minmax({along(from[0]), along(from[1]), along(from[2])});
-      if (low > reach || high < -reach) return false;
-    }
-  }
-  return true;
+  const Corners from = seen_from(centre);
+  return shadow_meets(0, from, half_side) && shadow_meets(1, from, half_side) &&
+         shadow_meets(2, from, half_side);
+}
+
+Corners TriangleReach::seen_from(const Point& centre) const {
+  return {minus(corners_[0], centre), minus(corners_[1], centre), minus(corners_[2], centre)};
+}
+
+bool TriangleReach::shadow_meets(std::size_t axis, const Corners& from, double half_side) const {
+  const std::size_t u = (axis + 1) % 3;
+  const std::size_t v = (axis + 2) % 3;
+  return std::ranges::all_of(edges_, [&](const Point& edge) {
+    const double reach = half_side * (std::abs(edge[u]) + std::abs(edge[v]));
+    const auto along = [&](const Point& p) { return edge[u] * p[v] - edge[v] * p[u]; };
+    const auto [low, high] = std::minmax({along(from[0]), along(from[1]), along(from[2])});
+    return low <= reach && high >= -reach;
+  });
+}
+
+std::array<double, 2> TriangleReach::ways_along_x(const Point& centre, double half_side) const {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  constexpr std::array kNone = {kInfinite, -kInfinite};
+  if (!shadow_meets(0, seen_from(centre), half_side)) return kNone;
+  const double reach =
+      half_side * (std::abs(normal_[0]) + std::abs(normal_[1]) + std::abs(normal_[2]));
+  const double off = dot(normal_, minus(centre, corners_[0]));
+  if (normal_[0] == 0) return std::abs(off) <= reach ? std::array{-kInfinite, kInfinite} : kNone;
+  const auto [least, largest] =
+      std::minmax({(-reach - off) / normal_[0], (reach - off) / normal_[0]});
+  return {least, largest};
 }
 
 }  // namespace isomesh::mesh

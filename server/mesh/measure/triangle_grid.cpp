@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "server/mesh/measure/point_triangle.h"
 #include "server/mesh/parallel.h"
@@ -12,16 +13,12 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr std::size_t kTrianglesPerTask = 1 << 15;
-constexpr std::uint32_t kWordSide = 4;  // cells of a word along each axis
-constexpr std::uint32_t kWordCells = 64;
+
 constexpr std::uint32_t kMostSlabs = 32;
 
 // The side of a cell relative to the root mean square of the edges. In larger cells there are more
 // triangles to look at; of smaller ones more cells.
 constexpr double kCellSide = 1.0;
-
-// The first search radius, as a share of a cell's side: most points lie this near.
-constexpr double kFirstReach = 0.2;
 
 // Empty cells cost only bits, but there may be many.
 constexpr std::uint64_t kMostCellsPerTriangle = 256;
@@ -57,12 +54,6 @@ struct Bounds {
   }
 };
 
-Corners corners_of(const SurfaceView& surface, std::size_t triangle) {
-  const auto& [a, b, c] = surface.triangles[triangle];
-  return {to_point(surface.positions[a]), to_point(surface.positions[b]),
-          to_point(surface.positions[c])};
-}
-
 Bounds bounds_of(const SurfaceView& surface, const Context& context) {
   const std::size_t triangles = surface.triangles.size();
   std::vector<Bounds> parts(chunks_of(triangles, kTrianglesPerTask));
@@ -71,33 +62,6 @@ Bounds bounds_of(const SurfaceView& surface, const Context& context) {
   Bounds whole;
   for (const Bounds& part : parts) whole.add(part);
   return whole;
-}
-
-// The bits of a word whose cells lie in [low, high] along an axis: kAxisBits[axis][low][high].
-using AxisBits = std::array<std::array<std::uint64_t, kWordSide>, kWordSide>;
-constexpr std::array<AxisBits, 3> kAxisBits = [] {
-  std::array<AxisBits, 3> table = {};
-  for (std::uint32_t low = 0; low < kWordSide; ++low) {
-    for (std::uint32_t high = low; high < kWordSide; ++high) {
-      for (std::uint32_t bit = 0; bit < kWordCells; ++bit) {
-        const std::array<std::uint32_t, 3> at = {bit % 4, bit / 4 % 4, bit / 16};
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          if (at[axis] < low || at[axis] > high) continue;
-          table[axis][low][high] |= std::uint64_t{1} << bit;
-        }
-      }
-    }
-  }
-  return table;
-}();
-
-// How far outside the bounds a point is, along the axis where it is farthest.
-double outside_by(const Point& point, const Point& low, const Point& high) {
-  double most = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    most = std::max({most, low[axis] - point[axis], point[axis] - high[axis]});
-  }
-  return most;
 }
 
 }  // namespace
@@ -113,6 +77,7 @@ TriangleGrid::TriangleGrid(const SurfaceView& surface, const Context& context) :
   const Context quiet = {context.stop, nullptr};
   choose_cells(quiet);
   fill_slabs(quiet);
+  make_trees(quiet);
   make_upper_levels();
 }
 
@@ -155,15 +120,6 @@ TriangleGrid::Steps TriangleGrid::steps_of(const Point& point) const {
   return steps;
 }
 
-std::uint32_t TriangleGrid::box_in(const StepRange& box, const Cell& cell) {
-  std::uint32_t packed = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    packed |= step_in(box.low[axis], cell[axis]) << kFieldBits * axis;
-    packed |= (kCellSteps - 1 - step_in(box.high[axis], cell[axis])) << kFieldBits * (axis + 3);
-  }
-  return packed;
-}
-
 TriangleGrid::StepRange TriangleGrid::box_of(const Corners& corners) const {
   Point low;
   Point high;
@@ -174,11 +130,13 @@ TriangleGrid::StepRange TriangleGrid::box_of(const Corners& corners) const {
   return {steps_of(low), steps_of(high)};
 }
 
-// Calls put(cell, box) for the cells of these layers that the triangle may reach.
+// Calls put(cell, box) for the cells of these layers that the triangle may reach. Returns how many
+// cells and rows it tested: in a large box only those near the triangle's plane.
 template <class Put>
-void TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t first_layer,
-                             std::uint32_t last_layer, Put put) const {
+std::uint64_t TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t first_layer,
+                                      std::uint32_t last_layer, Put put) const {
   constexpr std::uint64_t kFewCells = 12;
+  constexpr std::uint64_t kManyCells = 512;
   constexpr double kMargin = 1 + 1e-6;  // more than rounding takes
   const Corners corners = corners_of(surface_, triangle);
   const StepRange box = box_of(corners);
@@ -190,13 +148,24 @@ void TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t first_layer,
   high[2] = std::min(high[2], last_layer);
   const TriangleReach reach(corners);
   const double half = side_mm_ / 2 * kMargin;
+  std::uint64_t tested = 0;
   Cell cell;
   for (cell[2] = low[2]; cell[2] <= high[2]; ++cell[2]) {
     for (cell[1] = low[1]; cell[1] <= high[1]; ++cell[1]) {
-      for (cell[0] = low[0]; cell[0] <= high[0]; ++cell[0]) {
-        const Point centre = {low_[0] + (cell[0] + 0.5) * side_mm_,
-                              low_[1] + (cell[1] + 0.5) * side_mm_,
-                              low_[2] + (cell[2] + 0.5) * side_mm_};
+      std::uint32_t end = high[0] + 1;
+      cell[0] = low[0];
+      if (all > kManyCells) {
+        const auto [first, last] = reach.ways_along_x(centre_of(cell), half);
+        const auto in_row = [&](double way_mm) {
+          return std::clamp<double>(low[0] + way_mm / side_mm_, low[0], end);
+        };
+        cell[0] = static_cast<std::uint32_t>(in_row(first - side_mm_));
+        end = static_cast<std::uint32_t>(in_row(last + 2 * side_mm_));
+        ++tested;
+      }
+      for (; cell[0] < end; ++cell[0]) {
+        ++tested;
+        const Point centre = centre_of(cell);
         if (all > 1 &&
             !(all <= kFewCells ? reach.plane_meets(centre, half) : reach.meets(centre, half))) {
           continue;
@@ -205,6 +174,7 @@ void TriangleGrid::rasterise(std::uint32_t triangle, std::uint32_t first_layer,
       }
     }
   }
+  return tested;
 }
 
 void TriangleGrid::fill_slabs(const Context& context) {
@@ -231,8 +201,60 @@ void TriangleGrid::fill_slabs(const Context& context) {
   });
 }
 
+void TriangleGrid::make_trees(const Context& context) {
+  struct Crowd {
+    Slab* slab;
+    std::size_t number;
+    Point centre;
+  };
+  std::vector<Crowd> crowds;
+  const Level& level = levels_[0];
+  std::size_t index = 0;
+  Cell word;
+  for (word[2] = 0; word[2] < level.words[2]; ++word[2]) {
+    Slab& slab = slabs_[word[2] / slab_layers_];
+    for (word[1] = 0; word[1] < level.words[1]; ++word[1]) {
+      for (word[0] = 0; word[0] < level.words[0]; ++word[0], ++index) {
+        std::size_t cell = before_[index];
+        for (std::uint64_t rest = level.bits[index]; rest != 0; rest &= rest - 1, ++cell) {
+          if (slab.begins[cell + 1] - slab.begins[cell] <= kCrowd) continue;
+          const auto bit = static_cast<std::uint32_t>(std::countr_zero(rest));
+          const Cell at = {4 * word[0] + bit % 4, 4 * word[1] + bit / 4 % 4,
+                           4 * word[2] + bit / 16};
+          crowds.push_back({&slab, slab.crowded.size(), centre_of(at)});
+          slab.crowded.push_back(cell);
+        }
+      }
+    }
+  }
+  for (Slab& slab : slabs_) slab.trees.resize(slab.crowded.size());
+  parallel_for(context, crowds.size(), [&](std::size_t n) {
+    const auto& [slab, number, centre] = crowds[n];
+    const std::size_t cell = slab->crowded[number];
+    const auto entries =
+        std::span(slab->entries)
+            .subspan(slab->begins[cell], slab->begins[cell + 1] - slab->begins[cell]);
+    slab->trees[number] = TriangleTree(surface_, centre, side_mm_, entries);
+  });
+}
+
+Point TriangleGrid::centre_of(const Cell& cell) const {
+  return {low_[0] + (cell[0] + 0.5) * side_mm_, low_[1] + (cell[1] + 0.5) * side_mm_,
+          low_[2] + (cell[2] + 0.5) * side_mm_};
+}
+
+TriangleGrid::Size TriangleGrid::size() const {
+  Size size;
+  for (const Slab& slab : slabs_) {
+    size.tested_cells += slab.tested_cells;
+    size.entries += slab.entries.size();
+    for (const TriangleTree& tree : slab.trees) size.nodes += tree.nodes();
+  }
+  return size;
+}
+
 std::vector<TriangleGrid::Placed> TriangleGrid::entries_of(
-    std::uint32_t slab, std::span<const std::array<std::uint16_t, 2>> layers_of_triangles) const {
+    std::uint32_t slab, std::span<const std::array<std::uint16_t, 2>> layers_of_triangles) {
   const std::uint32_t first = slab * slab_layers_;
   const std::uint32_t last = std::min(first + slab_layers_, levels_[0].words[2]) - 1;
   const std::size_t first_word = levels_[0].index({0, 0, first});
@@ -240,13 +262,14 @@ std::vector<TriangleGrid::Placed> TriangleGrid::entries_of(
   for (std::uint32_t t = 0; t < layers_of_triangles.size(); ++t) {
     const auto& [low, high] = layers_of_triangles[t];
     if (low > last || high < first) continue;
-    rasterise(t, first * kWordSide, last * kWordSide + kWordSide - 1,
-              [&](const Cell& cell, std::uint32_t box) {
-                const std::size_t word = levels_[0].index({cell[0] / 4, cell[1] / 4, cell[2] / 4});
-                const std::size_t bit = cell[0] % 4 + 4 * (cell[1] % 4) + 16 * (cell[2] % 4);
-                entries.push_back(
-                    {static_cast<std::uint32_t>((word - first_word) * kWordCells + bit), {t, box}});
-              });
+    const auto put = [&](const Cell& cell, std::uint32_t box) {
+      const std::size_t word = levels_[0].index({cell[0] / 4, cell[1] / 4, cell[2] / 4});
+      const std::size_t bit = cell[0] % 4 + 4 * (cell[1] % 4) + 16 * (cell[2] % 4);
+      entries.push_back(
+          {static_cast<std::uint32_t>((word - first_word) * kWordCells + bit), {t, box}});
+    };
+    slabs_[slab].tested_cells +=
+        rasterise(t, first * kWordSide, last * kWordSide + kWordSide - 1, put);
   }
   return entries;
 }
@@ -303,134 +326,6 @@ void TriangleGrid::make_upper_levels() {
     }
     levels_.push_back(std::move(level));
   }
-}
-
-std::uint64_t TriangleGrid::bits_within(const CellRange& range, const Cell& word,
-                                        std::size_t level) {
-  const std::size_t shift = 2 * level;
-  std::uint64_t bits = ~std::uint64_t{0};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::int64_t first = std::int64_t{word[axis]} * kWordSide;
-    const std::int64_t low = std::int64_t{range.low[axis] >> shift} - first;
-    const std::int64_t high = std::int64_t{range.high[axis] >> shift} - first;
-    // The range may have shrunk since, and no longer contain the word.
-    if (low >= kWordSide || high < 0) return 0;
-    bits &= kAxisBits[axis][static_cast<std::size_t>(std::max<std::int64_t>(low, 0))]
-                     [static_cast<std::size_t>(std::min<std::int64_t>(high, kWordSide - 1))];
-  }
-  return bits;
-}
-
-unsigned TriangleGrid::bit_nearest_to_middle(const CellRange& range, const Cell& word,
-                                             std::size_t level) {
-  unsigned bit = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::int64_t middle = (std::int64_t{range.low[axis]} + range.high[axis]) / 2 >> 2 * level;
-    const std::int64_t at = middle - std::int64_t{word[axis]} * kWordSide;
-    bit |= static_cast<unsigned>(std::clamp<std::int64_t>(at, 0, kWordSide - 1)) << 2 * axis;
-  }
-  return bit;
-}
-
-std::uint64_t TriangleGrid::bits_xored(std::uint64_t word, unsigned number) {
-  constexpr std::array<std::uint64_t, 6> kLower = {0x5555555555555555, 0x3333333333333333,
-                                                   0x0f0f0f0f0f0f0f0f, 0x00ff00ff00ff00ff,
-                                                   0x0000ffff0000ffff, 0x00000000ffffffff};
-  for (unsigned digit = 0; digit < kLower.size(); ++digit) {
-    if ((number >> digit & 1) == 0) continue;
-    const unsigned shift = 1U << digit;
-    word = (word & kLower[digit]) << shift | (word >> shift & kLower[digit]);
-  }
-  return word;
-}
-
-double TriangleGrid::squared_distance_to(const Cell& cell, const Point& point) const {
-  double squared = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double from = point[axis] - low_[axis] - cell[axis] * side_mm_;
-    const double outside = std::max(std::max(-from, from - side_mm_), 0.0);
-    squared += outside * outside;
-  }
-  return squared;
-}
-
-std::span<const TriangleGrid::Entry> TriangleGrid::entries_at(const Cell& word, std::size_t index,
-                                                              unsigned bit) const {
-  const Slab& slab = slabs_[word[2] / slab_layers_];
-  const std::uint64_t lower = (std::uint64_t{1} << bit) - 1;
-  const std::size_t cell =
-      before_[index] + static_cast<std::size_t>(std::popcount(levels_[0].bits[index] & lower));
-  return std::span(slab.entries)
-      .subspan(slab.begins[cell], slab.begins[cell + 1] - slab.begins[cell]);
-}
-
-void TriangleGrid::look_at(std::uint32_t triangle, Search& search) const {
-  std::uint32_t& seen = search.seen[triangle % search.seen.size()];
-  if (seen == triangle) return;
-  seen = triangle;
-  const double squared = squared_distance(search.point, corners_of(surface_, triangle));
-  if (squared < search.nearest.squared_mm) search.nearest = {triangle, squared};
-}
-
-void TriangleGrid::look_within(double radius_mm, Search& search) const {
-  // More than rounding can add.
-  constexpr double kMargin = 1 + 1e-9;
-  constexpr double kStepMargin = 1e-9;
-  const Point& point = search.point;
-  StepRange box;
-  CellRange range;
-  double squared_reach = 0;
-  double known = radius_mm * radius_mm;
-  const auto reach_within = [&](double radius) {
-    const double reach = radius * kMargin + kStepMargin * side_mm_;
-    squared_reach = reach * reach;
-    box = {steps_of({point[0] - reach, point[1] - reach, point[2] - reach}),
-           steps_of({point[0] + reach, point[1] + reach, point[2] + reach})};
-    range = {cell_of(box.low), cell_of(box.high)};
-  };
-  reach_within(radius_mm);
-  auto visit = [&](const Cell& cell, std::span<const Entry> entries) {
-    if (squared_distance_to(cell, point) > squared_reach) return;
-    std::uint32_t reached = reach_in(box, cell);
-    for (const Entry& entry : entries) {
-      if (!may_meet(reached, entry.box)) continue;
-      look_at(entry.triangle, search);
-      if (search.nearest.squared_mm >= known) continue;
-      known = search.nearest.squared_mm;
-      if (known <= search.enough_squared_mm) known = 0;
-      reach_within(std::sqrt(known));
-      reached = reach_in(box, cell);
-    }
-  };
-  descend(levels_.size() - 1, {0, 0, 0}, range, visit);
-}
-
-TriangleGrid::Nearest TriangleGrid::nearest(const Point& point, std::uint32_t guess) const {
-  if (levels_.empty()) return {};
-  Search search = {point, 0, {}, {}};
-  search.seen.fill(kNone);
-  if (guess != kNone) look_at(guess, search);
-  // A distant guess would cause a search of too many cells.
-  double radius = outside_by(point, low_, high_) + kFirstReach * side_mm_;
-  for (; search.nearest.squared_mm > radius * radius; radius *= 2) {
-    look_within(radius, search);
-    if (search.nearest.squared_mm <= radius * radius) return search.nearest;
-  }
-  look_within(std::sqrt(search.nearest.squared_mm), search);
-  return search.nearest;
-}
-
-TriangleGrid::Nearest TriangleGrid::within(const Point& point, double squared_mm,
-                                           std::uint32_t guess) const {
-  if (levels_.empty()) return {};
-  if (guess != kNone) {
-    const double squared = squared_distance(point, corners_of(surface_, guess));
-    if (squared <= squared_mm) return {guess, squared};
-  }
-  Search search = {point, squared_mm, {}, {}};
-  search.seen.fill(kNone);
-  look_within(std::sqrt(squared_mm), search);
-  return search.nearest.squared_mm <= squared_mm ? search.nearest : Nearest{};
 }
 
 }  // namespace isomesh::mesh

@@ -1,4 +1,4 @@
-// A spatial index of a surface's triangles: the nearest one to a point, those near a box.
+// A spatial index of a surface's triangles: the nearest one to a point, those along a line.
 #pragma once
 
 #include <algorithm>
@@ -13,13 +13,17 @@
 #include "server/mesh/context.h"
 #include "server/mesh/measure/point_triangle.h"
 #include "server/mesh/measure/surface_view.h"
+#include "server/mesh/measure/triangle_tree.h"
 
 namespace isomesh::mesh {
 
 // Cubic cells of about an edge's length, each with the triangles that may reach into it. Words of 4
 // x 4 x 4 bits tell which cells have any, and further levels tell which words have any, so empty
-// space costs almost nothing. Takes some 40 bytes a triangle, twice as many while it is built. The
-// view's arrays must outlive it. Immutable, so safe to read from several threads.
+// space costs almost nothing. A cell is crowded if edges are much shorter along one axis than along
+// another, or if triangles differ much in size. It has a tree then (triangle_tree.h), so a search
+// looks at few triangles at any spacing. Takes some 40 bytes a triangle, twice as many while it is
+// built, and up to 100 with trees. The view's arrays must outlive it. Immutable, so safe to read
+// from several threads.
 class TriangleGrid {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -27,6 +31,7 @@ class TriangleGrid {
   struct Nearest {
     std::uint32_t triangle = kNone;
     double squared_mm = std::numeric_limits<double>::infinity();
+    std::uint64_t steps = 0;  // cells, boxes and triangles that were looked at
   };
 
   // Does not depend on the number of threads. Throws Error kUnusableVolume if a triangle names a
@@ -41,20 +46,30 @@ class TriangleGrid {
   // Returns kNone and infinity if there is none.
   Nearest within(const Point& point, double squared_mm, std::uint32_t guess) const;
 
-  // Calls visit(triangle) for all triangles that reach into the box; for some several times, and
-  // for some others near it.
+  // Calls visit(triangle) for all triangles that the line along +x from the point to the finite x
+  // may meet; for some several times, and for some others near it. Returns how many cells it looked
+  // into.
   template <class Visit>
-  void visit_near(const Point& low, const Point& high, Visit visit) const {
-    if (levels_.empty()) return;
-    const StepRange box = {steps_of(low), steps_of(high)};
+  std::uint64_t visit_along_x(const Point& from, double to_x, Visit visit) const {
+    if (levels_.empty()) return 0;
+    const Point to = {to_x, from[1], from[2]};
+    const StepRange box = {steps_of(from), steps_of(to)};
     const CellRange range = {cell_of(box.low), cell_of(box.high)};
-    auto visit_cell = [&](const Cell& cell, std::span<const Entry> entries) {
+    std::uint64_t cells = 0;
+    const auto visit_cell = [&](const Cell& cell, const Content& content) {
+      ++cells;
+      if (content.tree != nullptr) {
+        return content.tree->visit_along(content.entries, from, to,
+                                         [&](const Entry& entry) { visit(entry.triangle); });
+      }
       const std::uint32_t reached = reach_in(box, cell);
-      for (const Entry& entry : entries) {
-        if (may_meet(reached, entry.box)) visit(entry.triangle);
+      for (const Entry& entry : content.entries) {
+        if (BoxInCell::may_meet(reached, entry.box)) visit(entry.triangle);
       }
     };
-    descend(levels_.size() - 1, {0, 0, 0}, range, visit_cell);
+    const auto reaches = [](std::size_t, const Cell&) { return true; };
+    descend(levels_.size() - 1, {0, 0, 0}, range, reaches, visit_cell);
+    return cells;
   }
 
   // Calls visit_cell(triangles) and visit_pair(i, k), with i < k, for the pairs among these that
@@ -65,28 +80,40 @@ class TriangleGrid {
   void visit_pairs(std::size_t part, VisitCell visit_cell, VisitPair visit_pair) const {
     const Slab& slab = slabs_[part];
     for (std::size_t cell = 0; cell + 1 < slab.begins.size(); ++cell) {
-      const std::span<const Entry> entries(slab.entries.data() + slab.begins[cell],
-                                           slab.entries.data() + slab.begins[cell + 1]);
+      const auto [entries, tree] = slab.content(cell);
       if (entries.size() < 2) continue;
       visit_cell(entries);
+      if (tree != nullptr) {
+        tree->visit_pairs(entries, visit_pair);
+        continue;
+      }
       for (std::size_t i = 0; i + 1 < entries.size(); ++i) {
-        const std::uint32_t reached = reach_of(entries[i].box);
+        const std::uint32_t reached = BoxInCell::reach_of(entries[i].box);
         for (std::size_t k = i + 1; k < entries.size(); ++k) {
-          if (may_meet(reached, entries[k].box)) visit_pair(i, k);
+          if (BoxInCell::may_meet(reached, entries[k].box)) visit_pair(i, k);
         }
       }
     }
   }
 
+  // How much was done to build it, and how much it holds.
+  struct Size {
+    std::uint64_t tested_cells = 0;  // of triangles that may reach into several
+    std::uint64_t entries = 0;       // triangles of cells
+    std::uint64_t nodes = 0;         // of the trees of crowded cells
+  };
+  Size size() const;
+
   const SurfaceView& surface() const { return surface_; }
 
-  // A triangle in a cell.
-  struct Entry {
-    std::uint32_t triangle;
-    std::uint32_t box;
-  };
+  using Entry = TriangleInCell;
 
  private:
+  static constexpr std::uint32_t kWordSide = 4;  // cells of a word along each axis
+  static constexpr std::uint32_t kWordCells = 64;
+  // A cell with more triangles has a tree. On an even lattice hardly any cell has so many.
+  static constexpr std::size_t kCrowd = 64;
+
   using Cell = std::array<std::uint32_t, 3>;
   struct CellRange {
     Cell low;
@@ -102,21 +129,32 @@ class TriangleGrid {
       return (std::size_t{word[2]} * words[1] + word[1]) * words[0] + word[0];
     }
   };
-  // In sixteenths of a cell, for comparing boxes.
+  // In sixteenths of a cell (BoxInCell), for comparing boxes.
   using Steps = std::array<std::uint32_t, 3>;
   struct StepRange {
     Steps low;
     Steps high;  // the last one
   };
-  static constexpr std::uint32_t kCellSteps = 16;
-  // A box within a cell has six fields of four bits and a spare bit: for each axis where it begins,
-  // and how far before the cell's end it ends.
-  static constexpr std::uint32_t kFieldBits = 5;
-  static constexpr std::uint32_t kSpareBits = 0b10000'10000'10000'10000'10000'10000;
+  static constexpr std::uint32_t kCellSteps = BoxInCell::kSteps;
+  // Of a cell.
+  struct Content {
+    std::span<const Entry> entries;
+    const TriangleTree* tree;  // null if it is not crowded
+  };
   // Some layers of words; the entries of their cells follow each other.
   struct Slab {
     std::vector<std::uint32_t> begins;  // cells + 1
     std::vector<Entry> entries;
+    std::vector<std::size_t> crowded;  // cells
+    std::vector<TriangleTree> trees;   // of these
+    std::uint64_t tested_cells = 0;
+
+    Content content(std::size_t cell) const {
+      const auto its = std::span(entries).subspan(begins[cell], begins[cell + 1] - begins[cell]);
+      if (its.size() <= kCrowd) return {its, nullptr};
+      return {its, &trees[static_cast<std::size_t>(std::ranges::lower_bound(crowded, cell) -
+                                                   crowded.begin())]};
+    }
   };
   struct Placed {
     std::uint32_t bit;  // of the slab's
@@ -130,44 +168,42 @@ class TriangleGrid {
     const auto from_begin = static_cast<std::int32_t>(step - kCellSteps * cell);
     return static_cast<std::uint32_t>(std::clamp<std::int32_t>(from_begin, 0, kCellSteps - 1));
   }
-  static std::uint32_t box_in(const StepRange& box, const Cell& cell);
-  // The operands for comparing boxes: where the box ends, and where it begins.
+  static Steps steps_in(const Steps& steps, const Cell& cell) {
+    return {step_in(steps[0], cell[0]), step_in(steps[1], cell[1]), step_in(steps[2], cell[2])};
+  }
+  static std::uint32_t box_in(const StepRange& box, const Cell& cell) {
+    return BoxInCell::of(steps_in(box.low, cell), steps_in(box.high, cell));
+  }
   static std::uint32_t reach_in(const StepRange& box, const Cell& cell) {
-    return box_in({box.high, box.low}, cell);
-  }
-  // The same of a box within the cell.
-  static std::uint32_t reach_of(std::uint32_t box) {
-    constexpr std::uint32_t kHalf = 3 * kFieldBits;
-    constexpr std::uint32_t kFields = kSpareBits - (kSpareBits >> (kFieldBits - 1));
-    const std::uint32_t opposite = ~box & kFields;
-    return opposite >> kHalf | (opposite << kHalf & kFields);
-  }
-  static bool may_meet(std::uint32_t reach, std::uint32_t box) {
-    return (((reach | kSpareBits) - box) & kSpareBits) == kSpareBits;
+    return BoxInCell::reach(steps_in(box.low, cell), steps_in(box.high, cell));
   }
 
   void choose_cells(const Context& context);
   void fill_slabs(const Context& context);
-  std::vector<Placed> entries_of(
-      std::uint32_t slab, std::span<const std::array<std::uint16_t, 2>> layers_of_triangles) const;
+  std::vector<Placed> entries_of(std::uint32_t slab,
+                                 std::span<const std::array<std::uint16_t, 2>> layers_of_triangles);
   void fill_slab(std::uint32_t slab, std::span<const Placed> entries);
+  void make_trees(const Context& context);
   void make_upper_levels();
   template <class Put>
-  void rasterise(std::uint32_t triangle, std::uint32_t first_layer, std::uint32_t last_layer,
-                 Put put) const;
+  std::uint64_t rasterise(std::uint32_t triangle, std::uint32_t first_layer,
+                          std::uint32_t last_layer, Put put) const;
   Steps steps_of(const Point& point) const;
   StepRange box_of(const Corners& corners) const;
+  Point centre_of(const Cell& cell) const;
   static std::uint64_t bits_within(const CellRange& range, const Cell& word, std::size_t level);
   static unsigned bit_nearest_to_middle(const CellRange& range, const Cell& word,
                                         std::size_t level);
   // Bit n of the result is bit n ^ number of the word.
   static std::uint64_t bits_xored(std::uint64_t word, unsigned number);
-  std::span<const Entry> entries_at(const Cell& word, std::size_t index, unsigned bit) const;
-  double squared_distance_to(const Cell& cell, const Point& point) const;
+  Content content_at(const Cell& word, std::size_t index, unsigned bit) const;
+  // To a cell, or to a word of the level below.
+  double squared_distance_to(std::size_t level, const Cell& cell, const Point& point) const;
   // A search for one point; remembers triangles that it has looked at, because cells share them.
   struct Search {
     Point point;
     double enough_squared_mm;  // no need to find a nearer one
+    bool is_in_order;          // looks at the triangles of a cell by their numbers
     Nearest nearest;
     std::array<std::uint32_t, 64> seen;
   };
@@ -175,9 +211,11 @@ class TriangleGrid {
   // Looks at all cells within the radius that may have something nearer than what is known.
   void look_within(double radius_mm, Search& search) const;
 
-  // Visits the cells near the middle of the range first, roughly. `range` may shrink meanwhile.
-  template <class Visit>
-  void descend(std::size_t level, const Cell& word, const CellRange& range, Visit& visit) const {
+  // Visits the cells near the middle of the range first, roughly, but no word for which
+  // reaches(level, number) is false. `range` may shrink meanwhile.
+  template <class Reaches, class Visit>
+  void descend(std::size_t level, const Cell& word, const CellRange& range, Reaches& reaches,
+               Visit& visit) const {
     const std::size_t index = levels_[level].index(word);
     const std::uint64_t within = levels_[level].bits[index] & bits_within(range, word, level);
     if (within == 0) return;
@@ -186,9 +224,9 @@ class TriangleGrid {
       const unsigned bit = static_cast<unsigned>(std::countr_zero(rest)) ^ middle;
       const Cell below = {4 * word[0] + bit % 4, 4 * word[1] + bit / 4 % 4, 4 * word[2] + bit / 16};
       if (level == 0) {
-        visit(below, entries_at(word, index, bit));
-      } else {
-        descend(level - 1, below, range, visit);
+        visit(below, content_at(word, index, bit));
+      } else if (reaches(level, below)) {
+        descend(level - 1, below, range, reaches, visit);
       }
     }
   }
