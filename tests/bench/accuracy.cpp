@@ -1,10 +1,13 @@
 #include "tests/bench/accuracy.h"
 
 #include <limits>
+#include <random>
 
 #include <meshoptimizer.h>
 
+#include "server/jobs/making/stage_times.h"
 #include "server/mesh/measure/distance.h"
+#include "tests/bench/label_stages.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"
@@ -136,6 +139,45 @@ CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan) {
                 kCertifyRuns);
   time.points = time.certificate.from_mesh.points + time.certificate.from_reference.points;
   return time;
+}
+
+std::vector<UnevenTime> measure_uneven(int threads) {
+  constexpr std::uint32_t kSide = 20;
+  constexpr std::uint32_t kLabels = 4;
+  set_threads(threads);
+  std::vector<UnevenTime> times;
+  for (const double spacing : {1, 100, 1000}) {
+    Samples samples;
+    samples.dims = {kSide, kSide, kSide};
+    samples.geometry.spacing[2] = spacing;
+    std::mt19937 random(1);
+    for (std::uint32_t n = 0; n < kSide * kSide * kSide; ++n) {
+      samples.bytes.push_back(static_cast<std::byte>(random() % (kLabels + 1)));
+    }
+    LabelStages stages(samples);
+    stages.extract();
+    const mesh::SurfaceSize size = {stages.size().triangles, stages.size().vertices};
+    const jobs::VolumeSize volume = {kSide * kSide * kSide, 1, spacing};
+    UnevenTime time = {.spacing_z = spacing, .triangles = size.triangles};
+    const Timing timing = stages.run_job(true).timing;
+    time.certify_ms = timing.certify;
+    time.job_ms = timing.extract + timing.smooth + timing.encode + timing.certify;
+    time.expected_ms = jobs::stage_times(size, size, volume, stages.parameters(), true).certify;
+    times.push_back(time);
+  }
+  return times;
+}
+
+Json to_json(const std::vector<UnevenTime>& times) {
+  Json rows = Json::array();
+  for (const UnevenTime& time : times) {
+    rows.push_back({{"spacing_z", time.spacing_z},
+                    {"triangles", time.triangles},
+                    {"certify_ms", time.certify_ms},
+                    {"job_ms", time.job_ms},
+                    {"expected_certify_ms", time.expected_ms}});
+  }
+  return rows;
 }
 
 Json to_json(const std::vector<Approximation>& approximations) {

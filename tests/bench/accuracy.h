@@ -52,8 +52,20 @@ struct CertifyTime {
 };
 CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan);
 
+// A job by the labels of 20^3 random samples, with a certificate, at some spacings: the same
+// triangles, but many times as long in one direction.
+struct UnevenTime {
+  double spacing_z = 1;
+  std::uint64_t triangles = 0;
+  double certify_ms = 0;
+  double job_ms = 0;
+  double expected_ms = 0;  // of the certificate, by stage_times.h
+};
+std::vector<UnevenTime> measure_uneven(int threads);
+
 // One object for each.
 Json to_json(const std::vector<Approximation>& approximations);
 Json to_json(const CertifyTime& time);
+Json to_json(const std::vector<UnevenTime>& times);
 
 }  // namespace isomesh::bench

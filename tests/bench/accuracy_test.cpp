@@ -46,5 +46,17 @@ TEST(Accuracy, OfSmoothingIsMeasuredBothWays) {
   EXPECT_EQ(to_json(time).at("threads"), 2);
 }
 
+TEST(Accuracy, OfLabelsIsTimedAtSomeSpacings) {
+  const std::vector<UnevenTime> times = measure_uneven(2);
+  ASSERT_EQ(times.size(), 3U);
+  for (const UnevenTime& time : times) {
+    EXPECT_EQ(time.triangles, times.front().triangles);
+    EXPECT_GT(time.certify_ms, 0);
+    EXPECT_GT(time.expected_ms, 0);
+  }
+  EXPECT_EQ(times.back().spacing_z, 1000);
+  EXPECT_EQ(to_json(times).size(), 3U);
+}
+
 }  // namespace
 }  // namespace isomesh::bench

@@ -102,8 +102,8 @@ void LabelStages::measure() const {
   mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {});
 }
 
-JobFigures LabelStages::run_job() {
-  return bench::run_job(samples_, parameters_, 0, false,
+JobFigures LabelStages::run_job(bool certify) {
+  return bench::run_job(samples_, parameters_, 0, certify,
                         [&](const jobs::SampleArray& array, const jobs::MeshRequest& request,
                             std::span<const codec::Sink> sinks, jobs::Progress& progress) {
                           return jobs::make_labels(array, request, sinks, progress, surface_);

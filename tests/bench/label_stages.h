@@ -34,8 +34,9 @@ class LabelStages {
   std::size_t count_folded() const;  // triangles, see unfold.h
   void measure() const;              // topology, area and volume of each label
   // A job to a GLB.
-  JobFigures run_job();
+  JobFigures run_job(bool certify = false);
 
+  const MeshParameters& parameters() const { return parameters_; }
   const std::vector<std::int64_t>& labels() const { return options_.labels; }
   const std::vector<mesh::LabelVoxels>& voxels() const { return voxels_; }  // of those labels
   MeshSize size() const { return {surface_.mesh.positions.size(), surface_.mesh.triangles.size()}; }

@@ -206,6 +206,7 @@ int run_accuracy(const Options& options, AccuracyPlan plan, bool only_certify) {
     plan.threads = threads;
     if (only_certify) {
       output.add(count_of(threads), Json::array({to_json(measure_certify(samples, plan))}));
+      output.add("labels of 20^3 samples, " + count_of(threads), to_json(measure_uneven(threads)));
       continue;
     }
     if (threads < 2 && options.threads == 0) continue;  // each run takes minutes

@@ -165,7 +165,7 @@ JobFigures run_job(const Samples& samples, const MeshParameters& parameters, dou
   CountingSink counting;
   const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
   const jobs::Report nobody = [](Stage, double, const Timing&) {};
-  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, 0, parameters, certify));
+  jobs::Progress progress({}, nobody, jobs::stage_times({}, {}, {}, parameters, certify));
   const auto& [x, y, z] = samples.dims;
   const Volume volume;
   JobFigures figures;

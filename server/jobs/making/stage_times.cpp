@@ -45,7 +45,16 @@ double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters)
          (parameters.max_error_mm ? kSimplifyWithinPerTriangle : kSimplifyPerTriangle);
 }
 
-double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
+// How much longer it takes to find what is near if the spacing is uneven. The cells of
+// mesh/measure/triangle_grid.h are crowded then, and have trees.
+double uneven_factor(const VolumeSize& volume) {
+  constexpr double kPerDoubling = 0.2;
+  constexpr double kMost = 1.4;
+  const double ratio = volume.largest_spacing_mm / volume.smallest_spacing_mm;
+  return 1 + std::min(kMost, kPerDoubling * std::log2(std::max(1.0, ratio)));
+}
+
+double certify_ms(const SurfaceSize& surface, const SurfaceSize& written, const VolumeSize& volume,
                   const MeshParameters& parameters) {
   const bool is_proven = parameters.max_error_mm && why_measured(parameters) == nullptr;
   const auto points = [&](const SurfaceSize& size) {
@@ -53,8 +62,9 @@ double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
     return is_proven ? std::min(all, as_double(kMostPointsBesideAProof)) : all;
   };
   const auto measured = static_cast<double>(measured_formats(parameters).size());
-  return measured * (kGridPerTriangle * as_double(surface.triangles + written.triangles) +
-                     kDistancePerPoint * (points(surface) + points(written)));
+  return measured * uneven_factor(volume) *
+         (kGridPerTriangle * as_double(surface.triangles + written.triangles) +
+          kDistancePerPoint * (points(surface) + points(written)));
 }
 
 // Formats are written in parallel, so the slowest counts fully and the others by half.
@@ -81,15 +91,20 @@ SurfaceSize typical_surface(double samples) {
 
 }  // namespace
 
-Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written, std::uint64_t samples,
-                   const MeshParameters& parameters, bool certify) {
+VolumeSize VolumeSize::of(const Volume& volume) {
+  const auto [smallest, largest] = std::ranges::minmax(volume.geometry.spacing);
+  return {volume.sample_count(), smallest, largest};
+}
+
+Timing stage_times(const SurfaceSize& extracted, const SurfaceSize& written,
+                   const VolumeSize& volume, const MeshParameters& parameters, bool certify) {
   Timing times;
-  times.load = kMillisecondsPerJob + kLoadPerSample * as_double(samples);
-  times.extract = extract_ms(extracted, samples);
+  times.load = kMillisecondsPerJob + kLoadPerSample * as_double(volume.samples);
+  times.extract = extract_ms(extracted, volume.samples);
   times.smooth = smooth_ms(extracted, parameters);
   times.simplify = simplify_ms(extracted, parameters);
   times.encode = encode_ms(written, parameters);
-  if (certify) times.certify = certify_ms(extracted, written, parameters);
+  if (certify) times.certify = certify_ms(extracted, written, volume, parameters);
   return times;
 }
 
@@ -114,7 +129,8 @@ SurfaceSize simplified_surface(const SurfaceSize& extracted, const MeshParameter
 }
 
 Timing expected_times(const Volume& volume, const MeshParameters& parameters, bool certify) {
-  auto samples = as_double(volume.sample_count());
+  VolumeSize size = VolumeSize::of(volume);
+  auto samples = as_double(size.samples);
   if (parameters.crop) {
     double part = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -123,10 +139,10 @@ Timing expected_times(const Volume& volume, const MeshParameters& parameters, bo
     }
     samples = std::min(samples, part);
   }
+  size.samples = static_cast<std::uint64_t>(samples);
   const SurfaceSize extracted = typical_surface(samples);
-  const SurfaceSize written =
-      simplified_surface(extracted, parameters, std::ranges::min(volume.geometry.spacing));
-  return stage_times(extracted, written, static_cast<std::uint64_t>(samples), parameters, certify);
+  const SurfaceSize written = simplified_surface(extracted, parameters, size.smallest_spacing_mm);
+  return stage_times(extracted, written, size, parameters, certify);
 }
 
 double expected_ms(const Volume& volume, const JobParameters& parameters) {

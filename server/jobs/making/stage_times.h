@@ -9,11 +9,20 @@
 
 namespace isomesh::jobs {
 
+// What the times depend on besides surface and parameters.
+struct VolumeSize {
+  std::uint64_t samples = 0;
+  double smallest_spacing_mm = 1;
+  double largest_spacing_mm = 1;
+
+  static VolumeSize of(const Volume& volume);
+};
+
 // The times of all stages of the job but the queue, in milliseconds. First guesses come from a head
-// of 7.1 million voxels and five million triangles on two cores. `extracted` and `written` are the
-// sizes before and after simplification.
+// of 7.1 million voxels and five million triangles on two cores, and those of uneven spacing from
+// labels. `extracted` and `written` are the sizes before and after simplification.
 Timing stage_times(const mesh::SurfaceSize& extracted, const mesh::SurfaceSize& written,
-                   std::uint64_t samples, const MeshParameters& parameters, bool certify);
+                   const VolumeSize& volume, const MeshParameters& parameters, bool certify);
 
 // The fraction of the triangles that simplification leaves within an error. A guess.
 double share_within(double error_mm, double spacing_mm);

@@ -50,7 +50,7 @@ std::string key_of_part(const MeshParameters& parameters) {
 
 }  // namespace
 
-void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) {
+void CostModel::learn(const Job& job, const VolumeSize& volume) {
   if (!job.mesh || job.timing.encode <= 0) return;
   const SurfaceSize surface = {job.mesh->triangles, job.mesh->vertices};
   const auto add = [](Correction& correction, double seen, double guessed) {
@@ -63,7 +63,7 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
     extracted.vertices = extracted.triangles / 2;
   }
   const Timing guessed =
-      stage_times(extracted, surface, samples, job.parameters, job.parameters.certify);
+      stage_times(extracted, surface, volume, job.parameters, job.parameters.certify);
   for (std::size_t n = 0; n < kStages.size(); ++n) {
     const auto elapsed = kStages[n].elapsed;
     if (elapsed == nullptr) continue;
@@ -76,7 +76,7 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
   if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
     add(share_, static_cast<double>(surface.triangles),
         static_cast<double>(extracted.triangles) *
-            share_within(*job.parameters.max_error_mm, spacing_mm));
+            share_within(*job.parameters.max_error_mm, volume.smallest_spacing_mm));
   }
   if (job.mesh->labels_count) return;  // the record does not list their triangles
   const SurfaceSize in_files = surface_in_files(*job.mesh);
@@ -87,8 +87,8 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
 }
 
 double CostModel::milliseconds(const SurfaceSize& surface, const SurfaceSize& written,
-                               std::uint64_t samples, const JobParameters& parameters) const {
-  const Timing times = stage_times(surface, written, samples, parameters, parameters.certify);
+                               const VolumeSize& volume, const JobParameters& parameters) const {
+  const Timing times = stage_times(surface, written, volume, parameters, parameters.certify);
   double sum = 0;
   for (std::size_t n = 0; n < kStages.size(); ++n) {
     const auto elapsed = kStages[n].elapsed;
@@ -130,12 +130,13 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters.certify);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model(viewer);
-  const double spacing_mm = std::ranges::min(volume.geometry.spacing);
+  const VolumeSize size = VolumeSize::of(volume);
+  const double spacing_mm = size.smallest_spacing_mm;
   const bool is_simplified = parameters.max_error_mm || parameters.triangles;
   const SurfaceSize written =
       is_simplified ? costs.simplified(surface, parameters, spacing_mm) : surface;
   if (is_simplified) estimate.simplified_triangles = written.triangles;
-  estimate.milliseconds = costs.milliseconds(surface, written, volume.sample_count(), parameters);
+  estimate.milliseconds = costs.milliseconds(surface, written, size, parameters);
   SurfaceSize in_files = surface_in_files(counted);
   if (is_simplified) in_files = costs.simplified(in_files, parameters, spacing_mm);
   for (const MeshFormat format : files_of(parameters)) {
@@ -169,20 +170,13 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
 
 CostModel Estimator::model(const store::Viewer& viewer) const {
   CostModel costs;
-  struct Known {
-    std::uint64_t samples = 0;
-    double spacing_mm = 1;
-  };
-  std::map<std::string, Known> samples;
+  std::map<std::string, VolumeSize> sizes;
   for (const Job& job : jobs_.list(viewer, JobState::kSucceeded, "", kJobsLookedAt)) {
     const std::string& id = job.parameters.volume;
     if (!volumes_.contains(viewer, id)) continue;
-    const auto [known, is_new] = samples.try_emplace(id);
-    if (is_new) {
-      const Volume volume = volumes_.get(viewer, id);
-      known->second = {volume.sample_count(), std::ranges::min(volume.geometry.spacing)};
-    }
-    costs.learn(job, known->second.samples, known->second.spacing_mm);
+    const auto [known, is_new] = sizes.try_emplace(id);
+    if (is_new) known->second = VolumeSize::of(volumes_.get(viewer, id));
+    costs.learn(job, known->second);
   }
   return costs;
 }

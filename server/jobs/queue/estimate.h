@@ -12,6 +12,7 @@
 #include "proto/stages.h"
 #include "proto/types.h"
 #include "server/jobs/library/cache.h"
+#include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -26,10 +27,9 @@ using mesh::SurfaceSize;
 // safe.
 class CostModel {
  public:
-  // Learns from a successful job; `samples` is the number of its volume's samples, and `spacing_mm`
-  // its smallest spacing. Ignores jobs that took their result from another job: their stages have
-  // no times.
-  void learn(const Job& job, std::uint64_t samples, double spacing_mm);
+  // Learns from a successful job on that volume. Ignores jobs that took their result from another
+  // job: their stages have no times.
+  void learn(const Job& job, const VolumeSize& volume);
 
   // The predicted size of the surface after simplification.
   SurfaceSize simplified(const SurfaceSize& surface, const MeshParameters& parameters,
@@ -37,8 +37,8 @@ class CostModel {
 
   // Predicted milliseconds from loading to certifying, without the time in the queue. `surface` is
   // the extracted surface, `written` the one in the files.
-  double milliseconds(const SurfaceSize& surface, const SurfaceSize& written, std::uint64_t samples,
-                      const JobParameters& parameters) const;
+  double milliseconds(const SurfaceSize& surface, const SurfaceSize& written,
+                      const VolumeSize& volume, const JobParameters& parameters) const;
 
   // The predicted size of one file. Exact for STL.
   std::uint64_t file_bytes(MeshFormat format, const SurfaceSize& surface,
