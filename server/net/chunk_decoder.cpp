@@ -42,7 +42,7 @@ std::optional<std::size_t> ChunkDecoder::decode(std::span<char> bytes) {
 // Counts the next byte, which is not data.
 bool ChunkDecoder::is_too_long() {
   if (state_ >= State::kTrailer) return ++trailers_ > kMostTrailers;
-  if (state_ != State::kSize) ++extensions_;
+  if (state_ >= State::kExtension && state_ <= State::kBlank) ++extensions_;
   return ++line_ > kLongestLine || extensions_ > kMostExtensions;
 }
 

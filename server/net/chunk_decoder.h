@@ -61,7 +61,7 @@ class ChunkDecoder {
   std::uint64_t size_ = 0;      // of the chunk, then its remaining bytes
   bool has_size_ = false;       // a digit
   std::size_t line_ = 0;        // length of a chunk's line
-  std::size_t extensions_ = 0;  // bytes in lines of chunks after their sizes
+  std::size_t extensions_ = 0;  // bytes of chunks' extensions
   std::size_t trailers_ = 0;    // bytes of trailer fields
 };
 

@@ -115,30 +115,10 @@ std::optional<Continuation> checked_answer(App& app, Request& request, Response&
 
 // Reports a failure that is no client's fault. While the data folder is missing, it is not the
 // service's either.
-void answer_failure(const App& app, const Request& request, Response& response,
+void answer_failure(const store::DataFolder& folder, const Request& request, Response& response,
                     const Error& error) {
   log_error("{} {} failed: {}", request.method, request.path, error.what());
-  answer_problem(request, response, app.services.folder.works() ? error : store::missing_folder());
-}
-
-// Converts exceptions of `run` to a problem. Clients see the text of an Error only.
-std::optional<Continuation> guarded(const App& app, const Request& request, Response& response,
-                                    const std::function<std::optional<Continuation>()>& run) {
-  try {
-    return run();
-  } catch (const RecordedProblem& recorded) {
-    answer_problem(request, response, recorded.problem());
-  } catch (const Error& error) {
-    error.code() == ErrorCode::kInternal ? answer_failure(app, request, response, error)
-                                         : answer_problem(request, response, error);
-  } catch (const std::bad_alloc&) {
-    log_error("{} {} failed: out of memory", request.method, request.path);
-    answer_problem(request, response,
-                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
-  } catch (const std::exception& error) {
-    answer_failure(app, request, response, Error(ErrorCode::kInternal, error.what()));
-  }
-  return std::nullopt;
+  answer_problem(request, response, folder.works() ? error : store::missing_folder());
 }
 
 }  // namespace
@@ -166,23 +146,44 @@ App::App(const Services& the_services, const ServerOptions& the_options)
                                 const Error& error) { report_refused(metrics, address, error); }}) {
 }
 
+std::optional<Continuation> guarded(const store::DataFolder& folder, const Request& request,
+                                    Response& response,
+                                    const std::function<std::optional<Continuation>()>& run) {
+  try {
+    return run();
+  } catch (const RecordedProblem& recorded) {
+    answer_problem(request, response, recorded.problem());
+  } catch (const Error& error) {
+    error.code() == ErrorCode::kInternal ? answer_failure(folder, request, response, error)
+                                         : answer_problem(request, response, error);
+  } catch (const std::bad_alloc&) {
+    log_error("{} {} failed: out of memory", request.method, request.path);
+    answer_problem(request, response,
+                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
+  } catch (const std::exception& error) {
+    answer_failure(folder, request, response, Error(ErrorCode::kInternal, error.what()));
+  }
+  return std::nullopt;
+}
+
 std::optional<Continuation> answer(App& app, Request& request, Response& response) {
+  const store::DataFolder& folder = app.services.folder;
   auto continuation =
-      guarded(app, request, response, [&] { return checked_answer(app, request, response); });
+      guarded(folder, request, response, [&] { return checked_answer(app, request, response); });
   if (!continuation) return std::nullopt;
   if (continuation->abandoned) {
-    continuation->abandoned = [&app,
+    continuation->abandoned = [&folder,
                                run = std::move(continuation->abandoned)](const Request& asked) {
       Response nobodys;
-      guarded(app, asked, nobodys, [&] {
+      guarded(folder, asked, nobodys, [&] {
         run(asked);
         return std::optional<Continuation>();
       });
     };
   }
-  continuation->resume = [&app, resume = std::move(continuation->resume)](const Request& asked,
-                                                                          Response& out) {
-    guarded(app, asked, out, [&] {
+  continuation->resume = [&folder, resume = std::move(continuation->resume)](const Request& asked,
+                                                                             Response& out) {
+    guarded(folder, asked, out, [&] {
       resume(asked, out);
       return std::optional<Continuation>();
     });

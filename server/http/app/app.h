@@ -44,4 +44,10 @@ struct App {
 // Passes a request through its guards to its route. Does not throw.
 std::optional<Continuation> answer(App& app, Request& request, Response& response);
 
+// Converts exceptions of `run` to a problem. Clients see the text of an Error only. While the data
+// folder is missing, an internal error is answered with 503.
+std::optional<Continuation> guarded(const store::DataFolder& folder, const Request& request,
+                                    Response& response,
+                                    const std::function<std::optional<Continuation>()>& run);
+
 }  // namespace isomesh::http

@@ -1,4 +1,5 @@
 // Tests of the answers to requests whose handlers throw.
+#include <filesystem>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -6,6 +7,8 @@
 
 #include "base/log.h"
 #include "server/http/app/app.h"
+#include "server/store/files/data_folder.h"
+#include "tests/support/files.h"
 
 namespace isomesh::http {
 namespace {
@@ -20,13 +23,16 @@ struct Guarded {
 };
 
 template <class Thrown>
-Guarded guard(const Thrown& thrown) {
+Guarded guard(const Thrown& thrown, bool is_folder_away = false) {
+  const test::TemporaryFolder parent;
+  const store::DataFolder folder(parent / "data");
+  if (is_folder_away) std::filesystem::rename(parent / "data", parent / "away");
   Guarded result;
   Request request;
   request.path = "/v1/jobs/1/mesh.obj";
   start_log(LogFormat::kText, LogLevel::kInfo);
   testing::internal::CaptureStderr();
-  guarded(request, result.response, [&]() -> std::optional<Continuation> { throw thrown; });
+  guarded(folder, request, result.response, [&]() -> std::optional<Continuation> { throw thrown; });
   result.log = testing::internal::GetCapturedStderr();
   start_log(LogFormat::kText, LogLevel::kOff);
   return result;
@@ -36,6 +42,13 @@ TEST(GuardedRequest, HidesTheReasonOfItsOwnFailure) {
   const auto [response, log] = guard(Error(ErrorCode::kInternal, "the secret"));
   EXPECT_EQ(response.status, 500);
   EXPECT_THAT(response.body, Not(HasSubstr("the secret")));
+  EXPECT_THAT(log, HasSubstr("the secret"));
+}
+
+TEST(GuardedRequest, IsToComeAgainWhileTheDataFolderIsMissing) {
+  const auto [response, log] = guard(Error(ErrorCode::kInternal, "the secret"), true);
+  EXPECT_EQ(response.status, 503);
+  EXPECT_THAT(response.body, HasSubstr("missing"));
   EXPECT_THAT(log, HasSubstr("the secret"));
 }
 

@@ -22,8 +22,12 @@ inline std::vector<ChunkFraming> chunk_framings() {
   while (many.size() < ChunkDecoder::kMostExtensions + 10'000) {
     many += "1;" + std::string(200, 'x') + "\r\ny\r\n";
   }
+  constexpr std::size_t kSmallChunks = 30'000;  // more line breaks than extensions may have bytes
+  std::string small;
+  for (std::size_t n = 0; n < kSmallChunks; ++n) small += "1\r\ny\r\n";
   std::vector<ChunkFraming> framings = {
       {end, ""},
+      {small + end, std::string(kSmallChunks, 'y')},
       {hello + end, "hello"},
       {"a\r\n0123456789\r\nB\r\n0123456789x\r\n" + end, "01234567890123456789x"},
       {"5\r\nhel\r\n\r\n" + end, "hel\r\n"},
