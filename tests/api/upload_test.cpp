@@ -160,6 +160,20 @@ TEST_F(UploadTest, AFormWithoutItsLastBoundarySaysSo) {
   }
 }
 
+// The body has no end, so only a limit can refuse it.
+TEST_F(UploadTest, WhatIsBesideTheFileOfAFormIsBounded) {
+  const std::string beside(2 << 20, 'x');
+  for (const std::string& begin : {form("file", sphere_.bytes) + "--xyz", std::string("--xyz")}) {
+    const std::string body = chunked(begin + beside, 1 << 20);
+    const Answer answer =
+        answer_to(daemon_.url(), "POST " + target_ + " HTTP/1.1\r\nHost: localhost\r\n" +
+                                     kForm.front().first + ": " + kForm.front().second +
+                                     "\r\nTransfer-Encoding: chunked\r\n\r\n" +
+                                     body.substr(0, body.rfind("0\r\n\r\n")));
+    EXPECT_TRUE(is_problem(answer, ErrorCode::kInvalidParameter)) << answer.body;
+  }
+}
+
 TEST_F(UploadTest, AFormOfAnythingElseIsRefused) {
   const std::string file = form("file", sphere_.bytes);
   EXPECT_TRUE(blames(post(form("volume", sphere_.bytes) + kFormEnd, kForm), "file"));

@@ -35,6 +35,10 @@ constexpr std::string_view kFormEnd = "\r\n";
 
 constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
 
+// The library keeps what is no file of a form in memory: heads of fields, and what follows a
+// boundary.
+constexpr std::size_t kMostBytesBesideFiles = std::size_t{1} << 20;
+
 constexpr const char* kAcceptEncoding = "Accept-Encoding";
 
 // The library's view of a connection. It reads a head without headers, because it decodes percent
@@ -71,9 +75,14 @@ class HttplibStream : public httplib::Stream {
 
   std::string take_written() { return std::move(written_); }
 
+  // The library has passed on bytes of a form's file.
+  void passed_file_on() { beside_files_ = 0; }
+
  private:
   // Buffers the body: the library reads in pieces too small for system calls.
   bool read_ahead() {
+    beside_files_ += ahead_.size();
+    if (beside_files_ > kMostBytesBesideFiles) return false;
     ahead_read_ = 0;
     ahead_.resize(kPieceBytes);
     const auto count = body_.read(ahead_);
@@ -88,14 +97,16 @@ class HttplibStream : public httplib::Stream {
   std::string ahead_;  // buffered bytes of the body
   std::size_t ahead_read_ = 0;
   bool is_over_ = false;
+  std::size_t beside_files_ = 0;  // bytes of the body since a file's
   net::IncomingBody& body_;
   std::string written_;
 };
 
 class HttplibBodyReader : public BodyReader {
  public:
-  HttplibBodyReader(const httplib::ContentReader& reader, net::IncomingBody& body)
-      : reader_(reader), body_(body) {}
+  HttplibBodyReader(const httplib::ContentReader& reader, HttplibStream& stream,
+                    net::IncomingBody& body)
+      : reader_(reader), stream_(stream), body_(body) {}
 
   bool read(const TakePiece& take) override {
     std::string piece(kPieceBytes, '\0');
@@ -110,6 +121,7 @@ class HttplibBodyReader : public BodyReader {
     return reader_(
         [&](const httplib::MultipartFormData& field) { return begin(field.name, field.filename); },
         [&](const char* bytes, std::size_t size) {
+          stream_.passed_file_on();
           return take({bytes, size});
         });
   }
@@ -121,15 +133,16 @@ class HttplibBodyReader : public BodyReader {
 
  private:
   const httplib::ContentReader& reader_;
+  HttplibStream& stream_;
   net::IncomingBody& body_;
 };
 
 // The library's server for one request: its callbacks have no argument to distinguish requests.
 class HttplibServer : public httplib::Server {
  public:
-  HttplibServer(Request& request, net::IncomingBody& body, Response& response,
-                const std::function<void()>& handle)
-      : request_(request), body_(body), response_(response), handle_(handle) {
+  HttplibServer(Request& request, HttplibStream& stream, net::IncomingBody& body,
+                Response& response, const std::function<void()>& handle)
+      : request_(request), stream_(stream), body_(body), response_(response), handle_(handle) {
     set_payload_max_length(
         std::numeric_limits<std::size_t>::max());  // handlers enforce their own limits
     set_pre_routing_handler([this](const httplib::Request& /*in*/, httplib::Response& out) {
@@ -141,7 +154,7 @@ class HttplibServer : public httplib::Server {
     if (takes_body()) {
       const auto read = [this](const httplib::Request& /*in*/, httplib::Response& out,
                                const httplib::ContentReader& reader) {
-        HttplibBodyReader body_reader(reader, body_);
+        HttplibBodyReader body_reader(reader, stream_, body_);
         request_.body = &body_reader;
         handle_into(out);
         request_.body = nullptr;
@@ -157,7 +170,7 @@ class HttplibServer : public httplib::Server {
     });
   }
 
-  void run(HttplibStream& stream) { process(*this, stream); }
+  void run() { process(*this, stream_); }
 
  private:
   // The protected process_request is the library's only entry point without a socket. Its arguments
@@ -236,6 +249,7 @@ class HttplibServer : public httplib::Server {
   }
 
   Request& request_;
+  HttplibStream& stream_;
   net::IncomingBody& body_;
   Response& response_;
   const std::function<void()>& handle_;
@@ -250,7 +264,7 @@ WrittenResponse run_through_httplib(Request& request, net::IncomingBody& body, R
                                     const std::function<void()>& handle) {
   constexpr std::string_view kHeadEnd = "\r\n\r\n";
   HttplibStream stream(request, body);
-  HttplibServer(request, body, response, handle).run(stream);
+  HttplibServer(request, stream, body, response, handle).run();
   WrittenResponse written{.bytes = stream.take_written()};
   const std::size_t head_end = written.bytes.find(kHeadEnd);
   const bool has_head_only = request.method == "HEAD";
