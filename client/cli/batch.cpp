@@ -60,6 +60,7 @@ fs::path without_suffixes(const fs::path& path) {
 std::string plain(std::string_view name) {
   std::string text = printable(name);
   std::ranges::replace(text, '/', '_');
+  if (text == "." || text == "..") return std::string(text.size(), '_');  // folders
   return text;
 }
 

@@ -170,10 +170,8 @@ int status_of(const Job& job, const Options& options, const std::string& subject
   return kRefused;
 }
 
-void tell_notes(const Volume& volume, const Options& options, const std::string& subject) {
+void tell_notes(const Volume& volume, const std::string& subject) {
   for (const Note& note : volume.notes) {
-    const bool is_advice = note.code == describe(NoteCode::kLooksLikeLabels).name;
-    if (is_advice && options.parameters.labels) continue;
     complain((subject.empty() ? "" : subject + ": ") + "note: " + with_options(note.detail) + " (" +
              note.code + ")");
   }
@@ -228,7 +226,7 @@ std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
   for (const UploadedVolume& each : volumes) {
     if (!each.volume) continue;
     const bool has_both = !subject.empty() && volumes.size() > 1;
-    tell_notes(*each.volume, options,
+    tell_notes(*each.volume,
                subject + (has_both ? ": " : "") + (volumes.size() > 1 ? each.member : ""));
   }
   return volumes;

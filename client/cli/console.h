@@ -50,9 +50,8 @@ using SampleRange = std::array<double, 2>;
 int status_of(const Job& job, const Options& options, const std::string& subject = {},
               const std::optional<SampleRange>& range = {});
 
-// Reports the server's notes on a volume, without advice that the options follow already; `subject`
-// as above.
-void tell_notes(const Volume& volume, const Options& options, const std::string& subject);
+// Reports the server's notes on a volume; `subject` as above.
+void tell_notes(const Volume& volume, const std::string& subject);
 
 // Without a terminal no progress is shown, so the client uses the longest polls.
 Job wait(Client& client, const std::string& id, ProgressBar& bar);

@@ -131,11 +131,14 @@ void PartFile::publish() {
   if (::fsync(file_.number()) != 0) fail(target_, errno);
   if (part_.empty()) {
     if (link_to(target_)) return;
-    if (errno != EEXIST) fail(target_, errno);
     // Only a rename replaces a file.
     const std::filesystem::path part = part_beside(target_);
-    if (!link_to(part)) fail(target_, errno);
     part_ = part;
+    if (!link_to(part)) {  // some file systems have no links
+      std::error_code error;
+      std::filesystem::copy_file(place_of(file_.number()), part, error);
+      if (error) fail(target_, error.value());
+    }
   }
   if (::rename(part_.c_str(), target_.c_str()) != 0) fail(target_, errno);
   part_.clear();

@@ -72,8 +72,12 @@ describe('many uploads at once', () => {
 
   it('all arrive from Node', async () => {
     const client = new Client({ server: few.url });
+    const other = await occupy(few);
     let waits = 0;
-    const onBusy = (): void => void (waits += 1);
+    const onBusy = (): void => {
+      waits += 1;
+      other.destroy();
+    };
     const uploads = Array.from({ length: crowd }, (_, number) => client.upload(ballNrrd(64, 20, number), { onBusy }));
     const ids = (await Promise.all(uploads)).map(({ volumes }) => volumes[0]?.volume?.id);
     expect(new Set(ids).size).toBe(crowd);
@@ -90,15 +94,24 @@ describe('many uploads at once', () => {
     await page.goto(few.url);
     await page.addScriptTag({ type: 'module', url: '/module/start.js' });
     const head = ballNrrd(64, 20).toString('base64');
+    const other = await occupy(few);
+    await page.exposeFunction('release', () => void other.destroy());
     const { ids, waits } = await page.evaluate(
       async ({ head, crowd }) => {
-        const { isomesh } = globalThis as unknown as { isomesh: typeof import('../../../client/web/src/api/index') };
+        const { isomesh, release } = globalThis as unknown as {
+          isomesh: typeof import('../../../client/web/src/api/index');
+          release: () => Promise<void>;
+        };
         const client = new isomesh.Client();
         let waits = 0;
         const uploads = Array.from({ length: crowd }, (_, number) => {
           const bytes = Uint8Array.from(atob(head), (letter) => letter.charCodeAt(0));
           bytes[bytes.length - 1] = number + 1;
-          return client.upload(bytes, { onBusy: () => (waits += 1) });
+          const onBusy = (): void => {
+            waits += 1;
+            void release();
+          };
+          return client.upload(bytes, { onBusy });
         });
         const uploaded = await Promise.all(uploads);
         return { ids: uploaded.map(({ volumes }) => volumes[0]?.volume?.id), waits };

@@ -65,7 +65,7 @@ class Patience:
 
     def _next_pause(self, asked: Optional[float]) -> float:
         # Clients that were refused at the same time must not return at the same time.
-        if asked is not None:
+        if asked:  # a date that has passed says as little as no header
             return asked + random.uniform(0, max(asked / 4, _LEAST_JITTER))
         pause = self._pause
         self._pause = min(2 * pause, _LONGEST_PAUSE)

@@ -25,7 +25,7 @@ export function isBusy(status: number): boolean {
 export function retryAfterOf(headers: HeaderValues): number | undefined {
   const value = headers.get('Retry-After')?.trim() ?? '';
   if (/^\d+(\.\d+)?$/.test(value)) return Number(value);
-  const then = Date.parse(value);
+  const then = /^[A-Za-z]/.test(value) ? Date.parse(value) : NaN;
   if (Number.isNaN(then)) return undefined;
   const now = Date.parse(headers.get('Date') ?? '');
   return Math.max(0, (then - (Number.isNaN(now) ? Date.now() : now)) / 1000);
@@ -61,7 +61,8 @@ export class BusyPauses {
 
   // Clients that were refused at the same time must not return at the same time.
   private pauseOf(asked: number | undefined): number {
-    if (asked !== undefined) return asked + Math.random() * Math.max(asked / 4, leastJitter);
+    // A date that has passed says as little as no header.
+    if (asked) return asked + Math.random() * Math.max(asked / 4, leastJitter);
     const { pause } = this;
     this.pause = Math.min(2 * pause, longestPause);
     return pause / 2 + (Math.random() * pause) / 2;

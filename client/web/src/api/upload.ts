@@ -109,7 +109,9 @@ function answerInOne(
     };
     request.onerror = () => void assertReadable(whole).then(() => reject(failure()), reject);
     request.onabort = () => reject(options.signal?.reason as Error);
-    options.signal?.addEventListener('abort', () => request.abort());
+    const abort = (): void => request.abort();
+    options.signal?.addEventListener('abort', abort);
+    request.onloadend = () => options.signal?.removeEventListener('abort', abort);
     request.send(whole);
   });
 }
