@@ -8,24 +8,28 @@
 #include <cstdint>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 namespace isomesh::mesh {
 
-// A power of two that, multiplied with distances from the iso-value, makes the largest about 1; 1
-// itself if single precision holds them as they are. Some samples tell, because the largest need
-// not be exact.
+// A power of two that, multiplied with distances from the iso-value, makes the median about 1; 1
+// itself if single precision holds them as they are. Some samples tell, because the median need not
+// be exact. It is no fill value, as the largest may be.
 template <class T>
 double power_for(const T* samples, std::uint64_t count, double iso) {
   if constexpr (std::is_integral_v<T>) return 1;
   constexpr std::uint64_t kLookedAt = 4096;
   constexpr int kHeld = 64;  // half of single precision's exponents
   constexpr int kMost = std::numeric_limits<double>::max_exponent - 1;
-  double largest = 0;
+  std::vector<double> distances;
   for (std::uint64_t at = 0; at < count; at += count / kLookedAt | 1) {
-    largest = std::max(largest, std::abs(static_cast<double>(samples[at]) - iso));
+    const double distance = std::abs(static_cast<double>(samples[at]) - iso);
+    if (distance != 0) distances.push_back(distance);
   }
-  if (largest == 0) return 1;
-  const int exponent = std::isinf(largest) ? kMost : std::ilogb(largest);
+  if (distances.empty()) return 1;
+  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::ranges::nth_element(distances, median);
+  const int exponent = std::isinf(*median) ? kMost : std::ilogb(*median);
   return std::abs(exponent) <= kHeld ? 1 : std::ldexp(1.0, std::min(-exponent, kMost));
 }
 

@@ -40,7 +40,8 @@ struct LatticeToSpace {
 LatticeToSpace lattice_to_space(const Geometry& geometry);
 
 // A unit of length near the steps, in millimetres, for products of several lengths in single
-// precision. It is a power of two, so it changes no digit; 1 for steps of 1/256 to 256 mm.
+// precision. It is a power of two, so it changes no digit; 1 for steps between 1/256 and 256
+// mm.
 double unit_mm(const LatticeToSpace& to_space);
 
 // The fractional indices i, j and k of a point. The steps must not be in one plane.

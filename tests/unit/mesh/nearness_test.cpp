@@ -107,6 +107,8 @@ TEST(Nearness, OrdersNumbersThatSinglePrecisionDoesNotHold) {
   const std::vector<double> widest = {-1.7e308, 1.2e308};
   const Nearness<double> nearness(-1e308, false, power_for(widest.data(), 2, -1e308));
   EXPECT_LT(nearness.of_value(widest[0]), nearness.of_value(widest[1]));
+  const std::vector<double> filled = {-std::numeric_limits<double>::max(), 1.5, 2, -3, 1e300};
+  EXPECT_EQ(power_for(filled.data(), filled.size(), 0), 1);
   const std::vector<double> equal = {7, 7};
   EXPECT_EQ(power_for(equal.data(), equal.size(), 7), 1);
 }
