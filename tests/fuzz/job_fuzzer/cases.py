@@ -27,6 +27,8 @@ IN_ONE_REQUEST = 0.15
 EXACT = {"ply", "obj", "off", "3mf", "usda", "usdz", "vtk", "vtp", "gii"}
 # Numbers of a reason, which would make kinds of it.
 SPECIFIC = re.compile(r"-?[0-9][0-9.e+-]*(, -?[0-9][0-9.e+-]*)*")
+# Statuses of what is asked for. Others would hide that nothing was tried.
+REASONS = {400, 413, 414, 415, 422}
 JSON = {"Content-Type": "application/json"}
 RAW = {"Content-Type": "application/octet-stream"}
 
@@ -151,7 +153,7 @@ class Runner:
 
     def problem(self, status, problem, what):
         """The kind of a problem that names its reason. Anything else is a fault."""
-        if not 400 <= status < 500 or problem.get("status") != status:
+        if status not in REASONS or problem.get("status") != status:
             raise Bad(f"{what}: {status}, {json.dumps(problem)}")
         if faults := self.api.faults(problem, {"$ref": "#/components/schemas/Problem"}):
             raise Bad(f"{what}: {faults}, {json.dumps(problem)}")
