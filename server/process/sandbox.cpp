@@ -55,8 +55,8 @@ std::uint64_t sum(std::initializer_list<std::uint64_t> numbers) {
 void limit(__rlimit_resource resource, std::uint64_t most, std::uint64_t grace = 0) {
   rlimit bounds = {};
   require(::getrlimit(resource, &bounds) == 0, "getrlimit");
-  bounds.rlim_cur = std::min<rlim_t>(bounds.rlim_max, most);
   bounds.rlim_max = std::min<rlim_t>(bounds.rlim_max, sum({most, grace}));
+  bounds.rlim_cur = std::min<rlim_t>(std::max<rlim_t>(bounds.rlim_max, grace) - grace, most);
   require(::setrlimit(resource, &bounds) == 0, "setrlimit");
 }
 

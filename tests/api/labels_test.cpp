@@ -71,17 +71,12 @@ TEST_F(LabelsTest, AMaskAtAnIsoValueIsAdvisedToUseLabels) {
              "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 10 10 10\nspacings: 1 1 1\n"
              "encoding: raw\n\n" +
                  samples);
-  const auto errors_of = [&](const std::string& option, const std::string& value) {
-    const Finished made =
-        daemon_.command({"mesh", folder / "mask.nrrd", option, value, "-o", folder / "mask.glb"});
-    EXPECT_EQ(made.status, 0) << made.errors;
-    return made.errors;
-  };
-  const std::string told = errors_of("--iso", "0.5");
-  EXPECT_THAT(told, HasSubstr("note: The samples are a mask: each is 0 or 1."));
-  EXPECT_THAT(told, HasSubstr("--labels all"));
-  EXPECT_THAT(told, HasSubstr("(looks-like-labels)"));
-  EXPECT_THAT(errors_of("--labels", "1"), Not(HasSubstr("looks-like-labels")));
+  const Finished made =
+      daemon_.command({"mesh", folder / "mask.nrrd", "--iso", "0.5", "-o", folder / "mask.glb"});
+  EXPECT_EQ(made.status, 0) << made.errors;
+  EXPECT_THAT(made.errors, HasSubstr("note: The samples are a mask: each is 0 or 1."));
+  EXPECT_THAT(made.errors, HasSubstr("--labels all"));
+  EXPECT_THAT(made.errors, HasSubstr("(looks-like-labels)"));
 }
 
 TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {

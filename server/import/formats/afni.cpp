@@ -28,11 +28,13 @@ bool is_type(std::string_view line) {
                   *type == "float-attribute");
 }
 
+constexpr std::uint64_t kMostHeadBytes = std::uint64_t{8} << 20;  // statistics have long ones
+
 // Each attribute has three lines, then its value up to the next attribute.
 HeaderTexts read_attributes(const InputFile& file) {
   HeaderTexts attributes;
   std::string* value = nullptr;
-  LineReader lines(file, {.header = "The AFNI header"});
+  LineReader lines(file, {.header = "The AFNI header", .bytes = kMostHeadBytes});
   while (const auto line = lines.next_filled()) {
     if (is_type(*line)) {
       value = nullptr;
@@ -187,10 +189,13 @@ std::vector<std::string> afni_data_names(const InputFile& /*file*/, const Compan
 }
 
 MostBytes most_afni_bytes(const InputFile& beginning, const ImportTask& task) {
+  constexpr std::uint64_t kMostFileBytes = kMostHeadBytes + kHeadroomBytes;
+  if (beginning.size() >= kBeginningBytes) {  // the rest of the header is not known yet
+    return {.file = kMostFileBytes, .data = task.limits.max_sample_bytes + kHeadroomBytes};
+  }
   const SourceVolume volume = describe(read_attributes(beginning), task.options);
   check_limits(volume, task.limits);
-  return {.file = kMostTextHeaderBytes + kHeadroomBytes,
-          .data = volume.most_encoded_bytes() + kHeadroomBytes};
+  return {.file = kMostFileBytes, .data = volume.most_encoded_bytes() + kHeadroomBytes};
 }
 
 }  // namespace isomesh::import
