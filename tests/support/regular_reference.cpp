@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "proto/samples.h"
+#include "server/mesh/extract/nearness.h"
 #include "tests/support/joined.h"
 #include "tests/support/points.h"
 #include "tests/support/reference.h"
@@ -127,13 +128,14 @@ std::vector<std::uint32_t> regular_clusters(const mesh::Lattice<T>& lattice,
   for (const ReferenceVertex& vertex : plain.vertices) {
     crossings.push_back({vertex.inside, vertex.outside});
   }
+  const double power = mesh::power_for(lattice.samples, lattice.dims.samples(), options.iso);
   const auto distance = [&](const Sample& s) {
     if (options.interpolation == Interpolation::kMidpoint) return 0.F;
     if (plain.is_phantom(s)) return std::numeric_limits<float>::infinity();
     const mesh::Dims& dims = lattice.dims;
     const T value =
         lattice.samples[((s[2] - margin) * dims.y + (s[1] - margin)) * dims.x + s[0] - margin];
-    return static_cast<float>(std::abs(static_cast<double>(value) - options.iso));
+    return static_cast<float>(std::abs(static_cast<double>(value) * power - options.iso * power));
   };
   const auto is_within = [&](const Sample& s) {
     const std::array counts = {plain.dims.x, plain.dims.y, plain.dims.z};

@@ -12,25 +12,26 @@
 
 namespace isomesh::mesh {
 
-// A power of two that, multiplied with distances from the iso-value, makes the median about 1; 1
-// itself if single precision holds them as they are. Some samples tell, because the median need not
-// be exact. It is no fill value, as the largest may be.
+// A power of two to multiply distances from the iso-value with: 1 if single precision holds some of
+// them as they are, otherwise one that makes their median about 1. A part of the samples tells.
+// Neither follows from the largest, which may be a fill value.
 template <class T>
 double power_for(const T* samples, std::uint64_t count, double iso) {
   if constexpr (std::is_integral_v<T>) return 1;
   constexpr std::uint64_t kLookedAt = 4096;
   constexpr int kHeld = 64;  // half of single precision's exponents
   constexpr int kMost = std::numeric_limits<double>::max_exponent - 1;
-  std::vector<double> distances;
+  std::vector<int> exponents;
   for (std::uint64_t at = 0; at < count; at += count / kLookedAt | 1) {
     const double distance = std::abs(static_cast<double>(samples[at]) - iso);
-    if (distance != 0) distances.push_back(distance);
+    if (distance == 0) continue;
+    exponents.push_back(std::isinf(distance) ? kMost : std::ilogb(distance));
+    if (std::abs(exponents.back()) <= kHeld) return 1;
   }
-  if (distances.empty()) return 1;
-  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::ranges::nth_element(distances, median);
-  const int exponent = std::isinf(*median) ? kMost : std::ilogb(*median);
-  return std::abs(exponent) <= kHeld ? 1 : std::ldexp(1.0, std::min(-exponent, kMost));
+  if (exponents.empty()) return 1;
+  const auto median = exponents.begin() + static_cast<std::ptrdiff_t>(exponents.size() / 2);
+  std::ranges::nth_element(exponents, median);
+  return std::ldexp(1.0, std::min(-*median, kMost));
 }
 
 // Ranks samples of type T by their distance from the iso-value in single precision; what is inside

@@ -109,6 +109,8 @@ TEST(Nearness, OrdersNumbersThatSinglePrecisionDoesNotHold) {
   EXPECT_LT(nearness.of_value(widest[0]), nearness.of_value(widest[1]));
   const std::vector<double> filled = {-std::numeric_limits<double>::max(), 1.5, 2, -3, 1e300};
   EXPECT_EQ(power_for(filled.data(), filled.size(), 0), 1);
+  const std::vector<double> tiny = {-std::numeric_limits<double>::max(), 0x1p-400, 0x1p-401};
+  EXPECT_EQ(power_for(tiny.data(), tiny.size(), 0), 0x1p400);
   const std::vector<double> equal = {7, 7};
   EXPECT_EQ(power_for(equal.data(), equal.size(), 7), 1);
 }
