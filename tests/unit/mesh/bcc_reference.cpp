@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "proto/samples.h"
+#include "server/mesh/extract/nearness.h"
 #include "tests/support/points.h"
 #include "tests/support/reference.h"
 #include "tests/support/regular_reference.h"
@@ -135,11 +136,13 @@ class Enumeration {
     for (const BccVertex& vertex : reference.vertices) {
       crossings.push_back({shifted(vertex.inside, margin_), shifted(vertex.outside, margin_)});
     }
+    const double power = mesh::power_for(lattice_.samples, lattice_.dims.samples(), options_.iso);
     const auto distance = [&](const Sample& sample) {
       const HalfCells p = back(sample);
       if (options_.interpolation == Interpolation::kMidpoint) return 0.F;
       if (is_phantom(p)) return std::numeric_limits<float>::infinity();
-      return static_cast<float>(std::abs(static_cast<double>(value(p)) - options_.iso));
+      return static_cast<float>(
+          std::abs(static_cast<double>(value(p)) * power - options_.iso * power));
     };
     const auto is_within = [&](const Sample& sample) {
       const HalfCells p = back(sample);
