@@ -37,6 +37,15 @@ std::string worker_name(std::size_t thread) {
   return host_name() + ':' + std::to_string(::getpid()) + ':' + std::to_string(thread);
 }
 
+// False also if that cannot be found out: something of the machine is missing.
+bool responds(const store::BlobStore& blobs) noexcept {
+  try {
+    return blobs.responds();
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 // The machine's fault, if that ended a run: a full disk, or one that will pass soon.
@@ -129,14 +138,17 @@ bool Workers::drain(milliseconds wait) {
 
 void Workers::work(const std::stop_token& stop, const std::string& name) {
   JobProcess process(options_.program);
+  // The storage is not asked for nothing: that writes to a disk, or sends a request.
+  bool may_have_work = true;
   while (!stop.stop_requested()) {
     try {
-      if (!blobs_.has_room()) {
+      if (!blobs_.has_room() || (may_have_work && !responds(blobs_))) {
         pause(stop, kLongestIdle);
       } else if (const auto lease = jobs_.claim(name, options_.lease)) {
+        may_have_work = true;
         run(*lease, process);
       } else {
-        jobs_.wait_for_work(stop, kLongestIdle);
+        may_have_work = jobs_.wait_for_work(stop, kLongestIdle);
       }
     } catch (const std::exception& error) {
       log_error("the queue cannot be read and is retried: {}", error.what());
@@ -177,7 +189,7 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
     if (error.code() == ErrorCode::kOutOfSpace) fault = Fault::kFullDisk;
     // While the storage is missing, an internal error is the storage's.
     const bool is_internal = error.code() == ErrorCode::kInternal;
-    if (error.code() == ErrorCode::kUnavailable || (is_internal && !blobs_.responds())) {
+    if (error.code() == ErrorCode::kUnavailable || (is_internal && !responds(blobs_))) {
       fault = Fault::kOther;
     }
     if (error.code() != ErrorCode::kCancelled) {

@@ -112,11 +112,14 @@ auto FileBlobStore::read_in_folder(const Read& read) const {
   try {
     return read();
   } catch (const Error& error) {
-    const bool may_be_missing =
-        error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kInternal;
-    if (!may_be_missing) throw;
+    if (error.code() == ErrorCode::kInternal) {
+      if (!works()) throw missing_folder();
+    } else if (error.code() == ErrorCode::kNotFound) {
+      check_is_there();  // works() would write, each time that a cache lacks a copy
+    } else {
+      throw;
+    }
   }
-  if (!works()) throw missing_folder();
   return read();
 }
 
@@ -127,7 +130,8 @@ auto FileBlobStore::write_in_folder(const Write& write) const {
   } catch (const Error& error) {
     const bool is_missing = error.code() == ErrorCode::kNotFound;
     if (!is_missing && error.code() != ErrorCode::kInternal) throw;
-    if (!works()) throw missing_folder();
+    if (is_missing) check_is_there();
+    if (!is_missing && !works()) throw missing_folder();
     if (!holds_ || !is_missing) throw;
   }
   throw Error(ErrorCode::kUnavailable,
@@ -391,7 +395,6 @@ std::optional<std::uint64_t> FileBlobStore::size_now(const std::string& key) con
 }
 
 void FileBlobStore::erase(const std::string& key) {
-  if (!holds_) check_is_there();
   const std::filesystem::path place = found(key);
   const std::uint64_t bytes = size_of(place);
   std::error_code error;

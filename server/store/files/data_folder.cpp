@@ -108,7 +108,9 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }
   check_access(this->root());
-  std::filesystem::remove_all(scratch());
+  std::error_code left;  // by its code, because a text of the library names the path
+  std::filesystem::remove_all(scratch(), left);
+  if (left) throw_system_error(kDataFolder + std::string(": emptying scratch"), left.value());
   // Before anything is written: on a full disk this frees the necessary space.
   reserve_ = std::make_unique<Reserve>(this->root() / "reserve",
                                        reserve.value_or(Reserve::usual_bytes(this->root())));
@@ -122,8 +124,8 @@ bool DataFolder::is_there() const {
   if (!is && !was_missing) {
     log_error(
         "the storage of volumes and meshes is missing: the data folder is not at its place, "
-        "another "
-        "folder is there, or it cannot be written to. Jobs wait until it is back");
+        "another folder is there, or it cannot be written to. Jobs wait until it is back. If it "
+        "was mounted anew and this goes on, restart isomeshd");
   }
   if (is && was_missing) log_info("the storage of volumes and meshes is back");
   return is;

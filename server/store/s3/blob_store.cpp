@@ -75,7 +75,8 @@ S3BlobStore::S3BlobStore(const DataFolder& folder, S3Options options)
 bool S3BlobStore::responds() const {
   constexpr std::chrono::seconds kForHowLong{2};
   constexpr std::chrono::seconds kPatience{5};
-  return health_.passes(kForHowLong, kPatience, [this] { return client_.responds(); });
+  return folder_.is_there() &&
+         health_.passes(kForHowLong, kPatience, [this] { return client_.responds(); });
 }
 
 bool S3BlobStore::is_empty() const { return !client_.has_any(kBlobObjects); }

@@ -11,6 +11,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Another user while it exists, if the test has the right to change to one.
+class AsNobody {
+ public:
+  AsNobody() {
+    constexpr uid_t kNobody = 65534;
+    EXPECT_EQ(::seteuid(user_ == 0 ? kNobody : user_), 0);
+  }
+  ~AsNobody() { EXPECT_EQ(::seteuid(user_), 0); }
+  AsNobody(const AsNobody&) = delete;
+  AsNobody& operator=(const AsNobody&) = delete;
+
+ private:
+  const uid_t user_ = ::geteuid();
+};
+
 class HeldFolderTest : public testing::Test {
  protected:
   HeldFolderTest() { fs::create_directory(place()); }
@@ -53,19 +68,17 @@ TEST_F(HeldFolderTest, IsNotAtItsPlaceWithoutTheRightToWrite) {
   fs::permissions(parent_.path(), fs::perms::all);
   fs::permissions(place(), fs::perms::all);
   const HeldFolder folder(place());
-  const uid_t user = ::geteuid();
-  constexpr uid_t kNobody = 65534;
-  ASSERT_EQ(::seteuid(user == 0 ? kNobody : user), 0);
-  const bool with_right = folder.is_at_place();
-  ASSERT_EQ(::seteuid(user), 0);
+  {
+    const AsNobody nobody;
+    EXPECT_TRUE(folder.is_at_place());
+  }
   fs::permissions(place(), fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read |
                                fs::perms::others_exec);
-  ASSERT_EQ(::seteuid(user == 0 ? kNobody : user), 0);
-  const bool without = folder.is_at_place();
-  ASSERT_EQ(::seteuid(user), 0);
+  {
+    const AsNobody nobody;
+    EXPECT_FALSE(folder.is_at_place());
+  }
   fs::permissions(place(), fs::perms::all);
-  EXPECT_TRUE(with_right);
-  EXPECT_FALSE(without);
 }
 
 TEST_F(HeldFolderTest, AnotherProcessGetsItsPresentName) {

@@ -1,10 +1,12 @@
 #include "server/jobs/queue/workers.h"
 
 #include <algorithm>
+#include <atomic>
 #include <functional>
 #include <latch>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -43,6 +45,29 @@ class FailingBlobs : public store::FileBlobStore {
   mutable std::latch asked_{1};
 };
 
+// A storage that goes away as a job begins to read it. Counts how often it was found missing.
+class LeavingBlobs : public store::FileBlobStore {
+ public:
+  using FileBlobStore::FileBlobStore;
+
+  void leave_at_first_use(std::function<void()> leave) { leave_ = std::move(leave); }
+  std::size_t times_missing() const { return times_missing_; }
+
+  bool responds() const override {
+    const bool responds = FileBlobStore::responds();
+    times_missing_ += responds ? 0 : 1;
+    return responds;
+  }
+  bool is_intact(const std::string& key, const std::stop_token& stop) const override {
+    if (leave_) std::exchange(leave_, nullptr)();
+    return FileBlobStore::is_intact(key, stop);
+  }
+
+ private:
+  mutable std::function<void()> leave_;  // for one worker
+  mutable std::atomic<std::size_t> times_missing_ = 0;
+};
+
 class WorkersTest : public test::JobsFixture {
  protected:
   WorkerOptions threads(std::size_t count) const {
@@ -69,6 +94,27 @@ class WorkersTest : public test::JobsFixture {
     const std::size_t events = jobs_.events("", id, 0, milliseconds(0)).size();
     const store::JobAccount account = jobs_.account(id);
     return events >= 3 && account.job.state == JobState::kQueued && account.attempts == 0;
+  }
+
+  // A job that runs as the storage goes away is put back uncharged. Another one is not tried until
+  // the storage is back.
+  void expect_to_wait(LeavingBlobs& blobs, const std::function<void()>& leave,
+                      const std::function<void()>& come_back) {
+    const Volume volume = add_sphere();
+    const std::string running = submit(parameters_of(volume, 0));
+    blobs.leave_at_first_use(leave);
+    const Workers workers(threads(1), jobs_, volumes_, blobs);
+    EXPECT_TRUE(eventually([&] { return is_put_back_uncharged(running); }));
+    EXPECT_TRUE(eventually([&] { return blobs.times_missing() > 0; }));
+    const std::string waiting = submit(parameters_of(volume, 0.1));
+    const std::size_t times = blobs.times_missing();
+    EXPECT_TRUE(eventually([&] { return blobs.times_missing() > times + 1; }));
+    EXPECT_EQ(jobs_.events("", waiting, 0, milliseconds(0)).size(), 1U) << "no attempt";
+    come_back();
+    for (const std::string& id : {running, waiting}) {
+      EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kSucceeded);
+      EXPECT_EQ(jobs_.account(id).attempts, 1);
+    }
   }
 };
 
@@ -152,34 +198,30 @@ TEST_F(WorkersTest, AJobThatFindsNoDescriptorIsPutBackUncharged) {
 
 // A shared folder that is not mounted for a while damages no volume.
 TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
-  const Volume volume = add_sphere();
   std::filesystem::create_directory(folder_ / "shared");
-  store::FileBlobStore shared(store::shared_blob_folders(folder_ / "shared"), data_.reserve());
+  LeavingBlobs shared(store::shared_blob_folders(folder_ / "shared"), data_.reserve());
   shared.set_mark("ours 1\n");
-  test::put(shared, blob(volume.id));
-  std::filesystem::rename(folder_ / "shared", folder_ / "elsewhere");
-  const std::string id = submit(parameters_of(volume, 0));
-  const Workers workers(threads(1), jobs_, volumes_, shared);
-  EXPECT_TRUE(eventually([&] { return is_put_back_uncharged(id); }));
-  std::filesystem::rename(folder_ / "elsewhere", folder_ / "shared");
-  EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kSucceeded);
-  EXPECT_EQ(jobs_.account(id).attempts, 1);
+  test::put(shared, blob(add_sphere().id));
+  expect_to_wait(
+      shared, [&] { std::filesystem::rename(folder_ / "shared", folder_ / "elsewhere"); },
+      [&] { std::filesystem::rename(folder_ / "elsewhere", folder_ / "shared"); });
 }
 
 // So does the data folder: while another is in its place, too.
 TEST_F(WorkersTest, AJobWaitsUnchargedForADataFolderThatIsMovedAway) {
-  const Volume volume = add_sphere();
   const std::filesystem::path place = folder_ / "data";
-  std::filesystem::rename(place, folder_ / "elsewhere");
-  std::filesystem::create_directory(place);
-  const std::string id = submit(parameters_of(volume, 0));
-  const Workers workers(threads(1), jobs_, volumes_, blobs_);
-  EXPECT_TRUE(eventually([&] { return is_put_back_uncharged(id); }));
-  EXPECT_TRUE(std::filesystem::is_empty(place));
-  std::filesystem::remove(place);
-  std::filesystem::rename(folder_ / "elsewhere", place);
-  EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kSucceeded);
-  EXPECT_EQ(jobs_.account(id).attempts, 1);
+  LeavingBlobs blobs(data_);
+  expect_to_wait(
+      blobs,
+      [&] {
+        std::filesystem::rename(place, folder_ / "elsewhere");
+        std::filesystem::create_directory(place);
+      },
+      [&] {
+        EXPECT_TRUE(std::filesystem::is_empty(place));
+        std::filesystem::remove(place);
+        std::filesystem::rename(folder_ / "elsewhere", place);
+      });
 }
 
 TEST_F(WorkersTest, AJobWhoseStorageFailsWhileTheDaemonEndsIsPutBackUncharged) {

@@ -1,5 +1,7 @@
 #include "server/store/sqlite/database.h"
 
+#include <filesystem>
+#include <optional>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -51,6 +53,28 @@ TEST_F(DatabaseTest, AnErrorOfADiskThatIsMissingMayPass) {
   EXPECT_EQ(code(), ErrorCode::kInternal);
   responds = false;
   EXPECT_EQ(code(), ErrorCode::kUnavailable);
+}
+
+// The one that was opened in its place is closed later.
+TEST_F(DatabaseTest, ThatIsAwayRemovesNoFileOfAnotherAtItsEnd) {
+  const std::filesystem::path place = folder_ / "place";
+  std::optional<DataFolder> folder(std::in_place, place);
+  std::optional<Database> database(std::in_place, *folder);
+  std::filesystem::rename(place, folder_ / "away");
+  const DataFolder other(place);
+  Database others(other);
+  Volume volume;
+  volume.id = "abc";
+  SqlVolumeStore(others).add("", volume);
+  database.reset();
+  EXPECT_TRUE(std::filesystem::exists(place / "isomesh.sqlite-wal"));
+  EXPECT_TRUE(std::filesystem::exists(place / "isomesh.sqlite-shm"));
+  // At its place again, it closes as usual.
+  std::filesystem::rename(place, folder_ / "others");
+  std::filesystem::rename(folder_ / "away", place);
+  database.emplace(*folder);
+  database.reset();
+  EXPECT_FALSE(std::filesystem::exists(place / "isomesh.sqlite-wal"));
 }
 
 TEST_F(DatabaseTest, OfAnOlderVersionSaysThatItsAuditTrailHasAnotherForm) {
