@@ -39,8 +39,10 @@ std::chrono::system_clock::time_point time_of(std::string_view timestamp) {
   }
   parts.tm_year -= 1900;
   parts.tm_mon -= 1;
-  return std::chrono::system_clock::from_time_t(::timegm(&parts)) +
-         std::chrono::milliseconds(milliseconds);
+  constexpr std::time_t kYear2262 = 9'214'646'400;
+  const std::time_t seconds = ::timegm(&parts);
+  if (seconds < 0 || seconds >= kYear2262) return {};
+  return std::chrono::system_clock::from_time_t(seconds) + std::chrono::milliseconds(milliseconds);
 }
 
 std::string http_date_of(std::chrono::system_clock::time_point time) {

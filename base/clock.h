@@ -11,7 +11,8 @@ std::string timestamp();
 
 std::string timestamp_of(std::chrono::system_clock::time_point time);
 
-// The inverse of timestamp_of; 1970 for an invalid text.
+// The inverse of timestamp_of; the beginning of 1970 for an invalid text, and for a year that the
+// clock cannot have: before 1970 or after 2261.
 std::chrono::system_clock::time_point time_of(std::string_view timestamp);
 
 // In UTC, in strftime's format, up to 39 characters. Thread safe.

@@ -214,6 +214,18 @@ void take_orders(RecordStores& records) {
               "only one daemon may have --hospital, and this one cannot: " + reason);
 }
 
+void run_interrupted_again(store::JobStore& jobs) {
+  try {
+    const std::size_t count = jobs.reap();
+    if (count == 0) return;
+    log_warning("{} jobs were running when a daemon stopped; they are run again", count);
+  } catch (const Error& error) {
+    // A damaged database, for instance, which serves what can be read. The workers try it again.
+    log_error("jobs that were running when a daemon stopped cannot be run again yet: {}",
+              error.what());
+  }
+}
+
 int run(const Options& options, const sigset_t& signals) {
   // First, because all else opens some.
   const std::size_t descriptors = net::raise_descriptor_limit();
@@ -233,9 +245,7 @@ int run(const Options& options, const sigset_t& signals) {
   const auto records = open_record_stores(options, folder, blobs, clock_tolerance(keep));
   store::VolumeStore& volumes = records->volumes();
   store::JobStore& jobs = records->jobs();
-  if (const std::size_t count = jobs.reap()) {
-    log_warning("{} jobs were running when a daemon stopped; they are run again", count);
-  }
+  run_interrupted_again(jobs);
   store::RetentionOptions retention_options;
   retention_options.keep = keep;
   retention_options.max_bytes = options.max_disk;

@@ -25,6 +25,11 @@ bool is_new(const std::string& text) {
 
 }  // namespace
 
+bool is_of_damaged_database(const Error& error) {
+  return error.code() == ErrorCode::kInternal && !error.fields().empty() &&
+         error.fields().front().field == kDatabaseField;
+}
+
 void report_damaged_table(std::string_view what) {
   if (!is_new(std::string(what))) return;
   log_error("the database is damaged, and some {} cannot be read: restore it from a backup", what);

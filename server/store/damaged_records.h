@@ -4,13 +4,20 @@
 #include <string>
 #include <string_view>
 
+#include "base/error.h"
 #include "proto/types.h"
 
 namespace isomesh::store {
 
+// The field of an error that tells that the file of the database is damaged.
+inline constexpr const char* kDatabaseField = "database";
+
 // Logs that a record is damaged, once for each record in the life of the process: lists and the
 // queue meet it again and again. `kind` is the kind of record, such as "volume". Thread safe.
 void report_damaged(std::string_view kind, const std::string& id);
+
+// True for the error of a database whose file is damaged.
+bool is_of_damaged_database(const Error& error);
 
 // Logs once that some records of a table cannot be read at all. `what` is their plural.
 void report_damaged_table(std::string_view what);

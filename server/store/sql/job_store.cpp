@@ -10,6 +10,11 @@
 #include "server/store/sql/undamaged_rows.h"
 
 namespace isomesh::store {
+namespace {
+
+constexpr DamagedTable kJobs = {"jobs", "SELECT record FROM jobs j", "j.id", "j.id DESC"};
+
+}  // namespace
 
 // --- Queries
 
@@ -33,9 +38,8 @@ JobAccount SqlJobStore::account(const std::string& id) const {
 
 std::vector<Job> SqlJobStore::list(const Viewer& viewer, std::optional<JobState> state,
                                    const std::string& after, std::size_t limit) const {
-  return list_despite_damage(
-      "jobs", [&] { return list_after(viewer, state, after, limit); },
-      [&] { return undamaged_after(viewer, state, after, limit); });
+  return list_despite_damage([&] { return list_after(viewer, state, after, limit); },
+                             [&] { return undamaged_after(viewer, state, after, limit); });
 }
 
 std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, std::optional<JobState> state,
@@ -64,18 +68,19 @@ std::vector<Job> SqlJobStore::list_after(const Viewer& viewer, std::optional<Job
 
 std::vector<Job> SqlJobStore::undamaged_after(const Viewer& viewer, std::optional<JobState> state,
                                               const std::string& after, std::size_t limit) const {
-  std::map<std::string, Job> found;
+  std::map<std::string, Row> found;
   const auto take = [&](const Rows& rows) {
-    const Row row = row_of(rows);
-    if (row.is_damaged || (!after.empty() && row.job.id >= after)) return;
-    found.emplace(row.job.id, with_progress(row));
+    Row row = row_of(rows);
+    if (!row.is_damaged) found.emplace(row.job.id, std::move(row));
     if (found.size() > limit) found.erase(found.begin());
   };
-  read_undamaged(records_,
-                 select_ + "WHERE (?1 IS NULL OR j.owner = ?1) AND (?2 IS NULL OR j.state = ?2)",
-                 "j.id", "j.id DESC", take, viewer, state);
+  read_undamaged(records_, kJobs,
+                 select_ +
+                     "WHERE (?1 IS NULL OR j.owner = ?1) AND (?2 IS NULL OR j.state = ?2) AND (?3 "
+                     "= '' OR j.id < ?3)",
+                 take, viewer, state, after);
   std::vector<Job> jobs;
-  for (auto& [id, job] : found) jobs.push_back(std::move(job));
+  for (const auto& [id, row] : found) jobs.push_back(with_progress(row));
   std::ranges::reverse(jobs);
   return jobs;
 }

@@ -16,6 +16,8 @@ namespace {
 // Locked while an order is made, because that depends on the existing orders.
 constexpr const char* kOrders = "orders";
 
+constexpr DamagedTable kOrderTable = {"orders", "SELECT record FROM orders", "id", "id DESC"};
+
 // The columns that record_of() reads.
 constexpr const char* kColumns =
     "SELECT owner, record, work, id, state, coalesce(rule, ''), created FROM orders ";
@@ -228,9 +230,8 @@ Order SqlOrderStore::get(const Viewer& viewer, const std::string& id) const {
 
 std::vector<Order> SqlOrderStore::list(const Viewer& viewer, const OrderFilter& filter,
                                        const std::string& after, std::size_t limit) const {
-  return list_despite_damage(
-      "orders", [&] { return list_after(viewer, filter, after, limit); },
-      [&] { return undamaged_after(viewer, filter, after, limit); });
+  return list_despite_damage([&] { return list_after(viewer, filter, after, limit); },
+                             [&] { return undamaged_after(viewer, filter, after, limit); });
 }
 
 std::vector<Order> SqlOrderStore::list_after(const Viewer& viewer, const OrderFilter& filter,
@@ -262,14 +263,14 @@ std::vector<Order> SqlOrderStore::undamaged_after(const Viewer& viewer, const Or
   std::map<std::string, Order> found;
   const auto take = [&](const Rows& rows) {
     const std::string id = rows.text(1);
-    auto order = after.empty() || id < after ? readable_order(rows.text(0), id) : std::nullopt;
+    auto order = readable_order(rows.text(0), id);
     if (order) found.emplace(id, *std::move(order));
     if (found.size() > limit) found.erase(found.begin());
   };
-  read_undamaged(database_,
+  read_undamaged(database_, kOrderTable,
                  "SELECT record, id FROM orders WHERE (?1 IS NULL OR owner = ?1) AND (?2 IS NULL "
-                 "OR state = ?2) AND (?3 IS NULL OR rule = ?3)",
-                 "id", "id DESC", take, viewer, filter.state, filter.rule);
+                 "OR state = ?2) AND (?3 IS NULL OR rule = ?3) AND (?4 = '' OR id < ?4)",
+                 take, viewer, filter.state, filter.rule, after);
   std::vector<Order> orders;
   for (auto& [id, order] : found) orders.push_back(std::move(order));
   std::ranges::reverse(orders);
@@ -277,12 +278,25 @@ std::vector<Order> SqlOrderStore::undamaged_after(const Viewer& viewer, const Or
 }
 
 std::vector<OrderRecord> SqlOrderStore::due(Time now, std::size_t limit) const {
-  Rows rows = database_.query(
-      std::string(kColumns) + "WHERE state < {order.final} AND next <= ?1 ORDER BY next LIMIT ?2",
-      database_.to_us(now), limit);
-  std::vector<OrderRecord> records;
-  while (rows.next()) records.push_back(record_of(rows));
-  return records;
+  const std::string query = std::string(kColumns) + "WHERE state < {order.final} AND next <= ?1";
+  const std::int64_t now_us = database_.to_us(now);
+  return list_despite_damage(
+      [&] {
+        Rows rows = database_.query(query + " ORDER BY next LIMIT ?2", now_us, limit);
+        std::vector<OrderRecord> records;
+        while (rows.next()) records.push_back(record_of(rows));
+        return records;
+      },
+      [&] {
+        std::map<std::string, OrderRecord> found;
+        const auto take = [&](const Rows& rows) {
+          if (found.size() < limit) found.emplace(rows.text(3), record_of(rows));
+        };
+        read_undamaged(database_, kOrderTable, query, take, now_us);
+        std::vector<OrderRecord> records;
+        for (auto& [id, record] : found) records.push_back(std::move(record));
+        return records;
+      });
 }
 
 std::optional<OrderRecord> SqlOrderStore::if_due(const std::string& id, Time now) const {

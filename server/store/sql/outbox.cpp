@@ -1,6 +1,16 @@
 #include "server/store/sql/outbox.h"
 
+#include <map>
+#include <set>
+
+#include "server/store/sql/undamaged_rows.h"
+
 namespace isomesh::store {
+namespace {
+
+constexpr DamagedTable kCallbacks = {"callbacks", "SELECT body FROM callbacks", "job", "job DESC"};
+
+}  // namespace
 
 void add_callback(SqlConnection& connection, const std::string& id, const std::string& url,
                   const std::string& body) {
@@ -12,6 +22,11 @@ void add_callback(SqlConnection& connection, const std::string& id, const std::s
 }
 
 std::vector<Delivery> SqlOutbox::due(Time now, std::size_t per_receiver) const {
+  return list_despite_damage([&] { return first_due(now, per_receiver); },
+                             [&] { return undamaged_due(now, per_receiver); });
+}
+
+std::vector<Delivery> SqlOutbox::first_due(Time now, std::size_t per_receiver) const {
   Rows rows = database_.query(
       "SELECT job, url, body, attempts, created FROM (SELECT *, row_number() OVER "
       "(PARTITION BY receiver ORDER BY next, job) AS place FROM callbacks WHERE next <= ?1) "
@@ -19,6 +34,21 @@ std::vector<Delivery> SqlOutbox::due(Time now, std::size_t per_receiver) const {
       database_.to_us(now), per_receiver);
   std::vector<Delivery> deliveries;
   while (rows.next()) deliveries.push_back(delivery_of(rows));
+  return deliveries;
+}
+
+std::vector<Delivery> SqlOutbox::undamaged_due(Time now, std::size_t per_receiver) const {
+  std::vector<Delivery> deliveries;
+  std::set<std::string> taken;
+  std::map<std::string, std::size_t> of_receiver;
+  const auto take = [&](const Rows& rows) {
+    if (!taken.insert(rows.text(0)).second || ++of_receiver[rows.text(5)] > per_receiver) return;
+    deliveries.push_back(delivery_of(rows));
+  };
+  read_undamaged(database_, kCallbacks,
+                 "SELECT job, url, body, attempts, created, receiver FROM callbacks WHERE next <= "
+                 "?1",
+                 take, database_.to_us(now));
   return deliveries;
 }
 

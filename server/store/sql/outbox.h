@@ -24,6 +24,10 @@ class SqlOutbox : public Outbox {
   Delivery delivery_of(const Rows& row) const;
 
  private:
+  std::vector<Delivery> first_due(Time now, std::size_t per_receiver) const;
+  // The same from a table with damaged pages, in any order.
+  std::vector<Delivery> undamaged_due(Time now, std::size_t per_receiver) const;
+
   SqlDatabase& database_;
 };
 

@@ -15,6 +15,9 @@
 namespace isomesh::store {
 namespace {
 
+constexpr DamagedTable kVolumes = {"volumes", "SELECT record FROM volumes", "owner, id",
+                                   "owner DESC, id DESC"};
+
 // The record for lists, and the complete one if that is larger.
 struct Records {
   explicit Records(Volume volume)
@@ -150,9 +153,8 @@ bool SqlVolumeStore::contains(const Viewer& viewer, const std::string& id) const
 std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string& after,
                                          std::size_t limit, ListOrder order) const {
   const VolumePlace place(after, order);
-  return list_despite_damage(
-      "volumes", [&] { return list_after(place, viewer, limit, order); },
-      [&] { return undamaged_after(place, viewer, limit, order); });
+  return list_despite_damage([&] { return list_after(place, viewer, limit, order); },
+                             [&] { return undamaged_after(place, viewer, limit, order); });
 }
 
 std::vector<Volume> SqlVolumeStore::list_after(VolumePlace place, const Viewer& viewer,
@@ -188,9 +190,9 @@ std::vector<Volume> SqlVolumeStore::undamaged_after(const VolumePlace& place, co
     if (volume) found.emplace(at, *std::move(volume));
     if (found.size() > limit) found.erase(is_descending ? found.begin() : std::prev(found.end()));
   };
-  read_undamaged(database_,
-                 "SELECT record, created, id FROM volumes WHERE (?1 IS NULL OR owner = ?1)",
-                 "owner, id", "owner DESC, id DESC", take, viewer);
+  read_undamaged(database_, kVolumes,
+                 "SELECT record, created, id FROM volumes WHERE (?1 IS NULL OR owner = ?1)", take,
+                 viewer);
   std::vector<Volume> volumes;
   for (auto& [at, volume] : found) volumes.push_back(std::move(volume));
   if (is_descending) std::ranges::reverse(volumes);

@@ -88,37 +88,71 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
     return claim_next(worker, lease, considered);
   } catch (const Error& error) {
     // SQLite writes nothing more in this transaction. The next one leaves the job out.
-    const bool is_damaged = error.code() == ErrorCode::kInternal && !error.fields().empty();
-    if (is_damaged) considered.empty() ? leave_out_unreadable() : leave_out(considered);
+    if (is_of_damaged_database(error)) leave_out_damaged(considered);
     throw;
   }
 }
 
-void SqliteJobStore::leave_out_unreadable() {
-  const std::string known = unclaimable();
-  std::vector<std::string> queued;
-  {
+void SqliteJobStore::leave_out_damaged(const std::string& considered) {
+  if (considered.empty()) return leave_out_unreadable();
+  if (!can_change(considered)) return leave_out(considered);
+  report_damaged_table("records beside those of queued jobs");
+}
+
+bool SqliteJobStore::can_change(const std::string& id) {
+  try {
+    const Change change(*this, Durability::kProcess);  // rolled back
+    if (!find(change.connection(), std::nullopt, id)) return false;
+    change->run("UPDATE jobs SET state = {job.running} WHERE id = ?", id);
+    return true;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInternal) throw;
+    return false;
+  }
+}
+
+std::vector<std::string> SqliteJobStore::ids_in(JobState state) const {
+  const Reading reading(database_.reader());
+  // Indexes have all of this.
+  Rows rows = reading->query(state == JobState::kQueued
+                                 ? "SELECT id FROM jobs WHERE state = {job.queued}"
+                                 : "SELECT id FROM jobs WHERE state = {job.running}");
+  std::vector<std::string> ids;
+  while (rows.next()) ids.push_back(rows.text(0));
+  return ids;
+}
+
+bool SqliteJobStore::can_read(const std::string& id) const {
+  try {
     const Reading reading(database_.reader());
-    // An index has all of this.
-    Rows rows = reading->query("SELECT id FROM jobs WHERE state = {job.queued}");
-    while (rows.next()) queued.push_back(rows.text(0));
+    return find(reading.connection(), std::nullopt, id).has_value();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInternal) throw;
+    return false;
   }
-  for (const std::string& id : queued) {
-    if (known.find(id + '\n') != std::string::npos) continue;
-    try {
-      const Reading reading(database_.reader());
-      if (find(reading.connection(), std::nullopt, id)) continue;
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::kInternal) throw;
-    }
+}
+
+void SqliteJobStore::leave_out_unreadable() {
+  constexpr std::chrono::minutes kBetweenSearches{1};
+  {
+    const Lock lock(live_mutex_);
+    const auto now = Steady::clock::now();
+    if (now < next_search_) return;
+    next_search_ = now + kBetweenSearches;
+  }
+  bool has_found = false;
+  for (const std::string& id : ids_in(JobState::kQueued)) {
+    if (can_read(id)) continue;
     leave_out(id);
+    has_found = true;
   }
+  if (!has_found) report_damaged_table("records beside those of queued jobs");
 }
 
 void SqliteJobStore::leave_out(const std::string& id) {
   report_damaged("job", id);
   const Lock lock(live_mutex_);
-  unclaimable_ += id + '\n';
+  if (unclaimable_.find(id + '\n') == std::string::npos) unclaimable_ += id + '\n';
 }
 
 std::string SqliteJobStore::unclaimable() const {
@@ -171,11 +205,11 @@ std::optional<Lease> SqliteJobStore::claim_next(const std::string& worker,
 
 std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std::int64_t now,
                                                              std::string& considered) {
-  const std::string left_out = unclaimable();
-  considered.clear();
-  std::string id;
+  std::optional<Row> row;
   std::int64_t start_tag = 0;
-  {
+  do {
+    const std::string left_out = unclaimable();
+    considered.clear();
     Rows query = change->query(
         std::string(
             "WITH heads AS MATERIALIZED (SELECT q.priority, q.start_tag, (SELECT j.id FROM jobs j "
@@ -190,20 +224,12 @@ std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std
             "queued_owners q) SELECT job, start_tag FROM heads WHERE job IS NOT NULL ORDER BY "
             "priority, start_tag, job LIMIT 1",
         now, kLongestWaitUs, left_out);
-    if (query.next()) {
-      id = query.text(0);
-      start_tag = query.integer(1);
-    }
-  }
-  std::optional<Row> row;
-  if (!id.empty()) {
-    considered = id;
-    row = find(change.connection(), std::nullopt, id);
-    if (!row) {  // the index is damaged
-      leave_out(id);
-      return take_next(change, now, considered);
-    }
-  }
+    if (!query.next()) break;
+    considered = query.text(0);
+    start_tag = query.integer(1);
+    row = find(change.connection(), std::nullopt, considered);
+    if (!row) leave_out(considered);  // the index is damaged
+  } while (!row);
   // No job of a higher priority is ready, or none at all.
   constexpr int kAfterAll = static_cast<int>(Priority::kBulk) + 1;
   const int priority = row ? static_cast<int>(row->job.parameters.priority) : kAfterAll;
@@ -278,12 +304,28 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
 }
 
 std::size_t SqliteJobStore::reap() {
+  std::vector<std::string> running = ids_in(JobState::kRunning);
+  try {
+    return reap(running);
+  } catch (const Error& error) {
+    if (!is_of_damaged_database(error)) throw;
+  }
+  // One that is damaged stops no other.
+  std::erase_if(running, [this](const std::string& id) {
+    if (can_change(id)) return false;
+    report_damaged("job", id);
+    return true;
+  });
+  return reap(running);
+}
+
+std::size_t SqliteJobStore::reap(std::span<const std::string> running) {
   const std::size_t reaped = database_.freeing([&] {
     Change change(*this);
     std::vector<Row> rows;
-    {
-      Rows query = change->query(select_ + "WHERE j.state = {job.running}");
-      while (query.next()) rows.push_back(row_of(query));
+    for (const std::string& id : running) {
+      auto row = find(change.connection(), std::nullopt, id);
+      if (row && row->job.state == JobState::kRunning) rows.push_back(*std::move(row));
     }
     std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
     for (Row& row : rows) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -51,8 +52,18 @@ class SqliteJobStore : public SqlJobStore {
                                   std::string& considered);
   // Never selects that job again, because its rows in the database are damaged.
   void leave_out(const std::string& id);
-  // The same for all queued jobs that cannot be read.
+  // The same for all queued jobs that cannot be read. Searches once a minute at most.
   void leave_out_unreadable();
+  // After an error of the database while that job was to be claimed, or none if empty: leaves out
+  // what is to blame.
+  void leave_out_damaged(const std::string& considered);
+  // True if the job alone can be read and changed. Changes nothing.
+  bool can_change(const std::string& id);
+  bool can_read(const std::string& id) const;
+  // As reap(), for these jobs only.
+  std::size_t reap(std::span<const std::string> running);
+  // Ids of all jobs that are queued or running.
+  std::vector<std::string> ids_in(JobState state) const;
   std::string unclaimable() const;
   // The run's job with its last progress. Empty if the lease is lost.
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
@@ -78,6 +89,7 @@ class SqliteJobStore : public SqlJobStore {
   EventLog log_;
   // Ids of jobs that were left out, each with a line break.
   std::string unclaimable_ ISOMESH_GUARDED_BY(live_mutex_);
+  Steady next_search_ ISOMESH_GUARDED_BY(live_mutex_) = {};  // for jobs that cannot be read
 };
 
 }  // namespace isomesh::store

@@ -10,6 +10,7 @@
 
 #include "proto/error.h"
 #include "proto/json_tree.h"
+#include "server/store/damaged_records.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/microseconds.h"
 #include "server/store/sql/names.h"
@@ -233,7 +234,7 @@ Error Connection::error_of(int code) const {
   // It may quote what a damaged database holds.
   const std::string detail = "the database: " + valid_utf8(reason);
   if (primary != SQLITE_CORRUPT) return {ErrorCode::kInternal, detail};
-  return {ErrorCode::kInternal, detail, {{"database", "is damaged: restore it from a backup"}}};
+  return {ErrorCode::kInternal, detail, {{kDatabaseField, "is damaged: restore it from a backup"}}};
 }
 
 void Connection::end_batch(std::optional<Error> failure) noexcept {

@@ -69,6 +69,11 @@ TEST(Timestamp, IsRfc3339InUtcWithMilliseconds) {
 
 // The example of RFC 9110, 5.6.7.
 TEST(HttpDate, IsAsInTheStandard) {
+  for (const char* wrong : {"3024-01-01T00:00:00.000Z", "1969-12-31T23:59:59.999Z", "yesterday",
+                            "2262-01-01T00:00:00.000Z", "2024-2147483647-01T00:00:00.000Z"}) {
+    EXPECT_EQ(time_of(wrong), std::chrono::system_clock::time_point()) << wrong;
+  }
+  EXPECT_EQ(timestamp_of(time_of("2261-12-31T23:59:59.999Z")), "2261-12-31T23:59:59.999Z");
   EXPECT_EQ(http_date_of(time_of("1994-11-06T08:49:37.999Z")), "Sun, 06 Nov 1994 08:49:37 GMT");
 }
 

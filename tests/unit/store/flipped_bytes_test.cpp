@@ -1,5 +1,7 @@
 // One wrong byte in the file of SQLite's database, in the cell of a record.
+#include <chrono>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +11,9 @@
 #include "proto/json.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/job_rules.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/outbox.h"
+#include "server/store/sql/undamaged_rows.h"
 #include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/identity.h"
@@ -51,8 +56,9 @@ class FlippedBytes : public testing::Test {
   template <class Check>
   void for_each_flip(const std::string& key, const std::string& record, const Check& check) {
     const std::string whole = test::read_file(data_.records());
-    const std::size_t end = whole.find(record) + record.size();
-    ASSERT_LT(end, whole.size()) << record;
+    const std::size_t found = whole.find(record);
+    ASSERT_NE(found, std::string::npos) << record;
+    const std::size_t end = found + record.size();
     const std::size_t begin = whole.rfind(key, end - record.size());
     ASSERT_NE(begin, std::string::npos);
     for (std::size_t at = begin - kHeaderBytes; at < end; ++at) {
@@ -68,6 +74,24 @@ class FlippedBytes : public testing::Test {
       if (at > begin + key.size() + kHeaderBytes) at += 6;
     }
     test::write_file(data_.records(), whole);
+  }
+
+  // Makes a table of few rows unreadable.
+  void damage_table(const std::string& table) {
+    std::size_t page = 0;
+    std::size_t bytes = 0;
+    {
+      Database database(data_);
+      Rows root = database.query("SELECT rootpage FROM sqlite_schema WHERE name = ?1", table);
+      ASSERT_TRUE(root.next());
+      page = root.count(0);
+      Rows size = database.query("PRAGMA page_size");
+      ASSERT_TRUE(size.next());
+      bytes = size.count(0);
+    }
+    std::string file = test::read_file(data_.records());
+    file.replace((page - 1) * bytes, 8, 8, '\xff');
+    test::write_file(data_.records(), file);
   }
 
   // How many rows are found whatever the byte at that offset is.
@@ -115,6 +139,123 @@ TEST_F(FlippedBytes, OfAJobHideNoOtherAndDoNotStopTheQueue) {
       }
     }
     EXPECT_GE(claimed, least_of(offset)) << offset;
+  });
+  EXPECT_GT(hidden, 0U) << "the flips damage a record";
+}
+
+// Also if the damage is before any row that is asked for, from both ends.
+TEST_F(FlippedBytes, HideNothingFromWhoHasNothing) {
+  constexpr DamagedTable kTable = {"volumes", "SELECT record FROM volumes", "owner, id",
+                                   "owner DESC, id DESC"};
+  const std::string query = "SELECT record FROM volumes WHERE record = 'of nobody'";
+  std::size_t unreadable = 0;
+  for_each_flip(volume(2).id, to_record(volume(2)), [&](Database& database, std::size_t offset) {
+    try {
+      database.query(query);
+    } catch (const Error&) {
+      ++unreadable;
+    }
+    if (offset < kHeaderBytes) return;
+    EXPECT_NO_THROW(read_undamaged(database, kTable, query, [](const Rows&) {})) << offset;
+  });
+  EXPECT_GT(unreadable, 0U);
+}
+
+TEST_F(FlippedBytes, OfAWholeTableAreNoEmptyList) {
+  damage_table("volumes");
+  Database database(data_);
+  const SqlVolumeStore volumes(database);
+  EXPECT_EQ(test::code_thrown_by([&] { volumes.list("", "", 9, ListOrder::kOldestFirst); }),
+            ErrorCode::kInternal);
+}
+
+TEST_F(FlippedBytes, BesideTheQueueAreNotBlamedOnItsJobs) {
+  damage_table("turns");
+  Database database(data_);
+  FileBlobStore blobs(data_);
+  SqliteJobStore jobs(database, blobs, {});
+  start_log(LogFormat::kText, LogLevel::kInfo);
+  testing::internal::CaptureStderr();
+  for (std::size_t n = 0; n < kRows; ++n) {
+    EXPECT_EQ(test::code_thrown_by([&] { jobs.claim("worker", std::chrono::hours(1)); }),
+              ErrorCode::kInternal);
+  }
+  const std::string log = testing::internal::GetCapturedStderr();
+  start_log(LogFormat::kText, LogLevel::kOff);
+  for (const std::string& id : jobs_) EXPECT_THAT(log, testing::Not(testing::HasSubstr(id)));
+}
+
+TEST_F(FlippedBytes, OfARunningJobLeaveNoOtherWithoutAnEnd) {
+  std::string record;
+  {
+    Database database(data_);
+    FileBlobStore blobs(data_);
+    SqliteJobStore jobs(database, blobs, {});
+    for (std::size_t n = 0; n < kRows; ++n) {
+      ASSERT_TRUE(jobs.claim("worker", std::chrono::hours(1)));
+    }
+    Rows row = database.query("SELECT record FROM jobs WHERE id = ?1", jobs_[2]);
+    ASSERT_TRUE(row.next());
+    constexpr std::size_t kOnItsPage = 200;  // the end is on another page
+    record = row.text(0).substr(0, kOnItsPage);
+  }
+  std::size_t left = 0;
+  for_each_flip(jobs_[2], record, [&](Database& database, std::size_t offset) {
+    FileBlobStore blobs(data_);
+    SqliteJobStore jobs(database, blobs, {});
+    std::size_t reaped = 0;
+    try {
+      reaped = jobs.reap();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kInternal);
+    }
+    left += reaped < kRows ? 1 : 0;
+    EXPECT_GE(reaped, least_of(offset)) << offset;
+  });
+  EXPECT_GT(left, 0U) << "the flips damage a record";
+}
+
+TEST_F(FlippedBytes, OfACallbackStopNoOther) {
+  const auto body = [](std::size_t n) { return "{\"number\":" + std::to_string(n) + "}"; };
+  {
+    Database database(data_);
+    database.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+      for (std::size_t n = 0; n < kRows; ++n) {
+        add_callback(transaction.connection(), jobs_[n], "http://localhost/", body(n));
+      }
+      transaction.commit();
+    });
+  }
+  std::size_t hidden = 0;
+  for_each_flip(jobs_[2], body(2), [&](Database& database, std::size_t offset) {
+    const Time later = std::chrono::system_clock::now() + std::chrono::hours(1);
+    const std::size_t due = SqlOutbox(database).due(later, 9).size();
+    hidden += due < kRows ? 1 : 0;
+    EXPECT_GE(due, least_of(offset)) << offset;
+  });
+  EXPECT_GT(hidden, 0U) << "the flips damage a record";
+}
+
+TEST_F(FlippedBytes, OfAnOrderStopNoOther) {
+  std::vector<OrderSpec> specs(kRows);
+  {
+    Database database(data_);
+    SqlOrderStore orders(database);
+    for (std::size_t n = 0; n < kRows; ++n) {
+      Order& order = specs[n].record.order;
+      order.id = "order-" + std::string(40, static_cast<char>('a' + n));
+      order.created = "2024-01-01T00:00:00.000Z";
+      specs[n].record.work.begun = order.created;
+      orders.submit(specs[n], kRows);
+    }
+  }
+  const Order& flipped = specs[2].record.order;
+  std::size_t hidden = 0;
+  for_each_flip(flipped.id, to_json(flipped), [&](Database& database, std::size_t offset) {
+    const Time later = std::chrono::system_clock::now() + std::chrono::hours(1);
+    const std::size_t due = SqlOrderStore(database).due(later, 9).size();
+    hidden += due < kRows ? 1 : 0;
+    EXPECT_GE(due, least_of(offset)) << offset;
   });
   EXPECT_GT(hidden, 0U) << "the flips damage a record";
 }
