@@ -44,8 +44,8 @@ BlobFolders shared_blob_folders(const std::filesystem::path& root);
 // The folder with all of a daemon's data. Holds a lock, so a second daemon cannot use the same
 // folder. Holds the folder open, and all paths lead into that one: another folder in its place,
 // such as that of a second daemon, receives nothing. The paths are valid in this process only (see
-// for_other_process). SQLite replaces the path of records() by the real one as it opens the file
-// (see Connection::leave_files). Thread safe.
+// for_other_process). SQLite replaces the path of records() by the real one as it opens the file,
+// and leaves the files beside it alone if another file is there at the end. Thread safe.
 class DataFolder {
  public:
   // Creates missing folders and empties the scratch folder, which may have unfinished files of a

@@ -266,12 +266,6 @@ Database::Database(const DataFolder& folder)
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }
 
-Database::~Database() {
-  if (folder_.is_there()) return;
-  writer_.leave_files();
-  for (const auto& reader : readers_) reader->leave_files();
-}
-
 void Database::make_way() {
   folder_.reserve().let_go();
   const Lock writing(writer_.mutex());

@@ -26,9 +26,6 @@ class Database : public SqlDatabase {
   // Creates missing tables and migrates those of an older version. Throws Error kUnavailable if a
   // newer, unknown version made them; kOutOfSpace or kInternal.
   explicit Database(const DataFolder& folder);
-  ~Database() override;
-  Database(const Database&) = delete;
-  Database& operator=(const Database&) = delete;
 
   Connection& writer() { return writer_; }
   // An idle connection if there is one.

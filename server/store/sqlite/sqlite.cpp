@@ -163,10 +163,6 @@ Connection::~Connection() {
   sqlite3_close(handle_);
 }
 
-void Connection::leave_files() noexcept {
-  sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-}
-
 void Connection::know_newest(const std::atomic<std::int64_t>& newest_us) {
   // SQLite passes the pointer back unchanged.
   auto* given = const_cast<std::atomic<std::int64_t>*>(&newest_us);

@@ -77,10 +77,6 @@ class Connection : public SqlConnection {
   // which waits for readers.
   void limit_log(std::uint64_t bytes);
 
-  // Leaves the write-ahead log as it is when the last connection is closed. SQLite would remove the
-  // file by its name as of the start, which may be another database's by now.
-  void leave_files() noexcept;
-
   // Ends an open batch, then checkpoints and truncates if possible. For holders of the mutex.
   void empty_log() noexcept;
 

@@ -1,4 +1,5 @@
 // One wrong byte in the file of SQLite's database, in the cell of a record.
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <vector>
@@ -76,13 +77,13 @@ class FlippedBytes : public testing::Test {
     test::write_file(data_.records(), whole);
   }
 
-  // Makes a table of few rows unreadable.
-  void damage_table(const std::string& table) {
+  // Makes a table or an index of few rows unreadable.
+  void damage_table(const std::string& name) {
     std::size_t page = 0;
     std::size_t bytes = 0;
     {
       Database database(data_);
-      Rows root = database.query("SELECT rootpage FROM sqlite_schema WHERE name = ?1", table);
+      Rows root = database.query("SELECT rootpage FROM sqlite_schema WHERE name = ?1", name);
       ASSERT_TRUE(root.next());
       page = root.count(0);
       Rows size = database.query("PRAGMA page_size");
@@ -155,7 +156,6 @@ TEST_F(FlippedBytes, HideNothingFromWhoHasNothing) {
     } catch (const Error&) {
       ++unreadable;
     }
-    if (offset < kHeaderBytes) return;
     EXPECT_NO_THROW(read_undamaged(database, kTable, query, [](const Rows&) {})) << offset;
   });
   EXPECT_GT(unreadable, 0U);
@@ -170,7 +170,7 @@ TEST_F(FlippedBytes, OfAWholeTableAreNoEmptyList) {
 }
 
 TEST_F(FlippedBytes, BesideTheQueueAreNotBlamedOnItsJobs) {
-  damage_table("turns");
+  damage_table("events_by_job");
   Database database(data_);
   FileBlobStore blobs(data_);
   SqliteJobStore jobs(database, blobs, {});
@@ -255,7 +255,7 @@ TEST_F(FlippedBytes, OfAnOrderStopNoOther) {
     const Time later = std::chrono::system_clock::now() + std::chrono::hours(1);
     const std::size_t due = SqlOrderStore(database).due(later, 9).size();
     hidden += due < kRows ? 1 : 0;
-    EXPECT_GE(due, least_of(offset)) << offset;
+    EXPECT_GE(due, std::max<std::size_t>(least_of(offset), 1)) << offset;
   });
   EXPECT_GT(hidden, 0U) << "the flips damage a record";
 }
