@@ -177,8 +177,9 @@ std::optional<SampleType> whole_type(std::span<const std::byte> samples, SampleT
 std::optional<std::int64_t> mask_value(std::span<const std::byte> samples, SampleType type,
                                        const std::array<double, 2>& range) {
   constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
-  const auto [low, high] = range;
-  if (low != 0 || !(high > 0 && high <= kMost) || high != std::floor(high)) return std::nullopt;
+  const double high = range[1];
+  if (range[0] != 0 || !(high > 0 && high <= kMost) || high != std::floor(high))
+    return std::nullopt;
   const bool is_mask = with_sample(type, [&](auto sample) {
     using Sample = decltype(sample);
     const auto* first = reinterpret_cast<const Sample*>(samples.data());
