@@ -1,5 +1,6 @@
 // A daemon that takes few uploads at once: the page and the JavaScript client wait for it.
 import { execFileSync } from 'node:child_process';
+import { once } from 'node:events';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { connect, type Socket } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -23,9 +24,9 @@ afterEach(() => few.remove());
 async function occupy({ url }: Daemon): Promise<Socket> {
   const socket = connect(Number(new URL(url).port), '127.0.0.1');
   socket.on('error', () => undefined); // the daemon may end before it
-  socket.write('POST /v1/volumes HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 10000000\r\n\r\nNRRD0004\n');
-  const body = new Uint8Array(1_000_000);
-  await expect.poll(async () => (await fetch(`${url}/v1/volumes`, { method: 'POST', body })).status).toBe(429);
+  socket.write('POST /v1/volumes HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 10000000\r\nExpect: 100-continue\r\n\r\n');
+  const [answer] = (await once(socket, 'data')) as [Buffer];
+  expect(answer.toString()).toContain(' 100 '); // it has the place
   return socket;
 }
 
