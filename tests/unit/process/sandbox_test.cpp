@@ -174,7 +174,7 @@ TEST_F(Sandbox, EndsAProcessThatTakesTooMuchOfTheProcessor) {
 }
 
 TEST_F(Sandbox, TellsTheEndOfTheTimeFromOtherEnds) {
-  const auto status_of_signal = [this](int signal) {
+  const auto status_of_signal = [](int signal) {
     return status_of([signal] { return std::raise(signal) == 0; });
   };
   const int late = status_of_signal(SIGXCPU);
