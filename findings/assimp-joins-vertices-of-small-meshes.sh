@@ -11,8 +11,8 @@ cd "$t"
 for name in assimp-utils=5.2.5~ds0-1+b1 libassimp5=5.2.5~ds0-1+b1 libminizip1 libdraco7; do
   apt-get download "$name" >apt.log 2>&1
 done
-for package in *.deb; do dpkg -x "$package" root; done
-export LD_LIBRARY_PATH="$t/root/usr/lib/$(uname -m)-linux-gnu"
+for package in *.deb; do dpkg -x "$package" tree; done
+export LD_LIBRARY_PATH="$t/tree/usr/lib/$(uname -m)-linux-gnu"
 cat >ball.py <<'P'
 import math, struct, sys
 radius = float(sys.argv[1])
@@ -43,7 +43,7 @@ seen=
 for radius in 1 1e-4 2e-6; do
   python3 ball.py "$radius"
   for file in ball.obj ball.stl; do
-    root/usr/bin/assimp info "$file" -jiv >info 2>&1
+    tree/usr/bin/assimp info "$file" -jiv >info 2>&1
     vertices=$(awk '/^Vertices/ { print $2 }' info)
     triangles=$(awk '/^Faces/ { print $2 }' info)
     echo "radius $radius, $file: $vertices vertices, $triangles triangles"

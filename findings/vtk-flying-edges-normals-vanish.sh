@@ -13,9 +13,9 @@ cd "$t"
 # What this machine lacks of the package and of what it depends on; nothing is installed.
 apt-get -s --no-install-recommends install python3-vtk9=9.1.0+really9.1.0+dfsg2-5+deb12u1 |
   awk '/^Inst/ { print $2 }' | xargs -r apt-get download >apt.log 2>&1
-for package in *.deb; do [ ! -e "$package" ] || dpkg -x "$package" root; done
-libraries="root/usr/lib/$(uname -m)-linux-gnu"
-export PYTHONPATH="$t/root/usr/lib/python3/dist-packages"
+for package in *.deb; do [ ! -e "$package" ] || dpkg -x "$package" tree; done
+libraries="tree/usr/lib/$(uname -m)-linux-gnu"
+export PYTHONPATH="$t/tree/usr/lib/python3/dist-packages"
 export LD_LIBRARY_PATH="$t/$libraries:$t/$libraries/blas:$t/$libraries/lapack:$t/$libraries/openmpi/lib"
 cat >contour.py <<'P'
 import math

@@ -9,7 +9,7 @@
 
 namespace isomesh::jobs {
 
-// What the times depend on besides surface and parameters.
+// The properties of a volume that the times depend on.
 struct VolumeSize {
   std::uint64_t samples = 0;
   double smallest_spacing_mm = 1;

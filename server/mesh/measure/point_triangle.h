@@ -32,7 +32,7 @@ class TriangleReach {
   bool plane_meets(const Point& centre, double half_side) const;
   bool meets(const Point& centre, double half_side) const;
 
-  // Which cubes it may reach into of those that this one becomes when it moves along x: the least
+  // The cubes it may reach into, of those that this one becomes when it moves along x: the least
   // and the largest way, which may be infinite. The least is larger if there are none.
   std::array<double, 2> ways_along_x(const Point& centre, double half_side) const;
 

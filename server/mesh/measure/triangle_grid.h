@@ -136,7 +136,7 @@ class TriangleGrid {
     Steps high;  // the last one
   };
   static constexpr std::uint32_t kCellSteps = BoxInCell::kSteps;
-  // Of a cell.
+  // The triangles of a cell.
   struct Content {
     std::span<const Entry> entries;
     const TriangleTree* tree;  // null if it is not crowded

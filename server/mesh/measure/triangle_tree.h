@@ -164,7 +164,8 @@ class TriangleTree {
 
   // More than rounding to single precision takes of a squared distance.
   static constexpr double kLess = 1 - 1e-6;
-  // Of places and boxes, as a share of the cell's side or of what is farther from its centre.
+  // A rounding margin of places and boxes, as a share of the cell's side or of what is farther from
+  // its centre.
   static constexpr float kRounding = 1e-6F;
   static constexpr double kNear = 4;  // sides from the centre
   // Between two halvings there is one other division at most, see build().

@@ -64,7 +64,7 @@ void expect_as_plain(const Found& found, const SurfaceView& from, const SurfaceV
   }
 }
 
-// What a triangle of a surface costs.
+// The work for a triangle of a surface.
 struct Cost {
   double steps = 0;   // to find the nearest triangle to a point of a surface beside it
   double pairs = 0;   // that may intersect
