@@ -194,7 +194,7 @@ struct Sheet {
   SurfaceView view() const { return {positions, triangles}; }
 };
 
-// What simplification makes of a flat face beside a detailed one: its edges alone would make the
+// The result of simplifying a flat face beside a detailed one: its edges alone would make the
 // cells so large that one has all the small triangles.
 TEST(TriangleGrid, ManagesAHugeTriangleAmongTinyOnes) {
   for (const float size : {1e3F, 1e5F, 1e7F}) {

@@ -173,7 +173,7 @@ class SharedFolder : public testing::Test {
   DataFolder data_{folder_ / "data"};
 };
 
-// What is deleted while the data folder is away would stay until the next start.
+// Otherwise samples deleted while the data folder is away would stay until the next start.
 TEST_F(SharedFolder, IsNotNeededToEraseWhatTheDataFolderHolds) {
   FileBlobStore blobs(data_);
   const std::string key = test::put(blobs, "hello").key;
