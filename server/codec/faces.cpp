@@ -7,30 +7,32 @@
 
 namespace isomesh::codec {
 
-std::vector<FaceRun> faces_of(const mesh::Mesh& mesh) {
-  return {{.count = mesh.triangles.size(), .label = 0, .at = [&mesh](std::size_t t) {
-             return mesh.triangles[t];
-           }}};
+FaceRun::FaceRun(const LabelledSurface& surface, std::size_t number)
+    : mesh_(surface.walls.mesh),
+      surface_(&surface),
+      own_(surface.triangles.of(number)),
+      number_(number),
+      label_(static_cast<std::uint32_t>(surface.labels[number - 1].label)) {}
+
+mesh::Triangle FaceRun::outward(std::uint32_t wall) const {
+  const mesh::Triangle& triangle = mesh_.triangles[wall];
+  const mesh::SeparatingSurface& walls = surface_->walls;
+  const bool is_inside_out = walls.parts.belongs(walls.sides[wall].front, number_);
+  return is_inside_out ? mesh::Triangle{triangle[0], triangle[2], triangle[1]} : triangle;
 }
 
-std::vector<FaceRun> faces_of(const LabelledSurface& surface) {
+std::vector<FaceRun> faces_of(const FileContent& content) {
+  if (content.labels == nullptr) return {FaceRun(content.mesh)};
   std::vector<FaceRun> runs;
-  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
-    const auto own = surface.triangles.of(n);
-    const auto face = [&walls = surface.walls, own, n](std::size_t t) {
-      const mesh::Triangle& wall = walls.mesh.triangles[own[t]];
-      const bool is_inside_out = walls.parts.belongs(walls.sides[own[t]].front, n);
-      return is_inside_out ? mesh::Triangle{wall[0], wall[2], wall[1]} : wall;
-    };
-    const auto label = static_cast<std::uint32_t>(surface.labels[n - 1].label);
-    runs.push_back({.count = own.size(), .label = label, .at = face});
+  for (std::size_t number = 1; number <= content.labels->labels.size(); ++number) {
+    runs.emplace_back(*content.labels, number);
   }
   return runs;
 }
 
 std::size_t count_of(const std::vector<FaceRun>& runs) {
   std::size_t faces = 0;
-  for (const FaceRun& run : runs) faces += run.count;
+  for (const FaceRun& run : runs) faces += run.count();
   return faces;
 }
 

@@ -3,25 +3,41 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <span>
 #include <vector>
 
-#include "server/codec/encode_labels.h"
+#include "server/codec/encode.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::codec {
 
-// The triangles of one label. Several threads may call `at`; its source must outlive it.
-struct FaceRun {
-  std::size_t count = 0;
-  std::uint32_t label = 0;  // for signed labels, its bits
-  std::function<mesh::Triangle(std::size_t)> at;
+// The triangles of one surface, or of one label's own surface. Its content must outlive it. Thread
+// safe.
+class FaceRun {
+ public:
+  explicit FaceRun(const mesh::Mesh& mesh) : mesh_(mesh) {}
+  // `number` counts the labels from 1.
+  FaceRun(const LabelledSurface& surface, std::size_t number);
+
+  std::size_t count() const { return surface_ == nullptr ? mesh_.triangles.size() : own_.size(); }
+  std::uint32_t label() const { return label_; }  // for signed labels, its bits
+
+  mesh::Triangle at(std::size_t index) const {
+    return surface_ == nullptr ? mesh_.triangles[index] : outward(own_[index]);
+  }
+
+ private:
+  mesh::Triangle outward(std::uint32_t wall) const;
+
+  const mesh::Mesh& mesh_;
+  const LabelledSurface* surface_ = nullptr;
+  std::span<const std::uint32_t> own_;
+  std::size_t number_ = 0;
+  std::uint32_t label_ = 0;
 };
 
-std::vector<FaceRun> faces_of(const mesh::Mesh& mesh);
-
-// Each label's own surface, oriented outward: a wall occurs once for each of its labels.
-std::vector<FaceRun> faces_of(const LabelledSurface& surface);
+// A run for each label, or one.
+std::vector<FaceRun> faces_of(const FileContent& content);
 
 std::size_t count_of(const std::vector<FaceRun>& runs);
 

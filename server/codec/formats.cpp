@@ -36,39 +36,11 @@ double levels_of(const MeshParameters& parameters) {
 
 bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
 
-std::optional<mesh::Topology> encode_turned_drc(const Format::Surface& surface,
+std::optional<mesh::Topology> encode_turned_drc(const FileContent& content,
                                                 const mesh::Context& context, const Sink& sink) {
-  return use_in_space(surface.mesh, surface.frame.space, [&](const mesh::Mesh& mesh) {
-    return encode_drc(mesh, surface.provenance.parameters.draco, context, sink);
+  return use_in_space(content.mesh, content.space, [&](const mesh::Mesh& mesh) {
+    return encode_drc(mesh, content.provenance.parameters.draco, context, sink);
   });
-}
-
-template <auto encode>
-std::optional<mesh::Topology> encode_in_frame(const Format::Surface& surface,
-                                              const mesh::Context& context, const Sink& sink) {
-  encode(surface.mesh, surface.frame, context, sink);
-  return std::nullopt;
-}
-
-template <auto encode>
-std::optional<mesh::Topology> encode_with_provenance(const Format::Surface& surface,
-                                                     const mesh::Context& context,
-                                                     const Sink& sink) {
-  encode(surface.mesh, surface.provenance, context, sink);
-  return std::nullopt;
-}
-
-template <auto encode>
-void encode_labels_in_frame(const LabelledSurface& surface, const Provenance& /*provenance*/,
-                            const Frame& frame, const mesh::Context& context, const Sink& sink) {
-  encode(surface, frame, context, sink);
-}
-
-template <auto encode>
-void encode_labels_with_provenance(const LabelledSurface& surface, const Provenance& provenance,
-                                   const Frame& /*frame*/, const mesh::Context& context,
-                                   const Sink& sink) {
-  encode(surface, provenance, context, sink);
 }
 
 double usd_bytes(const SurfaceSize& surface, const MeshParameters& parameters) {
@@ -154,12 +126,7 @@ constexpr std::array kFormats = {
                  return parameters.glb_codec == GlbCodec::kDraco && if_ours(parameters) &&
                         !parameters.distances;
                },
-           .encode =
-               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
-                 return encode_glb(surface.mesh, surface.provenance, context, sink,
-                                   surface.extracted);
-               },
-           .encode_labels = encode_labels_with_provenance<encode_labels_glb>,
+           .encode = encode_glb,
            .decode = decoding::decode_glb},
     Format{.format = MeshFormat::kStl,
            .media_type = "model/stl",
@@ -167,7 +134,7 @@ constexpr std::array kFormats = {
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .has_exact_bytes = true,
-           .encode = encode_in_frame<encode_stl>},
+           .encode = encode_stl},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -176,8 +143,7 @@ constexpr std::array kFormats = {
                  return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
-           .encode = encode_in_frame<encode_ply>,
-           .encode_labels = encode_labels_in_frame<encode_labels_ply>},
+           .encode = encode_ply},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
            .milliseconds_per_triangle = 2.0e-4,
@@ -185,8 +151,7 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
-           .encode = encode_in_frame<encode_obj>,
-           .encode_labels = encode_labels_in_frame<encode_labels_obj>},
+           .encode = encode_obj},
     Format{.format = MeshFormat::k3mf,
            .media_type = "model/3mf",
            .milliseconds_per_triangle = 6.5e-4,
@@ -201,33 +166,19 @@ constexpr std::array kFormats = {
                  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
                },
            .shows_topology = [](const MeshParameters&) { return true; },
-           .encode =
-               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
-                 return encode_3mf(surface.mesh, surface.provenance, context, sink);
-               },
-           .encode_labels = encode_labels_with_provenance<encode_labels_3mf>},
+           .encode = encode_3mf},
     Format{.format = MeshFormat::kUsda,
            .media_type = "model/vnd.usda",
            .milliseconds_per_triangle = 3.0e-4,
            .bytes = usd_bytes,
            .memory_bytes = usd_memory,
-           .encode =
-               [](const Format::Surface& surface, const mesh::Context& context, const Sink& sink) {
-                 encode_usda(surface.mesh, surface.provenance, MeshFormat::kUsda, context, sink);
-                 return std::optional<mesh::Topology>();
-               },
-           .encode_labels =
-               [](const LabelledSurface& surface, const Provenance& provenance,
-                  const Frame& /*frame*/, const mesh::Context& context, const Sink& sink) {
-                 encode_labels_usda(surface, provenance, MeshFormat::kUsda, context, sink);
-               }},
+           .encode = encode_usda},
     Format{.format = MeshFormat::kUsdz,
            .media_type = "model/vnd.usdz+zip",
            .milliseconds_per_triangle = 6.0e-4,  // formatted twice
            .bytes = usd_bytes,
            .memory_bytes = usd_memory,
-           .encode = encode_with_provenance<encode_usdz>,
-           .encode_labels = encode_labels_with_provenance<encode_labels_usdz>},
+           .encode = encode_usdz},
     Format{.format = MeshFormat::kOff,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 2.0e-4,
@@ -235,7 +186,7 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 100 + 28 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
-           .encode = encode_in_frame<encode_off>},
+           .encode = encode_off},
     Format{.format = MeshFormat::kVtk,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -245,8 +196,7 @@ constexpr std::array kFormats = {
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
-           .encode = encode_in_frame<encode_vtk>,
-           .encode_labels = encode_labels_in_frame<encode_labels_vtk>},
+           .encode = encode_vtk},
     Format{.format = MeshFormat::kVtp,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -256,8 +206,7 @@ constexpr std::array kFormats = {
                         (parameters.labels ? 20 : 16) * as_double(surface.triangles);
                },
            .has_exact_bytes = true,
-           .encode = encode_with_provenance<encode_vtp>,
-           .encode_labels = encode_labels_with_provenance<encode_labels_vtp>},
+           .encode = encode_vtp},
     Format{.format = MeshFormat::kGii,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 6.0e-5,
@@ -265,7 +214,7 @@ constexpr std::array kFormats = {
                [](const SurfaceSize& surface, const MeshParameters&) {
                  return 2500 + 16 * as_double(surface.vertices) + 16 * as_double(surface.triangles);
                },
-           .encode = encode_with_provenance<encode_gii>},
+           .encode = encode_gii},
     Format{.format = MeshFormat::kZip,
            .media_type = "application/zip",
            .milliseconds_per_triangle = 3.0e-5,
@@ -291,10 +240,6 @@ constexpr std::array kFormats = {
            .encode = nullptr},
 };
 
-Frame frame_of(MeshFormat format, const Provenance& provenance) {
-  return {space_of(format, provenance.parameters), length_unit(provenance.notes)};
-}
-
 }  // namespace
 
 const Format& describe(MeshFormat format) {
@@ -316,16 +261,25 @@ std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
   if (row.encode == nullptr) {
     throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
   }
-  return row.encode({mesh, provenance, frame_of(format, provenance), extracted}, context, sink);
+  return row.encode({.mesh = mesh,
+                     .provenance = provenance,
+                     .space = space_of(format, provenance.parameters),
+                     .unit = length_unit(provenance.notes),
+                     .extracted = extracted},
+                    context, sink);
 }
 
 void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
                    const mesh::Context& context, const Sink& sink) {
-  const Format& row = describe(format);
-  if (row.encode_labels == nullptr) {
+  if (!holds_all_labels(format)) {
     throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
   }
-  row.encode_labels(surface, provenance, frame_of(format, provenance), context, sink);
+  describe(format).encode({.mesh = surface.walls.mesh,
+                           .provenance = provenance,
+                           .space = space_of(format, provenance.parameters),
+                           .unit = length_unit(provenance.notes),
+                           .labels = &surface},
+                          context, sink);
 }
 
 DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,

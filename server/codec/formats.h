@@ -11,7 +11,6 @@
 #include "proto/types.h"
 #include "server/codec/decode/decode.h"
 #include "server/codec/encode.h"
-#include "server/codec/encode_labels.h"
 #include "server/mesh/context.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/mesh.h"
@@ -21,14 +20,6 @@ namespace isomesh::codec {
 
 // Times and sizes are first guesses, from a head of five million triangles on two cores.
 struct Format {
-  // The input of an encoder of one surface.
-  struct Surface {
-    const mesh::Mesh& mesh;
-    const Provenance& provenance;
-    Frame frame;                          // of the file
-    const mesh::TriangleGrid* extracted;  // for distances
-  };
-
   MeshFormat format;
   std::string_view media_type;  // application/octet-stream if none is registered
   double milliseconds_per_triangle;
@@ -44,13 +35,7 @@ struct Format {
   bool (*shows_topology)(const MeshParameters& parameters) = [](const MeshParameters&) {
     return false;
   };
-  // Null for a format that holds files of labels only.
-  std::optional<mesh::Topology> (*encode)(const Surface& surface, const mesh::Context& context,
-                                          const Sink& sink);
-  // Null for a format that does not hold all labels in one file.
-  void (*encode_labels)(const LabelledSurface& surface, const Provenance& provenance,
-                        const Frame& frame, const mesh::Context& context,
-                        const Sink& sink) = nullptr;
+  Encoder* encode;  // null for a format that holds files of labels only
   // Null for a format that holds the mesh's triangles and floats exactly, in the file's space; by
   // labels, the triangles of each label's own surface. Other formats round coordinates.
   DecodedSurface (*decode)(std::span<const std::byte> file, const mesh::Context& context) = nullptr;

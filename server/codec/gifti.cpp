@@ -42,9 +42,10 @@ constexpr std::string_view kCoordinateSystem =
 
 }  // namespace
 
-void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-                const Sink& sink) {
+std::optional<mesh::Topology> encode_gii(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
   context.throw_if_stopped();
+  const mesh::Mesh& mesh = content.mesh;
   const std::size_t vertices = mesh.positions.size();
   const std::size_t triangles = mesh.triangles.size();
   check_signed_indices(vertices, triangles, MeshFormat::kGii);
@@ -56,19 +57,24 @@ void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
            "<GIFTI Version=\"1.0\" NumberOfDataArrays=\"" +
                std::string(is_empty ? "0" : "2") +
                "\">\n<MetaData>\n<MD><Name>isomesh:provenance</Name><Value>" +
-               provenance_for_xml(provenance) + "</Value></MD>\n</MetaData>\n<LabelTable/>\n");
-  if (is_empty) return put_text(sink, "</GIFTI>\n");
+               provenance_for_xml(content.provenance) +
+               "</Value></MD>\n</MetaData>\n<LabelTable/>\n");
+  if (is_empty) {
+    put_text(sink, "</GIFTI>\n");
+    return std::nullopt;
+  }
   put_text(sink, array_head("NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", vertices) +
                      std::string(kCoordinateSystem) + "<Data>");
   BlockWriter writer(context, sink, vertices + triangles);
   writer.write(vertices, kRecordText + 1, [&](std::size_t v, std::byte* out) {
-    return write_record(in_space(mesh.positions[v], Space::kRas), out);
+    return write_record(in_space(mesh.positions[v], content.space), out);
   });
   put_text(sink, "</Data>\n</DataArray>\n" +
                      array_head("NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", triangles) + "<Data>");
   writer.write(triangles, kRecordText + 1,
                [&](std::size_t t, std::byte* out) { return write_record(mesh.triangles[t], out); });
   put_text(sink, "</Data>\n</DataArray>\n</GIFTI>\n");
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

@@ -9,8 +9,8 @@
 
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
-#include "server/codec/encode_labels.h"
 #include "server/codec/glb_document.h"
+#include "server/codec/label_titles.h"
 #include "server/codec/levels.h"
 #include "server/mesh/measure/distance.h"
 #include "server/mesh/measure/normals.h"
@@ -175,36 +175,8 @@ void add_levels(const LabelledSurface& surface, double share, const Grid& grid,
   });
 }
 
-}  // namespace
-
-std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
-                                         const mesh::Context& context, const Sink& sink,
-                                         const mesh::TriangleGrid* extracted) {
-  const MeshParameters& parameters = provenance.parameters;
-  const auto shares = coarser_shares(parameters);
-  const auto level_of = [&](double share, const mesh::Mesh& level, const Grid& grid,
-                            const mesh::Context& progress) {
-    const Distances distances(level, parameters, extracted, progress);
-    return encode_level(share, level, distances, grid, parameters, progress);
-  };
-  const Grid grid = grid_of(mesh, parameters.draco.position_bits);
-  GlbPart part = {.name = "surface", .material = "neutral"};
-  const LevelProgress finest(context, 0, shares.size() + 1);
-  part.add_level(level_of(1, mesh, grid, finest.encode));
-  mesh::Mesh coarse;
-  if (!shares.empty()) coarse = copy_of(mesh);
-  for (std::size_t n = 0; n < shares.size(); ++n) {
-    const LevelProgress progress(context, n + 1, shares.size() + 1);
-    coarsen(count_of(shares[n], mesh), progress.simplify, coarse);
-    part.add_level(level_of(shares[n], coarse, grid, progress.encode));
-  }
-  write_glb({&part, 1}, grid, provenance, sink);
-  if (part.levels.empty() || part.levels.front().streams.empty()) return std::nullopt;
-  return topology_of(mesh, part.levels.front().streams, {context.stop, nullptr});
-}
-
-void encode_labels_glb(const LabelledSurface& surface, const Provenance& provenance,
-                       const mesh::Context& context, const Sink& sink) {
+void encode_labels(const LabelledSurface& surface, const Provenance& provenance,
+                   const mesh::Context& context, const Sink& sink) {
   const MeshParameters& parameters = provenance.parameters;
   const auto shares = coarser_shares(parameters);
   const Grid grid = grid_of(surface.walls.mesh, parameters.draco.position_bits);
@@ -222,6 +194,38 @@ void encode_labels_glb(const LabelledSurface& surface, const Provenance& provena
                progress.encode, parts);
   }
   write_glb(parts, grid, provenance, sink);
+}
+
+}  // namespace
+
+std::optional<mesh::Topology> encode_glb(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
+  if (content.labels != nullptr) {
+    encode_labels(*content.labels, content.provenance, context, sink);
+    return std::nullopt;
+  }
+  const mesh::Mesh& mesh = content.mesh;
+  const MeshParameters& parameters = content.provenance.parameters;
+  const auto shares = coarser_shares(parameters);
+  const auto level_of = [&](double share, const mesh::Mesh& level, const Grid& grid,
+                            const mesh::Context& progress) {
+    const Distances distances(level, parameters, content.extracted, progress);
+    return encode_level(share, level, distances, grid, parameters, progress);
+  };
+  const Grid grid = grid_of(mesh, parameters.draco.position_bits);
+  GlbPart part = {.name = "surface", .material = "neutral"};
+  const LevelProgress finest(context, 0, shares.size() + 1);
+  part.add_level(level_of(1, mesh, grid, finest.encode));
+  mesh::Mesh coarse;
+  if (!shares.empty()) coarse = copy_of(mesh);
+  for (std::size_t n = 0; n < shares.size(); ++n) {
+    const LevelProgress progress(context, n + 1, shares.size() + 1);
+    coarsen(count_of(shares[n], mesh), progress.simplify, coarse);
+    part.add_level(level_of(shares[n], coarse, grid, progress.encode));
+  }
+  write_glb({&part, 1}, grid, content.provenance, sink);
+  if (part.levels.empty() || part.levels.front().streams.empty()) return std::nullopt;
+  return topology_of(mesh, part.levels.front().streams, {context.stop, nullptr});
 }
 
 }  // namespace isomesh::codec

@@ -11,7 +11,7 @@
 
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/label_titles.h"
 #include "server/codec/meshopt_chunk.h"
 
 namespace isomesh::codec {

@@ -11,6 +11,7 @@
 #include "proto/error.h"
 #include "server/codec/draco/grid.h"
 #include "server/codec/formats.h"
+#include "server/codec/label_titles.h"
 #include "server/codec/levels.h"
 #include "server/codec/zip_writer.h"
 #include "server/mesh/labels/label_surface.h"

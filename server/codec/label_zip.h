@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "proto/types.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/encode.h"
 
 namespace isomesh::codec {
 

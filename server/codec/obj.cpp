@@ -1,13 +1,18 @@
+#include <string>
+#include <vector>
+
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
-#include "server/codec/ply_obj_records.h"
+#include "server/codec/faces.h"
+#include "server/codec/label_titles.h"
+#include "server/codec/number_text.h"
+#include "server/codec/space.h"
 
 namespace isomesh::codec {
+namespace {
 
-std::string obj_header(const Frame& frame) {
-  return "# isomesh, " + std::string(frame.unit.name) + ", " +
-         std::string(letters_of(frame.space)) + '\n';
-}
+constexpr std::size_t kMostObjVertexBytes = 2 + 3 * (1 + kMostFloatBytes);
+constexpr std::size_t kMostObjFaceBytes = 2 + 3 * (1 + kMostIndexBytes);
 
 std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* begin) {
   char* out = reinterpret_cast<char*>(begin);
@@ -31,17 +36,29 @@ std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
   return reinterpret_cast<std::byte*>(out);
 }
 
-void encode_obj(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
-                const Sink& sink) {
+}  // namespace
+
+std::optional<mesh::Topology> encode_obj(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
   context.throw_if_stopped();
-  put_text(sink, obj_header(frame));
-  BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
+  const mesh::Mesh& mesh = content.mesh;
+  put_text(sink, "# isomesh, " + std::string(content.unit.name) + ", " +
+                     std::string(letters_of(content.space)) + '\n');
+  const std::vector<FaceRun> runs = faces_of(content);
+  BlockWriter writer(context, sink, mesh.positions.size() + count_of(runs));
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(in_space(mesh.positions[v], frame.space), out);
+    return write_obj_vertex(in_space(mesh.positions[v], content.space), out);
   });
-  writer.write(mesh.triangles.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
-    return write_obj_face(mesh.triangles[t], out);
-  });
+  ObjGroups groups;
+  for (std::size_t n = 0; n < runs.size(); ++n) {
+    if (content.labels != nullptr) {
+      const std::string group = groups.of(content.labels->labels[n]);
+      put_text(sink, "g " + group + "\nusemtl " + group + '\n');
+    }
+    writer.write(runs[n].count(), kMostObjFaceBytes,
+                 [&](std::size_t t, std::byte* out) { return write_obj_face(runs[n].at(t), out); });
+  }
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

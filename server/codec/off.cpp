@@ -24,16 +24,17 @@ char* write_numbers(Number a, Number b, Number c, char* out) {
 
 }  // namespace
 
-void encode_off(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
-                const Sink& sink) {
+std::optional<mesh::Topology> encode_off(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
   context.throw_if_stopped();
-  put_text(sink, "OFF\n# isomesh, " + std::string(frame.unit.name) + ", " +
-                     std::string(letters_of(frame.space)) + '\n' +
+  const mesh::Mesh& mesh = content.mesh;
+  put_text(sink, "OFF\n# isomesh, " + std::string(content.unit.name) + ", " +
+                     std::string(letters_of(content.space)) + '\n' +
                      std::to_string(mesh.positions.size()) + ' ' +
                      std::to_string(mesh.triangles.size()) + " 0\n");
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostVertexLineBytes, [&](std::size_t v, std::byte* out) {
-    const auto& [x, y, z] = in_space(mesh.positions[v], frame.space);
+    const auto& [x, y, z] = in_space(mesh.positions[v], content.space);
     return reinterpret_cast<std::byte*>(write_numbers(x, y, z, reinterpret_cast<char*>(out)));
   });
   writer.write(mesh.triangles.size(), kMostFaceBytes, [&](std::size_t t, std::byte* out) {
@@ -42,6 +43,7 @@ void encode_off(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context&
     return reinterpret_cast<std::byte*>(
         write_numbers(std::uint64_t{a}, std::uint64_t{b}, std::uint64_t{c}, text));
   });
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

@@ -1,47 +1,60 @@
 #include <bit>
 #include <cstring>
 #include <string>
+#include <vector>
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
-#include "server/codec/ply_obj_records.h"
+#include "server/codec/faces.h"
+#include "server/codec/space.h"
 
 namespace isomesh::codec {
+namespace {
 
 static_assert(std::endian::native == std::endian::little, "the PLY written here is little-endian");
 
-std::string ply_header(const Frame& frame, std::size_t vertices, std::size_t faces,
-                       std::string_view of_faces) {
-  return "ply\nformat binary_little_endian 1.0\ncomment isomesh, " + std::string(frame.unit.name) +
-         ", " + std::string(letters_of(frame.space)) + "\nelement vertex " +
-         std::to_string(vertices) +
-         "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-         std::to_string(faces) + "\nproperty list uchar uint vertex_indices\n" +
-         std::string(of_faces) + "end_header\n";
+constexpr std::size_t kFaceBytes = 1 + sizeof(mesh::Triangle);
+
+std::string ply_header(const FileContent& content, std::size_t faces) {
+  std::string header = "ply\nformat binary_little_endian 1.0\ncomment isomesh, " +
+                       std::string(content.unit.name) + ", " +
+                       std::string(letters_of(content.space)) + "\nelement vertex " +
+                       std::to_string(content.mesh.positions.size()) +
+                       "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+                       std::to_string(faces) + "\nproperty list uchar uint vertex_indices\n";
+  if (content.labels != nullptr) {
+    header += has_wide_labels(*content.labels) ? "property uint label\n" : "property int label\n";
+  }
+  return header + "end_header\n";
 }
 
-std::byte* write_ply_vertex(const mesh::Vec3& position, std::byte* out) {
-  std::memcpy(out, &position, kPlyVertexBytes);
-  return out + kPlyVertexBytes;
-}
+}  // namespace
 
-std::byte* write_ply_face(const mesh::Triangle& triangle, std::byte* out) {
-  *out = std::byte{3};
-  std::memcpy(out + 1, &triangle, sizeof triangle);
-  return out + kPlyFaceBytes;
-}
-
-void encode_ply(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
-                const Sink& sink) {
+std::optional<mesh::Topology> encode_ply(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
   context.throw_if_stopped();
-  put_text(sink, ply_header(frame, mesh.positions.size(), mesh.triangles.size(), ""));
-  BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
-  writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_ply_vertex(in_space(mesh.positions[v], frame.space), out);
+  const mesh::Mesh& mesh = content.mesh;
+  const std::vector<FaceRun> runs = faces_of(content);
+  const std::size_t faces = count_of(runs);
+  put_text(sink, ply_header(content, faces));
+  BlockWriter writer(context, sink, mesh.positions.size() + faces);
+  writer.write(mesh.positions.size(), sizeof(mesh::Vec3), [&](std::size_t v, std::byte* out) {
+    const mesh::Vec3 position = in_space(mesh.positions[v], content.space);
+    std::memcpy(out, &position, sizeof position);
+    return out + sizeof position;
   });
-  writer.write(mesh.triangles.size(), kPlyFaceBytes, [&](std::size_t t, std::byte* out) {
-    return write_ply_face(mesh.triangles[t], out);
-  });
+  const std::size_t label_bytes = content.labels == nullptr ? 0 : sizeof(std::uint32_t);
+  for (const FaceRun& run : runs) {
+    writer.write(run.count(), kFaceBytes + label_bytes, [&](std::size_t t, std::byte* out) {
+      const mesh::Triangle face = run.at(t);
+      const std::uint32_t label = run.label();
+      *out = std::byte{3};
+      std::memcpy(out + 1, &face, sizeof face);
+      std::memcpy(out + kFaceBytes, &label, label_bytes);
+      return out + kFaceBytes + label_bytes;
+    });
+  }
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

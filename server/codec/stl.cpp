@@ -40,8 +40,9 @@ void write_facet(const mesh::Mesh& mesh, Space space, const mesh::Triangle& tria
 
 }  // namespace
 
-void encode_stl(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context& context,
-                const Sink& sink) {
+std::optional<mesh::Topology> encode_stl(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
+  const mesh::Mesh& mesh = content.mesh;
   const std::size_t triangles = mesh.triangles.size();
   if (triangles > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge,
@@ -49,8 +50,8 @@ void encode_stl(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context&
                 "simplify it.");
   }
   // The header must not start with "solid": readers would assume a text file.
-  const std::string title = "isomesh binary STL, " + std::string(frame.unit.name) +
-                            ", SPACE=" + std::string(letters_of(frame.space));
+  const std::string title = "isomesh binary STL, " + std::string(content.unit.name) +
+                            ", SPACE=" + std::string(letters_of(content.space));
   std::array<std::byte, kHeaderBytes + 4> header = {};
   std::memcpy(header.data(), title.data(), title.size());
   const auto count = static_cast<std::uint32_t>(triangles);
@@ -59,9 +60,10 @@ void encode_stl(const mesh::Mesh& mesh, const Frame& frame, const mesh::Context&
 
   BlockWriter(context, sink, triangles)
       .write(triangles, kFacetBytes, [&](std::size_t t, std::byte* out) {
-        write_facet(mesh, frame.space, mesh.triangles[t], out);
+        write_facet(mesh, content.space, mesh.triangles[t], out);
         return out + kFacetBytes;
       });
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

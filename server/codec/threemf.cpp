@@ -6,7 +6,8 @@
 
 #include "base/xml.h"
 #include "server/codec/block_writer.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/encode.h"
+#include "server/codec/label_titles.h"
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
 #include "server/codec/space.h"
@@ -162,35 +163,14 @@ bool is_solid(const mesh::Topology& topology) {
   return topology.boundary_edges == 0 && topology.manifold && topology.oriented;
 }
 
-}  // namespace
-
-std::optional<mesh::Topology> encode_3mf(const mesh::Mesh& mesh, const Provenance& provenance,
-                                         const mesh::Context& context, const Sink& sink) {
-  const mesh::Topology topology = measure_topology(mesh, {context.stop, nullptr});
-  Package package(sink, {mesh.triangles.size(), mesh.positions.size()},
-                  space_of(MeshFormat::k3mf, provenance.parameters));
-  package.begin_model("surface", provenance);
-  if (mesh.triangles.size() > 0) {
-    constexpr std::array<double, 3> kNeutral = {0.9, 0.9, 0.9};
-    package.begin_materials();
-    package.add_material("neutral", kNeutral);
-    package.end_materials();
-    package.add_object({.name = "surface", .part_number = {}, .is_solid = is_solid(topology)}, mesh,
-                       context);
-  }
-  package.finish();
-  return topology;
-}
-
-void encode_labels_3mf(const LabelledSurface& surface, const Provenance& provenance,
-                       const mesh::Context& context, const Sink& sink) {
+void encode_labels(const LabelledSurface& surface, const FileContent& content,
+                   const mesh::Context& context, const Sink& sink) {
   const mesh::Context quiet = {context.stop, nullptr};
   const std::size_t labels = surface.labels.size();
   // Every wall belongs to one or two labels.
   const std::uint64_t walls = surface.walls.mesh.triangles.size();
-  Package package(sink, {2 * walls, 2 * 3 * walls},
-                  space_of(MeshFormat::k3mf, provenance.parameters));
-  package.begin_model("labels", provenance);
+  Package package(sink, {2 * walls, 2 * 3 * walls}, content.space);
+  package.begin_model("labels", content.provenance);
   if (labels > 0) {
     package.begin_materials();
     for (const LabelSummary& label : surface.labels) {
@@ -212,6 +192,30 @@ void encode_labels_3mf(const LabelledSurface& surface, const Provenance& provena
     if (context.progress) context.progress(static_cast<double>(n) / static_cast<double>(labels));
   }
   package.finish();
+}
+
+}  // namespace
+
+std::optional<mesh::Topology> encode_3mf(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
+  if (content.labels != nullptr) {
+    encode_labels(*content.labels, content, context, sink);
+    return std::nullopt;
+  }
+  const mesh::Mesh& mesh = content.mesh;
+  const mesh::Topology topology = measure_topology(mesh, {context.stop, nullptr});
+  Package package(sink, {mesh.triangles.size(), mesh.positions.size()}, content.space);
+  package.begin_model("surface", content.provenance);
+  if (mesh.triangles.size() > 0) {
+    constexpr std::array<double, 3> kNeutral = {0.9, 0.9, 0.9};
+    package.begin_materials();
+    package.add_material("neutral", kNeutral);
+    package.end_materials();
+    package.add_object({.name = "surface", .part_number = {}, .is_solid = is_solid(topology)}, mesh,
+                       context);
+  }
+  package.finish();
+  return topology;
 }
 
 }  // namespace isomesh::codec

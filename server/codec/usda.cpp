@@ -10,8 +10,9 @@
 #include "base/text.h"
 #include "proto/parameters.h"
 #include "server/codec/block_writer.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/encode.h"
 #include "server/codec/faces.h"
+#include "server/codec/label_titles.h"
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
 #include "server/mesh/measure/normals.h"
@@ -79,8 +80,8 @@ struct MeshPrim {
 
 class Stage {
  public:
-  Stage(MeshFormat format, const Provenance& provenance, const Sink& sink)
-      : format_(format), has_normals_(provenance.parameters.normals), sink_(sink) {
+  Stage(const Provenance& provenance, const Sink& sink)
+      : has_normals_(provenance.parameters.normals), sink_(sink) {
     write("#usda 1.0\n(\n    customLayerData = {\n        string \"isomesh:provenance\" = " +
           usd_string(provenance_text(provenance)) +
           "\n    }\n    defaultPrim = \"isomesh\"\n    metersPerUnit = " +
@@ -90,7 +91,7 @@ class Stage {
   }
 
   void add(const MeshPrim& object, const mesh::Mesh& mesh, const mesh::Context& context) {
-    check_signed_indices(mesh.positions.size(), mesh.triangles.size(), format_);
+    check_signed_indices(mesh.positions.size(), mesh.triangles.size(), MeshFormat::kUsda);
     mesh::Buffer<mesh::Vec3> normals;
     if (has_normals_) vertex_normals(mesh, {context.stop, nullptr}, normals);
     std::array<float, 3> linear;
@@ -175,37 +176,21 @@ class Stage {
     write("]\n");
   }
 
-  const MeshFormat format_;
   const bool has_normals_;
   const Sink& sink_;
 };
 
-}  // namespace
-
-void encode_usda(const mesh::Mesh& mesh, const Provenance& provenance, MeshFormat format,
-                 const mesh::Context& context, const Sink& sink) {
-  context.throw_if_stopped();
-  Stage stage(format, provenance, sink);
-  constexpr std::array<double, 3> kNeutral = {0.863, 0.839, 0.784};
-  if (mesh.triangles.size() > 0) stage.add({"surface", "", kNeutral}, mesh, context);
-  stage.finish();
-}
-
-void encode_labels_usda(const LabelledSurface& surface, const Provenance& provenance,
-                        MeshFormat format, const mesh::Context& context, const Sink& sink) {
-  context.throw_if_stopped();
+void add_labels(const LabelledSurface& surface, bool has_normals, const mesh::Context& context,
+                Stage& stage) {
   const mesh::Context quiet = {context.stop, nullptr};
   const std::size_t labels = surface.labels.size();
-  Stage stage(format, provenance, sink);
   std::set<std::string> prims;
   mesh::Mesh mesh;
   for (std::size_t n = 1; n <= labels; ++n) {
     const LabelSummary& label = surface.labels[n - 1];
     if (!surface.triangles.of(n).empty()) {
       extract_label(surface.walls, surface.triangles, n, mesh);
-      if (provenance.parameters.normals) {
-        shade_label(surface.walls, surface.triangles, n, quiet, mesh);
-      }
+      if (has_normals) shade_label(surface.walls, surface.triangles, n, quiet, mesh);
       const std::string metadata =
           "        customData = {\n            int64 label = " + std::to_string(label.label) +
           "\n        }\n        displayName = " + usd_string(title_of(label)) + '\n';
@@ -213,7 +198,22 @@ void encode_labels_usda(const LabelledSurface& surface, const Provenance& proven
     }
     if (context.progress) context.progress(static_cast<double>(n) / static_cast<double>(labels));
   }
+}
+
+}  // namespace
+
+std::optional<mesh::Topology> encode_usda(const FileContent& content, const mesh::Context& context,
+                                          const Sink& sink) {
+  context.throw_if_stopped();
+  Stage stage(content.provenance, sink);
+  if (content.labels != nullptr) {
+    add_labels(*content.labels, content.provenance.parameters.normals, context, stage);
+  } else if (content.mesh.triangles.size() > 0) {
+    constexpr std::array<double, 3> kNeutral = {0.863, 0.839, 0.784};
+    stage.add({"surface", "", kNeutral}, content.mesh, context);
+  }
   stage.finish();
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

@@ -1,12 +1,11 @@
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <string>
 #include <string_view>
 
 #include <zlib.h>
 
-#include "server/codec/encode_labels.h"
+#include "server/codec/encode.h"
 
 namespace isomesh::codec {
 namespace {
@@ -73,13 +72,14 @@ std::string directory_of(const File& file) {
   return entry.bytes() + end.bytes();
 }
 
-using Encode = std::function<void(const mesh::Context&, const Sink&)>;
+}  // namespace
 
-void write_package(const Encode& encode, const mesh::Context& context, const Sink& sink) {
+std::optional<mesh::Topology> encode_usdz(const FileContent& content, const mesh::Context& context,
+                                          const Sink& sink) {
   constexpr std::uint64_t kForTheRest = 1024;
   constexpr std::uint64_t kMostBytes = std::numeric_limits<std::uint32_t>::max() - kForTheRest;
   File file;
-  encode(context.part(0, 0.5), [&](std::span<const std::byte> piece) {
+  encode_usda(content, context.part(0, 0.5), [&](std::span<const std::byte> piece) {
     file.checksum = static_cast<std::uint32_t>(
         crc32_z(file.checksum, reinterpret_cast<const Bytef*>(piece.data()), piece.size()));
     file.bytes += piece.size();
@@ -89,26 +89,9 @@ void write_package(const Encode& encode, const mesh::Context& context, const Sin
                 "simplify it.");
   });
   put_text(sink, header_of(file));
-  encode(context.part(0.5, 1), sink);
+  encode_usda(content, context.part(0.5, 1), sink);
   put_text(sink, directory_of(file));
-}
-
-}  // namespace
-
-void encode_usdz(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-                 const Sink& sink) {
-  write_package([&](const mesh::Context& part,
-                    const Sink& to) { encode_usda(mesh, provenance, MeshFormat::kUsdz, part, to); },
-                context, sink);
-}
-
-void encode_labels_usdz(const LabelledSurface& surface, const Provenance& provenance,
-                        const mesh::Context& context, const Sink& sink) {
-  write_package(
-      [&](const mesh::Context& part, const Sink& to) {
-        encode_labels_usda(surface, provenance, MeshFormat::kUsdz, part, to);
-      },
-      context, sink);
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

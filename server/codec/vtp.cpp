@@ -6,7 +6,6 @@
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
-#include "server/codec/encode_labels.h"
 #include "server/codec/faces.h"
 #include "server/codec/provenance_json.h"
 #include "server/codec/space.h"
@@ -40,10 +39,13 @@ class Appended {
   std::uint64_t offset_ = 0;
 };
 
-void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const char* label_type,
-                const Provenance& provenance, const mesh::Context& context, const Sink& sink) {
+}  // namespace
+
+std::optional<mesh::Topology> encode_vtp(const FileContent& content, const mesh::Context& context,
+                                         const Sink& sink) {
   context.throw_if_stopped();
-  const Space space = space_of(MeshFormat::kVtp, provenance.parameters);
+  const mesh::Mesh& mesh = content.mesh;
+  const std::vector<FaceRun> runs = faces_of(content);
   const std::size_t vertices = mesh.positions.size();
   const std::size_t faces = count_of(runs);
   check_signed_indices(vertices, faces, MeshFormat::kVtp);
@@ -55,8 +57,8 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n" +
-      text_array("SPACE", letters_of(space)) +  // read by 3D Slicer
-      text_array("isomesh:provenance", provenance_text(provenance)) +
+      text_array("SPACE", letters_of(content.space)) +  // read by 3D Slicer
+      text_array("isomesh:provenance", provenance_text(content.provenance)) +
       "</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(vertices) +
       "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
       std::to_string(faces) + "\">\n";
@@ -66,24 +68,25 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   header += appended.element("Int32", "connectivity", "", corner_bytes);
   header += appended.element("Int32", "offsets", "", face_bytes);
   header += "</Polys>\n";
-  if (label_type != nullptr) {
+  if (content.labels != nullptr) {
+    const char* const type = has_wide_labels(*content.labels) ? "UInt32" : "Int32";
     header += "<CellData Scalars=\"label\">\n";
-    header += appended.element(label_type, "label", "", face_bytes);
+    header += appended.element(type, "label", "", face_bytes);
     header += "</CellData>\n";
   }
   put_text(sink, header + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
 
   const auto begin_array = [&](std::uint64_t bytes) { sink(std::as_bytes(std::span(&bytes, 1))); };
-  BlockWriter writer(context, sink, vertices + faces * (label_type == nullptr ? 2 : 3));
+  BlockWriter writer(context, sink, vertices + faces * (content.labels == nullptr ? 2 : 3));
   begin_array(point_bytes);
   writer.write(vertices, sizeof(mesh::Vec3), [&](std::size_t v, std::byte* out) {
-    const mesh::Vec3 position = in_space(mesh.positions[v], space);
+    const mesh::Vec3 position = in_space(mesh.positions[v], content.space);
     std::memcpy(out, &position, sizeof position);
     return out + sizeof position;
   });
   begin_array(corner_bytes);
   for (const FaceRun& run : runs) {
-    writer.write(run.count, sizeof(mesh::Triangle), [&](std::size_t t, std::byte* out) {
+    writer.write(run.count(), sizeof(mesh::Triangle), [&](std::size_t t, std::byte* out) {
       const mesh::Triangle face = run.at(t);
       std::memcpy(out, &face, sizeof face);
       return out + sizeof face;
@@ -97,27 +100,15 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
   writer.write(faces, sizeof(std::uint32_t), [&](std::size_t t, std::byte* out) {
     return write_word(static_cast<std::uint32_t>(3 * (t + 1)), out);  // the end of the face
   });
-  if (label_type != nullptr) {
+  if (content.labels != nullptr) {
     begin_array(face_bytes);
     for (const FaceRun& run : runs) {
-      writer.write(run.count, sizeof run.label,
-                   [&](std::size_t, std::byte* out) { return write_word(run.label, out); });
+      writer.write(run.count(), sizeof run.label(),
+                   [&](std::size_t, std::byte* out) { return write_word(run.label(), out); });
     }
   }
   put_text(sink, "\n</AppendedData>\n</VTKFile>\n");
-}
-
-}  // namespace
-
-void encode_vtp(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-                const Sink& sink) {
-  write_file(mesh, faces_of(mesh), nullptr, provenance, context, sink);
-}
-
-void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
-                       const mesh::Context& context, const Sink& sink) {
-  write_file(surface.walls.mesh, faces_of(surface), has_wide_labels(surface) ? "UInt32" : "Int32",
-             provenance, context, sink);
+  return std::nullopt;
 }
 
 }  // namespace isomesh::codec

@@ -10,7 +10,7 @@
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/label_titles.h"
 #include "server/hospital/objects/encapsulated_document.h"
 #include "server/hospital/objects/uid.h"
 #include "server/jobs/library/label_pages.h"

@@ -16,7 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "server/codec/encode_labels.h"
+#include "server/codec/label_titles.h"
 #include "tests/unit/codec/decode.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/foreign_3mf.h"

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/codec/formats.h"
+#include "server/codec/label_titles.h"
 #include "server/mesh/measure/normals.h"
 #include "tests/unit/codec/label_files.h"
 #include "tests/unit/codec/meshes.h"

@@ -1,22 +1,13 @@
-#include "server/codec/encode_labels.h"
+#include "server/codec/label_titles.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <string>
-#include <string_view>
-#include <vector>
-
-#include "server/codec/block_writer.h"
-#include "server/codec/faces.h"
-#include "server/codec/ply_obj_records.h"
 
 namespace isomesh::codec {
 namespace {
-
-constexpr std::size_t kFaceBytes = kPlyFaceBytes + sizeof(std::uint32_t);
 
 // Consecutive labels are a golden section of the hue circle apart.
 std::array<double, 3> series_color(std::int64_t label) {
@@ -78,47 +69,6 @@ std::string mtl_material(const std::string& group, const LabelSummary& label) {
 
 double linear_of(double srgb) {
   return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
-}
-
-void encode_labels_ply(const LabelledSurface& surface, const Frame& frame,
-                       const mesh::Context& context, const Sink& sink) {
-  context.throw_if_stopped();
-  const mesh::Mesh& mesh = surface.walls.mesh;
-  const std::vector<FaceRun> runs = faces_of(surface);
-  const std::size_t faces = count_of(runs);
-  put_text(sink,
-           ply_header(frame, mesh.positions.size(), faces,
-                      has_wide_labels(surface) ? "property uint label\n" : "property int label\n"));
-  BlockWriter writer(context, sink, mesh.positions.size() + faces);
-  writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_ply_vertex(in_space(mesh.positions[v], frame.space), out);
-  });
-  for (const FaceRun& run : runs) {
-    writer.write(run.count, kFaceBytes, [&](std::size_t t, std::byte* out) {
-      out = write_ply_face(run.at(t), out);
-      std::memcpy(out, &run.label, sizeof run.label);
-      return out + sizeof run.label;
-    });
-  }
-}
-
-void encode_labels_obj(const LabelledSurface& surface, const Frame& frame,
-                       const mesh::Context& context, const Sink& sink) {
-  context.throw_if_stopped();
-  const mesh::Mesh& mesh = surface.walls.mesh;
-  put_text(sink, obj_header(frame));
-  const std::vector<FaceRun> runs = faces_of(surface);
-  BlockWriter writer(context, sink, mesh.positions.size() + count_of(runs));
-  writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(in_space(mesh.positions[v], frame.space), out);
-  });
-  ObjGroups groups;
-  for (std::size_t n = 0; n < runs.size(); ++n) {
-    const std::string group = groups.of(surface.labels[n]);
-    put_text(sink, "g " + group + "\nusemtl " + group + '\n');
-    writer.write(runs[n].count, kMostObjFaceBytes,
-                 [&](std::size_t t, std::byte* out) { return write_obj_face(runs[n].at(t), out); });
-  }
 }
 
 }  // namespace isomesh::codec
