@@ -11,18 +11,14 @@ if TYPE_CHECKING:
     from typing_extensions import NotRequired
 
 
+#: The type of one sample.
 SampleType = Literal['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'float32', 'float64']
-
-
+#: The format and suffix of a mesh file. STL, PLY and VTK are binary. vtk is VTK's legacy
+#: format, vtp its XML format, gii GIFTI, usda USD's text, and usdz that text in a package. zip
+#: is for labels. It holds one file per label in each other requested format except glb, 3mf,
+#: usda and usdz. If there is none, the files are STL.
 MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', 'usda', 'usdz', 'off', 'vtk', 'vtp', 'gii', 'zip']
-
-
-MeshBytes = str
-
-
 JobState = Literal['queued', 'running', 'succeeded', 'failed', 'cancelled']
-
-
 Vector = Union['Sequence[float]']
 
 
@@ -39,7 +35,6 @@ class Volume(TypedDict):
     format: VolumeFormat
     #: The number of samples along x, y and z.
     dims: Sequence[int]
-    #: The type of one sample.
     type: SampleType
     #: Millimetres between samples along each axis. Along z it is the distance from slice to slice,
     #: even if a tilted gantry shears the slices.
@@ -68,8 +63,6 @@ class Volume(TypedDict):
     #: those of the first upload. A GLB repeats the notes on samples and geometry in
     #: asset.extras.notes. A job does not reuse a mesh that was made with other notes.
     notes: Sequence[Note]
-    #: The patient and the origin of a volume from DICOM. Only the uploader sees it, and lists of
-    #: volumes leave it out. A text is empty if DICOM does not give it.
     dicom: NotRequired[DicomIdentity]
 
 
@@ -84,23 +77,17 @@ class UploadedVolumesVolumes(TypedDict):
     problem: Optional[Problem]
 
 
-class UploadedVolumes(TypedDict):
-    volumes: Sequence[UploadedVolumesVolumes]
-
-
 class Note(TypedDict):
-    #: A stable name, for programs.
     code: NoteCode
     #: What the note means for this volume, for people.
     detail: str
 
 
+#: The format of an upload.
 VolumeFormat = Literal['nifti', 'nrrd', 'metaimage', 'vti', 'vtk', 'mgh', 'afni', 'par', 'isq', 'mrc', 'cube', 'numpy', 'hdf5', 'tiff', 'png', 'bmp', 'dicom', 'raw']
-
-
+#: A stable name, for programs.
 NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'unit-angstrom', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'contours-skipped', 'contours-interpolated', 'fractional-segments']
-
-
+#: A reason to reject a volume, unless the query accepts it.
 AcceptableNote = Literal['space-assumed', 'frame-of-reference']
 
 
@@ -151,7 +138,6 @@ class DicomIdentity(TypedDict):
     deidentification_method: str
     acquisition_datetime: str
     position_reference_indicator: str
-    #: The device that made the images.
     equipment: DicomIdentityEquipment
     #: The coded meanings of the segments. Left out if there are none.
     segments: NotRequired[Sequence[DicomSegment]]
@@ -160,11 +146,8 @@ class DicomIdentity(TypedDict):
 class DicomSegment(TypedDict):
     #: The label of the segment in the volume.
     label: int
-    #: An entry of a coding scheme. Its texts are empty if nothing was coded.
     category: DicomCode
-    #: An entry of a coding scheme. Its texts are empty if nothing was coded.
     type: DicomCode
-    #: An entry of a coding scheme. Its texts are empty if nothing was coded.
     region: DicomCode
 
 
@@ -179,21 +162,6 @@ class DicomCode(TypedDict):
 class DicomInstance(TypedDict):
     sop_class_uid: str
     sop_instance_uid: str
-
-
-class Version(TypedDict):
-    version: str
-    #: Whether a PACS is configured, so that orders are accepted.
-    orders: bool
-    #: The version of the mesher. As long as it stays the same, the same volume and parameters give
-    #: the same bytes.
-    mesher: str
-
-
-class VolumeList(TypedDict):
-    volumes: Sequence[Volume]
-    #: The cursor of the next page. Null on the last page.
-    next: Optional[str]
 
 
 class Histogram(TypedDict):
@@ -252,11 +220,6 @@ class Estimate(TypedDict):
     volume: str
     #: Otsu's threshold if it was requested. Left out for a job by labels.
     iso: NotRequired[float]
-    #: Number of tetrahedra per cell, or lattice. 6 is Kuhn's split of the primitive cubic lattice.
-    #: 5 is the subdivision of the face-centred cubic lattice: every second cell is mirrored; the
-    #: cell (0,0,0) is not. The names kuhn and fcc mean 6 and 5. bcc is the body-centred cubic
-    #: lattice, which has a sample in the centre of each cell, too, the mean of its corners: 1.4
-    #: times as many triangles as 6, with larger angles. It is not for labels.
     scheme: Scheme
     #: The exact number for the extracted surface, before components and fill_cavities remove
     #: anything and before simplification.
@@ -274,7 +237,6 @@ class Estimate(TypedDict):
     fits: bool
     #: The time of the run, without the queue.
     milliseconds: float
-    #: The current number of jobs that the client can see.
     queue: EstimateQueue
     #: For a job by labels: the exact number of triangles of each label's surface. Left out if
     #: there are more than 256 labels.
@@ -294,98 +256,47 @@ class Callback(TypedDict):
 
 
 Iso = Union["Union[float, Literal['otsu']]"]
-
-
 Labels = Union["Union[Literal['all'], Sequence[int]]"]
-
-
 Background = int
-
-
 LabelNames = Union['Union[Mapping[int, str], Mapping[str, str]]']
-
-
 LabelColors = Union['Union[Mapping[int, str], Mapping[str, str]]']
-
-
 LabelValues = Union['Union[Mapping[int, Sequence[int]], Mapping[str, Sequence[int]]]']
-
-
 Scheme = Literal[5, 6, 'fcc', 'kuhn', 'bcc']
-
-
 Interpolation = Literal['linear', 'midpoint']
-
-
 Regularize = bool
-
-
 Passes = int
-
-
 Smoothing = Literal['laplacian', 'taubin', 'angle', 'optimize', 'labels']
-
-
 Lambda = Union['Optional[float]']
-
-
 PassBand = float
-
-
 MaxDisplacement = Union['Optional[float]']
-
-
 Close = bool
-
-
+#: Keep the N largest connected components.
 Keep = Union['Optional[int]']
-
-
+#: Drop connected components with fewer triangles than this.
 MinTriangles = Union['Optional[int]']
-
-
+#: Keep the connected component nearest to each of these points. A point is x, y and z in
+#: millimetres (LPS). A query lists the numbers of all points in one row. The nearest component
+#: is the one with the nearest vertex.
 NearestTo = Union['Sequence[Sequence[float]]']
-
-
 FillCavities = bool
-
-
 Crop = Union['Optional[Sequence[Sequence[float]]]']
-
-
 MaxError = Union['Optional[float]']
-
-
 Triangles = Union['Optional[int]']
-
-
+#: Number of bits that Draco keeps per coordinate. The grid spans the mesh's longest side.
 PositionBits = int
-
-
+#: Draco's encoding speed; low values make smaller files and take longer. 0 to 4 use valence
+#: coding by libdraco: the smallest files, slow. 5 to 9 are all the same: isomesh's own
+#: encoder, which uses several threads and takes no more bytes than libdraco at 5. 10 uses
+#: sequential coding by libdraco: the order of vertices and triangles is kept, at several times
+#: the bytes.
 Speed = int
-
-
 Normals = bool
-
-
 Distances = bool
-
-
 Lods = Union['Sequence[float]']
-
-
 Merge = bool
-
-
 GlbCodec = Literal['draco', 'meshopt']
-
-
 Space = Literal['lps', 'ras']
-
-
 Priority = Literal['stat', 'routine', 'bulk']
-
-
 Certify = bool
 
 
@@ -395,589 +306,52 @@ class JobParametersComponents(TypedDict):
     the rest. Components are ranked by their number of triangles, equal ones by their first
     vertex. Without members all are kept. Labels do not allow it."""
 
-    #: Keep the N largest connected components.
     keep: NotRequired[Keep]
-    #: Drop connected components with fewer triangles than this.
     min_triangles: NotRequired[MinTriangles]
-    #: Keep the connected component nearest to each of these points. A point is x, y and z in
-    #: millimetres (LPS). A query lists the numbers of all points in one row. The nearest component
-    #: is the one with the nearest vertex.
     nearest_to: NotRequired[NearestTo]
 
 
 class JobParametersDraco(TypedDict):
     """Options of the drc format, and of the Draco streams in glb."""
 
-    #: Number of bits that Draco keeps per coordinate. The grid spans the mesh's longest side.
     position_bits: NotRequired[PositionBits]
-    #: Draco's encoding speed; low values make smaller files and take longer. 0 to 4 use valence
-    #: coding by libdraco: the smallest files, slow. 5 to 9 are all the same: isomesh's own
-    #: encoder, which uses several threads and takes no more bytes than libdraco at 5. 10 uses
-    #: sequential coding by libdraco: the order of vertices and triangles is kept, at several times
-    #: the bytes.
     speed: NotRequired[Speed]
 
 
-JobParameters = TypedDict(
-    'JobParameters',
-    {
-        'volume': 'NotRequired[str]',
-        'iso': 'NotRequired[Iso]',
-        'labels': 'NotRequired[Labels]',
-        'background': 'NotRequired[Background]',
-        'label_names': 'NotRequired[LabelNames]',
-        'label_colors': 'NotRequired[LabelColors]',
-        'label_values': 'NotRequired[LabelValues]',
-        'scheme': 'NotRequired[Scheme]',
-        'interpolation': 'NotRequired[Interpolation]',
-        'regularize': 'NotRequired[Regularize]',
-        'passes': 'NotRequired[Passes]',
-        'smoothing': 'NotRequired[Smoothing]',
-        'lambda': 'NotRequired[Lambda]',
-        'pass_band': 'NotRequired[PassBand]',
-        'max_displacement_mm': 'NotRequired[MaxDisplacement]',
-        'close': 'NotRequired[Close]',
-        'components': 'NotRequired[JobParametersComponents]',
-        'fill_cavities': 'NotRequired[FillCavities]',
-        'crop': 'NotRequired[Crop]',
-        'max_error_mm': 'NotRequired[MaxError]',
-        'triangles': 'NotRequired[Triangles]',
-        'formats': 'NotRequired[Sequence[MeshFormat]]',
-        'draco': 'NotRequired[JobParametersDraco]',
-        'normals': 'NotRequired[Normals]',
-        'distances': 'NotRequired[Distances]',
-        'lods': 'NotRequired[Lods]',
-        'merge': 'NotRequired[Merge]',
-        'glb_codec': 'NotRequired[GlbCodec]',
-        'space': 'NotRequired[Space]',
-        'priority': 'NotRequired[Priority]',
-        'certify': 'NotRequired[Certify]',
-        'callback': 'NotRequired[Callback]',
-    },
-)
-
-
-CompleteJobParameters = Union['JobParameters']
-
-
-class Job(TypedDict):
-    """A job and, if it succeeded, its mesh. label_names, label_colors and label_values are
-    empty here if they have more than 256 entries."""
-
-    #: A UUID. Newer jobs have greater ids.
-    id: str
-    state: JobState
-    #: The current stage of a job, or its last one.
-    stage: Stage
-    #: The progress of the whole job.
-    progress: float
-    #: The parameters of a job, with the defaults of those that the request left out. A parameter
-    #: that is not required here may be absent. It then has its default, or does not apply to the
-    #: job.
-    parameters: CompleteJobParameters
-    #: The volume's id, as in the parameters.
-    volume: str
-    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
-    #: jobs are expected to take, and each owner's jobs start by age.
+class _Parameters(TypedDict, total=False):
+    iso: Iso
+    labels: Labels
+    background: Background
+    label_names: LabelNames
+    label_colors: LabelColors
+    label_values: LabelValues
+    scheme: Scheme
+    interpolation: Interpolation
+    regularize: Regularize
+    passes: Passes
+    smoothing: Smoothing
+    pass_band: PassBand
+    max_displacement_mm: MaxDisplacement
+    close: Close
+    components: JobParametersComponents
+    fill_cavities: FillCavities
+    crop: Crop
+    max_error_mm: MaxError
+    triangles: Triangles
+    formats: Sequence[MeshFormat]
+    draco: JobParametersDraco
+    normals: Normals
+    distances: Distances
+    lods: Lods
+    merge: Merge
+    glb_codec: GlbCodec
+    space: Space
     priority: Priority
-    created: str
-    #: Null while the job is queued.
-    started: Optional[str]
-    #: Null until the job ends.
-    finished: Optional[str]
-    #: The milliseconds of each stage. 0 for a stage that has not ended.
-    timing: Timing
-    #: Null unless the job has succeeded.
-    mesh: Optional[MeshSummary]
-    #: Null unless the job has failed.
-    error: Optional[Problem]
-    #: Whether the job used the mesh of an earlier job with the same volume and parameters.
-    #: Priority and callback may differ.
-    reused: bool
-    #: What a queued job waits for, other than a worker. disk means that it runs when there is
-    #: space for its files. Otherwise null.
-    waiting_for: Optional[Literal['disk']]
+    certify: Certify
+    callback: Callback
 
 
-class JobEvent(TypedDict):
-    """The progress of a job."""
-
-    state: JobState
-    #: The current stage of a job, or its last one.
-    stage: Stage
-    progress: float
-
-
-class AnyJobEvent(TypedDict):
-    """The progress of one of all jobs."""
-
-    #: The id of the job.
-    id: str
-    state: JobState
-    #: The current stage of a job, or its last one.
-    stage: Stage
-    progress: float
-
-
-class JobList(TypedDict):
-    jobs: Sequence[Job]
-    #: The cursor of the next page. Null on the last page.
-    next: Optional[str]
-
-
-Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
-
-
-class Timing(TypedDict):
-    """The milliseconds of each stage. 0 for a stage that has not ended."""
-
-    #: From acceptance to start.
-    queue: float
-    #: Loading the samples into memory.
-    load: float
-    #: Marching tetrahedra.
-    extract: float
-    #: All smoothing passes.
-    smooth: float
-    #: Simplification, if fewer triangles are requested.
-    simplify: float
-    #: Writing the files and measuring the mesh.
-    encode: float
-    #: Measuring the error, if requested.
-    certify: float
-    #: From acceptance to end.
-    total: float
-
-
-class MeshSummaryDropped(TypedDict):
-    """What components and fill_cavities removed."""
-
-    components: int
-    triangles: int
-
-
-class MeshSummarySimplified(TypedDict):
-    """Only for a job with max_error_mm or triangles."""
-
-    triangles_before: int
-    #: What stopped the simplification: the error, the number of triangles, or, if there are more
-    #: than triangles, the topology. Fewer would open or fold the surface, or change its boundary,
-    #: junction curves or handles: a closed connected component has at least 4 triangles.
-    bound_by: Literal['error', 'triangles', 'topology']
-
-
-class MeshSummaryVolumeMm3(TypedDict):
-    """The volume that the surface encloses, before and after smoothing and simplification. An
-    open surface encloses nothing. It is then closed by a cone to the first sample, so the
-    number depends on that point and may be negative. See quality.encloses_volume and the
-    parameter close."""
-
-    extracted: float
-    smoothed: float
-
-
-class MeshSummaryDisplacementMm(TypedDict):
-    """How far smoothing moved the vertices from their extracted positions."""
-
-    mean: float
-    max: float
-
-
-class MeshSummary(TypedDict):
-    """The numbers of the mesh, after smoothing unless stated otherwise. For a job by labels:
-    triangles, vertices and areas count each wall between labels once. Volumes are what all
-    labels enclose together. Connected components, edges and quality cover the surfaces of all
-    labels."""
-
-    #: The iso-value that was used, also for Otsu's. Left out for a job by labels.
-    iso: NotRequired[float]
-    #: There is no surface: the iso-value is outside the samples' range, or no connected component
-    #: remained. The files have no triangles.
-    empty: bool
-    triangles: int
-    vertices: int
-    #: Edges that belong to one triangle only. They lie on the volume's border. A surface made with
-    #: close has none.
-    boundary_edges: int
-    #: The number of connected components.
-    components: int
-    #: Vertices - edges + triangles.
-    euler: int
-    #: What components and fill_cavities removed.
-    dropped: MeshSummaryDropped
-    #: Only for a job with max_error_mm or triangles.
-    simplified: NotRequired[MeshSummarySimplified]
-    #: The quality of the mesh. Each job measures all values on the mesh itself.
-    quality: MeshQuality
-    area_mm2: float
-    #: Before smoothing.
-    area_extracted_mm2: float
-    #: The volume that the surface encloses, before and after smoothing and simplification. An open
-    #: surface encloses nothing. It is then closed by a cone to the first sample, so the number
-    #: depends on that point and may be negative. See quality.encloses_volume and the parameter
-    #: close.
-    volume_mm3: MeshSummaryVolumeMm3
-    #: How far smoothing moved the vertices from their extracted positions.
-    displacement_mm: MeshSummaryDisplacementMm
-    #: The smallest and the largest corner. Zero for an empty mesh.
-    bounds: Sequence[Vector]
-    #: One entry for each requested format. For a job by labels: the formats that hold all labels,
-    #: and a zip of the others.
-    files: Mapping[str, MeshFile]
-    #: For a job by labels, in ascending order. Lists of jobs leave it out. A job with more than
-    #: 256 labels has labels_count instead.
-    labels: NotRequired[Sequence[LabelSummary]]
-    #: The number of labels, only if there are more than 256. /v1/jobs/{id}/labels lists them.
-    labels_count: NotRequired[int]
-    #: The distance between the files and the extracted surface, before smoothing. Only for a job
-    #: with certify. The bytes of drc and glb, which round coordinates, are decoded by an
-    #: independent reader. All other formats hold the mesh exactly, so the mesh is measured once
-    #: for all of them. The distance is measured at all vertices and at the centres of all
-    #: triangles. It is the exact distance from each point to the triangles of the other surface.
-    #: Distances are stored in single precision.
-    certificate: NotRequired[MeshCertificate]
-
-
-class MeshCertificateBudgetMm(TypedDict):
-    """How max_error_mm was divided among three causes."""
-
-    #: The largest movement of a vertex by smoothing.
-    smoothing: float
-    #: The remaining error.
-    simplification: float
-    #: The largest movement of a point by rounding the coordinates in a file.
-    quantisation: float
-
-
-class MeshCertificate(TypedDict):
-    """The distance between the files and the extracted surface, before smoothing. Only for a
-    job with certify. The bytes of drc and glb, which round coordinates, are decoded by an
-    independent reader. All other formats hold the mesh exactly, so the mesh is measured once
-    for all of them. The distance is measured at all vertices and at the centres of all
-    triangles. It is the exact distance from each point to the triangles of the other surface.
-    Distances are stored in single precision."""
-
-    #: The file with the largest distance. The distances are those of this file. Of several files
-    #: that hold the mesh exactly, the first.
-    file: MeshFormat
-    #: Whether bound_mm was proven for every point. If not, why_unproven says why, and other points
-    #: can be farther than found_mm.
-    proven: bool
-    #: No point of any file is farther from the extracted surface, and no point of the extracted
-    #: surface is farther from any file. At most max_error_mm. Only if it was proven.
-    bound_mm: NotRequired[float]
-    #: Why the distance was measured and not proven.
-    why_unproven: NotRequired[str]
-    #: The largest distance that was found, in both directions.
-    found_mm: float
-    #: From the file to the extracted surface. Shows what was added.
-    from_mesh: DistanceSummary
-    #: From the extracted surface to the file. Shows what was removed.
-    from_extracted: DistanceSummary
-    #: How max_error_mm was divided among three causes.
-    budget_mm: NotRequired[MeshCertificateBudgetMm]
-
-
-class DistanceSummary(TypedDict):
-    points: int
-    max_mm: float
-    mean_mm: float
-    rms_mm: float
-    #: 99 % of the points are at most this far.
-    p99_mm: float
-    #: The number of points in equal bins from 0 to max_mm.
-    histogram: Sequence[int]
-
-
-class LabelSummaryList(TypedDict):
-    labels: Sequence[LabelSummary]
-    #: The cursor of the next page. Null on the last page.
-    next: Optional[str]
-
-
-class LabelSummary(TypedDict):
-    """The samples and the smoothed surface of one label. A wall between two labels is part of
-    both."""
-
-    label: int
-    name: Optional[str]
-    color: Optional[str]
-    voxels: int
-    #: The volume of these voxels.
-    voxels_mm3: float
-    triangles: int
-    vertices: int
-    closed: bool
-    manifold: bool
-    oriented: bool
-    components: int
-    area_mm2: float
-    #: The volume that the surface encloses.
-    volume_mm3: float
-    #: The label's files in the ZIP, one for each format.
-    files: Mapping[str, LabelFile]
-
-
-class LabelFile(TypedDict):
-    bytes: int
-    sha256: str
-    #: The offset of its first byte in the ZIP.
-    offset: int
-    #: The address to download it from.
-    href: str
-
-
-class MeshQualitySelfIntersections(TypedDict):
-    """Pairs of triangles that intersect at more than their shared corners and edges, computed
-    exactly. Only for a job with certify."""
-
-    pairs: int
-    #: Triangles that intersect another one.
-    triangles: int
-    #: The places of the first pairs, in LPS millimetres.
-    places: Sequence[Vector]
-
-
-class MeshQuality(TypedDict):
-    """The quality of the mesh. Each job measures all values on the mesh itself."""
-
-    #: No edge belongs to one triangle only.
-    closed: bool
-    #: At most two triangles share an edge, and the triangles around each vertex are one fan, open
-    #: or closed.
-    manifold: bool
-    #: Triangles that share an edge use it in opposite directions.
-    oriented: bool
-    #: The number of connected components.
-    components: int
-    #: The sum of the handles of all connected components. Null if the mesh is open or not a
-    #: manifold.
-    genus: Optional[int]
-    #: For each triangle: twice the radius of the inscribed circle divided by the radius of the
-    #: circumscribed circle. 1 is equilateral, 0 is flat. The bins are 0.05 wide.
-    aspect_ratio: QualityStages
-    #: The smallest angle of each triangle, at most 60 degrees. The bins are 3 degrees wide.
-    smallest_angle_deg: QualityStages
-    #: Whether the surface is closed and oriented, so that the volumes are those that it encloses.
-    #: Otherwise they depend on the point of reference.
-    encloses_volume: bool
-    #: Pairs of triangles that intersect at more than their shared corners and edges, computed
-    #: exactly. Only for a job with certify.
-    self_intersections: NotRequired[MeshQualitySelfIntersections]
-
-
-class QualityStages(TypedDict):
-    """Before and after smoothing."""
-
-    #: Over all triangles. If there are more than 1 048 576, over about half a million that are
-    #: spread over the mesh; the sum of the histogram is their number. 0 if there are none.
-    extracted: Distribution
-    #: Over all triangles. If there are more than 1 048 576, over about half a million that are
-    #: spread over the mesh; the sum of the histogram is their number. 0 if there are none.
-    smoothed: Distribution
-
-
-class Distribution(TypedDict):
-    """Over all triangles. If there are more than 1 048 576, over about half a million that are
-    spread over the mesh; the sum of the histogram is their number. 0 if there are none."""
-
-    mean: float
-    min: float
-    #: The number of measured triangles in equal bins from 0. The last bin includes its end.
-    histogram: Sequence[int]
-
-
-class MeshFile(TypedDict):
-    bytes: int
-    sha256: str
-    #: The address to download it from.
-    href: str
-
-
-OrderState = Literal['waiting', 'fetching', 'meshing', 'sending', 'succeeded', 'failed', 'cancelled']
-
-
-class SendTarget(TypedDict):
-    pacs: str
-    #: stl makes one Encapsulated STL object, or one for each label. obj makes one Encapsulated OBJ
-    #: object of all labels. With labels, an Encapsulated MTL object of their colours comes before
-    #: it.
-    format: NotRequired[Literal['stl', 'obj']]
-
-
-class OrderRequestSource(TypedDict):
-    #: The name of a configured PACS.
-    pacs: str
-    #: Its Study Instance UID.
-    study: str
-    #: Its Series Instance UID.
-    series: str
-
-
-class OrderRequestCallback(TypedDict):
-    """As for a job. The request holds id, state, rule, job, created, finished and the type of
-    an error. It holds no patient data."""
-
-    url: str
-
-
-class OrderRequest(TypedDict):
-    source: OrderRequestSource
-    #: The name of a configured rule. It supplies what is left out here.
-    rule: NotRequired[str]
-    #: As in POST /v1/jobs, without volume, priority and callback. The default of formats is [stl].
-    #: These members take precedence over those of a rule.
-    parameters: NotRequired[Mapping[str, Any]]
-    #: The destinations of the mesh. May be empty.
-    send: NotRequired[Sequence[SendTarget]]
-    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
-    #: jobs are expected to take, and each owner's jobs start by age.
-    priority: NotRequired[Priority]
-    #: As for a job. The request holds id, state, rule, job, created, finished and the type of an
-    #: error. It holds no patient data.
-    callback: NotRequired[OrderRequestCallback]
-
-
-class OrderResult(TypedDict):
-    """One DICOM object for one PACS."""
-
-    pacs: str
-    format: str
-    #: Only for an order by labels, and an object of one label.
-    label: Optional[int]
-    #: Encapsulated STL, OBJ or MTL Storage.
-    sop_class_uid: str
-    series_uid: str
-    sop_instance_uid: str
-    bytes: int
-    #: Whether the PACS has confirmed the object and finds it.
-    stored: bool
-
-
-class OrderSource(TypedDict):
-    #: A PACS, or dimse:TITLE for objects that were sent to that AE title by C-STORE.
-    pacs: str
-    study: str
-    series: str
-    #: The number of objects of the series, once it is complete.
-    instances: Optional[int]
-
-
-class Order(TypedDict):
-    id: str
-    #: waiting until the series is there and has stopped growing, fetching the series, meshing in a
-    #: job, sending the result. succeeded when all objects are stored and found.
-    state: OrderState
-    rule: Optional[str]
-    source: OrderSource
-    #: As for a job.
-    parameters: Mapping[str, Any]
-    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
-    #: jobs are expected to take, and each owner's jobs start by age.
-    priority: Priority
-    send: Sequence[SendTarget]
-    volume: Optional[str]
-    job: Optional[str]
-    results: Sequence[OrderResult]
-    #: The number of failed attempts.
-    attempts: int
-    #: The time of the next attempt after a failed one.
-    next_attempt: Optional[str]
-    created: str
-    finished: Optional[str]
-    #: The reason why the order, or its last attempt, failed.
-    error: Optional[Problem]
-
-
-class OrderList(TypedDict):
-    orders: Sequence[Order]
-    #: The cursor of the next page. Null on the last page.
-    next: Optional[str]
-
-
-class PacsListPacs(TypedDict):
-    name: str
-    last_success: Optional[str]
-    last_failure: Optional[str]
-    #: The reason of that failure, in one word.
-    reason: Optional[str]
-
-
-class PacsList(TypedDict):
-    pacs: Sequence[PacsListPacs]
-
-
-class ProblemErrors(TypedDict):
-    field: str
-    message: str
-
-
-class ProblemChoices(TypedDict):
-    #: The query parameter to add.
-    parameter: Literal['series', 'member', 'volume', 'spacing']
-    value: str
-    #: A description of the value, for people.
-    title: str
-
-
-class Problem(TypedDict):
-    """Describes what went wrong (RFC 9457)."""
-
-    #: A stable name, for programs.
-    type: Literal['urn:isomesh:problem:invalid-parameter', 'urn:isomesh:problem:digest-mismatch', 'urn:isomesh:problem:unauthorized', 'urn:isomesh:problem:forbidden', 'urn:isomesh:problem:not-found', 'urn:isomesh:problem:method-not-allowed', 'urn:isomesh:problem:not-ready', 'urn:isomesh:problem:gone', 'urn:isomesh:problem:length-required', 'urn:isomesh:problem:too-large', 'urn:isomesh:problem:uri-too-long', 'urn:isomesh:problem:unsupported-media', 'urn:isomesh:problem:range-not-satisfiable', 'urn:isomesh:problem:unusable-volume', 'urn:isomesh:problem:key-reused', 'urn:isomesh:problem:too-many-requests', 'urn:isomesh:problem:internal', 'urn:isomesh:problem:unavailable', 'urn:isomesh:problem:out-of-space', 'urn:isomesh:problem:cancelled', 'urn:isomesh:problem:request-timeout', 'urn:isomesh:problem:precondition-failed', 'urn:isomesh:problem:headers-too-large', 'urn:isomesh:problem:pacs-unreachable', 'urn:isomesh:problem:pacs-refused', 'urn:isomesh:problem:series-incomplete', 'https://iana.org/assignments/http-problem-types#mismatching-upload-offset']
-    #: The type in words.
-    title: str
-    #: The HTTP status.
-    status: int
-    #: What is wrong with this request, for people.
-    detail: str
-    #: The path of the request or of the job.
-    instance: NotRequired[str]
-    #: The parameters or members that are wrong.
-    errors: NotRequired[Sequence[ProblemErrors]]
-    #: If a user may override the rejection: the code to add to the query accept to have the same
-    #: request accepted.
-    overridable: NotRequired[AcceptableNote]
-    #: The possible choices if the request is ambiguous, at most 1000.
-    choices: NotRequired[Sequence[ProblemChoices]]
-
-
-class SucceededJob(TypedDict):
-    """A job that has succeeded: its mesh is never None."""
-
-    #: A UUID. Newer jobs have greater ids.
-    id: str
-    state: Literal['succeeded']
-    #: The current stage of a job, or its last one.
-    stage: Stage
-    #: The progress of the whole job.
-    progress: float
-    #: The parameters of a job, with the defaults of those that the request left out. A parameter
-    #: that is not required here may be absent. It then has its default, or does not apply to the
-    #: job.
-    parameters: CompleteJobParameters
-    #: The volume's id, as in the parameters.
-    volume: str
-    #: Jobs start in order of priority. Within a priority, owners take turns by the time that their
-    #: jobs are expected to take, and each owner's jobs start by age.
-    priority: Priority
-    created: str
-    started: str
-    finished: str
-    #: The milliseconds of each stage. 0 for a stage that has not ended.
-    timing: Timing
-    mesh: MeshSummary
-    #: Null unless the job has failed.
-    error: Optional[Problem]
-    #: Whether the job used the mesh of an earlier job with the same volume and parameters.
-    #: Priority and callback may differ.
-    reused: bool
-    #: What a queued job waits for, other than a worker. disk means that it runs when there is
-    #: space for its files. Otherwise null.
-    waiting_for: Optional[Literal['disk']]
-
-
-class JobOptions(TypedDict, total=False):
+class JobOptions(_Parameters, total=False):
     """The parameters of a job.
 
     Every member is a keyword of Client.mesh, Client.submit and Client.estimate.
@@ -1147,34 +521,347 @@ class JobOptions(TypedDict, total=False):
         a day until it succeeds. It may arrive more than once with the same webhook-id.
     """
 
-    iso: Iso
-    labels: Labels
-    background: Background
-    label_names: LabelNames
-    label_colors: LabelColors
-    label_values: LabelValues
-    scheme: Scheme
-    interpolation: Interpolation
-    regularize: Regularize
-    passes: Passes
-    smoothing: Smoothing
     lambda_: Lambda
-    pass_band: PassBand
-    max_displacement_mm: MaxDisplacement
-    close: Close
-    components: JobParametersComponents
-    fill_cavities: FillCavities
-    crop: Crop
-    max_error_mm: MaxError
-    triangles: Triangles
-    formats: Sequence[MeshFormat]
-    draco: JobParametersDraco
-    normals: Normals
-    distances: Distances
-    lods: Lods
-    merge: Merge
-    glb_codec: GlbCodec
-    space: Space
+
+
+_Others = TypedDict('_Others', {'volume': 'str', 'lambda': 'Lambda'}, total=False)
+
+
+class JobParameters(_Parameters, _Others):
+    """The parameters of a job as JSON; see JobOptions."""
+
+
+#: The parameters of a job, with the defaults of those that the request left out. A parameter
+#: that is not required here may be absent. It then has its default, or does not apply to the
+#: job.
+CompleteJobParameters = Union['JobParameters']
+
+
+class Job(TypedDict):
+    """A job and, if it succeeded, its mesh. label_names, label_colors and label_values are
+    empty here if they have more than 256 entries."""
+
+    #: A UUID. Newer jobs have greater ids.
+    id: str
+    state: JobState
+    stage: Stage
+    #: The progress of the whole job.
+    progress: float
+    parameters: CompleteJobParameters
+    #: The volume's id, as in the parameters.
+    volume: str
     priority: Priority
-    certify: Certify
-    callback: Callback
+    created: str
+    #: Null while the job is queued.
+    started: Optional[str]
+    #: Null until the job ends.
+    finished: Optional[str]
+    timing: Timing
+    #: Null unless the job has succeeded.
+    mesh: Optional[MeshSummary]
+    #: Null unless the job has failed.
+    error: Optional[Problem]
+    #: Whether the job used the mesh of an earlier job with the same volume and parameters.
+    #: Priority and callback may differ.
+    reused: bool
+    #: What a queued job waits for, other than a worker. disk means that it runs when there is
+    #: space for its files. Otherwise null.
+    waiting_for: Optional[Literal['disk']]
+
+
+#: The current stage of a job, or its last one.
+Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
+
+
+class Timing(TypedDict):
+    """The milliseconds of each stage. 0 for a stage that has not ended."""
+
+    #: From acceptance to start.
+    queue: float
+    #: Loading the samples into memory.
+    load: float
+    #: Marching tetrahedra.
+    extract: float
+    #: All smoothing passes.
+    smooth: float
+    #: Simplification, if fewer triangles are requested.
+    simplify: float
+    #: Writing the files and measuring the mesh.
+    encode: float
+    #: Measuring the error, if requested.
+    certify: float
+    #: From acceptance to end.
+    total: float
+
+
+class MeshSummaryDropped(TypedDict):
+    """What components and fill_cavities removed."""
+
+    components: int
+    triangles: int
+
+
+class MeshSummarySimplified(TypedDict):
+    """Only for a job with max_error_mm or triangles."""
+
+    triangles_before: int
+    #: What stopped the simplification: the error, the number of triangles, or, if there are more
+    #: than triangles, the topology. Fewer would open or fold the surface, or change its boundary,
+    #: junction curves or handles: a closed connected component has at least 4 triangles.
+    bound_by: Literal['error', 'triangles', 'topology']
+
+
+class MeshSummaryVolumeMm3(TypedDict):
+    """The volume that the surface encloses, before and after smoothing and simplification. An
+    open surface encloses nothing. It is then closed by a cone to the first sample, so the
+    number depends on that point and may be negative. See quality.encloses_volume and the
+    parameter close."""
+
+    extracted: float
+    smoothed: float
+
+
+class MeshSummaryDisplacementMm(TypedDict):
+    """How far smoothing moved the vertices from their extracted positions."""
+
+    mean: float
+    max: float
+
+
+class MeshSummary(TypedDict):
+    """The numbers of the mesh, after smoothing unless stated otherwise. For a job by labels:
+    triangles, vertices and areas count each wall between labels once. Volumes are what all
+    labels enclose together. Connected components, edges and quality cover the surfaces of all
+    labels."""
+
+    #: The iso-value that was used, also for Otsu's. Left out for a job by labels.
+    iso: NotRequired[float]
+    #: There is no surface: the iso-value is outside the samples' range, or no connected component
+    #: remained. The files have no triangles.
+    empty: bool
+    triangles: int
+    vertices: int
+    #: Edges that belong to one triangle only. They lie on the volume's border. A surface made with
+    #: close has none.
+    boundary_edges: int
+    #: The number of connected components.
+    components: int
+    #: Vertices - edges + triangles.
+    euler: int
+    dropped: MeshSummaryDropped
+    simplified: NotRequired[MeshSummarySimplified]
+    quality: MeshQuality
+    area_mm2: float
+    #: Before smoothing.
+    area_extracted_mm2: float
+    volume_mm3: MeshSummaryVolumeMm3
+    displacement_mm: MeshSummaryDisplacementMm
+    #: The smallest and the largest corner. Zero for an empty mesh.
+    bounds: Sequence[Vector]
+    #: One entry for each requested format. For a job by labels: the formats that hold all labels,
+    #: and a zip of the others.
+    files: Mapping[str, MeshFile]
+    #: For a job by labels, in ascending order. Lists of jobs leave it out. A job with more than
+    #: 256 labels has labels_count instead.
+    labels: NotRequired[Sequence[LabelSummary]]
+    #: The number of labels, only if there are more than 256. /v1/jobs/{id}/labels lists them.
+    labels_count: NotRequired[int]
+    certificate: NotRequired[MeshCertificate]
+
+
+class MeshCertificateBudgetMm(TypedDict):
+    """How max_error_mm was divided among three causes."""
+
+    #: The largest movement of a vertex by smoothing.
+    smoothing: float
+    #: The remaining error.
+    simplification: float
+    #: The largest movement of a point by rounding the coordinates in a file.
+    quantisation: float
+
+
+class MeshCertificate(TypedDict):
+    """The distance between the files and the extracted surface, before smoothing. Only for a
+    job with certify. The bytes of drc and glb, which round coordinates, are decoded by an
+    independent reader. All other formats hold the mesh exactly, so the mesh is measured once
+    for all of them. The distance is measured at all vertices and at the centres of all
+    triangles. It is the exact distance from each point to the triangles of the other surface.
+    Distances are stored in single precision."""
+
+    #: The file with the largest distance. The distances are those of this file. Of several files
+    #: that hold the mesh exactly, the first.
+    file: MeshFormat
+    #: Whether bound_mm was proven for every point. If not, why_unproven says why, and other points
+    #: can be farther than found_mm.
+    proven: bool
+    #: No point of any file is farther from the extracted surface, and no point of the extracted
+    #: surface is farther from any file. At most max_error_mm. Only if it was proven.
+    bound_mm: NotRequired[float]
+    #: Why the distance was measured and not proven.
+    why_unproven: NotRequired[str]
+    #: The largest distance that was found, in both directions.
+    found_mm: float
+    #: From the file to the extracted surface. Shows what was added.
+    from_mesh: DistanceSummary
+    #: From the extracted surface to the file. Shows what was removed.
+    from_extracted: DistanceSummary
+    budget_mm: NotRequired[MeshCertificateBudgetMm]
+
+
+class DistanceSummary(TypedDict):
+    points: int
+    max_mm: float
+    mean_mm: float
+    rms_mm: float
+    #: 99 % of the points are at most this far.
+    p99_mm: float
+    #: The number of points in equal bins from 0 to max_mm.
+    histogram: Sequence[int]
+
+
+class LabelSummary(TypedDict):
+    """The samples and the smoothed surface of one label. A wall between two labels is part of
+    both."""
+
+    label: int
+    name: Optional[str]
+    color: Optional[str]
+    voxels: int
+    #: The volume of these voxels.
+    voxels_mm3: float
+    triangles: int
+    vertices: int
+    closed: bool
+    manifold: bool
+    oriented: bool
+    components: int
+    area_mm2: float
+    #: The volume that the surface encloses.
+    volume_mm3: float
+    #: The label's files in the ZIP, one for each format.
+    files: Mapping[str, LabelFile]
+
+
+class LabelFile(TypedDict):
+    bytes: int
+    sha256: str
+    #: The offset of its first byte in the ZIP.
+    offset: int
+    #: The address to download it from.
+    href: str
+
+
+class MeshQualitySelfIntersections(TypedDict):
+    """Pairs of triangles that intersect at more than their shared corners and edges, computed
+    exactly. Only for a job with certify."""
+
+    pairs: int
+    #: Triangles that intersect another one.
+    triangles: int
+    #: The places of the first pairs, in LPS millimetres.
+    places: Sequence[Vector]
+
+
+class MeshQuality(TypedDict):
+    """The quality of the mesh. Each job measures all values on the mesh itself."""
+
+    #: No edge belongs to one triangle only.
+    closed: bool
+    #: At most two triangles share an edge, and the triangles around each vertex are one fan, open
+    #: or closed.
+    manifold: bool
+    #: Triangles that share an edge use it in opposite directions.
+    oriented: bool
+    #: The number of connected components.
+    components: int
+    #: The sum of the handles of all connected components. Null if the mesh is open or not a
+    #: manifold.
+    genus: Optional[int]
+    #: For each triangle: twice the radius of the inscribed circle divided by the radius of the
+    #: circumscribed circle. 1 is equilateral, 0 is flat. The bins are 0.05 wide.
+    aspect_ratio: QualityStages
+    #: The smallest angle of each triangle, at most 60 degrees. The bins are 3 degrees wide.
+    smallest_angle_deg: QualityStages
+    #: Whether the surface is closed and oriented, so that the volumes are those that it encloses.
+    #: Otherwise they depend on the point of reference.
+    encloses_volume: bool
+    self_intersections: NotRequired[MeshQualitySelfIntersections]
+
+
+class QualityStages(TypedDict):
+    """Before and after smoothing."""
+
+    extracted: Distribution
+    smoothed: Distribution
+
+
+class Distribution(TypedDict):
+    """Over all triangles. If there are more than 1 048 576, over about half a million that are
+    spread over the mesh; the sum of the histogram is their number. 0 if there are none."""
+
+    mean: float
+    min: float
+    #: The number of measured triangles in equal bins from 0. The last bin includes its end.
+    histogram: Sequence[int]
+
+
+class MeshFile(TypedDict):
+    bytes: int
+    sha256: str
+    #: The address to download it from.
+    href: str
+
+
+class ProblemErrors(TypedDict):
+    field: str
+    message: str
+
+
+class ProblemChoices(TypedDict):
+    #: The query parameter to add.
+    parameter: Literal['series', 'member', 'volume', 'spacing']
+    value: str
+    #: A description of the value, for people.
+    title: str
+
+
+class Problem(TypedDict):
+    """Describes what went wrong (RFC 9457)."""
+
+    #: A stable name, for programs.
+    type: Literal['urn:isomesh:problem:invalid-parameter', 'urn:isomesh:problem:digest-mismatch', 'urn:isomesh:problem:unauthorized', 'urn:isomesh:problem:forbidden', 'urn:isomesh:problem:not-found', 'urn:isomesh:problem:method-not-allowed', 'urn:isomesh:problem:not-ready', 'urn:isomesh:problem:gone', 'urn:isomesh:problem:length-required', 'urn:isomesh:problem:too-large', 'urn:isomesh:problem:uri-too-long', 'urn:isomesh:problem:unsupported-media', 'urn:isomesh:problem:range-not-satisfiable', 'urn:isomesh:problem:unusable-volume', 'urn:isomesh:problem:key-reused', 'urn:isomesh:problem:too-many-requests', 'urn:isomesh:problem:internal', 'urn:isomesh:problem:unavailable', 'urn:isomesh:problem:out-of-space', 'urn:isomesh:problem:cancelled', 'urn:isomesh:problem:request-timeout', 'urn:isomesh:problem:precondition-failed', 'urn:isomesh:problem:headers-too-large', 'urn:isomesh:problem:pacs-unreachable', 'urn:isomesh:problem:pacs-refused', 'urn:isomesh:problem:series-incomplete', 'https://iana.org/assignments/http-problem-types#mismatching-upload-offset']
+    #: The type in words.
+    title: str
+    #: The HTTP status.
+    status: int
+    #: What is wrong with this request, for people.
+    detail: str
+    #: The path of the request or of the job.
+    instance: NotRequired[str]
+    #: The parameters or members that are wrong.
+    errors: NotRequired[Sequence[ProblemErrors]]
+    #: If a user may override the rejection: the code to add to the query accept to have the same
+    #: request accepted.
+    overridable: NotRequired[AcceptableNote]
+    #: The possible choices if the request is ambiguous, at most 1000.
+    choices: NotRequired[Sequence[ProblemChoices]]
+
+
+class SucceededJob(TypedDict):
+    """A job that has succeeded: its mesh is never None. Job describes the members."""
+
+    id: str
+    state: Literal['succeeded']
+    stage: Stage
+    progress: float
+    parameters: CompleteJobParameters
+    volume: str
+    priority: Priority
+    created: str
+    started: str
+    finished: str
+    timing: Timing
+    mesh: MeshSummary
+    error: Optional[Problem]
+    reused: bool
+    waiting_for: Optional[Literal['disk']]
