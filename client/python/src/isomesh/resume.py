@@ -7,13 +7,14 @@ import json
 import time
 from typing import Dict, Iterator, Optional, Union
 
-from . import busy
+from . import busy, uploads
 from .errors import IsomeshError, Refused, Unreachable, WrongAnswer, warn
 from .transport import Answer, Request, Transport
 from .uploads import Body
 
 RESUMABLE_BYTES = 8 << 20  # smaller bodies are sent in one request
 _PLACES = "/v1/uploads/"
+_NOT_THE_API = "the server's response does not follow the API"
 _LONGEST_CUT = 60.0  # seconds without progress, then the upload fails
 _FIRST_PAUSE = 0.1
 _LONGEST_PAUSE = 3.0
@@ -25,8 +26,6 @@ _PASSING = (408, 409, 502, 504)
 def send(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> Answer:
     """The response to `POST target` with this body. Raises as Transport.send does."""
     place = _begin(transport, target, headers, body)
-    if not place:
-        return transport.send(Request("POST", target, headers, body))
     try:
         return _finish(transport, target, body, place)
     except Unreachable:
@@ -56,18 +55,14 @@ def _is_cancelled(error: Refused) -> bool:
 
 
 def _begin(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> str:
-    """The address of the upload; empty for a server of an earlier version."""
+    """The address of the upload."""
     told = {**headers, "Upload-Complete": "?0", "Upload-Length": str(body.size)}
-    try:
-        answer = transport.send(Request("POST", target, told, Body(0, lambda: iter(()))))
-    except Refused as error:
-        # An earlier server rejects an empty body. It repeats any other error for the whole body.
-        if error.status != 400:
-            raise
-        return ""
+    answer = transport.send(Request("POST", target, told, uploads.of_bytes(b"")))
     answer.text()
     place = answer.header("Location")
-    return place if place.startswith(_PLACES) else ""
+    if not place.startswith(_PLACES):
+        raise WrongAnswer(_NOT_THE_API)
+    return place
 
 
 def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer:
@@ -92,8 +87,13 @@ def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer
                 # The body has arrived: this asks for the response that was lost.
                 sign = "&" if "?" in target else "?"
                 target_again = f"{target}{sign}upload={place.rpartition('/')[2]}"
-                return transport.send(Request("POST", target_again, {}, Body(0, lambda: iter(()))))
-            return transport.send(Request("PATCH", place, _part(offset), _after(body, offset)))
+                return transport.send(Request("POST", target_again, {}, uploads.of_bytes(b"")))
+            part = {
+                "Content-Type": "application/partial-upload",
+                "Upload-Complete": "?1",
+                "Upload-Offset": str(offset),
+            }
+            return transport.send(Request("PATCH", place, part, _after(body, offset)))
         except (Refused, Unreachable) as error:
             if isinstance(error, Refused) and (error.status not in _PASSING or _is_cancelled(error)):
                 raise
@@ -122,18 +122,10 @@ def _look(transport: Transport, place: str) -> Answer:
     return state
 
 
-def _part(offset: int) -> Dict[str, str]:
-    return {
-        "Content-Type": "application/partial-upload",
-        "Upload-Complete": "?1",
-        "Upload-Offset": str(offset),
-    }
-
-
 def _offset_in(state: Answer, size: int) -> int:
     text = state.header("Upload-Offset")
     if not text.isdigit() or int(text) > size:
-        raise WrongAnswer("the server's response does not follow the API")
+        raise WrongAnswer(_NOT_THE_API)
     return int(text)
 
 
