@@ -149,21 +149,23 @@ class UploadRelay(Relay):
             side.shutdown(socket.SHUT_RDWR)
 
 
-class Canned:
-    """A server whose response to every request is the same JSON."""
+class FakeServer:
+    """A server that answers each request with the status, headers and body that `respond(handler, body)` returns."""
 
-    def __init__(self, value):
-        body = json.dumps(value).encode()
-
+    def __init__(self, respond):
         class Handler(http.server.BaseHTTPRequestHandler):
-            def respond(self):
-                self.rfile.read(int(self.headers.get("Content-Length", 0)))
-                self.send_response(200)
-                self.send_header("Content-Length", str(len(body)))
+            def answer(self):
+                status, headers, content = respond(self, self.rfile.read(int(self.headers.get("Content-Length", 0))))
+                self.send_response_only(status)
+                for name, value in headers.items():
+                    if name.lower() not in ("transfer-encoding", "content-length", "connection"):
+                        self.send_header(name, value)
+                self.send_header("Content-Length", str(len(content)))
                 self.end_headers()
-                self.wfile.write(body)
+                if self.command != "HEAD":
+                    self.wfile.write(content)
 
-            do_GET = do_POST = do_PATCH = do_DELETE = respond
+            do_GET = do_POST = do_PATCH = do_DELETE = do_HEAD = answer
 
             def log_message(self, *_):
                 pass
@@ -180,6 +182,13 @@ class Canned:
         self.server.shutdown()
         self.server.server_close()
         self.thread.join(60)
+
+
+class Canned(FakeServer):
+    """A server whose response to every request is the same JSON."""
+
+    def __init__(self, value):
+        super().__init__(lambda *_: (200, {}, json.dumps(value).encode()))
 
 
 def ball(size=(40, 32, 24), radius=9.0, spacing=(1.0, 1.0, 1.0)):

@@ -2,7 +2,6 @@
 
 import contextlib
 import http.client
-import http.server
 import subprocess
 import sys
 import threading
@@ -14,7 +13,7 @@ import isomesh
 import numpy
 from isomesh import busy
 from limits import LimitedTest
-from support import DaemonTest, ball
+from support import DaemonTest, FakeServer, ball
 
 NEVER = 10**9
 
@@ -40,61 +39,29 @@ class Clock:
         return mock.patch.object(busy, "time", self)
 
 
-class BusyServer:
+class BusyServer(FakeServer):
     """Rejects the first `refusals` requests of each method and path, and passes all others on to the
     daemon at `url`."""
 
     def __init__(self, url="", refusals=1, status=429, headers=None):
+        self.url_of_daemon, self.refusals, self.status = url, refusals, status
+        self.told = {"Retry-After": "7"} if headers is None else headers
         self.refused, self.seen = Counter(), []
-        told = {"Retry-After": "7"} if headers is None else headers
-        outer = self
+        super().__init__(self.respond)
 
-        class Handler(http.server.BaseHTTPRequestHandler):
-            def respond(self):
-                body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-                # The body of a large upload says nothing here, and its offset does.
-                sent = (self.command, self.path, self.headers.get("Upload-Offset"))
-                outer.seen.append((*sent, self.headers.get("Idempotency-Key"), body))
-                if outer.refused[sent] < refusals:
-                    outer.refused[sent] += 1
-                    answer = status, told, b'{"title": "Busy", "detail": "come again"}'
-                else:
-                    answer = self.passed_on(body)
-                code, headers, content = answer
-                self.send_response_only(code)
-                for name, value in headers.items():
-                    if name.lower() not in ("transfer-encoding", "content-length", "connection"):
-                        self.send_header(name, value)
-                self.send_header("Content-Length", str(len(content)))
-                self.send_header("Content-Type", "application/problem+json")
-                self.end_headers()
-                if self.command != "HEAD":
-                    self.wfile.write(content)
-
-            def passed_on(self, body):
-                daemon = http.client.HTTPConnection(url.removeprefix("http://"), timeout=60)
-                with contextlib.closing(daemon):
-                    daemon.request(self.command, self.path, body, dict(self.headers))
-                    response = daemon.getresponse()
-                    return response.status, dict(response.getheaders()), response.read()
-
-            do_GET = do_POST = do_PATCH = do_DELETE = do_HEAD = respond
-
-            def log_message(self, *_):
-                pass
-
-        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.url = f"http://127.0.0.1:{self.server.server_address[1]}"
-        self.thread = threading.Thread(target=self.server.serve_forever, daemon=True)
-        self.thread.start()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.server.shutdown()
-        self.server.server_close()
-        self.thread.join(60)
+    def respond(self, request, body):
+        # The body of a large upload says nothing here, and its offset does.
+        sent = (request.command, request.path, request.headers.get("Upload-Offset"))
+        self.seen.append((*sent, request.headers.get("Idempotency-Key"), body))
+        if self.refused[sent] < self.refusals:
+            self.refused[sent] += 1
+            problem = {**self.told, "Content-Type": "application/problem+json"}
+            return self.status, problem, b'{"title": "Busy", "detail": "come again"}'
+        daemon = http.client.HTTPConnection(self.url_of_daemon.removeprefix("http://"), timeout=60)
+        with contextlib.closing(daemon):
+            daemon.request(request.command, request.path, body, dict(request.headers))
+            response = daemon.getresponse()
+            return response.status, dict(response.getheaders()), response.read()
 
 
 class RetryAfter(LimitedTest):
