@@ -12,7 +12,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kLongestPause{15'000};
 // Also for a pause of a second, whose quarter would spread few clients.
 constexpr milliseconds kLeastJitter{500};
 
@@ -56,7 +55,7 @@ milliseconds BusyWait::pause_after(std::chrono::seconds retry_after) {
     const milliseconds asked = retry_after;
     return asked + share_of(std::max(asked / 4, kLeastJitter), waiting_.random());
   }
-  const milliseconds whole = std::exchange(pause_, std::min(2 * pause_, kLongestPause));
+  const milliseconds whole = backoff_.next();
   return whole / 2 + share_of(whole / 2, waiting_.random());
 }
 

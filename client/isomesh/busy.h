@@ -1,7 +1,10 @@
-// Requests to a busy server, which are sent again. Private to this folder.
+// How long the client waits: between attempts, for a server that is busy, and until an upload is
+// given up. Private to this folder.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -11,6 +14,33 @@
 #include "client/isomesh/transport.h"
 
 namespace isomesh {
+
+// The duration of one long poll.
+inline constexpr std::chrono::seconds kLongestWait{30};
+// The minimum interval between polls, for a server that answers long polls immediately.
+inline constexpr std::chrono::milliseconds kShortestLook{200};
+// How often a request that may be repeated is sent if its connection breaks.
+inline constexpr int kTries = 4;
+
+// Pauses that double.
+class Backoff {
+ public:
+  constexpr Backoff(std::chrono::milliseconds first, std::chrono::milliseconds longest)
+      : first_(first), longest_(longest), next_(first) {}
+
+  std::chrono::milliseconds next() { return std::exchange(next_, std::min(2 * next_, longest_)); }
+  void restart() { next_ = first_; }
+
+ private:
+  std::chrono::milliseconds first_;
+  std::chrono::milliseconds longest_;
+  std::chrono::milliseconds next_;
+};
+
+// After a broken connection.
+inline constexpr Backoff kBroken{std::chrono::milliseconds{100}, std::chrono::seconds{3}};
+// After a refusal by a busy server that does not say how long to wait.
+inline constexpr Backoff kBusy{std::chrono::milliseconds{500}, std::chrono::seconds{15}};
 
 // Returns after `duration`. Throws Error kCancelled immediately on a stop request.
 void pause(std::chrono::milliseconds duration, const std::stop_token& stop);
@@ -44,7 +74,50 @@ class BusyWait {
   std::chrono::milliseconds limit_;
   Waiting waiting_;
   std::optional<Waiting::Clock::time_point> refused_at_;
-  std::chrono::milliseconds pause_{500};
+  Backoff backoff_ = kBusy;
+};
+
+// When to give an upload up that does not get on. The outage begins with the first failure after
+// progress. A part that fails may have been received in part, which only the server knows. So
+// nothing is given up before it was asked.
+class Patience {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  explicit Patience(std::function<Clock::time_point()> now = Clock::now) : now_(std::move(now)) {}
+
+  // Call after each failure, of a part or of a question.
+  void fail() {
+    if (!cut_at_) cut_at_ = now_();
+  }
+
+  // Call with each answer of the server.
+  void hear(std::uint64_t offset) {
+    if (offset > reached_) {
+      cut_at_.reset();
+      backoff_.restart();
+    }
+    reached_ = offset;
+  }
+
+  // Call with the time for which the client waits because the server is busy, which is no outage.
+  void excuse(std::chrono::milliseconds busy) {
+    if (cut_at_) *cut_at_ += busy;
+  }
+
+  // Call after a question that failed, or whose answer was heard.
+  bool is_over() const { return cut_at_ && now_() - *cut_at_ >= kLongestCut; }
+
+  std::chrono::milliseconds next_pause() { return backoff_.next(); }
+
+  // The longest outage. A restart of the daemon takes a few seconds.
+  static constexpr std::chrono::milliseconds kLongestCut{60'000};
+
+ private:
+  std::function<Clock::time_point()> now_;
+  std::optional<Clock::time_point> cut_at_;
+  std::uint64_t reached_ = 0;
+  Backoff backoff_ = kBroken;
 };
 
 struct PersistenceOptions {

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/base64.h"
 #include "base/hex.h"
 #include "base/ids.h"
 #include "base/sha256.h"
 #include "base/text.h"
-#include "client/isomesh/download.h"
-#include "client/isomesh/event_reader.h"
 #include "client/isomesh/file.h"
 #include "client/isomesh/impl.h"
-#include "client/isomesh/package.h"
-#include "client/isomesh/transport.h"
-#include "client/isomesh/url.h"
 #include "proto/json.h"
 
 namespace isomesh {
@@ -23,60 +17,154 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr std::size_t kDigestBytes = 1024 * 1024;
+// A job's JSON has a few kilobytes, so a longer line is not an event.
+constexpr std::size_t kLongestLine = 1024 * 1024;
 
-template <std::size_t N>
-std::string joined(const std::array<double, N>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ",") + to_text(value);
-  return text;
-}
+// Parses a job's stream of server-sent events incrementally. Not thread safe.
+class EventReader {
+ public:
+  explicit EventReader(JobListener listener) : listener_(std::move(listener)) {}
 
-void add_raw(const RawDescription& raw, Query& pairs) {
-  const auto& [x, y, z] = raw.dims;
-  pairs.emplace_back("dims", std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z));
-  pairs.emplace_back("type", to_string(raw.type));
-  pairs.emplace_back("spacing", joined(raw.geometry.spacing));
-  pairs.emplace_back("origin", joined(raw.geometry.origin));
-  pairs.emplace_back("direction", joined(raw.geometry.direction));
-  if (raw.big_endian) pairs.emplace_back("byte_order", "big");
-}
-
-std::string upload_query(const UploadOptions& options) {
-  Query pairs;
-  if (options.raw) {
-    RawDescription raw = *options.raw;
-    if (options.spacing) raw.geometry.spacing = *options.spacing;
-    add_raw(raw, pairs);
+  // Calls the listener for each complete event. Throws Error kInternal for anything other than a
+  // job's events.
+  void take(std::string_view piece) {
+    while (!piece.empty()) {
+      const std::size_t end = piece.find('\n');
+      line_ += piece.substr(0, end);
+      if (line_.size() > kLongestLine) {
+        throw Error(ErrorCode::kInternal, "the server's events do not match the API");
+      }
+      if (end == std::string_view::npos) return;
+      take_line(line_);
+      line_.clear();
+      piece.remove_prefix(end + 1);
+    }
   }
-  if (!options.series.empty()) pairs.emplace_back("series", options.series);
-  if (!options.member.empty()) pairs.emplace_back("member", options.member);
-  if (options.volume) pairs.emplace_back("volume", std::to_string(*options.volume));
-  std::string accepted;
-  for (const std::string& code : options.accept) accepted += (accepted.empty() ? "" : ",") + code;
-  if (!accepted.empty()) pairs.emplace_back("accept", accepted);
-  if (options.nifti_form) pairs.emplace_back("nifti_form", to_string(*options.nifti_form));
-  if (options.spacing && !options.raw) pairs.emplace_back("spacing", joined(*options.spacing));
-  return pairs.empty() ? std::string() : query_string(pairs);
-}
 
-// File names may name patients, so they are sent in a header: logs contain targets.
-std::string disposition_of(const std::filesystem::path& path, const std::string& name) {
-  const auto file = (path.has_filename() ? path : path.parent_path()).filename();
-  return "attachment; filename*=UTF-8''" + percent_encode(name.empty() ? file.string() : name);
-}
+  // Call before the bytes of another stream, which continues after last_id().
+  void restart() { line_ = name_ = data_ = id_ = ""; }
 
-std::string digest_of(const UploadBody& file) {
-  Sha256 sha256;
-  std::vector<char> piece(kDigestBytes);
-  for (std::uint64_t offset = 0; offset < file.size(); offset += piece.size()) {
-    piece.resize(
-        static_cast<std::size_t>(std::min<std::uint64_t>(kDigestBytes, file.size() - offset)));
-    file.read(offset, piece);
-    sha256.update(std::string_view(piece.data(), piece.size()));
+  const std::string& last_id() const { return last_id_; }
+  // The job, once it has ended.
+  const std::optional<Job>& job() const { return job_; }
+
+ private:
+  // A line is a field, a comment, which begins with a colon, or empty, which ends an event.
+  void take_line(std::string_view line) {
+    if (line.empty()) return finish_event();
+    const std::size_t colon = line.find(':');
+    const std::string_view name = line.substr(0, colon);
+    std::string_view value = colon == std::string_view::npos ? "" : line.substr(colon + 1);
+    if (value.starts_with(' ')) value.remove_prefix(1);
+    if (name == "event") name_ = value;
+    if (name == "data") data_ += value;
+    if (name == "id") id_ = value;
   }
-  return to_base64(sha256.finish());
+
+  void finish_event() {
+    if (name_ == "done") {
+      job_ = job_from_json(data_);
+    } else if (name_ == "stage" || name_ == "progress") {
+      const JobEvent event = job_event_from_json(data_);
+      if (listener_) listener_(event);
+    }
+    if (!id_.empty()) last_id_ = id_;
+    name_.clear();
+    data_.clear();
+  }
+
+  JobListener listener_;
+  std::string line_;
+  std::string name_;
+  std::string data_;
+  std::string id_;
+  std::string last_id_;
+  std::optional<Job> job_;
+};
+
+// The file of a finished job in that format; with `label`, one label's own file of a job by labels.
+// Throws as Client::fetch does if there is none.
+MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> label) {
+  if (job.state == JobState::kCancelled)
+    throw Error(ErrorCode::kCancelled, "the job was cancelled");
+  if (job.state == JobState::kFailed) {
+    throw job.error ? to_error(*job.error) : Error(ErrorCode::kInternal, "the job failed");
+  }
+  if (job.state != JobState::kSucceeded || !job.mesh) {
+    throw Error(ErrorCode::kNotReady,
+                "the job is " + std::string(to_string(job.state)) + "; its mesh is not ready");
+  }
+  if (const auto found = job.mesh->files.find(format); !label && found != job.mesh->files.end()) {
+    return found->second;
+  }
+  for (const LabelSummary& each : job.mesh->labels) {
+    const auto found = each.files.find(format);
+    if (found == each.files.end() || (label ? *label != each.label : job.mesh->labels.size() > 1)) {
+      continue;
+    }
+    return {found->second.bytes, found->second.sha256, found->second.href};
+  }
+  const auto has = [&](const LabelSummary& each) { return each.files.contains(format); };
+  if (!label && std::ranges::any_of(job.mesh->labels, has)) {
+    throw Error(ErrorCode::kNotFound, "the job has a file of the format \"" +
+                                          std::string(to_string(format)) +
+                                          "\" for each label; choose a label, or the zip");
+  }
+  throw Error(ErrorCode::kNotFound, "the job has no file of the format \"" +
+                                        std::string(to_string(format)) + '"' +
+                                        (label ? " of the label " + std::to_string(*label) : ""));
 }
+
+// Writes a mesh as it arrives and checks it against the job's size and digest. Not thread safe.
+class Download {
+ public:
+  Download(MeshFile announced, const std::filesystem::path& target,
+           const TransferProgress& progress)
+      : announced_(std::move(announced)), file_(target), progress_(progress) {}
+
+  // The request headers to resume a download; none if nothing has arrived.
+  std::vector<std::pair<std::string, std::string>> headers() const {
+    if (received_ == 0 || received_ == announced_.bytes) return {};
+    return {{"Range", "bytes=" + std::to_string(received_) + "-"},
+            {"If-Range", '"' + announced_.sha256 + '"'}};
+  }
+
+  // Takes the status of the response: the whole file, or the requested range.
+  void begin(int status) {
+    constexpr int kPartial = 206;
+    if (status == kPartial || received_ == 0) return;
+    file_.restart();
+    sha256_.emplace();
+    received_ = 0;
+  }
+
+  // Throws Error kDigestMismatch for too many bytes.
+  void take(std::string_view piece) {
+    received_ += piece.size();
+    if (received_ > announced_.bytes) refuse();
+    file_.write(piece);
+    sha256_->update(piece);
+    if (progress_) progress_(received_, announced_.bytes);
+  }
+
+  // Throws Error kDigestMismatch for wrong bytes.
+  void publish() {
+    if (received_ != announced_.bytes || to_hex(sha256_->finish()) != announced_.sha256) refuse();
+    file_.publish();
+  }
+
+ private:
+  [[noreturn]] static void refuse() {
+    throw Error(ErrorCode::kDigestMismatch,
+                "the received mesh does not match the checksum of the job");
+  }
+
+  const MeshFile announced_;
+  PartFile file_;
+  const TransferProgress& progress_;
+  std::optional<Sha256> sha256_{std::in_place};
+  std::uint64_t received_ = 0;
+};
 
 std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_segment(id); }
 std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(id); }
@@ -85,49 +173,8 @@ std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(
 
 Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
 Client::~Client() = default;
-Error several_volumes(const std::vector<UploadedVolume>& volumes) {
-  Remedy remedy;
-  for (const UploadedVolume& each : volumes) {
-    remedy.choices.push_back(
-        {"member", each.member, each.problem ? each.problem->detail : "can be meshed"});
-  }
-  return Error(ErrorCode::kUnusableVolume, "the upload contains " + std::to_string(volumes.size()) +
-                                               " volumes, but one is needed")
-      .with_remedy(std::move(remedy));
-}
-
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
-
-Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
-  std::vector<UploadedVolume> volumes = upload_all({path}, options);
-  if (volumes.size() == 1 && volumes.front().volume) return std::move(*volumes.front().volume);
-  throw several_volumes(volumes);
-}
-
-std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem::path>& paths,
-                                               const UploadOptions& options) {
-  const UploadBody file(paths);
-  HttpRequest request{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
-  request.headers = {{"Content-Type", "application/octet-stream"},
-                     {"Content-Disposition", disposition_of(paths.front(), options.name)}};
-  if (options.digest) {
-    request.headers.emplace_back("Content-Digest", "sha-256=:" + digest_of(file) + ":");
-  }
-  request.source_bytes = file.size();
-  request.source = [&](std::uint64_t offset, std::span<char> piece) {
-    if (options.progress) options.progress(offset, file.size());
-    file.read(offset, piece);
-    if (options.progress && offset + piece.size() == file.size()) {
-      options.progress(file.size(), file.size());
-    }
-  };
-  constexpr int kMultiStatus = 207;
-  const bool is_resumable = file.size() >= options.resumable_bytes;
-  const HttpResponse response = is_resumable ? impl_->resumed(request) : impl_->exchange(request);
-  if (response.status == kMultiStatus) return uploaded_volumes_from_json(response.body);
-  return {{.member = {}, .status = response.status, .volume = volume_from_json(response.body)}};
-}
 
 Volume Client::volume(const std::string& id) {
   return volume_from_json(impl_->repeat({.target = volume_path(id)}));
@@ -169,7 +216,9 @@ void Client::slice(const std::string& id, const SliceOptions& options,
                    const std::filesystem::path& target) {
   Query query = {{"axis", options.axis}};
   if (options.index) query.emplace_back("index", std::to_string(*options.index));
-  if (options.window) query.emplace_back("window", joined(*options.window));
+  if (const auto& window = options.window) {
+    query.emplace_back("window", to_text((*window)[0]) + ',' + to_text((*window)[1]));
+  }
   PartFile file(target);
   std::uint64_t bytes = 0;
   HttpRequest request{.target = volume_path(id) + "/slice.png" + query_string(query)};

@@ -11,8 +11,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr int kTries = 4;
-constexpr milliseconds kFirstPause{100};
 // For the server to end the import of a cancelled upload, or to finish storing its volume.
 constexpr milliseconds kPartingSilence{5'000};
 constexpr milliseconds kPartingRetries{2'000};
@@ -92,6 +90,7 @@ HttpResponse Client::Impl::exchange(const HttpRequest& request) const {
 
 HttpResponse Client::Impl::repeated(const HttpRequest& request,
                                     const std::function<void()>& before) const {
+  Backoff backoff = kBroken;
   for (int attempt = 1;; ++attempt) {
     try {
       if (before) before();
@@ -99,7 +98,7 @@ HttpResponse Client::Impl::repeated(const HttpRequest& request,
     } catch (const NoResponse& lost) {
       if (!lost.broken() || attempt == kTries) throw;
     }
-    pause(kFirstPause * (1 << (attempt - 1)));
+    pause(backoff.next());
   }
 }
 

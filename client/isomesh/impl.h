@@ -19,10 +19,6 @@
 
 namespace isomesh {
 
-// The duration of one long poll.
-inline constexpr std::chrono::seconds kLongestWait{30};
-// The minimum interval between polls, for a server that answers long polls immediately.
-inline constexpr std::chrono::milliseconds kShortestLook{200};
 inline constexpr std::size_t kKeyBytes = 16;
 
 using Query = std::vector<std::pair<std::string, std::string>>;
@@ -70,8 +66,7 @@ class Client::Impl {
     return all;
   }
 
-  // Sends a request with a source, and resumes it after a broken connection. Works as exchange()
-  // with a server that does not support this.
+  // Sends a request with a source, and resumes it after a broken connection.
   HttpResponse resumed(const HttpRequest& request) const;
 
   // Throws Error kCancelled immediately on a stop request.

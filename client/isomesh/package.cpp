@@ -59,13 +59,8 @@ std::vector<std::string> lines_of(const fs::path& path) {
   const InputFile file = InputFile::chosen(path);
   std::string text(static_cast<std::size_t>(std::min(file.size(), kMostBytes)), '\0');
   file.read_exactly(0, std::as_writable_bytes(std::span(text)));
-  std::vector<std::string> lines;
-  for (std::size_t next = 0; next < text.size();) {
-    const std::size_t end = std::min(text.find('\n', next), text.size());
-    lines.emplace_back(trimmed(std::string_view(text).substr(next, end - next)));
-    next = end + 1;
-  }
-  return lines;
+  const std::vector<std::string_view> found = lines(text);
+  return {found.begin(), found.end()};
 }
 
 // The value of the field `name` if the line is "Name = value" or "name: value".

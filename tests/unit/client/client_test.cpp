@@ -77,11 +77,7 @@ TEST(Reachability, AGetWhoseConnectionBrokeIsTriedAgain) {
   const std::string body = to_json(std::vector<Volume>{some_volume()});
   test::SocketServer server([&](int socket) {
     test::read_head(socket);
-    if (++requests < 3) return;
-    test::send_text(socket,
-                    "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n"
-                    "Content-Length: " +
-                        std::to_string(body.size()) + "\r\n\r\n" + body);
+    if (++requests == 3) test::answer(socket, "200 OK", body);
   });
   Client client({.server = server.url()});
   EXPECT_THAT(client.volumes(), ElementsAre(some_volume()));
@@ -120,9 +116,7 @@ TEST(Reachability, ASubmissionIsRepeatedWithItsKey) {
 // Volumes and the token go to the server that was named, and to nothing else.
 TEST(Reachability, ProxiesOfTheEnvironmentAreNotUsed) {
   FakeServer server;
-  server.http.Get("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
-    response.set_content(to_json(std::vector<Volume>{some_volume()}), kJson);
-  });
+  server.http.Get("/v1/volumes", test::answering(to_json(std::vector{some_volume()})));
   Client client({.server = server.start()});
   ASSERT_EQ(::setenv("http_proxy", test::unused_url().c_str(), 1), 0);
   ASSERT_EQ(::setenv("all_proxy", test::unused_url().c_str(), 1), 0);
@@ -133,9 +127,7 @@ TEST(Reachability, ProxiesOfTheEnvironmentAreNotUsed) {
 
 TEST(Reachability, IsAskedFromSeveralThreads) {
   FakeServer server;
-  server.http.Get("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
-    response.set_content(to_json(std::vector<Volume>{some_volume()}), kJson);
-  });
+  server.http.Get("/v1/volumes", test::answering(to_json(std::vector{some_volume()})));
   Client client({.server = server.start()});
   std::vector<std::jthread> threads;
   for (int n = 0; n < 8; ++n) {
@@ -188,23 +180,16 @@ TEST(Volumes, AreLookedAtBeforeAJob) {
   TemporaryFolder folder;
   FakeServer server;
   httplib::Params asked;
+  server.http.set_pre_routing_handler([&](const httplib::Request& request, const auto&) {
+    asked = request.params;
+    return httplib::Server::HandlerResponse::Unhandled;
+  });
   server.http.Get("/v1/volumes/7/histogram",
-                  [&](const httplib::Request& request, httplib::Response& response) {
-                    asked = request.params;
-                    response.set_content(to_json(Histogram{"7", {0, 9}, {1, 2}}), kJson);
-                  });
-  server.http.Get("/v1/volumes/7/slice.png",
-                  [&](const httplib::Request& request, httplib::Response& response) {
-                    asked = request.params;
-                    response.set_content("a picture", "image/png");
-                  });
-  server.http.Get("/v1/estimate",
-                  [&](const httplib::Request& request, httplib::Response& response) {
-                    asked = request.params;
-                    Estimate estimate;
-                    estimate.triangles = 11;
-                    response.set_content(to_json(estimate), kJson);
-                  });
+                  test::answering(to_json(Histogram{"7", {0, 9}, {1, 2}})));
+  server.http.Get("/v1/volumes/7/slice.png", test::answering("a picture", "image/png"));
+  Estimate estimate;
+  estimate.triangles = 11;
+  server.http.Get("/v1/estimate", test::answering(to_json(estimate)));
   Client client({.server = server.start()});
   const auto value = [&](const std::string& name) {
     const auto found = asked.find(name);
@@ -303,9 +288,7 @@ TEST(Timeouts, ASilentServerIsGivenUp) {
 
 TEST(Timeouts, TheLongestDoesNotEndALongPoll) {
   FakeServer server;
-  server.http.Get("/v1/jobs/7", [](const httplib::Request&, httplib::Response& response) {
-    response.set_content(to_json(test::finished_job("7", "mesh")), kJson);
-  });
+  server.http.Get("/v1/jobs/7", test::answering(to_json(finished_job("7", "mesh"))));
   Client client({.server = server.start(), .silence_timeout = std::chrono::milliseconds::max()});
   EXPECT_EQ(client.job("7", std::chrono::seconds{30}).state, JobState::kSucceeded);
 }

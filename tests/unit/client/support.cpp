@@ -97,6 +97,11 @@ void send_text(int socket, const std::string& text) {
   }
 }
 
+void answer(int socket, const std::string& head, const std::string& body) {
+  send_text(socket, "HTTP/1.1 " + head + "\r\nContent-Length: " + std::to_string(body.size()) +
+                        "\r\n\r\n" + body);
+}
+
 std::string pattern(std::size_t size) {
   std::string bytes(size, '\0');
   for (std::size_t n = 0; n < size; ++n) bytes[n] = static_cast<char>(n * 131 + n / 251);
@@ -115,6 +120,12 @@ void answer_with(httplib::Response& response, const Error& error) {
   const Problem problem = to_problem(error, "/v1/here");
   response.status = problem.status;
   response.set_content(to_json(problem), "application/problem+json");
+}
+
+httplib::Server::Handler answering(const std::string& body, const std::string& type) {
+  return [=](const httplib::Request&, httplib::Response& response) {
+    response.set_content(body, type);
+  };
 }
 
 Job finished_job(const std::string& id, const std::string& mesh_bytes) {

@@ -64,6 +64,8 @@ std::string read_head(int socket);
 std::size_t read_to_the_end(int socket);
 // Sends all of it; a client that went away is no error.
 void send_text(int socket, const std::string& text);
+// Sends a response; `head` is its status and headers: "201 Created\r\nLocation: /there".
+void answer(int socket, const std::string& head, const std::string& body = {});
 
 // Bytes that are not the same anywhere near.
 std::string pattern(std::size_t size);
@@ -73,6 +75,10 @@ Volume some_volume();
 
 // Answers with the problem that the error is.
 void answer_with(httplib::Response& response, const Error& error);
+
+// Always the same answer.
+httplib::Server::Handler answering(const std::string& body,
+                                   const std::string& type = "application/json");
 
 // A job that has succeeded with one Draco file of these bytes.
 Job finished_job(const std::string& id, const std::string& mesh_bytes);

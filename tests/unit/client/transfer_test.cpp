@@ -30,7 +30,18 @@ using testing::Not;
 constexpr const char* kJson = "application/json";
 const UploadOptions kInOnePiece = {.resumable_bytes = UINT64_MAX};
 
-TEST(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
+class Upload : public testing::Test {
+ protected:
+  // A file with that content.
+  std::filesystem::path file(const std::string& content) const {
+    test::write_file(folder_ / "file", content);
+    return folder_ / "file";
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
   const std::string content = pattern(3'000'001);
   FakeServer server;
   std::string received;
@@ -46,8 +57,6 @@ TEST(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
     response.set_content(to_json(some_volume()), kJson);
     response.status = 201;
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "head.nii.gz", content);
 
   std::uint64_t last = 0;
   UploadOptions options{.digest = true};
@@ -58,7 +67,7 @@ TEST(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
     last = done;
   };
   Client client({.server = server.start(), .token = "secret"});
-  EXPECT_EQ(client.upload(folder / "head.nii.gz", options), some_volume());
+  EXPECT_EQ(client.upload(file(content), options), some_volume());
 
   EXPECT_TRUE(received == content);
   EXPECT_EQ(last, content.size());
@@ -71,19 +80,16 @@ TEST(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
   EXPECT_EQ(headers.find("Content-Digest")->second, "sha-256=:" + to_base64(sha256.finish()) + ":");
 }
 
-TEST(Upload, OfAnEmptyFileReachesTheServer) {
+TEST_F(Upload, OfAnEmptyFileReachesTheServer) {
   FakeServer server;
   server.http.Post("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
     answer_with(response, Error(ErrorCode::kUnsupportedMedia, "the body is empty"));
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "empty", "");
   Client client({.server = server.start()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "empty"); }).code(),
-            ErrorCode::kUnsupportedMedia);
+  EXPECT_EQ(error_of([&] { client.upload(file("")); }).code(), ErrorCode::kUnsupportedMedia);
 }
 
-TEST(Upload, DescribesRawSamplesInTheQuery) {
+TEST_F(Upload, DescribesRawSamplesInTheQuery) {
   FakeServer server;
   httplib::Params seen;
   std::string target;
@@ -94,8 +100,6 @@ TEST(Upload, DescribesRawSamplesInTheQuery) {
     read([](const char*, std::size_t) { return true; });
     response.set_content(to_json(some_volume()), kJson);
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "ct.raw", pattern(48));
 
   UploadOptions options;
   options.raw = RawDescription{.dims = {2, 3, 4},
@@ -105,7 +109,7 @@ TEST(Upload, DescribesRawSamplesInTheQuery) {
                                             .direction = {0, 1, 0, 1, 0, 0, 0, 0, -1}},
                                .big_endian = true};
   Client client({.server = server.start()});
-  client.upload(folder / "ct.raw", options);
+  client.upload(file(pattern(48)), options);
 
   EXPECT_EQ(seen.find("dims")->second, "2,3,4");
   EXPECT_EQ(seen.find("type")->second, "int16");
@@ -117,46 +121,38 @@ TEST(Upload, DescribesRawSamplesInTheQuery) {
 }
 
 // A large upload without a token fails with the server's reason, not with a broken pipe.
-TEST(Upload, HearsARefusalThatComesBeforeTheBodyWasTaken) {
-  const std::string body = to_json(to_problem(Error(ErrorCode::kUnauthorized, "no token"), ""));
-  test::SocketServer server([&](int socket) {
+TEST_F(Upload, HearsARefusalThatComesBeforeTheBodyWasTaken) {
+  test::SocketServer server([](int socket) {
     test::read_head(socket);
-    test::send_text(socket,
-                    "HTTP/1.1 401 Unauthorized\r\nContent-Type: application/problem+json\r\n"
-                    "Connection: close\r\nContent-Length: " +
-                        std::to_string(body.size()) + "\r\n\r\n" + body);
+    test::answer(socket,
+                 "401 Unauthorized\r\nContent-Type: application/problem+json\r\nConnection: close",
+                 to_json(to_problem(Error(ErrorCode::kUnauthorized, "no token"), "")));
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "large", pattern(20'000'000));
   Client client({.server = server.url()});
-  const Error error = error_of([&] { client.upload(folder / "large"); });
+  const Error error = error_of([&] { client.upload(file(pattern(20'000'000))); });
   EXPECT_EQ(error.code(), ErrorCode::kUnauthorized);
   EXPECT_STREQ(error.what(), "no token");
   EXPECT_EQ(server.connections(), 1);
 }
 
-// Bytes of a large body that a client sends although it is refused by its head.
-std::size_t bytes_sent_in_vain() {
-  std::promise<std::size_t> received;
-  test::SocketServer server([&](int socket) {
-    EXPECT_THAT(test::read_head(socket), HasSubstr("Content-Length: 20000000\r\n"));
-    test::send_text(socket, "HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\n\r\n");
-    received.set_value(test::read_to_the_end(socket));
-  });
-  TemporaryFolder folder;
-  test::write_file(folder / "large", pattern(20'000'000));
-  Client client({.server = server.url()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "large", kInOnePiece); }).code(),
-            ErrorCode::kUnauthorized);
-  return received.get_future().get();
-}
-
 // It waits for a second, in which a server that stands still does not refuse it.
-TEST(Upload, SendsNothingOfALargeBodyThatIsRefusedByItsHead) {
-  EXPECT_TRUE(test::eventually([] { return bytes_sent_in_vain() == 0; }));
+TEST_F(Upload, SendsNothingOfALargeBodyThatIsRefusedByItsHead) {
+  const auto bytes_sent_in_vain = [&] {
+    std::promise<std::size_t> received;
+    test::SocketServer server([&](int socket) {
+      EXPECT_THAT(test::read_head(socket), HasSubstr("Content-Length: 20000000\r\n"));
+      test::answer(socket, "401 Unauthorized");
+      received.set_value(test::read_to_the_end(socket));
+    });
+    Client client({.server = server.url()});
+    EXPECT_EQ(error_of([&] { client.upload(file(pattern(20'000'000)), kInOnePiece); }).code(),
+              ErrorCode::kUnauthorized);
+    return received.get_future().get();
+  };
+  EXPECT_TRUE(test::eventually([&] { return bytes_sent_in_vain() == 0; }));
 }
 
-TEST(Upload, StopsWhereARefusalComesInTheMiddle) {
+TEST_F(Upload, StopsWhereARefusalComesInTheMiddle) {
   constexpr std::size_t kBytes = 50'000'000;
   std::promise<std::size_t> received;
   test::SocketServer server([&](int socket) {
@@ -164,53 +160,28 @@ TEST(Upload, StopsWhereARefusalComesInTheMiddle) {
     test::send_text(socket, "HTTP/1.1 100 Continue\r\n\r\n");
     std::string begin(1'000'000, ' ');
     EXPECT_EQ(::recv(socket, begin.data(), begin.size(), MSG_WAITALL), 1'000'000);
-    test::send_text(socket, "HTTP/1.1 507 Full\r\nContent-Length: 0\r\n\r\n");
+    test::answer(socket, "507 Full");
     received.set_value(test::read_to_the_end(socket));
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "large", pattern(kBytes));
   Client client({.server = server.url()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "large", kInOnePiece); }).code(),
+  EXPECT_EQ(error_of([&] { client.upload(file(pattern(kBytes)), kInOnePiece); }).code(),
             ErrorCode::kOutOfSpace);
   EXPECT_LT(received.get_future().get(), kBytes / 2);
 }
 
-TEST(Upload, InPartsIsInOnePieceForAServerThatKnowsNoParts) {
-  FakeServer server;
-  const std::string content = pattern(100'000);
-  std::vector<std::string> bodies;
-  server.http.Post(
-      "/v1/volumes", [&](const httplib::Request& request, httplib::Response& response) {
-        bodies.push_back(request.body);
-        if (request.body.empty()) {
-          return answer_with(response, Error(ErrorCode::kInvalidParameter, "the body is empty"));
-        }
-        response.set_content(to_json(some_volume()), kJson);
-      });
-  TemporaryFolder folder;
-  test::write_file(folder / "file", content);
-  Client client({.server = server.start()});
-  EXPECT_EQ(client.upload(folder / "file", {.resumable_bytes = 1000}), some_volume());
-  EXPECT_THAT(bodies, ElementsAre("", content));
-}
-
-TEST(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) {
+TEST_F(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) {
   const std::string content = pattern(200'000);
   std::string received;
   std::vector<std::string> asked;
   const test::SocketServer server([&](int socket) {
     const std::string head = test::read_head(socket);
     asked.push_back(head.substr(0, head.find(" HTTP")));
-    const auto answer = [&](const std::string& text, const std::string& body = {}) {
-      test::send_text(socket, "HTTP/1.1 " + text + "\r\nContent-Length: " +
-                                  std::to_string(body.size()) + "\r\n\r\n" + body);
-    };
     if (head.starts_with("POST") && head.find("upload=") == std::string::npos) {
       EXPECT_THAT(head, HasSubstr("Upload-Length: 200000\r\n"));
       EXPECT_THAT(head, HasSubstr("Repr-Digest: sha-256=:"));
-      return answer("201 Created\r\nLocation: /v1/uploads/7");
+      return test::answer(socket, "201 Created\r\nLocation: /v1/uploads/7");
     }
-    if (head.starts_with("POST")) return answer("200 OK", to_json(some_volume()));
+    if (head.starts_with("POST")) return test::answer(socket, "200 OK", to_json(some_volume()));
     if (head.starts_with("HEAD")) {
       const bool is_whole = received.size() == content.size();
       return test::send_text(
@@ -222,32 +193,26 @@ TEST(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) {
     ::recv(socket, part.data(), part.size(), MSG_WAITALL);
     received += part;
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "file", content);
   Client client({.server = server.url()});
-  EXPECT_EQ(client.upload(folder / "file", {.digest = true, .resumable_bytes = 1000}),
-            some_volume());
+  EXPECT_EQ(client.upload(file(content), {.digest = true, .resumable_bytes = 1000}), some_volume());
   EXPECT_TRUE(received == content);
   EXPECT_THAT(
       asked, ElementsAre("POST /v1/volumes", "PATCH /v1/uploads/7", "HEAD /v1/uploads/7",
                          "PATCH /v1/uploads/7", "HEAD /v1/uploads/7", "POST /v1/volumes?upload=7"));
 }
 
-TEST(Upload, GoesOnWhereTheConnectionStalls) {
+TEST_F(Upload, GoesOnWhereTheConnectionStalls) {
   const std::string content = pattern(20'000'000);
   int stalled = -1;
   bool is_whole = false;
   const test::SocketServer server([&](int socket) {
     const std::string head = test::read_head(socket);
-    const auto answer = [&](const std::string& text, const std::string& body = {}) {
-      test::send_text(socket, "HTTP/1.1 " + text + "\r\nContent-Length: " +
-                                  std::to_string(body.size()) + "\r\n\r\n" + body);
-    };
     if (head.starts_with("HEAD")) {
       return test::send_text(
           socket, "HTTP/1.1 204 No Content\r\nUpload-Offset: 0\r\nUpload-Complete: ?0\r\n\r\n");
     }
-    if (head.starts_with("POST")) return answer("201 Created\r\nLocation: /v1/uploads/7");
+    if (head.starts_with("POST"))
+      return test::answer(socket, "201 Created\r\nLocation: /v1/uploads/7");
     if (stalled < 0) {
       stalled = ::dup(socket);  // open, and nobody reads what comes
       return;
@@ -255,70 +220,58 @@ TEST(Upload, GoesOnWhereTheConnectionStalls) {
     std::string body(content.size(), ' ');
     ::recv(socket, body.data(), body.size(), MSG_WAITALL);
     is_whole = body == content;
-    answer("201 Created", to_json(some_volume()));
+    test::answer(socket, "201 Created", to_json(some_volume()));
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "file", content);
   Client client({.server = server.url(), .stall_timeout = std::chrono::milliseconds{1500}});
-  EXPECT_EQ(client.upload(folder / "file"), some_volume());
+  EXPECT_EQ(client.upload(file(content)), some_volume());
   EXPECT_TRUE(is_whole);
   ::close(stalled);
 }
 
 // As of another daemon of a cluster, or when it has expired.
-TEST(Upload, InPartsIsSentInOnePieceWhereItIsNotKept) {
+TEST_F(Upload, InPartsIsSentInOnePieceWhereItIsNotKept) {
   std::vector<std::string> asked;
   const test::SocketServer server([&](int socket) {
     const std::string head = test::read_head(socket);
     asked.push_back(head.substr(0, head.find(' ')));
-    const auto answer = [&](const std::string& text, const std::string& body = {}) {
-      test::send_text(socket, "HTTP/1.1 " + text + "\r\nContent-Length: " +
-                                  std::to_string(body.size()) + "\r\n\r\n" + body);
-    };
-    if (asked.size() == 1) return answer("201 Created\r\nLocation: /v1/uploads/7");
+    if (asked.size() == 1) return test::answer(socket, "201 Created\r\nLocation: /v1/uploads/7");
     if (asked.size() == 2) return;  // the connection breaks
-    if (asked.size() == 3) return answer("410 Gone");
+    if (asked.size() == 3) return test::answer(socket, "410 Gone");
     EXPECT_THAT(head, Not(HasSubstr("Upload-Complete")));
     std::string body(2000, ' ');
     ::recv(socket, body.data(), body.size(), MSG_WAITALL);
     EXPECT_TRUE(body == pattern(2000));
-    answer("201 Created", to_json(some_volume()));
+    test::answer(socket, "201 Created", to_json(some_volume()));
   });
-  TemporaryFolder folder;
-  test::write_file(folder / "file", pattern(2000));
   Client client({.server = server.url()});
-  EXPECT_EQ(client.upload(folder / "file", {.resumable_bytes = 1000}), some_volume());
+  EXPECT_EQ(client.upload(file(pattern(2000)), {.resumable_bytes = 1000}), some_volume());
   EXPECT_THAT(asked, ElementsAre("POST", "PATCH", "HEAD", "POST"));
 }
 
-TEST(Upload, IsNotRepeatedWhenTheConnectionBreaks) {
+TEST_F(Upload, IsNotRepeatedWhenTheConnectionBreaks) {
   test::SocketServer server([](int socket) { test::read_head(socket); });
-  TemporaryFolder folder;
-  test::write_file(folder / "file", pattern(1000));
   Client client({.server = server.url()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "file"); }).code(), ErrorCode::kUnreachable);
+  EXPECT_EQ(error_of([&] { client.upload(file(pattern(1000))); }).code(), ErrorCode::kUnreachable);
   EXPECT_EQ(server.connections(), 1);
 }
 
-TEST(Upload, GivesBackWhatACallbackThrows) {
+TEST_F(Upload, GivesBackWhatACallbackThrows) {
   FakeServer server;
   server.http.Post("/v1/volumes", [](const httplib::Request&, httplib::Response&) {});
-  TemporaryFolder folder;
-  test::write_file(folder / "file", pattern(1000));
   UploadOptions options;
   options.progress = [](std::uint64_t, std::uint64_t) { throw std::out_of_range("enough"); };
   Client client({.server = server.start()});
-  EXPECT_THROW(client.upload(folder / "file", options), std::out_of_range);
+  EXPECT_THROW(client.upload(file(pattern(1000)), options), std::out_of_range);
 }
 
-TEST(Upload, NamesAFileThatIsNotThere) {
+TEST_F(Upload, NamesAFileThatIsNotThere) {
   Client client({.server = test::unused_url()});
   const Error error = error_of([&] { client.upload("/nowhere/head.nii"); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
   EXPECT_THAT(error.what(), HasSubstr("/nowhere/head.nii"));
 }
 
-TEST(Upload, NamesAFileThatCannotBeLookedAt) {
+TEST_F(Upload, NamesAFileThatCannotBeLookedAt) {
   TemporaryFolder folder;
   std::filesystem::create_symlink("loop.nii", folder / "loop.nii");
   Client client({.server = test::unused_url()});
@@ -335,14 +288,8 @@ class Fetch : public testing::Test {
  protected:
   // A server whose job 7 announces `announced` and whose mesh is `sent`.
   Client client_for(const std::string& announced, const std::string& sent) {
-    server_.http.Get("/v1/jobs/7",
-                     [announced](const httplib::Request&, httplib::Response& response) {
-                       response.set_content(to_json(finished_job("7", announced)), kJson);
-                     });
-    server_.http.Get("/v1/jobs/7/mesh.drc",
-                     [sent](const httplib::Request&, httplib::Response& response) {
-                       response.set_content(sent, "application/octet-stream");
-                     });
+    server_.http.Get("/v1/jobs/7", test::answering(to_json(finished_job("7", announced))));
+    server_.http.Get("/v1/jobs/7/mesh.drc", test::answering(sent, "application/octet-stream"));
     return Client({.server = server_.start()});
   }
 
@@ -387,58 +334,40 @@ TEST_F(Fetch, GivesTheReasonOfAJobThatFailed) {
   job.state = JobState::kFailed;
   job.mesh.reset();
   job.error = to_problem(Error(ErrorCode::kTooLarge, "the mesh has too many triangles"), "");
-  server_.http.Get("/v1/jobs/7", [&](const httplib::Request&, httplib::Response& response) {
-    response.set_content(to_json(job), kJson);
-  });
+  server_.http.Get("/v1/jobs/7", test::answering(to_json(job)));
   Client client({.server = server_.start()});
   const Error error = error_of([&] { client.fetch("7", MeshFormat::kDrc, folder_ / "a.drc"); });
   EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
   EXPECT_STREQ(error.what(), "the mesh has too many triangles");
 }
 
-TEST_F(Fetch, StartsOverWhenTheConnectionBreaksInTheMiddle) {
-  const std::string mesh = pattern(100'000);
-  std::atomic<int> downloads = 0;
-  test::SocketServer server([&](int socket) {
-    const bool download = test::read_head(socket).find("/mesh.drc") != std::string::npos;
-    const std::string body = download ? mesh : to_json(finished_job("7", mesh));
-    const bool cut = download && ++downloads == 1;
-    test::send_text(socket, "HTTP/1.1 200 OK\r\nContent-Length: " + std::to_string(body.size()) +
-                                "\r\n\r\n" + body.substr(0, cut ? 70'000 : body.size()));
-  });
-  Client client({.server = server.url()});
-  client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc");
-  EXPECT_EQ(downloads, 2);
-  EXPECT_TRUE(test::read_file(folder_ / "brain.drc") == mesh);
-}
-
-TEST_F(Fetch, GoesOnWhereTheConnectionBroke) {
-  const std::string mesh = test::pattern(200'000);
-  const std::string job = to_json(test::finished_job("7", mesh));
-  std::vector<std::string> asked;
-  const test::SocketServer server([&](int socket) {
-    const std::string head = test::read_head(socket);
-    if (head.find("mesh.drc") == std::string::npos) {
-      return test::send_text(
-          socket, "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " +
-                      std::to_string(job.size()) + "\r\n\r\n" + job);
-    }
-    asked.push_back(head);
-    const std::size_t at = head.find("Range: bytes=");
-    const std::size_t from = at == std::string::npos ? 0 : std::stoul(head.substr(at + 13));
-    const std::string rest = mesh.substr(from);
-    test::send_text(socket, std::string("HTTP/1.1 ") +
-                                (from > 0 ? "206 Partial Content" : "200 OK") +
-                                "\r\nContent-Length: " + std::to_string(rest.size()) + "\r\n\r\n" +
-                                rest.substr(0, asked.size() < 3 ? 70'000 : rest.size()));
-  });
-  Client({.server = server.url()}).fetch("7", MeshFormat::kDrc, folder_ / "mesh.drc");
-  EXPECT_EQ(test::read_file(folder_ / "mesh.drc"), mesh);
-  ASSERT_EQ(asked.size(), 3U);
-  EXPECT_THAT(asked[0], testing::Not(testing::HasSubstr("Range")));
-  EXPECT_THAT(asked[1], testing::HasSubstr("\r\nRange: bytes=70000-\r\n"));
-  EXPECT_THAT(asked[1], testing::HasSubstr("\r\nIf-Range: \""));
-  EXPECT_THAT(asked[2], testing::HasSubstr("\r\nRange: bytes=140000-\r\n"));
+// A server that knows no ranges sends the whole file again.
+TEST_F(Fetch, GoesOnWhereTheConnectionBrokeOrStartsOver) {
+  const std::string mesh = pattern(200'000);
+  for (const bool knows_ranges : {true, false}) {
+    std::vector<std::string> asked;
+    const test::SocketServer server([&](int socket) {
+      const std::string head = test::read_head(socket);
+      if (head.find("mesh.drc") == std::string::npos) {
+        return test::answer(socket, "200 OK", to_json(finished_job("7", mesh)));
+      }
+      asked.push_back(head);
+      const std::size_t at = head.find("Range: bytes=");
+      const bool is_range = knows_ranges && at != std::string::npos;
+      const std::string rest = mesh.substr(is_range ? std::stoul(head.substr(at + 13)) : 0);
+      test::send_text(socket, std::string("HTTP/1.1 ") +
+                                  (is_range ? "206 Partial Content" : "200 OK") +
+                                  "\r\nContent-Length: " + std::to_string(rest.size()) +
+                                  "\r\n\r\n" + rest.substr(0, asked.size() < 3 ? 70'000 : -1));
+    });
+    Client({.server = server.url()}).fetch("7", MeshFormat::kDrc, folder_ / "mesh.drc");
+    EXPECT_TRUE(test::read_file(folder_ / "mesh.drc") == mesh);
+    ASSERT_EQ(asked.size(), 3U);
+    EXPECT_THAT(asked[0], Not(HasSubstr("Range")));
+    EXPECT_THAT(asked[1], HasSubstr("\r\nRange: bytes=70000-\r\n"));
+    EXPECT_THAT(asked[1], HasSubstr("\r\nIf-Range: \""));
+    EXPECT_THAT(asked[2], HasSubstr(knows_ranges ? "bytes=140000-\r\n" : "bytes=70000-\r\n"));
+  }
 }
 
 TEST_F(Fetch, NamesATargetThatCannotBeWritten) {

@@ -1,5 +1,5 @@
-// Resumable uploads: "Resumable Uploads for HTTP" (draft-ietf-httpbis-resumable-upload);
-// docs/uploads.md has the server's subset.
+// Uploads. Large ones are resumed: "Resumable Uploads for HTTP"
+// (draft-ietf-httpbis-resumable-upload); docs/uploads.md has the server's subset.
 #include <algorithm>
 #include <array>
 #include <exception>
@@ -8,14 +8,70 @@
 #include <utility>
 #include <vector>
 
+#include "base/base64.h"
+#include "base/sha256.h"
 #include "base/text.h"
 #include "client/isomesh/impl.h"
-#include "client/isomesh/patience.h"
-#include "client/isomesh/transport.h"
+#include "client/isomesh/package.h"
 #include "proto/json.h"
 
 namespace isomesh {
 namespace {
+
+constexpr std::size_t kDigestBytes = 1024 * 1024;
+
+template <std::size_t N>
+std::string joined(const std::array<double, N>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ",") + to_text(value);
+  return text;
+}
+
+void add_raw(const RawDescription& raw, Query& pairs) {
+  const auto& [x, y, z] = raw.dims;
+  pairs.emplace_back("dims", std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z));
+  pairs.emplace_back("type", to_string(raw.type));
+  pairs.emplace_back("spacing", joined(raw.geometry.spacing));
+  pairs.emplace_back("origin", joined(raw.geometry.origin));
+  pairs.emplace_back("direction", joined(raw.geometry.direction));
+  if (raw.big_endian) pairs.emplace_back("byte_order", "big");
+}
+
+std::string upload_query(const UploadOptions& options) {
+  Query pairs;
+  if (options.raw) {
+    RawDescription raw = *options.raw;
+    if (options.spacing) raw.geometry.spacing = *options.spacing;
+    add_raw(raw, pairs);
+  }
+  if (!options.series.empty()) pairs.emplace_back("series", options.series);
+  if (!options.member.empty()) pairs.emplace_back("member", options.member);
+  if (options.volume) pairs.emplace_back("volume", std::to_string(*options.volume));
+  std::string accepted;
+  for (const std::string& code : options.accept) accepted += (accepted.empty() ? "" : ",") + code;
+  if (!accepted.empty()) pairs.emplace_back("accept", accepted);
+  if (options.nifti_form) pairs.emplace_back("nifti_form", to_string(*options.nifti_form));
+  if (options.spacing && !options.raw) pairs.emplace_back("spacing", joined(*options.spacing));
+  return pairs.empty() ? std::string() : query_string(pairs);
+}
+
+// File names may name patients, so they are sent in a header: logs contain targets.
+std::string disposition_of(const std::filesystem::path& path, const std::string& name) {
+  const auto file = (path.has_filename() ? path : path.parent_path()).filename();
+  return "attachment; filename*=UTF-8''" + percent_encode(name.empty() ? file.string() : name);
+}
+
+std::string digest_of(const UploadBody& file) {
+  Sha256 sha256;
+  std::vector<char> piece(kDigestBytes);
+  for (std::uint64_t offset = 0; offset < file.size(); offset += piece.size()) {
+    piece.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(kDigestBytes, file.size() - offset)));
+    file.read(offset, piece);
+    sha256.update(std::string_view(piece.data(), piece.size()));
+  }
+  return to_base64(sha256.finish());
+}
 
 constexpr const char* kPlaces = "/v1/uploads/";
 
@@ -84,20 +140,55 @@ Progress progress_of(const HttpResponse& response, std::uint64_t bytes) {
 
 }  // namespace
 
-std::string Client::Impl::begin_upload(const HttpRequest& request) const {
-  try {
-    std::string place = repeated(beginning_of(request)).header("location");
-    return place.starts_with(kPlaces) ? place : std::string();
-  } catch (const Error& error) {
-    // Older servers reject an empty body. Other errors recur with the fallback.
-    if (error.code() != ErrorCode::kInvalidParameter) throw;
-    return {};
+Error several_volumes(const std::vector<UploadedVolume>& volumes) {
+  Remedy remedy;
+  for (const UploadedVolume& each : volumes) {
+    remedy.choices.push_back(
+        {"member", each.member, each.problem ? each.problem->detail : "can be meshed"});
   }
+  return Error(ErrorCode::kUnusableVolume, "the upload contains " + std::to_string(volumes.size()) +
+                                               " volumes, but one is needed")
+      .with_remedy(std::move(remedy));
+}
+
+Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
+  std::vector<UploadedVolume> volumes = upload_all({path}, options);
+  if (volumes.size() == 1 && volumes.front().volume) return std::move(*volumes.front().volume);
+  throw several_volumes(volumes);
+}
+
+std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem::path>& paths,
+                                               const UploadOptions& options) {
+  const UploadBody file(paths);
+  HttpRequest request{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
+  request.headers = {{"Content-Type", "application/octet-stream"},
+                     {"Content-Disposition", disposition_of(paths.front(), options.name)}};
+  if (options.digest) {
+    request.headers.emplace_back("Content-Digest", "sha-256=:" + digest_of(file) + ":");
+  }
+  request.source_bytes = file.size();
+  request.source = [&](std::uint64_t offset, std::span<char> piece) {
+    if (options.progress) options.progress(offset, file.size());
+    file.read(offset, piece);
+    if (options.progress && offset + piece.size() == file.size()) {
+      options.progress(file.size(), file.size());
+    }
+  };
+  constexpr int kMultiStatus = 207;
+  const bool is_resumable = file.size() >= options.resumable_bytes;
+  const HttpResponse response = is_resumable ? impl_->resumed(request) : impl_->exchange(request);
+  if (response.status == kMultiStatus) return uploaded_volumes_from_json(response.body);
+  return {{.member = {}, .status = response.status, .volume = volume_from_json(response.body)}};
+}
+
+std::string Client::Impl::begin_upload(const HttpRequest& request) const {
+  std::string place = repeated(beginning_of(request)).header("location");
+  if (!place.starts_with(kPlaces)) throw other_api();
+  return place;
 }
 
 HttpResponse Client::Impl::resumed(const HttpRequest& request) const {
   const std::string place = begin_upload(request);
-  if (place.empty()) return exchange(request);
   try {
     return finish_upload(request, place);
   } catch (const NoResponse&) {
