@@ -1,7 +1,7 @@
 // How a surface comes: its progress, and what can be done with it meanwhile.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, keepNotices, labelsNrrd, openSurface, setup, surfaceLoaded } from './support';
+import { ballNrrd, holdMeshes, keepNotices, labelsNrrd, openSurface, setup, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -43,20 +43,14 @@ describe('a surface that is loading', () => {
     const { page, daemon } = at;
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
-    const held: { go: () => void } = { go: () => undefined };
     await keepNotices(page);
-    await page.route(/\/glb|\.glb/, async (route) => {
-      await new Promise<void>((resolve) => {
-        held.go = resolve;
-      });
-      await route.continue();
-    });
+    const release = await holdMeshes(page);
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await page.getByRole('button', { name: 'Measure' }).click();
     const canvas = page.locator('.viewport canvas');
     await canvas.click();
     await expect.poll(() => page.locator('.toasts').textContent()).toContain('still loading');
-    held.go();
+    release();
     await surfaceLoaded(page);
     await canvas.click();
     await expect.poll(() => page.locator('.pane [aria-live]').first().textContent()).toBe('First point set');
