@@ -207,15 +207,7 @@ void visit(Is<MeshCertificate> auto& self, auto&& field) {
   if (is_told(self, self.why_unproven.has_value())) {
     field("why_unproven", self.why_unproven);
   }
-  constexpr bool kIsRead = !std::is_const_v<std::remove_reference_t<decltype(self)>>;
-  std::optional<double> found_mm;
-  if constexpr (!kIsRead) found_mm = self.found_mm;
-  field("found_mm", found_mm);
-  if constexpr (kIsRead) {
-    std::optional<double> max_mm;  // its name in records of older versions
-    field("max_mm", max_mm);
-    self.found_mm = found_mm.value_or(max_mm.value_or(0));
-  }
+  field("found_mm", self.found_mm);
   field("from_mesh", self.from_mesh);
   field("from_extracted", self.from_extracted);
   if (is_told(self, self.budget_mm.has_value())) {

@@ -118,18 +118,7 @@ std::vector<PacsStatus> pacs_from_json(std::string_view text) {
 }
 
 std::string to_record(const OrderWork& work) { return json_values::to_text(work); }
-Order order_from_record(std::string_view text) {
-  Json record = parse_json<Json>(text, nullptr, false);
-  const Json::json_pointer results("/results");
-  if (!record.is_object() || !record.contains(results) || !record[results].is_array()) {
-    return json_values::from_record<Order>(text);
-  }
-  // Older versions made objects of one class only, and did not write it.
-  for (Json& result : record[results]) {
-    if (result.is_object()) result.emplace("sop_class_uid", kEncapsulatedStlStorage);
-  }
-  return json_values::from_record<Order>(record.dump());
-}
+Order order_from_record(std::string_view text) { return json_values::from_record<Order>(text); }
 OrderWork order_work_from_record(std::string_view text) {
   return json_values::from_record<OrderWork>(text);
 }

@@ -151,7 +151,7 @@ Order order_from_json(std::string_view text);
 std::vector<Order> orders_from_json(std::string_view text);
 std::vector<PacsStatus> pacs_from_json(std::string_view text);
 
-// For stores. Readers give members that an older version lacked their defaults. They throw Error
+// For stores. Readers give missing members their defaults. They throw Error
 // kInternal.
 std::string to_record(const OrderWork& work);
 Order order_from_record(std::string_view text);

@@ -126,23 +126,26 @@ struct Commands::State {
             "Restore the data folder from a backup; the folder must be missing or empty", [this] {
               refuse_database("use pg_restore to restore them (docs/cluster.md)");
               check_is_whole();
-              tell("restored", store::restore(folder, options.data));
+              tell("restored", store::restore(folder, options.data, components()));
             });
     restored.add_option("DIR", folder, "Folder that `isomeshd backup` created")->required();
   }
 
   void add_move_command() {
-    CLI::App& move =
-        add(cli, "move",
-            "Move the records of the folder of --data to an empty database. No daemon may use the "
-            "folder meanwhile. The files of volumes and meshes stay where they are",
-            [this] {
-              store::postgresql::check_url(target);
-              const store::DataFolder folder_of_data(options.data, options.disk_reserve);
-              const auto moved = store::postgresql::move_records(folder_of_data, target);
-              std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs and "
-                        << moved.orders << " orders" << std::endl;
-            });
+    CLI::App& move = add(
+        cli, "move",
+        "Move the records of the folder of --data to an empty database. No daemon may use the "
+        "folder meanwhile. The files of volumes and meshes stay where they are",
+        [this] {
+          store::postgresql::check_url(target);
+          const store::DataFolder folder_of_data(options.data, options.disk_reserve);
+          const auto moved = store::postgresql::move_records(folder_of_data, target, components());
+          std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs";
+          for (const auto& [name, count] : moved.others) {
+            std::cout << " and " << count << ' ' << name;
+          }
+          std::cout << std::endl;
+        });
     move.add_option("--to", target, "The database, as postgresql://USER@HOST/NAME")->required();
   }
 

@@ -13,6 +13,7 @@
 #include "server/store/postgresql/outbox.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/outbox.h"
 #include "server/store/sql/received_store.h"
 #include "server/store/sql/volume_store.h"
@@ -108,20 +109,23 @@ class SharedStores : public SqlStores {
 
 }  // namespace
 
+std::vector<store::Schema> components() { return {store::order_tables()}; }
+
 std::unique_ptr<RecordStores> open_record_stores(const Options& options,
                                                  const store::DataFolder& folder,
                                                  store::BlobStore& blobs,
                                                  std::chrono::milliseconds tolerance) {
   if (options.store.empty()) {
-    return std::make_unique<FolderStores>(options, std::make_unique<store::Database>(folder), blobs,
-                                          tolerance);
+    return std::make_unique<FolderStores>(
+        options, std::make_unique<store::Database>(folder, components()), blobs, tolerance);
   }
   store::postgresql::check_url(options.store);
   // A copied folder on another machine is another node.
   auto database = std::make_unique<store::postgresql::Database>(
       store::postgresql::DatabaseOptions{.url = options.store,
                                          .node = folder.name() + '@' + host_name(),
-                                         .connections = kRequestConnections + options.workers});
+                                         .connections = kRequestConnections + options.workers,
+                                         .components = components()});
   return std::make_unique<SharedStores>(options, std::move(database), blobs, tolerance);
 }
 
@@ -132,14 +136,14 @@ template <class Act>
 auto with_audit_trail(const Options& options, const Act& act) {
   if (!options.store.empty()) {
     store::postgresql::check_url(options.store);
-    return act(*store::postgresql::connect_to_trail(options.store));
+    return act(*store::postgresql::connect_to_trail(options.store, components()));
   }
   const std::filesystem::path file = options.data / "isomesh.sqlite";
   if (!std::filesystem::exists(file)) {
     throw Error(ErrorCode::kNotFound, "the data folder has no data of isomeshd");
   }
   store::Connection connection(file, store::Connection::Mode::kRead);
-  store::check_has_trail(connection);
+  store::check_versions(connection, components());
   store::refuse_moved(connection);
   return act(connection);
 }

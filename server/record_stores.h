@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/options.h"
 #include "server/store/audit_trail.h"
@@ -13,9 +14,13 @@
 #include "server/store/order_store.h"
 #include "server/store/outbox.h"
 #include "server/store/received_store.h"
+#include "server/store/sql/schema.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh {
+
+// The tables of the components that this daemon was built with.
+std::vector<store::Schema> components();
 
 // Thread safe.
 class RecordStores {
@@ -45,7 +50,7 @@ std::unique_ptr<RecordStores> open_record_stores(const Options& options,
                                                  std::chrono::milliseconds tolerance);
 
 // Opens only the audit trail, also beside daemons, and reads it; see AuditTrail::read. Changes
-// nothing, not even the tables of an older version.
+// nothing.
 void read_audit_trail(const Options& options, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line);
 

@@ -64,8 +64,7 @@ struct AuditCheck {
 
 // A hash chain. The digest of an entry is the hex SHA-256 of the previous entry's digest (empty for
 // the first), a line break and the entry's line. So changing, removing or inserting an entry
-// requires changing all later digests. Entries written by earlier versions have no digest; the
-// first entry with one covers them.
+// requires changing all later digests.
 class AuditChain {
  public:
   AuditChain() = default;

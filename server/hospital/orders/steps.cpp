@@ -293,7 +293,6 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   const store::Viewer viewer = record.owner;
   if (parameters.labels) {
     Volume volume = services_.volumes.get(viewer, parameters.volume);
-    // Orders of an older version have none.
     if (record.work.labels) volume.labels = *record.work.labels;
     parameters = jobs::complete_labels(std::move(parameters), viewer, volume, services_.labels);
   }

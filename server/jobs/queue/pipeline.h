@@ -24,11 +24,11 @@ struct PipelineLimits {
 };
 
 // Increment whenever the same volume and parameters would give different bytes than before.
-inline constexpr const char* kMesherVersion = "17";
+inline constexpr const char* kMesherVersion = "1";
 
 // Increment with kMesherVersion, and whenever jobs can ask for something new: in an upgrade, the
 // older daemons that share the queue leave newer jobs to newer daemons.
-inline constexpr int kJobVersion = 2;
+inline constexpr int kJobVersion = 1;
 
 // What stands for the mesher in the key of a result: its version, and the name of the back end
 // unless that is the default.

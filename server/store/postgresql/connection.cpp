@@ -261,6 +261,10 @@ void Connection::script(const std::string& sql) {
   checked(result_of(PQsendQuery(handle_, with_numbers(sql).c_str()) == 1));
 }
 
+bool Connection::has_table(const std::string& name) {
+  return query("SELECT 1 WHERE to_regclass(?1) IS NOT NULL", name).next();
+}
+
 void Connection::wait_for(short events) {
   if (waits_for(PQsocket(handle_), events, deadline_)) return;
   is_given_up_ = true;

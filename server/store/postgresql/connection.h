@@ -60,11 +60,12 @@ class Connection : public SqlConnection {
   // Throws Interrupted, Error kOutOfSpace, kUnavailable or kInternal. tell() throws the same.
   Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
   std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) override;
+  void script(const std::string& sql) override;
+  bool has_table(const std::string& name) override;
+  const char* key_type() const override { return "text COLLATE \"C\""; }
+  const char* end_of_keyed_table() const override { return ""; }
   const char* for_update() const override { return " FOR UPDATE"; }
   void lock_table(const std::string& name) override;
-
-  // Runs several statements without parameters.
-  void script(const std::string& sql);
 
   // False once the connection is lost.
   bool is_open() const;

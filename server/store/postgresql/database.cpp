@@ -63,7 +63,7 @@ Database::Database(DatabaseOptions options) : options_(std::move(options)), node
   with_reason(options_.url, [&] {
     ask([&](Connection& connection, bool) {
       check_encoding(connection);
-      migrate(connection);
+      upgrade(connection, options_.components);
     });
   });
   ask([&](Connection& connection, bool) {
@@ -187,10 +187,14 @@ void Database::give(std::unique_ptr<Connection> connection) {
 
 void Database::pause() { std::this_thread::sleep_for(kBetweenQuestions); }
 
-std::unique_ptr<Connection> connect_to_trail(const std::string& url) {
+std::unique_ptr<Connection> connect_to_trail(const std::string& url,
+                                             const std::vector<Schema>& components) {
   return with_reason(url, [&] {
     auto connection = std::make_unique<Connection>(url);
-    check_has_trail(*connection);
+    if (!connection->has_table("audit")) {
+      throw Error(ErrorCode::kNotFound, "the database has no data of isomeshd");
+    }
+    check_versions(*connection, components);
     connection->wait_until(Connection::Clock::time_point::max());  // it has many responses
     return connection;
   });

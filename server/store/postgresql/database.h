@@ -15,6 +15,7 @@
 #include "base/mutex.h"
 #include "server/store/expiry.h"
 #include "server/store/postgresql/connection.h"
+#include "server/store/sql/schema.h"
 
 namespace isomesh::store::postgresql {
 
@@ -24,6 +25,7 @@ struct DatabaseOptions {
   std::size_t connections = 16;
   // Time to wait for a response, and to retry interrupted work, before that is an error.
   std::chrono::milliseconds patience{5000};
+  std::vector<Schema> components = {};  // beside the service's own tables
 };
 
 // The records of a cluster: one PostgreSQL database used by any number of processes. Each has a
@@ -31,9 +33,9 @@ struct DatabaseOptions {
 // database. Thread safe.
 class Database : public SqlDatabase {
  public:
-  // Creates missing tables and migrates those of an older version. Throws Error kUnavailable, with
-  // libpq's reason, if no connection can be made or a newer version made the tables; kInternal
-  // otherwise. The text is for the operator.
+  // Creates missing tables and upgrades those of an older version. Throws Error kUnavailable, with
+  // libpq's reason, if no connection can be made, and as check_versions() of sql/schema.h does;
+  // kInternal otherwise. The text is for the operator.
   explicit Database(DatabaseOptions options);
 
   // Runs `act(connection, is_again)`, and repeats it while it is interrupted, so `act` must be
@@ -124,6 +126,7 @@ class Database : public SqlDatabase {
 
 // A connection for commands that read the audit trail beside daemons of any version: it changes
 // nothing. Throws Error as Database does, and kNotFound if there are no tables.
-std::unique_ptr<Connection> connect_to_trail(const std::string& url);
+std::unique_ptr<Connection> connect_to_trail(const std::string& url,
+                                             const std::vector<Schema>& components);
 
 }  // namespace isomesh::store::postgresql

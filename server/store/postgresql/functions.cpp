@@ -3,8 +3,7 @@
 
 namespace isomesh::store::postgresql {
 
-// A changed function needs a new version of the schema, so that an older daemon that starts does
-// not restore its own.
+// Created again with each new version of the schema, so a changed function needs a new one.
 const char* const kFunctions = R"sql(
 -- Of those that make the same mesh: who submits one looks whether there is a mesh while nobody stores it.
 CREATE OR REPLACE FUNCTION alike_lock(p_owner text, p_key text) RETURNS bigint LANGUAGE sql IMMUTABLE AS
@@ -78,7 +77,7 @@ BEGIN
   INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
                    request_digest, record, cost, version)
     VALUES(s.id, s.owner, {job.queued}, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url,
-           s.idempotency_key, s.request_digest, s.record, coalesce(s.cost, 1000000), coalesce(s.version, 1))  -- older daemons tell none
+           s.idempotency_key, s.request_digest, s.record, s.cost, s.version)
     ON CONFLICT DO NOTHING;
   IF NOT FOUND THEN                    -- two with one key
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
@@ -98,8 +97,8 @@ END $$;
 -- A claim that is lost with the database's power is made again, so it does not wait for the disk. The fence is
 -- never one that a lost claim had: the time is in it. Claims are made one after the other, so that each sees the turns
 -- that the others have taken. Jobs of a newer version than p_newest wait for a newer daemon. An older one is not claimed
--- but returned without a fence: the caller adopts it and claims again. Daemons of the first version do not tell theirs.
-CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint, p_newest int DEFAULT 1)
+-- but returned without a fence: the caller adopts it and claims again.
+CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint, p_newest int)
 RETURNS TABLE(id text, fence bigint, attempts int, owner text, record text, accepted bigint, claimed bigint)
 LANGUAGE plpgsql AS $$
 DECLARE turn record; c record; now_us bigint; f bigint;
@@ -187,11 +186,11 @@ BEGIN
   IF s.state = {job.succeeded} THEN
     PERFORM pg_advisory_xact_lock(alike_lock(j.owner, j.result_key));
     IF EXISTS (SELECT 1 FROM jobs a WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued}
-                 AND a.version <= coalesce(s.newest, 1)
+                 AND a.version <= s.newest
                  AND a.id NOT IN (SELECT t.id FROM jsonb_to_recordset(s.alike) AS t(id text))) THEN
       RETURN QUERY SELECT 'alike', a.id, a.record, a.accepted FROM jobs a
         WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = {job.queued}
-          AND a.version <= coalesce(s.newest, 1) ORDER BY a.id;
+          AND a.version <= s.newest ORDER BY a.id;
       RETURN;
     END IF;
   END IF;

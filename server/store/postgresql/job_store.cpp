@@ -112,8 +112,7 @@ PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
   if (!rows.is_null(9)) {
     row.job.stage = rows.choice(9, Stage::kDone);
     row.job.progress = rows.real(10);
-    // Daemons of the first version write no timings.
-    if (!rows.is_null(11)) row.job.timing = readable_timing(rows.text(11));
+    row.job.timing = readable_timing(rows.text(11));
   }
   row.job.timing.queue = milliseconds_between(row.accepted, rows.integer(8));
   return row;

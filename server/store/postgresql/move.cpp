@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "base/files.h"
@@ -26,29 +27,19 @@ constexpr std::chrono::hours kLongestMove{24};
 
 // A table in SQLite and the columns in PostgreSQL that receive its rows.
 struct Table {
-  const char* columns;  // with the table's name
-  const char* rows;
+  std::string columns;  // with the table's name
+  std::string rows;
   int count;
 };
 
 // Events are not copied: their numbers have another form, and nobody waits for them.
-constexpr std::array kAsTheyAre = {
+const std::array kAsTheyAre = {
     Table{"volumes(owner, id, created, used, bytes, record, labelled)",
           "SELECT owner, id, created, used, bytes, record, labelled FROM volumes", 7},
     Table{"meshes(job, blob, bytes)", "SELECT job, blob, bytes FROM meshes", 3},
     Table{"callbacks(job, receiver, url, body, attempts, created, next)",
           "SELECT job, receiver, url, body, attempts, created, next FROM callbacks", 7},
     Table{"expired(id, owner, at)", "SELECT id, owner, at FROM expired", 3},
-    Table{"orders(id, owner, state, rule, created, finished, next, idempotency_key, "
-          "request_digest, record, work)",
-          "SELECT id, owner, state, rule, created, finished, next, idempotency_key, "
-          "coalesce(request_digest, ''), record, work FROM orders",
-          11},
-    Table{"order_blobs(\"order\", blob)", "SELECT \"order\", blob FROM order_blobs", 2},
-    Table{"watched(rule, study, series, \"order\", instances, seen)",
-          "SELECT rule, study, series, \"order\", instances, seen FROM watched", 6},
-    Table{"received(route, study, series, instance, blob, bytes, at)",
-          "SELECT route, study, series, instance, blob, bytes, at FROM received", 7},
     Table{"audit(id, at, record, chain)", "SELECT id, at, record, chain FROM audit ORDER BY id",
           4}};
 
@@ -79,7 +70,7 @@ class Values {
 };
 
 std::string insertion(const Table& table) {
-  std::string sql = std::string("INSERT INTO ") + table.columns + " VALUES(";
+  std::string sql = "INSERT INTO " + table.columns + " VALUES(";
   for (int n = 1; n <= table.count; ++n) sql += (n > 1 ? ", ?" : "?") + std::to_string(n);
   return sql + ')';
 }
@@ -92,21 +83,29 @@ std::uint64_t copy(Source& from, Connection& to, const Table& table) {
   return count;
 }
 
+// Tables of components have the same columns in both databases.
+std::uint64_t copy_as_it_is(Source& from, Connection& to, const std::string& table) {
+  Rows columns = from.query("SELECT count(*) FROM pragma_table_info(?1)", table);
+  columns.next();
+  const int count = static_cast<int>(columns.integer(0));
+  return copy(from, to, {.columns = table, .rows = "SELECT * FROM " + table, .count = count});
+}
+
 // Ordered by id, that is, by age.
 std::uint64_t copy_jobs(Source& from, Connection& to) {
-  constexpr Table kTable = {
+  const Table kTable = {
       "jobs(id, owner, state, priority, volume, result_key, accepted, finished, not_before, "
-      "attempts, fence, waiting_for, idempotency_key, request_digest, record, cost, receiver, "
-      "url)",
+      "attempts, fence, waiting_for, idempotency_key, request_digest, record, cost, version, "
+      "receiver, url)",
       "SELECT id, owner, state, priority, volume, result_key, accepted, finished, not_before, "
-      "attempts, fence, waiting_for, idempotency_key, coalesce(request_digest, ''), record, cost "
+      "attempts, fence, waiting_for, idempotency_key, request_digest, record, cost, 1 "
       "FROM jobs ORDER BY id",
-      18};
+      19};
   const std::string sql = insertion(kTable);
   std::uint64_t count = 0;
   Rows rows = from.query(kTable.rows);
   for (; rows.next(); ++count) {
-    Values values(rows, 16);
+    Values values(rows, 17);
     // A damaged record is copied as it is, and its job fails there.
     const auto job = readable_job(rows.text(14), rows.text(0));
     const auto callback = job ? job->parameters.callback : std::nullopt;
@@ -124,29 +123,42 @@ std::string name_of_blobs(store::Database& source) {
   return row.next() ? row.text(0) : random_hex(16);
 }
 
+void refuse_used(Transaction& transaction, const std::vector<std::string>& tables) {
+  std::string all;
+  std::string rows;
+  for (const std::string& table : tables) {
+    all += (all.empty() ? "" : ", ") + table;
+    rows += (rows.empty() ? "" : " UNION ALL ") + ("SELECT 1 FROM " + table);
+  }
+  transaction->script("LOCK TABLE identity, " + all + " IN EXCLUSIVE MODE");
+  if (!transaction->query(rows + " LIMIT 1").next()) return;
+  throw Error(ErrorCode::kInvalidParameter, "the database already has records: name an empty one");
+}
+
 // Copies all records to a database without records. The blobs belong to the database by that name.
-Moved copy_records(store::Database& source, const std::string& url, const std::string& name) {
+Moved copy_records(store::Database& source, const std::string& url, const std::string& name,
+                   const std::vector<Schema>& components) {
   const store::Reading reading(source.writer());
-  Database target({.url = url, .node = "move " + random_hex(8), .connections = 1});
+  Database target(
+      {.url = url, .node = "move " + random_hex(8), .connections = 1, .components = components});
   return target.ask_for(kLongestMove, [&](Connection& to, bool) {
     Transaction transaction(to);
-    transaction->query("LOCK TABLE volumes, jobs, orders, audit, identity IN EXCLUSIVE MODE");
-    const bool is_used = transaction
-                             ->query(
-                                 "SELECT 1 FROM volumes UNION ALL SELECT 1 FROM jobs UNION ALL "
-                                 "SELECT 1 FROM orders UNION ALL SELECT 1 FROM audit LIMIT 1")
-                             .next();
-    if (is_used) {
-      throw Error(ErrorCode::kInvalidParameter,
-                  "the database already has records: name an empty one");
+    std::vector<std::string> unused = {"volumes", "jobs", "audit"};
+    for (const Schema& schema : components) {
+      unused.insert(unused.end(), schema.tables.begin(), schema.tables.end());
     }
+    refuse_used(transaction, unused);
     Moved moved;
     moved.jobs = copy_jobs(reading.connection(), to);
     for (const Table& table : kAsTheyAre) {
       const std::uint64_t count = copy(reading.connection(), to, table);
-      const std::string_view columns = table.columns;
-      if (columns.starts_with("volumes(")) moved.volumes = count;
-      if (columns.starts_with("orders(")) moved.orders = count;
+      if (table.columns.starts_with("volumes(")) moved.volumes = count;
+    }
+    for (const Schema& schema : components) {
+      for (const std::string& table : schema.tables) {
+        const std::uint64_t count = copy_as_it_is(reading.connection(), to, table);
+        if (table == schema.tables.front()) moved.others[table] = count;
+      }
     }
     {
       Rows row = reading->query("SELECT id FROM audit_sent");
@@ -172,16 +184,17 @@ void retire(store::Database& source, const std::string& name) {
 
 }  // namespace
 
-Moved move_records(const DataFolder& folder, const std::string& url) {
+Moved move_records(const DataFolder& folder, const std::string& url,
+                   const std::vector<Schema>& components) {
   if (!std::filesystem::exists(folder.records())) {
     throw Error(ErrorCode::kInvalidParameter, "the data folder has no records to move");
   }
-  store::Database source(folder);
+  store::Database source(folder, components);
   // Nobody runs these jobs any more. They are queued again, here as in the copy.
   FileBlobStore blobs(folder);
   SqliteJobStore(source, blobs, {}).reap();
   const std::string name = name_of_blobs(source);
-  const Moved moved = copy_records(source, url, name);
+  const Moved moved = copy_records(source, url, name, components);
   retire(source, name);
   return moved;
 }

@@ -1,17 +1,20 @@
 // The tables and functions of isomesh in PostgreSQL. Private to this folder.
 #pragma once
 
+#include <vector>
+
 #include "server/store/postgresql/connection.h"
+#include "server/store/sql/schema.h"
 
 namespace isomesh::store::postgresql {
 
-// Creates missing tables and migrates those of an older version, in one transaction and by one
-// process at a time. Retries for ten minutes while other sessions hold the tables; a statement may
-// take as long. Throws Error kUnavailable if a newer version made them.
-void migrate(Connection& connection);
+// Creates missing tables of the service and of `components`, and upgrades those of an older
+// version, in one transaction and by one process at a time. Retries for ten minutes while other
+// sessions hold the tables; a statement may take as long. Throws as check_versions().
+void upgrade(Connection& connection, const std::vector<Schema>& components);
 
-// Throws Error unless this isomeshd can read the audit trail of these tables. Changes nothing.
-void check_has_trail(Connection& connection);
+// Throws Error kUnavailable as check_versions() of sql/schema.h does. Changes nothing.
+void check_versions(Connection& connection, const std::vector<Schema>& components);
 
 // The SQL that creates the functions of the newest version.
 extern const char* const kFunctions;

@@ -1,9 +1,7 @@
 #include "server/store/sql/audit_trail.h"
 
-#include <optional>
 #include <string>
 
-#include "proto/error.h"
 #include "server/store/microseconds.h"
 
 namespace isomesh::store {
@@ -12,7 +10,7 @@ namespace {
 struct Entry {
   std::uint64_t number = 0;
   std::string line;
-  std::optional<std::string> chain;
+  std::string chain;
 };
 
 // Calls `take` for the entries after `after`, oldest first, while it returns true. Reads in pieces,
@@ -26,32 +24,15 @@ void read_pieces(const Ask& ask, std::uint64_t after, const Take& take) {
     if (!rows.next()) return;
     do {
       after = rows.count(0);
-      const auto chain = rows.is_null(3) ? std::nullopt : std::optional(rows.text(3));
-      if (!take(Entry{after, audit_line(after, rows.text(1), rows.text(2)), chain})) return;
+      if (!take(Entry{after, audit_line(after, rows.text(1), rows.text(2)), rows.text(3)})) return;
     } while (rows.next());
   }
 }
 
-// The chain over all entries so far: from the last entry that has a digest, and all after it.
+// The chain over all entries so far.
 AuditChain chain_of(SqlConnection& connection) {
-  std::uint64_t after = 0;
-  AuditChain chain;
-  {
-    Rows last = connection.query(
-        "SELECT id, chain FROM audit WHERE chain IS NOT NULL ORDER BY id DESC LIMIT 1");
-    if (last.next()) {
-      after = last.count(0);
-      chain = AuditChain(last.text(1));
-    }
-  }
-  const auto ask = [&](const char* sql, std::uint64_t from, int most) {
-    return connection.query(sql, from, most);
-  };
-  read_pieces(ask, after, [&](const Entry& entry) {
-    chain.add(entry.line);
-    return true;
-  });
-  return chain;
+  Rows last = connection.query("SELECT chain FROM audit ORDER BY id DESC LIMIT 1");
+  return last.next() ? AuditChain(last.text(0)) : AuditChain();
 }
 
 }  // namespace
@@ -99,15 +80,6 @@ void SqlAuditTrail::note_sent(std::uint64_t number) {
   database_.run(Change::kNeeded, "UPDATE audit_sent SET id = ?1", number);
 }
 
-void refuse_old_trail(std::int64_t version, std::int64_t oldest) {
-  if (version >= oldest) return;
-  throw Error(ErrorCode::kUnavailable,
-              "the records were made by an older isomeshd: they have version " +
-                  std::to_string(version) + ", and the audit trail can be read from version " +
-                  std::to_string(oldest) +
-                  " on. A daemon of this version upgrades them when it starts");
-}
-
 void read_audit_trail(SqlConnection& connection, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line) {
   read_pieces([&](const char* sql, std::uint64_t from,
@@ -122,14 +94,12 @@ void read_audit_trail(SqlConnection& connection, std::uint64_t after,
 AuditCheck verify_audit_trail(SqlConnection& connection) {
   AuditCheck result;
   AuditChain chain;
-  bool has_begun = false;
   const auto ask = [&](const char* sql, std::uint64_t from, int most) {
     return connection.query(sql, from, most);
   };
   read_pieces(ask, 0, [&](const Entry& entry) {
     chain.add(entry.line);
-    has_begun = has_begun || entry.chain;
-    if (has_begun && entry.chain != chain.digest()) {
+    if (entry.chain != chain.digest()) {
       result.misfit = entry.number;
       return false;
     }

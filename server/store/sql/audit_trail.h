@@ -23,9 +23,6 @@ class SqlAuditTrail : public AuditTrail {
   SqlDatabase& database_;
 };
 
-// Throws Error kUnavailable if records of that version have the audit trail in an older form.
-void refuse_old_trail(std::int64_t version, std::int64_t oldest);
-
 // Reads every entry.
 AuditCheck verify_audit_trail(SqlConnection& connection);
 // As read(), on a connection.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "server/store/sql/schema.h"
+
 namespace isomesh::store {
 namespace {
 
@@ -41,16 +43,6 @@ OwnedBytes read_owned_bytes(Rows rows) {
   OwnedBytes bytes;
   while (rows.next()) bytes[rows.text(0)] = rows.count(1);
   return bytes;
-}
-
-bool is_named(SqlConnection& connection, const std::string& blob) {
-  return connection
-      .query(
-          "SELECT 1 FROM volumes WHERE id = ?1 UNION ALL SELECT 1 FROM meshes WHERE blob = ?1 "
-          "UNION ALL SELECT 1 FROM order_blobs WHERE blob = ?1 UNION ALL SELECT 1 FROM received "
-          "WHERE blob = ?1 LIMIT 1",
-          blob)
-      .next();
 }
 
 bool has_expired(SqlConnection& connection, const std::optional<std::string>& viewer,

@@ -22,9 +22,6 @@ std::vector<Blob> read_blobs(Rows rows);
 // From rows of owner and sum of bytes.
 OwnedBytes read_owned_bytes(Rows rows);
 
-// True if any record, of a volume, mesh, order or received instance, names the blob.
-bool is_named(SqlConnection& connection, const std::string& blob);
-
 // True if a job or volume with that id, visible to the viewer, has expired.
 bool has_expired(SqlConnection& connection, const std::optional<std::string>& viewer,
                  const std::string& id);

@@ -116,6 +116,15 @@ class SqlConnection {
     return tell(sql, parameters);
   }
 
+  // Runs several statements without parameters.
+  virtual void script(const std::string& sql) = 0;
+
+  virtual bool has_table(const std::string& name) = 0;
+  // The type of a text that is a key, in a script that creates tables.
+  virtual const char* key_type() const = 0;
+  // The end of a table that is stored by its primary key.
+  virtual const char* end_of_keyed_table() const = 0;
+
   // The end of a SELECT whose rows the transaction may change, so that no other transaction changes
   // them meanwhile: " FOR UPDATE" if there may be others.
   virtual const char* for_update() const = 0;

@@ -10,6 +10,7 @@
 #include "server/store/damaged_records.h"
 #include "server/store/microseconds.h"
 #include "server/store/sql/expiry.h"
+#include "server/store/sql/schema.h"
 #include "server/store/sql/undamaged_rows.h"
 
 namespace isomesh::store {

@@ -162,37 +162,11 @@ void snapshot(const fs::path& data, const fs::path& file) {
 
 // A column whose values are the keys of blobs, and the column that says in messages what needs
 // them.
-struct Naming {
-  std::string table;
-  std::string blob;
-  std::string name;
-  std::string what;
-};
-
-// The tables that is_named() of the stores looks at. Records of an older version lack some of them.
-std::vector<Naming> namings(Connection& connection) {
-  std::vector<Naming> all = {
-      {.table = "volumes", .blob = "id", .name = "id", .what = "the volume "},
-      {.table = "meshes", .blob = "blob", .name = "job", .what = "a mesh of the job "},
-      {.table = "order_blobs",
-       .blob = "blob",
-       .name = "\"order\"",
-       .what = "an object of the order "},
-      {.table = "received", .blob = "blob", .name = "instance", .what = "the received image "}};
-  std::erase_if(all, [&](const Naming& each) {
-    return !connection.query("SELECT 1 FROM sqlite_schema WHERE name = ?", each.table).next();
-  });
-  return all;
-}
-
 std::set<std::string> named_blobs(const fs::path& records) {
   Connection connection(records, Connection::Mode::kRead);
   std::set<std::string> blobs;
-  for (const Naming& each : namings(connection)) {
-    Rows query = connection.query("SELECT DISTINCT " + each.blob + " FROM " + each.table +
-                                  " WHERE " + each.blob + " IS NOT NULL");
-    while (query.next()) blobs.insert(place_of(query.text(0)));
-  }
+  Rows query = connection.query("SELECT DISTINCT blob FROM named_blobs WHERE blob IS NOT NULL");
+  while (query.next()) blobs.insert(place_of(query.text(0)));
   return blobs;
 }
 
@@ -200,13 +174,9 @@ std::set<std::string> named_blobs(const fs::path& records) {
 std::vector<std::string> told(const fs::path& records, const std::set<std::string>& keys) {
   Connection connection(records, Connection::Mode::kRead);
   std::vector<std::string> lost;
-  for (const Naming& each : namings(connection)) {
-    const std::string sql =
-        "SELECT " + each.name + " FROM " + each.table + " WHERE " + each.blob + " = ?";
-    for (const std::string& key : keys) {
-      Rows query = connection.query(sql, key);
-      while (query.next()) lost.push_back(each.what + query.text(0));
-    }
+  for (const std::string& key : keys) {
+    Rows query = connection.query("SELECT what, name FROM named_blobs WHERE blob = ?1", key);
+    while (query.next()) lost.push_back(query.text(0) + query.text(1));
   }
   return lost;
 }
@@ -227,7 +197,7 @@ Copied described(const Amount& amount, const std::set<std::string>& missing_plac
 void mark_blobs(const fs::path& folder) {
   Connection connection(folder / kRecords, Connection::Mode::kRead);
   Rows query = connection.query("SELECT id, number FROM identity");
-  if (!query.next()) return;  // written by a version without marks
+  if (!query.next()) return;
   const std::string text = query.text(0) + ' ' + std::to_string(query.integer(1)) + '\n';
   File file = File::create(folder / kBlobs / kIdentity);
   file.write(std::as_bytes(std::span(text)));
@@ -334,11 +304,12 @@ Copied back_up(const fs::path& data, const fs::path& named) {
   }
 }
 
-Copied restore(const fs::path& backup, const fs::path& data) {
+Copied restore(const fs::path& backup, const fs::path& data,
+               const std::vector<Schema>& components) {
   check_is_data_folder(backup);
   {
     Connection connection(backup / kRecords, Connection::Mode::kRead);
-    check_version(connection);
+    check_versions(connection, components);
   }
   if (is_in(data, backup)) refuse(data, "is inside the backup");
   std::error_code error;

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "server/store/sql/schema.h"
+
 namespace isomesh::store {
 
 struct Copied {
@@ -27,7 +29,8 @@ Copied back_up(const std::filesystem::path& data, const std::filesystem::path& t
 // Copies a backup to `data`, which must be missing or empty. If root does this, the files get the
 // owner of an existing empty `data`. No daemon can start there before the restore is complete, even
 // if it was killed. If it fails, `data` is as before. Throws as back_up, and kUnavailable if a
-// newer isomeshd made the backup.
-Copied restore(const std::filesystem::path& backup, const std::filesystem::path& data);
+// newer isomeshd made the backup, or one with other components.
+Copied restore(const std::filesystem::path& backup, const std::filesystem::path& data,
+               const std::vector<Schema>& components);
 
 }  // namespace isomesh::store

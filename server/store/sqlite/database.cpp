@@ -1,32 +1,31 @@
 #include "server/store/sqlite/database.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
+#include <string>
 
 #include "proto/error.h"
 #include "server/store/files/files.h"
-#include "server/store/sql/audit_trail.h"
 #include "server/store/sql/fair_queue.h"
 
 namespace isomesh::store {
 namespace {
 
-// The tables of the first version, then the changes of each later one. Only append; never edit.
-//
-// A record is the JSON of the API; the other columns serve queries.
-constexpr std::array kSteps = {R"sql(
+// The service's tables. A record is the JSON of the API; the other columns serve queries.
+constexpr const char* kTables = R"sql(
 CREATE TABLE volumes(
   owner TEXT NOT NULL,
   id TEXT NOT NULL,
   created INTEGER NOT NULL,
   used INTEGER NOT NULL,      -- when it was created or a job that needed it ended, whichever is last
   bytes INTEGER NOT NULL,     -- of its blob
-  record TEXT NOT NULL,
+  record TEXT NOT NULL,       -- without labels
+  labelled TEXT,              -- with them, if there are any
   PRIMARY KEY(owner, id)
 ) WITHOUT ROWID;
 CREATE INDEX volumes_by_blob ON volumes(id);
 CREATE INDEX volumes_by_use ON volumes(used);
+CREATE INDEX volumes_by_time ON volumes(created, id);
 
 CREATE TABLE jobs(
   id TEXT NOT NULL PRIMARY KEY,
@@ -35,9 +34,11 @@ CREATE TABLE jobs(
   priority INTEGER NOT NULL,
   volume TEXT NOT NULL,
   result_key TEXT NOT NULL,   -- the same for jobs that make the same mesh
+  cost INTEGER NOT NULL,      -- microseconds that a run is expected to take
   accepted INTEGER NOT NULL,
   finished INTEGER,
   not_before INTEGER NOT NULL,
+  waiting_for INTEGER,        -- of queued ones, see WaitingFor
   attempts INTEGER NOT NULL,
   fence INTEGER NOT NULL,
   claimed INTEGER,            -- when its run began, while it runs
@@ -45,16 +46,25 @@ CREATE TABLE jobs(
   worker TEXT,
   cancelling INTEGER NOT NULL,
   idempotency_key TEXT,
-  request_digest TEXT,
+  request_digest TEXT NOT NULL,
   record TEXT NOT NULL
 ) WITHOUT ROWID;
-CREATE INDEX jobs_queue ON jobs(priority, id) WHERE state = {job.queued};
+CREATE INDEX jobs_by_turn ON jobs(priority, owner, id, state) WHERE state = {job.queued};  -- covers the look for owners
+CREATE INDEX jobs_waiting ON jobs(waiting_for) WHERE state = {job.queued} AND waiting_for IS NOT NULL;
 CREATE INDEX jobs_running ON jobs(lease_until) WHERE state = {job.running};
 CREATE INDEX jobs_by_result ON jobs(owner, result_key, state);
 CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < {job.final};
 CREATE INDEX jobs_by_end ON jobs(finished) WHERE finished IS NOT NULL;
 CREATE INDEX jobs_by_owner ON jobs(owner, id);
 CREATE UNIQUE INDEX jobs_by_key ON jobs(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
+
+CREATE TABLE turns(           -- of owners' last claims; see fair_queue.h
+  priority INTEGER NOT NULL,
+  owner TEXT NOT NULL,
+  start_tag INTEGER NOT NULL,
+  finish_tag INTEGER NOT NULL,
+  PRIMARY KEY(priority, owner)
+) WITHOUT ROWID;
 
 CREATE TABLE meshes(          -- which blobs the meshes of which jobs are in
   job TEXT NOT NULL REFERENCES jobs(id) ON DELETE CASCADE,
@@ -93,135 +103,50 @@ CREATE TABLE callbacks(       -- of jobs that have ended, until they are deliver
   next INTEGER NOT NULL       -- when it is due
 ) WITHOUT ROWID;
 CREATE INDEX callbacks_by_time ON callbacks(next);
-)sql",
-                               R"sql(
-ALTER TABLE jobs ADD COLUMN waiting_for INTEGER;  -- of queued ones, see WaitingFor
-CREATE INDEX jobs_waiting ON jobs(waiting_for) WHERE state = {job.queued} AND waiting_for IS NOT NULL;
 
 CREATE TABLE identity(        -- one row: see Identity
   id TEXT NOT NULL,
   number INTEGER NOT NULL,
   seen INTEGER NOT NULL
 );
-)sql",
-                               R"sql(
-CREATE TABLE orders(          -- states are the values of OrderState; those from {order.final} on are final
-  id TEXT NOT NULL PRIMARY KEY,
-  owner TEXT NOT NULL,
-  state INTEGER NOT NULL,
-  rule TEXT,
-  created INTEGER NOT NULL,
-  finished INTEGER,
-  next INTEGER NOT NULL,      -- when it is due, while it is open
-  idempotency_key TEXT,
-  request_digest TEXT,
-  record TEXT NOT NULL,       -- the JSON of the API
-  work TEXT NOT NULL          -- what the API does not tell
-) WITHOUT ROWID;
-CREATE INDEX orders_due ON orders(next) WHERE state < {order.final};
-CREATE INDEX orders_by_owner ON orders(owner, id);
-CREATE INDEX orders_by_end ON orders(finished) WHERE finished IS NOT NULL;
-CREATE UNIQUE INDEX orders_by_key ON orders(owner, idempotency_key)
-  WHERE idempotency_key IS NOT NULL;
-
-CREATE TABLE order_blobs(     -- objects that are about to be sent
-  "order" TEXT NOT NULL REFERENCES orders(id) ON DELETE CASCADE,
-  blob TEXT NOT NULL,
-  PRIMARY KEY("order", blob)
-) WITHOUT ROWID;
-CREATE INDEX order_blobs_by_blob ON order_blobs(blob);
-
-CREATE TABLE watched(         -- series that rules have made orders of
-  rule TEXT NOT NULL,
-  study TEXT NOT NULL,
-  series TEXT NOT NULL,
-  "order" TEXT NOT NULL,      -- the last one
-  instances INTEGER NOT NULL, -- as many as there were for that
-  seen INTEGER NOT NULL,
-  PRIMARY KEY(rule, study, series)
-) WITHOUT ROWID;
-CREATE INDEX watched_by_order ON watched("order");
-CREATE INDEX watched_by_time ON watched(seen);
 
 CREATE TABLE audit(
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   at TEXT NOT NULL,
-  record TEXT NOT NULL
+  record TEXT NOT NULL,
+  chain TEXT NOT NULL         -- see AuditChain
 );
 CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit
   BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
 CREATE TRIGGER audit_is_not_removed BEFORE DELETE ON audit
   BEGIN SELECT raise(ABORT, 'the audit trail is not removed'); END;
-)sql",
-                               R"sql(
-CREATE TABLE received(        -- instances that peers have sent; see ReceivedStore
-  route TEXT NOT NULL,
-  study TEXT NOT NULL,
-  series TEXT NOT NULL,
-  instance TEXT NOT NULL,
-  blob TEXT,                  -- while it is held
-  bytes INTEGER NOT NULL,
-  at INTEGER NOT NULL,
-  PRIMARY KEY(route, study, series, instance)
-) WITHOUT ROWID;
-CREATE INDEX received_held ON received(route, study, series, at, bytes) WHERE blob IS NOT NULL;
-CREATE INDEX received_by_blob ON received(blob) WHERE blob IS NOT NULL;
-
+CREATE TRIGGER audit_is_not_replaced BEFORE INSERT ON audit
+  WHEN EXISTS(SELECT 1 FROM audit WHERE id = new.id)
+  BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
 CREATE TABLE audit_sent(      -- one row: up to which entry a collector has had the trail
   id INTEGER NOT NULL
 );
 INSERT INTO audit_sent VALUES(0);
-)sql",
-                               R"sql(
-ALTER TABLE volumes ADD COLUMN labelled TEXT;  -- the record with its labels, if it has any: `record` is without
-UPDATE volumes SET labelled = record, record = json_remove(record, '$.labels')
-  WHERE instr(record, '"labels":[');
-CREATE INDEX volumes_by_time ON volumes(created, id);
-)sql",
-                               R"sql(
-ALTER TABLE audit ADD COLUMN chain TEXT;  -- see AuditChain; none in entries of versions before
-CREATE TRIGGER audit_is_not_replaced BEFORE INSERT ON audit
-  WHEN EXISTS(SELECT 1 FROM audit WHERE id = new.id)
-  BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
-)sql",
-                               R"sql(
-ALTER TABLE jobs ADD COLUMN cost INTEGER NOT NULL DEFAULT 1000000;  -- microseconds that a run is expected to take
-DROP INDEX jobs_queue;
-CREATE INDEX jobs_by_turn ON jobs(priority, owner, id, state) WHERE state = {job.queued};  -- covers the look for owners
-CREATE TABLE turns(           -- of owners' last claims; see fair_queue.h
-  priority INTEGER NOT NULL,
-  owner TEXT NOT NULL,
-  start_tag INTEGER NOT NULL,
-  finish_tag INTEGER NOT NULL,
-  PRIMARY KEY(priority, owner)
-) WITHOUT ROWID;
-)sql"};
+)sql";
 
-// Versions 1 and 2 were never released.
-constexpr std::int64_t kFirst = 3;
-constexpr std::int64_t kChained = 8;  // the first version whose audit trail has digests
-constexpr auto kNewest = kFirst + static_cast<std::int64_t>(kSteps.size()) - 1;
-
-std::int64_t version_of(Connection& connection) {
-  Rows query = connection.query("PRAGMA user_version");
-  query.next();
-  return query.integer(0);
+std::vector<Schema> with_own(std::vector<Schema> components) {
+  components.insert(components.begin(), {.component = kService,
+                                         .steps = {std::string(kTables) + kQueuedOwners},
+                                         .named_blobs = kBlobsOfService});
+  return components;
 }
 
-// Migrates the tables before any other access.
-Connection::Mode migrated(const std::filesystem::path& file) {
+// Upgrades the tables before any other access.
+Connection::Mode upgraded(const std::filesystem::path& file,
+                          const std::vector<Schema>& components) {
   // Records may identify patients. SQLite's other files get the access rights of this one.
   if (!std::filesystem::exists(file)) File::create(file);
   Connection connection(file, Connection::Mode::kWrite);
-  check_version(connection);
-  const std::int64_t version = version_of(connection);
-  if (version == kNewest) return Connection::Mode::kWrite;
+  check_versions(connection, components);
+  const std::vector<Schema> schemas = with_own(components);
+  if (!needs_upgrade(connection, schemas)) return Connection::Mode::kWrite;
   Transaction transaction(connection);
-  for (std::int64_t next = version == 0 ? kFirst : version + 1; next <= kNewest; ++next) {
-    connection.script(kSteps[static_cast<std::size_t>(next - kFirst)]);
-  }
-  connection.script(kQueuedOwners);
-  connection.script(("PRAGMA user_version=" + std::to_string(kNewest)).c_str());
+  upgrade(connection, schemas);
   transaction.commit();
   return Connection::Mode::kWrite;
 }
@@ -235,24 +160,12 @@ std::uint64_t log_bytes(std::uint64_t disk) {
 
 }  // namespace
 
-void check_version(Connection& connection) {
-  const std::int64_t version = version_of(connection);
-  if (version == 0 || (version >= kFirst && version <= kNewest)) return;
-  throw Error(ErrorCode::kUnavailable,
-              std::string("the data folder was made by ") +
-                  (version > kNewest ? "a newer isomeshd" : "a pre-release isomeshd") +
-                  ": its records have version " + std::to_string(version) +
-                  ", this isomeshd reads versions " + std::to_string(kFirst) + " to " +
-                  std::to_string(kNewest));
+void check_versions(Connection& connection, const std::vector<Schema>& components) {
+  store::check_versions(connection, "the data folder", with_own(components));
 }
 
-void check_has_trail(Connection& connection) {
-  check_version(connection);
-  refuse_old_trail(version_of(connection), kChained);
-}
-
-Database::Database(const DataFolder& folder)
-    : folder_(folder), writer_(folder.records(), migrated(folder.records())) {
+Database::Database(const DataFolder& folder, const std::vector<Schema>& components)
+    : folder_(folder), writer_(folder.records(), upgraded(folder.records(), components)) {
   const auto disk_responds = [&folder] { return folder.works(); };
   for (auto& reader : readers_) {
     reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);

@@ -9,11 +9,13 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "server/store/expiry.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/microseconds.h"
+#include "server/store/sql/schema.h"
 #include "server/store/sqlite/sqlite.h"
 
 namespace isomesh::store {
@@ -23,9 +25,9 @@ namespace isomesh::store {
 // Thread safe; `folder` must outlive this object.
 class Database : public SqlDatabase {
  public:
-  // Creates missing tables and migrates those of an older version. Throws Error kUnavailable if a
-  // newer, unknown version made them; kOutOfSpace or kInternal.
-  explicit Database(const DataFolder& folder);
+  // Opens the tables of the service and of `components`: creates missing ones and upgrades those of
+  // an older version. Throws Error kUnavailable as check_versions does; kOutOfSpace or kInternal.
+  explicit Database(const DataFolder& folder, const std::vector<Schema>& components = {});
 
   Connection& writer() { return writer_; }
   // An idle connection if there is one.
@@ -71,11 +73,8 @@ class Database : public SqlDatabase {
   std::atomic<std::size_t> next_ = 0;  // the next reader if all are busy
 };
 
-// Throws Error kUnavailable if this isomeshd cannot read records of that version.
-void check_version(Connection& connection);
-
-// The same for the audit trail without a migration.
-void check_has_trail(Connection& connection);
+// Throws Error kUnavailable as check_versions() of sql/schema.h does. Changes nothing.
+void check_versions(Connection& connection, const std::vector<Schema>& components);
 
 // Microseconds since 1970 by this machine's clock.
 std::int64_t now_us();

@@ -171,9 +171,13 @@ void Connection::know_newest(const std::atomic<std::int64_t>& newest_us) {
   if (code != SQLITE_OK) throw error_of(code);
 }
 
-void Connection::script(const char* sql) {
+void Connection::script(const std::string& sql) {
   const int code = sqlite3_exec(handle_, with_numbers(sql).c_str(), nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) throw last_error();
+}
+
+bool Connection::has_table(const std::string& name) {
+  return query("SELECT 1 FROM sqlite_schema WHERE name = ?1", name).next();
 }
 
 void Connection::set_durability(Durability durability) {
@@ -186,7 +190,7 @@ void Connection::limit_log(std::uint64_t bytes) {
   Rows page = query("PRAGMA page_size");
   page.next();
   log_pages_ = static_cast<int>(bytes / static_cast<std::uint64_t>(page.integer(0)));
-  script(("PRAGMA journal_size_limit=" + std::to_string(bytes)).c_str());
+  script("PRAGMA journal_size_limit=" + std::to_string(bytes));
   sqlite3_wal_hook(handle_, look_at_log, this);
 }
 

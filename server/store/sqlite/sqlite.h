@@ -58,6 +58,10 @@ class Connection : public SqlConnection {
   std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) override;
   // Not needed: a transaction has the connection exclusively, and no other connection writes.
   const char* for_update() const override { return ""; }
+  void script(const std::string& sql) override;
+  bool has_table(const std::string& name) override;
+  const char* key_type() const override { return "TEXT"; }
+  const char* end_of_keyed_table() const override { return " WITHOUT ROWID"; }
   void lock_table(const std::string&) override {}
 
   // Sets the newest certain time for `isomesh_kept`. `newest_us` must outlive this object.
@@ -69,9 +73,6 @@ class Connection : public SqlConnection {
 
   // The error of the last call.
   Error last_error() const;
-
-  // Runs several statements without parameters.
-  void script(const char* sql);
 
   // Checkpoints the write-ahead log when it reaches this size, and truncates it at twice the size,
   // which waits for readers.

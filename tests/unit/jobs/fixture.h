@@ -22,6 +22,10 @@ namespace isomesh::test {
 
 class JobsFixture : public testing::Test {
  protected:
+  // The records have the tables of these, too.
+  explicit JobsFixture(const std::vector<store::Schema>& components = {})
+      : database_(data_, components) {}
+
   // Adds samples as an upload of raw ones.
   template <class T>
   Volume add(const SampleVolume<T>& samples, SampleType type) {
@@ -63,7 +67,7 @@ class JobsFixture : public testing::Test {
 
   TemporaryFolder folder_;
   store::DataFolder data_{folder_ / "data"};
-  store::Database database_{data_};
+  store::Database database_;
   store::FileBlobStore blobs_{data_};
   store::SqlVolumeStore volumes_{database_};
   store::SqliteJobStore jobs_{database_, blobs_, options()};

@@ -19,6 +19,7 @@
 #include "server/hospital/orders/received.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/received_store.h"
 #include "tests/api/dicom_bytes.h"
 #include "tests/support/errors.h"
@@ -290,7 +291,7 @@ class WatchedReceived : public store::SqlReceivedStore {
 
 class OrdersTest : public test::JobsFixture {
  protected:
-  OrdersTest() {
+  OrdersTest() : JobsFixture({store::order_tables()}) {
     for (const char* name : {"main", "other"}) {
       PacsSettings settings;
       settings.name = name;

@@ -298,23 +298,5 @@ TEST(Records, OfAnOlderVersionHaveDefaultsForWhatItDidNotKnow) {
   }
 }
 
-// As versions wrote it that had all parameters in one type.
-TEST(Record, KeepsTheParametersOfEarlierVersions) {
-  const std::string parameters =
-      R"({"volume":"abc","iso":"otsu","scheme":5,"interpolation":"midpoint","passes":9,)"
-      R"("smoothing":"taubin","lambda":0.5,"pass_band":0.05,"max_displacement_mm":null,)"
-      R"("close":true,"components":{"keep":2,"min_triangles":null},"formats":["glb","stl"],)"
-      R"("draco":{"position_bits":11,"speed":3},"normals":true,"priority":"bulk",)"
-      R"("callback":{"url":"https://receiver.example/?key=1"}})";
-  const Job job = job_from_record(R"({"id":"7","parameters":)" + parameters +
-                                  R"(,"volume":"abc","priority":"bulk"})");
-  const json read = json::parse(to_json(job.parameters));
-  const json written = json::parse(parameters);
-  for (const auto& [name, value] : written.items()) EXPECT_EQ(read[name], value) << name;
-  EXPECT_EQ(job.parameters.volume, "abc");
-  EXPECT_EQ(job.parameters.components.keep, 2U);
-  EXPECT_EQ(job.parameters.callback, Callback{"https://receiver.example/?key=1"});
-}
-
 }  // namespace
 }  // namespace isomesh

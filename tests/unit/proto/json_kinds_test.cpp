@@ -105,17 +105,6 @@ TEST(JobJson, OfTheErrorComesBackTheSame) {
   EXPECT_EQ(job_from_json(to_json(certified_job())), certified_job());
 }
 
-TEST(JobJson, HasTheCertificateOfAnOlderVersion) {
-  json job = json::parse(to_json(certified_job()));
-  json& certificate = job["mesh"]["certificate"];
-  EXPECT_TRUE(certificate["proven"]);
-  for (const char* const name : {"proven", "bound_mm", "found_mm"}) certificate.erase(name);
-  certificate["max_mm"] = 0.09;
-  const MeshCertificate read = job_from_json(job.dump()).mesh->certificate.value();
-  EXPECT_EQ(read.found_mm, 0.09);
-  EXPECT_FALSE(read.bound_mm);
-}
-
 TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {
   const json job = json::parse(to_json(succeeded_job()));
   for (const char* const name :

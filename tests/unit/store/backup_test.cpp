@@ -9,6 +9,7 @@
 #include "base/ids.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/received_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/identity.h"
@@ -28,7 +29,7 @@ class BackupOfAHospitalTest : public testing::Test {
  protected:
   BackupOfAHospitalTest() {
     const DataFolder data(root());
-    Database database(data);
+    Database database(data, {order_tables()});
     FileBlobStore blobs(data);
     image_ = test::put(blobs, "an image").key;
     SqlReceivedStore(database).add({"BONE", "1.2", "1.3"},
@@ -61,7 +62,7 @@ TEST_F(BackupOfAHospitalTest, HasWhatWasReceivedAndWhatIsToBeSent) {
   const Copied copied = back_up(root(), folder_ / "backup");
   EXPECT_EQ(copied.blobs, 2U);
   EXPECT_THAT(copied.missing, IsEmpty());
-  EXPECT_EQ(restore(folder_ / "backup", folder_ / "restored"), copied);
+  EXPECT_EQ(restore(folder_ / "backup", folder_ / "restored", {order_tables()}), copied);
   EXPECT_EQ(test::read_file(blob("restored", image_)), "an image");
   EXPECT_EQ(test::read_file(blob("restored", object_)), "an object");
 }
@@ -70,7 +71,7 @@ TEST_F(BackupOfAHospitalTest, HasWhatWasReceivedAndWhatIsToBeSent) {
 TEST_F(BackupOfAHospitalTest, OfRecordsThatWereMovedIsRefused) {
   {
     const DataFolder data(root());
-    Database database(data);
+    Database database(data, {order_tables()});
     mark_as_moved(database, "of the blobs");
   }
   const Error error = test::error_of([&] { back_up(root(), folder_ / "backup"); });
@@ -87,20 +88,13 @@ TEST_F(BackupOfAHospitalTest, SaysWhichOfThemIsDamagedOrMissing) {
   EXPECT_THAT(copied.damaged, ElementsAre("an object of the order " + order_));
 }
 
-// Records of the first version have no orders.
-TEST_F(BackupOfAHospitalTest, OfRecordsWithoutOrdersIsRestored) {
-  Connection(root() / "isomesh.sqlite", Connection::Mode::kWrite)
-      .script("DROP TABLE order_blobs; DROP TABLE received;");
-  EXPECT_EQ(back_up(root(), folder_ / "backup").blobs, 0U);
-  EXPECT_THAT(restore(folder_ / "backup", folder_ / "restored").missing, IsEmpty());
-}
-
 // A daemon would not start with it.
 TEST_F(BackupOfAHospitalTest, OfANewerVersionIsNotRestored) {
   back_up(root(), folder_ / "backup");
   Connection(folder_ / "backup/isomesh.sqlite", Connection::Mode::kWrite)
-      .script("PRAGMA user_version=99");
-  const auto error = test::thrown_by([&] { restore(folder_ / "backup", folder_ / "restored"); });
+      .script("UPDATE schema_versions SET version = 99");
+  const auto error =
+      test::thrown_by([&] { restore(folder_ / "backup", folder_ / "restored", {order_tables()}); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
   EXPECT_THAT(error->what(), HasSubstr("a newer isomeshd"));

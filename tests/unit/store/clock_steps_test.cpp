@@ -8,6 +8,7 @@
 #include "server/store/files/blob_store.h"
 #include "server/store/retention.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/job_store.h"
@@ -30,7 +31,7 @@ class Life {
  public:
   explicit Life(const std::filesystem::path& root, bool trust_clock = false)
       : data_(root),
-        database_(data_),
+        database_(data_, {order_tables()}),
         blobs_(data_),
         identity_(database_, blobs_, {.trust_clock = trust_clock}, {}),
         volumes_(database_),

@@ -16,6 +16,7 @@
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/support/postgres.h"
@@ -47,7 +48,8 @@ class SetClock {
 struct Node {
   Node(const std::string& url, const std::string& name, BlobStore& shared,
        JobStoreOptions options = {.grace = milliseconds(0)})
-      : database({.url = url, .node = name, .patience = seconds(60)}),
+      : database(
+            {.url = url, .node = name, .patience = seconds(60), .components = {order_tables()}}),
         volumes(database),
         outbox(database),
         jobs(database, shared, for_tests(std::move(options))) {}
@@ -106,13 +108,6 @@ class ClusterTest : public testing::Test {
                   "pg_backend_pid() AND backend_type = 'client backend'");
   }
   std::string ask(const std::string& sql) { return Postgres::ask(url_, sql); }
-  void make_version_one() {
-    ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); DROP VIEW "
-        "queued_owners; DROP TABLE turns; DROP TABLE tasks; DROP INDEX jobs_by_turn; ALTER TABLE "
-        "jobs DROP COLUMN cost, DROP COLUMN version; DROP FUNCTION claim_job; "
-        "CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0; UPDATE isomesh_version "
-        "SET version = 1");
-  }
   // As when their time is over.
   void end_leases() { ask("UPDATE runs SET lease_until = 0"); }
 

@@ -12,6 +12,7 @@
 #include "server/store/postgresql/schema.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "tests/support/errors.h"
 #include "tests/unit/store/cluster_fixture.h"
 
@@ -25,7 +26,7 @@ using testing::SizeIs;
 // --- Tables
 
 TEST_F(ClusterTest, TablesOfANewerVersionAreRefused) {
-  ask("UPDATE isomesh_version SET version = 1000");
+  ask("UPDATE schema_versions SET version = 1000");
   EXPECT_EQ(code_thrown_by([&] { Database({.url = url_, .node = "x"}); }), ErrorCode::kUnavailable);
 }
 
@@ -40,23 +41,13 @@ TEST_F(ClusterTest, ADatabaseThatIsNotOfUtf8IsRefusedWithItsEncoding) {
   EXPECT_THAT(error.what(), testing::HasSubstr("LATIN1"));
 }
 
-TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
-  const std::string id = submit();
-  make_version_one();
-  one_.emplace(url_, "one", blobs_);
-  const Lease lease = one().claimed();
-  EXPECT_EQ(lease.id, id);
-  one().jobs.renew(lease, {Stage::kSmooth, 0.5, {.load = 1}}, kLongLease);
-  EXPECT_EQ(two().jobs.get("", id).timing.load, 1);
-  submit(2);
-}
-
 // A large table takes longer than statements of a running daemon may.
 TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
-  make_version_one();
+  const Schema newer{.component = "trial",
+                     .steps = {"ALTER TABLE jobs ADD COLUMN trial int NOT NULL DEFAULT 7"}};
   ask("CREATE FUNCTION check_patience() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN IF "
       "current_setting('statement_timeout')::interval < interval '10 minutes' THEN RAISE 'hurry'; "
-      "END IF; RETURN new; END $$; CREATE TRIGGER patience BEFORE UPDATE ON isomesh_version FOR "
+      "END IF; RETURN new; END $$; CREATE TRIGGER patience BEFORE INSERT ON schema_versions FOR "
       "EACH ROW EXECUTE FUNCTION check_patience()");
   Connection connection(url_, Connection::Clock::now() + std::chrono::minutes(2));
   std::optional<Transaction> dump(std::in_place, connection);
@@ -64,7 +55,7 @@ TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
   std::optional<ErrorCode> failure;
   std::jthread upgrade([&] {
     Connection own(url_);
-    failure = code_thrown_by([&] { migrate(own); });
+    failure = code_thrown_by([&] { upgrade(own, {newer}); });
   });
   const auto waits = [&] {
     return ask("SELECT count(*) FROM pg_locks WHERE NOT granted AND mode = 'AccessExclusiveLock' "
@@ -75,8 +66,8 @@ TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
   dump.reset();
   upgrade.join();
   EXPECT_FALSE(failure);
-  two_.emplace(url_, "two", blobs_);
   submit();
+  EXPECT_EQ(ask("SELECT trial FROM jobs"), "7");
 }
 
 TEST_F(ClusterTest, SeveralThatStartAtOnceMakeThemOnce) {
@@ -87,7 +78,7 @@ TEST_F(ClusterTest, SeveralThatStartAtOnceMakeThemOnce) {
   }
   nodes.clear();
   EXPECT_EQ(Postgres::ask(place, "SELECT count(*) FROM nodes"), "6");
-  EXPECT_EQ(Postgres::ask(place, "SELECT count(*) FROM isomesh_version"), "1");
+  EXPECT_EQ(Postgres::ask(place, "SELECT count(*) FROM schema_versions"), "1");
 }
 
 TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
@@ -99,18 +90,15 @@ TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
 
 TEST_F(ClusterTest, WhoeverReadsTheAuditTrailChangesNothing) {
   SqlAuditTrail(one().database).add({});
-  const auto entries = [&] { return verify_audit_trail(*connect_to_trail(url_)).entries; };
-  ask("UPDATE isomesh_version SET version = 4");
+  const auto entries = [&] {
+    return verify_audit_trail(*connect_to_trail(url_, {order_tables()})).entries;
+  };
   EXPECT_EQ(entries(), 1U);
-  EXPECT_EQ(ask("SELECT version FROM isomesh_version"), "4")
-      << "daemons of this version still start";
   EXPECT_EQ(ask("SELECT count(*) FROM nodes"), "2");
-  for (const std::string version : {"3", "1000"}) {
-    ask("UPDATE isomesh_version SET version = " + version);
-    EXPECT_EQ(code_thrown_by(entries), ErrorCode::kUnavailable) << version;
-  }
+  ask("UPDATE schema_versions SET version = 1000");
+  EXPECT_EQ(code_thrown_by(entries), ErrorCode::kUnavailable);
   const std::string unused = Postgres::shared().new_place();
-  EXPECT_EQ(code_thrown_by([&] { connect_to_trail(unused); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { connect_to_trail(unused, {}); }), ErrorCode::kNotFound);
   EXPECT_EQ(
       Postgres::ask(unused, "SELECT count(*) FROM pg_tables WHERE schemaname = current_schema"),
       "0");
@@ -118,9 +106,9 @@ TEST_F(ClusterTest, WhoeverReadsTheAuditTrailChangesNothing) {
 
 TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
   for (int n = 0; n < 5; ++n) SqlAuditTrail((n % 2 ? one() : two()).database).add({});
-  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_)).entries, 5U);
+  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_, {order_tables()})).entries, 5U);
   ask("ALTER TABLE audit DISABLE TRIGGER audit_is_kept; UPDATE audit SET at = '' WHERE id = 3");
-  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_)).misfit, 3U);
+  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_, {order_tables()})).misfit, 3U);
 }
 
 // --- What is not kept

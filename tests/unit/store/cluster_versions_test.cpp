@@ -52,14 +52,6 @@ TEST_F(ClusterVersionsTest, AnOlderNodeLeavesAJobToANewerOne) {
   EXPECT_EQ(newer().claimed().id, id);
 }
 
-TEST_F(ClusterVersionsTest, ANodeThatTellsNoVersionIsOfTheFirst) {
-  submit_newer();
-  const std::string claim = "SELECT id FROM claim_job(gen_random_uuid(), 'worker', 60000000)";
-  EXPECT_THAT(ask(claim), IsEmpty());
-  const std::string older = submit(1);
-  EXPECT_EQ(ask(claim), older);
-}
-
 TEST_F(ClusterVersionsTest, AJobThatOnlyANewerNodeCanReadIsNotDamaged) {
   const std::string id = submit_newer();
   give_unknown_value(id);

@@ -1,6 +1,7 @@
 #include "tests/unit/store/engine.h"
 
 #include <optional>
+#include <vector>
 
 #include "base/clock.h"
 #include "server/store/files/blob_store.h"
@@ -10,6 +11,7 @@
 #include "server/store/postgresql/outbox.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/outbox.h"
 #include "server/store/sql/received_store.h"
 #include "server/store/sql/volume_store.h"
@@ -22,6 +24,8 @@
 
 namespace isomesh::test {
 namespace {
+
+const std::vector<store::Schema> kTables = {store::order_tables()};
 
 // The stores on one kind of database, with their blobs in a data folder.
 template <class Database, class OutboxOfKind, class JobStoreOfKind>
@@ -49,8 +53,8 @@ class EngineOn : public Engine {
     database_.reset();
   }
 
-  void open(const auto& place_of_database) {
-    database_.emplace(place_of_database);
+  void open(const auto&... place_of_database) {
+    database_.emplace(place_of_database...);
     volumes_.emplace(*database_);
     outbox_.emplace(*database_);
     orders_.emplace(*database_);
@@ -83,7 +87,7 @@ class SqliteEngine : public EngineOn<store::Database, store::SqlOutbox, store::S
 
   void restart() override {
     close();
-    open(*data_);
+    open(*data_, kTables);
     jobs_->reap();
   }
 
@@ -113,7 +117,7 @@ class SqliteEngine : public EngineOn<store::Database, store::SqlOutbox, store::S
     }
     data_.emplace(place);
     blobs_.emplace(*data_);
-    open(*data_);
+    open(*data_, kTables);
   }
 
   int lives_ = 0;
@@ -147,8 +151,10 @@ class PostgresEngine
   }
 
  private:
-  const store::postgresql::DatabaseOptions database_options_{
-      .url = Postgres::shared().new_place(), .node = "one", .patience = std::chrono::minutes(1)};
+  const store::postgresql::DatabaseOptions database_options_{.url = Postgres::shared().new_place(),
+                                                             .node = "one",
+                                                             .patience = std::chrono::minutes(1),
+                                                             .components = kTables};
 };
 
 template <class Kind>

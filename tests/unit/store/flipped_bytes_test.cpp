@@ -13,6 +13,7 @@
 #include "server/store/files/blob_store.h"
 #include "server/store/job_rules.h"
 #include "server/store/sql/order_store.h"
+#include "server/store/sql/order_tables.h"
 #include "server/store/sql/outbox.h"
 #include "server/store/sql/undamaged_rows.h"
 #include "server/store/sql/volume_store.h"
@@ -33,7 +34,7 @@ class FlippedBytes : public testing::Test {
   static constexpr std::size_t kRows = 5;
 
   FlippedBytes() {
-    Database database(data_);
+    Database database(data_, {order_tables()});
     SqlVolumeStore volumes(database);
     for (std::size_t n = 0; n < kRows; ++n) volumes.add("", volume(n));
     FileBlobStore blobs(data_);
@@ -68,7 +69,7 @@ class FlippedBytes : public testing::Test {
         std::string flipped = whole;
         flipped[at] = static_cast<char>(flipped[at] ^ flip);
         test::write_file(data_.records(), flipped);
-        Database database(data_);
+        Database database(data_, {order_tables()});
         check(database, at - begin + kHeaderBytes);
       }
       // Most of a record is alike.
@@ -82,7 +83,7 @@ class FlippedBytes : public testing::Test {
     std::size_t page = 0;
     std::size_t bytes = 0;
     {
-      Database database(data_);
+      Database database(data_, {order_tables()});
       Rows root = database.query("SELECT rootpage FROM sqlite_schema WHERE name = ?1", name);
       ASSERT_TRUE(root.next());
       page = root.count(0);
@@ -119,7 +120,7 @@ TEST_F(FlippedBytes, OfAVolumeHideNoOther) {
 TEST_F(FlippedBytes, OfAJobHideNoOtherAndDoNotStopTheQueue) {
   std::string record;
   {
-    Database database(data_);
+    Database database(data_, {order_tables()});
     FileBlobStore blobs(data_);
     record = to_record(SqliteJobStore(database, blobs, {}).get("", jobs_[2]));
   }
@@ -163,7 +164,7 @@ TEST_F(FlippedBytes, HideNothingFromWhoHasNothing) {
 
 TEST_F(FlippedBytes, OfAWholeTableAreNoEmptyList) {
   damage_table("volumes");
-  Database database(data_);
+  Database database(data_, {order_tables()});
   const SqlVolumeStore volumes(database);
   EXPECT_EQ(test::code_thrown_by([&] { volumes.list("", "", 9, ListOrder::kOldestFirst); }),
             ErrorCode::kInternal);
@@ -171,7 +172,7 @@ TEST_F(FlippedBytes, OfAWholeTableAreNoEmptyList) {
 
 TEST_F(FlippedBytes, BesideTheQueueAreNotBlamedOnItsJobs) {
   damage_table("events_by_job");
-  Database database(data_);
+  Database database(data_, {order_tables()});
   FileBlobStore blobs(data_);
   SqliteJobStore jobs(database, blobs, {});
   start_log(LogFormat::kText, LogLevel::kInfo);
@@ -188,7 +189,7 @@ TEST_F(FlippedBytes, BesideTheQueueAreNotBlamedOnItsJobs) {
 TEST_F(FlippedBytes, OfARunningJobLeaveNoOtherWithoutAnEnd) {
   std::string record;
   {
-    Database database(data_);
+    Database database(data_, {order_tables()});
     FileBlobStore blobs(data_);
     SqliteJobStore jobs(database, blobs, {});
     for (std::size_t n = 0; n < kRows; ++n) {
@@ -218,7 +219,7 @@ TEST_F(FlippedBytes, OfARunningJobLeaveNoOtherWithoutAnEnd) {
 TEST_F(FlippedBytes, OfACallbackStopNoOther) {
   const auto body = [](std::size_t n) { return "{\"number\":" + std::to_string(n) + "}"; };
   {
-    Database database(data_);
+    Database database(data_, {order_tables()});
     database.change(Change::kNeeded, [&](SqlTransaction& transaction) {
       for (std::size_t n = 0; n < kRows; ++n) {
         add_callback(transaction.connection(), jobs_[n], "http://localhost/", body(n));
@@ -239,7 +240,7 @@ TEST_F(FlippedBytes, OfACallbackStopNoOther) {
 TEST_F(FlippedBytes, OfAnOrderStopNoOther) {
   std::vector<OrderSpec> specs(kRows);
   {
-    Database database(data_);
+    Database database(data_, {order_tables()});
     SqlOrderStore orders(database);
     for (std::size_t n = 0; n < kRows; ++n) {
       Order& order = specs[n].record.order;
