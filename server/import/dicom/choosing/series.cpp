@@ -177,9 +177,7 @@ DicomCode code_of(const DataSet& data, Tag sequence) {
 
 std::vector<DicomSegment> segments_of(const DataSet& data) {
   std::vector<DicomSegment> segments;
-  const Element* sequence = data.find(kSegmentSequence);
-  if (sequence == nullptr) return segments;
-  for (const DataSet& item : sequence->items) {
+  for (const DataSet& item : data.items(kSegmentSequence)) {
     const auto number = item.unsigned_number(kSegmentNumber);
     if (!number) continue;
     segments.push_back({.label = *number,

@@ -6,7 +6,6 @@
 #include <map>
 #include <utility>
 
-#include "server/import/dicom/contours/distance.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/vectors.h"
 #include "server/import/source/source.h"

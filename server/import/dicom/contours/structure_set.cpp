@@ -25,9 +25,7 @@ std::uint32_t number_of(const DataSet& item, Tag tag) {
 
 std::map<std::uint32_t, std::string> names_of_structures(const DataSet& data) {
   std::map<std::uint32_t, std::string> names;
-  const Element* sequence = data.find(kStructureSetRoiSequence);
-  if (sequence == nullptr) return names;
-  for (const DataSet& item : sequence->items) {
+  for (const DataSet& item : data.items(kStructureSetRoiSequence)) {
     names.emplace(number_of(item, kRoiNumber), utf8(item, kRoiName));
   }
   return names;
@@ -63,12 +61,10 @@ bool is_closed(const DataSet& item) {
 }
 
 void add_contours(const DataSet& item, Structure& structure, StructureSet& set) {
-  const Element* contours = item.find(kContourSequence);
-  if (contours == nullptr) return;
-  for (std::size_t at = 0; at < contours->items.size(); ++at) {
-    const DataSet& contour = contours->items[at];
+  std::size_t number = 0;
+  for (const DataSet& contour : item.items(kContourSequence)) {
     std::vector<Vector3> points =
-        points_of(contour, "Contour " + std::to_string(at + 1) + " of the DICOM structure " +
+        points_of(contour, "Contour " + std::to_string(++number) + " of the DICOM structure " +
                                in_quotes(structure.name));
     if (is_closed(contour) && points.size() >= 3) {
       structure.contours.push_back(std::move(points));
@@ -96,15 +92,13 @@ StructureSet read_structures(const DataSet& data) {
   set.frame_of_reference_uid = frame_of_structures(data);
   const auto names = names_of_structures(data);
   std::map<std::uint32_t, Structure> structures;
-  if (const Element* sequence = data.find(kRoiContourSequence)) {
-    for (const DataSet& item : sequence->items) {
-      const std::uint32_t number = number_of(item, kReferencedRoiNumber);
-      Structure& structure = structures[number];
-      structure.number = number;
-      if (const auto name = names.find(number); name != names.end()) structure.name = name->second;
-      if (!structure.color) structure.color = color_of(item);
-      add_contours(item, structure, set);
-    }
+  for (const DataSet& item : data.items(kRoiContourSequence)) {
+    const std::uint32_t number = number_of(item, kReferencedRoiNumber);
+    Structure& structure = structures[number];
+    structure.number = number;
+    if (const auto name = names.find(number); name != names.end()) structure.name = name->second;
+    if (!structure.color) structure.color = color_of(item);
+    add_contours(item, structure, set);
   }
   for (auto& [number, structure] : structures) {
     if (structure.contours.empty()) continue;

@@ -123,9 +123,14 @@ const Element* DataSet::find(Tag tag) const {
   return found == elements.end() ? nullptr : &*found;
 }
 
-const DataSet* DataSet::item(Tag sequence) const {
+std::span<const DataSet> DataSet::items(Tag sequence) const {
   const Element* element = find(sequence);
-  return element == nullptr || element->items.empty() ? nullptr : &element->items.front();
+  return element == nullptr ? std::span<const DataSet>() : element->items;
+}
+
+const DataSet* DataSet::item(Tag sequence) const {
+  const auto all = items(sequence);
+  return all.empty() ? nullptr : &all.front();
 }
 
 std::string_view DataSet::text(Tag tag) const {

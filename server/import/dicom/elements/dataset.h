@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,6 +48,9 @@ class DataSet {
 
   // Returns the first element with this tag, or null.
   const Element* find(Tag tag) const;
+
+  // The items of a sequence; empty if it is missing.
+  std::span<const DataSet> items(Tag sequence) const;
 
   // Returns the first item of a sequence, or null.
   const DataSet* item(Tag sequence) const;

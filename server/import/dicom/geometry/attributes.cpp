@@ -25,11 +25,18 @@ enum class Kind { kText, kReal, kWord };
 // The group of rows that are set from elsewhere: no tag of a sequence.
 constexpr Tag kNoGroup = 0xFFFFFFFF;
 
+enum class Role {
+  kVolume,  // scanners give each volume one value
+  kStep,    // a step of a protocol
+  kTaken    // a slice that was taken twice differs from its copy, too
+};
+
 struct PhaseRow {
   std::string_view name;
   Tag group;  // 0: the object itself
   Tag tag;
   Kind kind;
+  Role role = Role::kVolume;
 };
 
 constexpr std::array kPhaseRows = {
@@ -50,42 +57,22 @@ constexpr std::array kPhaseRows = {
     PhaseRow{"B_value", 0, kSiemensBValue, Kind::kText},
     PhaseRow{"BActualValue", 0, kGridBValue, Kind::kReal},
     PhaseRow{"DiffusionGradientOrientation", kDiffusionGradientSequence, kDiffusionGradient,
-             Kind::kReal},
-    PhaseRow{"InversionTime", 0, kInversionTime, Kind::kText},
-    PhaseRow{"FlipAngle", 0, kFlipAngle, Kind::kText},
+             Kind::kReal, Role::kStep},
+    PhaseRow{"InversionTime", 0, kInversionTime, Kind::kText, Role::kStep},
+    PhaseRow{"FlipAngle", 0, kFlipAngle, Kind::kText, Role::kStep},
     PhaseRow{"ComplexImageComponent", kMrImageFrameTypeSequence, kComplexImageComponent,
              Kind::kText},
-    PhaseRow{"FrameType", kMrImageFrameTypeSequence, kFrameType, Kind::kText},
-    PhaseRow{"ImageType", 0, kImageType, Kind::kText},
-    PhaseRow{"TriggerTime", 0, kTriggerTime, Kind::kText},
-    PhaseRow{"NominalCardiacTriggerDelayTime", kCardiacSequence, kNominalTriggerDelay, Kind::kReal},
+    PhaseRow{"FrameType", kMrImageFrameTypeSequence, kFrameType, Kind::kText, Role::kTaken},
+    PhaseRow{"ImageType", 0, kImageType, Kind::kText, Role::kTaken},
+    PhaseRow{"TriggerTime", 0, kTriggerTime, Kind::kText, Role::kStep},
+    PhaseRow{"NominalCardiacTriggerDelayTime", kCardiacSequence, kNominalTriggerDelay, Kind::kReal,
+             Role::kStep},
     PhaseRow{"StackID", kFrameContentSequence, kStackId, Kind::kText},
-    PhaseRow{"AcquisitionNumber", 0, kAcquisitionNumber, Kind::kText},
-    PhaseRow{"AcquisitionDateTime", 0, kAcquisitionDateTime, Kind::kText},
-    PhaseRow{"AcquisitionTime", 0, kAcquisitionTime, Kind::kText},
-    PhaseRow{"ContentTime", 0, kContentTime, Kind::kText},
+    PhaseRow{"AcquisitionNumber", 0, kAcquisitionNumber, Kind::kText, Role::kTaken},
+    PhaseRow{"AcquisitionDateTime", 0, kAcquisitionDateTime, Kind::kText, Role::kTaken},
+    PhaseRow{"AcquisitionTime", 0, kAcquisitionTime, Kind::kText, Role::kTaken},
+    PhaseRow{"ContentTime", 0, kContentTime, Kind::kText, Role::kTaken},
 };
-
-constexpr std::array<std::string_view, 6> kUnplannedNames = {
-    "AcquisitionNumber", "AcquisitionDateTime", "AcquisitionTime",
-    "ContentTime",       "FrameType",           "ImageType"};
-
-// Scanners give each volume one value of these.
-constexpr std::array<std::string_view, 15> kNamesOfVolumes = {"TemporalPositionIdentifier",
-                                                              "TemporalPositionIndex",
-                                                              "TemporalPositionTimeOffset",
-                                                              "DataType",
-                                                              "EnergyWindowVector",
-                                                              "RRIntervalVector",
-                                                              "TimeSlotVector",
-                                                              "EchoTime",
-                                                              "EffectiveEchoTime",
-                                                              "EchoNumbers",
-                                                              "DiffusionBValue",
-                                                              "B_value",
-                                                              "BActualValue",
-                                                              "ComplexImageComponent",
-                                                              "StackID"};
 
 bool all_finite(const std::vector<double>& numbers) {
   return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
@@ -179,21 +166,21 @@ std::vector<double> cosines_of(const Attributes& attributes) {
 
 Attributes::Attributes(const DataSet& data, std::uint32_t frame)
     : data_(data), shared_(data.item(kSharedFunctionalGroups)) {
-  const Element* frames = data.find(kPerFrameFunctionalGroups);
-  if (frames != nullptr && frame < frames->items.size()) own_ = &frames->items[frame];
+  const auto frames = data.items(kPerFrameFunctionalGroups);
+  if (frame < frames.size()) own_ = &frames[frame];
 }
 
-const Element* Attributes::sequence(Tag tag) const {
+std::span<const DataSet> Attributes::items(Tag sequence) const {
   for (const DataSet* groups : {own_, shared_}) {
-    const Element* found = groups == nullptr ? nullptr : groups->find(tag);
-    if (found != nullptr && !found->items.empty()) return found;
+    const auto found = groups == nullptr ? std::span<const DataSet>() : groups->items(sequence);
+    if (!found.empty()) return found;
   }
-  return nullptr;
+  return {};
 }
 
-const DataSet* Attributes::group(Tag sequence_tag) const {
-  const Element* found = sequence(sequence_tag);
-  return found == nullptr ? nullptr : &found->items.front();
+const DataSet* Attributes::group(Tag sequence) const {
+  const auto found = items(sequence);
+  return found.empty() ? nullptr : &found.front();
 }
 
 const DataSet& Attributes::place(Tag sequence) const {
@@ -276,12 +263,13 @@ std::size_t phase_attribute(std::string_view name) {
 }
 
 bool is_planned(std::string_view phase_name) {
-  return std::ranges::find(kPhaseNames, phase_name) != kPhaseNames.end() &&
-         std::ranges::find(kUnplannedNames, phase_name) == kUnplannedNames.end();
+  const auto* row = std::ranges::find(kPhaseRows, phase_name, &PhaseRow::name);
+  return row != kPhaseRows.end() && row->role != Role::kTaken;
 }
 
 bool is_of_volumes(std::string_view phase_name) {
-  return std::ranges::find(kNamesOfVolumes, phase_name) != kNamesOfVolumes.end();
+  const auto* row = std::ranges::find(kPhaseRows, phase_name, &PhaseRow::name);
+  return row != kPhaseRows.end() && row->role == Role::kVolume;
 }
 
 std::vector<Phase> phases_of_object(const DataSet& data) {
@@ -289,9 +277,8 @@ std::vector<Phase> phases_of_object(const DataSet& data) {
 }
 
 std::vector<Phase> phases_of_frame(const DataSet& data, std::uint32_t frame) {
-  const Element* frames = data.find(kPerFrameFunctionalGroups);
-  if (frames == nullptr || frame >= frames->items.size()) return {};
-  return phases_in(&frames->items[frame], nullptr);
+  const auto frames = data.items(kPerFrameFunctionalGroups);
+  return frame < frames.size() ? phases_in(&frames[frame], nullptr) : std::vector<Phase>();
 }
 
 }  // namespace isomesh::import::dicom

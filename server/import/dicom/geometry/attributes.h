@@ -17,11 +17,11 @@ class Attributes {
   // `data` must outlive the attributes.
   Attributes(const DataSet& data, std::uint32_t frame);
 
-  // All items of the frame's own or shared group; null if there is neither.
-  const Element* sequence(Tag tag) const;
+  // All items of the frame's own or shared group; empty if there is neither.
+  std::span<const DataSet> items(Tag sequence) const;
 
-  // The first item of it; null if there is none.
-  const DataSet* group(Tag sequence_tag) const;
+  // The first of them; null if there is none.
+  const DataSet* group(Tag sequence) const;
 
   // The data set that holds the attributes of a group.
   const DataSet& place(Tag sequence) const;

@@ -166,16 +166,15 @@ void unfold_siemens(const DataSet& data, Image& image) {
 void unfold_united_imaging(const DataSet& data, Image& image) {
   const auto count = data.numbers(kGridImages);
   const Tiling tiling = tiling_of(count.empty() ? 0 : count.front(), false);
-  const Element* places = data.find(kGridFrames);
-  const std::size_t told = places == nullptr ? 0 : places->items.size();
-  if (told != tiling.slices) {
+  const auto places = data.items(kGridFrames);
+  if (places.size() != tiling.slices) {
     throw_unusable("The DICOM image is a grid of " + std::to_string(tiling.slices) +
-                   " slices, but it describes " + std::to_string(told) + ' ' +
+                   " slices, but it describes " + std::to_string(places.size()) + ' ' +
                    tag_name(kGridFrames) + ".");
   }
   cut(tiling, image);
   for (Frame& frame : image.frames) {
-    const auto position = required_numbers(places->items[frame.number], kImagePosition, 3,
+    const auto position = required_numbers(places[frame.number], kImagePosition, 3,
                                            "position of every slice in its grid");
     std::ranges::copy(position, frame.plane.position.begin());
   }

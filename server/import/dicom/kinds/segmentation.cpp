@@ -75,9 +75,7 @@ constexpr double kMostThicknesses = 20;
 
 std::vector<Segment> described_segments(const DataSet& data) {
   std::vector<Segment> segments;
-  const Element* sequence = data.find(kSegmentSequence);
-  if (sequence == nullptr) return segments;
-  for (const DataSet& item : sequence->items) {
+  for (const DataSet& item : data.items(kSegmentSequence)) {
     const auto number = item.unsigned_number(kSegmentNumber);
     if (number) segments.push_back({*number, utf8(item, kSegmentLabel), display_color(item)});
   }

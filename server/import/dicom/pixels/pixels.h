@@ -1,4 +1,5 @@
-// Reads a frame's samples, plain or compressed.
+// The layout of an object's samples (PS3.3, C.7.6.3), and the samples of its frames, plain or
+// compressed.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +9,14 @@
 #include "server/import/dicom/geometry/image.h"
 
 namespace isomesh::import::dicom {
+
+// Supports 1, 8, 16 and 32 bits, and floating-point numbers of 32 and 64. Throws Error
+// kUnusableVolume for colours, other sizes and contradictions.
+PixelLayout pixel_layout(const DicomFile& file);
+
+// Throws Error kUnusableVolume if the object has no pixels, fewer than `frames` need, or an
+// unsupported transfer syntax.
+void require_pixels(const DicomFile& file, const PixelLayout& layout, std::uint32_t frames);
 
 // Reads the frames of one file. The file and its description must outlive the reader. Not thread
 // safe.

@@ -1,6 +1,9 @@
-// Stored samples -> modality values: extracts bits, extends signs, applies slope and intercept.
+// Stored samples -> modality values: extracts bits, extends signs, applies slope and intercept, or
+// a modality lookup table.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,5 +22,14 @@ std::vector<SampleType> candidate_types(std::span<const Slice> slices);
 // Returns false if one does not fit.
 bool convert_frame(std::span<const std::byte> stored, const PixelLayout& layout,
                    const Rescale& rescale, SampleType type, std::span<std::byte> target);
+
+// The Modality LUT Sequence of an object (PS3.3, C.11.1); empty without one. Throws Error
+// kUnusableVolume if the table is incomplete, or if the samples are not integers of 8 or 16 bits.
+std::optional<ValueTable> value_table(const DataSet& data, const PixelLayout& stored);
+
+// Replaces stored samples by the table's values. `target` has two bytes for each sample,
+// little-endian.
+void apply_table(const ValueTable& table, const PixelLayout& layout,
+                 std::span<const std::byte> stored, std::span<std::byte> target);
 
 }  // namespace isomesh::import::dicom

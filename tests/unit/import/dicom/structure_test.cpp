@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/import/dicom/contours/distance.h"
 #include "server/import/dicom/contours/raster.h"
 #include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/structures.h"
