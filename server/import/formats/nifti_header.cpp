@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "server/import/labels/label_table.h"
-#include "server/import/labels/label_xml.h"
+#include "server/import/labels/label_text.h"
 #include "server/import/source/header_fields.h"
 
 namespace isomesh::import {

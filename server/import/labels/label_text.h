@@ -1,6 +1,7 @@
-// Text tables of labels, as programs write them beside a label volume.
+// Tables of labels, as programs write them beside a label volume or into its header.
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 #include <vector>
 
@@ -18,5 +19,10 @@ namespace isomesh::import {
 // Returns none unless every other line is such an entry, and for more than Volume::kMostLabels.
 // Unordered. Never throws because of the text.
 std::vector<LabelEntry> labels_of_text(std::string_view text);
+
+// The labels of one of the file's volumes: Caret's LabelTable in the VolumeInformation of that
+// index, or AFNI's attribute VALUE_LABEL_DTABLE. Empty if the document has neither or is not
+// well-formed; at most one more than Volume::kMostLabels. Unordered.
+std::vector<LabelEntry> labels_of_xml(std::string_view text, std::uint64_t volume);
 
 }  // namespace isomesh::import
