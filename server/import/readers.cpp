@@ -16,129 +16,38 @@
 namespace isomesh::import {
 namespace {
 
-// For formats with a header.
-template <SourceVolume (*kParse)(const InputFile&, const Companions&, const ImportOptions&)>
-Volume parse_with(const Input& input) {
-  const InputFile file(input.path);
-  const ImportTask& task = input.task;
-  Volume volume = write_canonical(file, kParse(file, input.companions, task.options), task);
-  take_labels_beside(input.companions, volume);
-  return volume;
+constexpr Reader kDicomReader = {.name = "dicom",
+                                 .content = Content::kSlices,
+                                 .sniff = is_dicom,
+                                 .parse = parse_dicom,
+                                 .most_bytes = most_dicom_bytes};
+
+constexpr Reader image_reader(std::string_view name, bool (*sniff)(std::string_view head)) {
+  return {.name = name,
+          .content = Content::kPages,
+          .sniff = sniff,
+          .parse = parse_image,
+          .most_bytes = most_image_bytes};
 }
 
-// For formats that are read as a whole.
-template <Volume (*kParse)(const Input&)>
-Volume parse_whole(const Input& input) {
-  Volume volume = kParse(input);
-  take_labels_beside(input.companions, volume);
-  return volume;
-}
+constexpr Reader kTiffReader = image_reader("tiff", is_tiff);
+constexpr Reader kPngReader = image_reader("png", is_png);
+constexpr Reader kBmpReader = image_reader("bmp", is_bmp);
+constexpr Reader kArchiveReader = {
+    .name = "archive", .content = Content::kFiles, .sniff = is_archive, .parse = parse_archive};
 
-// For a header in front of its samples: the size of both. Formats with more data behind the samples
-// get more room.
-template <SourceVolume (*kParse)(const InputFile&, const Companions&, const ImportOptions&)>
-MostBytes most_plain_bytes(const InputFile& beginning, const ImportTask& task) {
-  constexpr std::uint64_t kFooterBytes = std::uint64_t{16} << 20;
-  const Companions none;
-  const SourceVolume volume = kParse(beginning, none, task.options);
-  check_limits(volume, task.limits);
-  return {.file = volume.payload.offset + volume.most_encoded_bytes() + kHeadroomBytes +
-                  (volume.has_footer ? kFooterBytes : 0)};
-}
-
-constexpr Reader kRaw = {.name = "raw", .parse = parse_raw};
-
-constexpr Reader kReaders[] = {
-    kRaw,
-    {.name = "nifti",
-     .sniff = is_nifti,
-     .parse = parse_with<parse_nifti>,
-     .most_bytes = most_nifti_bytes,
-     .data_names = nifti_data_names},
-    {.name = "nrrd",
-     .sniff = is_nrrd,
-     .parse = parse_with<parse_nrrd>,
-     .most_bytes = most_nrrd_bytes,
-     .data_names = nrrd_data_names},
-    {.name = "metaimage",
-     .sniff = is_metaimage,
-     .parse = parse_with<parse_metaimage>,
-     .most_bytes = most_metaimage_bytes,
-     .data_names = metaimage_data_names},
-    {.name = "vti",
-     .sniff = is_vti,
-     .may_hold_volume = may_hold_image,
-     .parse = parse_with<parse_vti>,
-     .most_bytes = most_vti_bytes},
-    {.name = "vtk",
-     .sniff = is_vtk_legacy,
-     .may_hold_volume = may_hold_structured_points,
-     .parse = parse_with<parse_vtk_legacy>,
-     .most_bytes = most_vtk_legacy_bytes},
-    {.name = "mgh",
-     .sniff = is_mgh,
-     .parse = parse_with<parse_mgh>,
-     .most_bytes = most_plain_bytes<parse_mgh>},
-    {.name = "afni",
-     .sniff = is_afni,
-     .parse = parse_with<parse_afni>,
-     .most_bytes = most_afni_bytes,
-     .data_names = afni_data_names},
-    {.name = "par",
-     .sniff = is_par,
-     .parse = parse_with<parse_par>,
-     .most_bytes = most_par_bytes,
-     .data_names = par_data_names},
-    {.name = "isq",
-     .sniff = is_isq,
-     .parse = parse_with<parse_isq>,
-     .most_bytes = most_plain_bytes<parse_isq>},
-    {.name = "mrc",
-     .sniff = is_mrc,
-     .parse = parse_with<parse_mrc>,
-     .most_bytes = most_plain_bytes<parse_mrc>},
-    {.name = "cube",
-     .sniff = is_cube,
-     .parse = parse_with<parse_cube>,
-     .most_bytes = most_plain_bytes<parse_cube>},
-    {.name = "numpy",
-     .sniff = is_numpy,
-     .may_hold_volume = may_hold_numpy_volume,
-     .parse = parse_with<parse_numpy>,
-     .most_bytes = most_plain_bytes<parse_numpy>},
-    {.name = "hdf5",
-     .sniff = is_hdf5,
-     .parse = parse_whole<parse_hdf5>,
-     .most_bytes = most_hdf5_bytes},
+constexpr const Reader* kReaders[] = {
+    &kRawReader, &kNiftiReader, &kNrrdReader, &kMetaImageReader, &kVtiReader, &kVtkLegacyReader,
+    &kMghReader, &kAfniReader, &kParReader, &kIsqReader, &kMrcReader, &kCubeReader, &kNumpyReader,
+    &kHdf5Reader,
     // Before images: the preamble of a DICOM file may be the header of a TIFF file (PS3.10, 7.1).
-    {.name = "dicom",
-     .content = Content::kSlices,
-     .sniff = is_dicom,
-     .parse = parse_dicom,
-     .most_bytes = most_dicom_bytes},
-    {.name = "tiff",
-     .content = Content::kPages,
-     .sniff = is_tiff,
-     .parse = parse_image,
-     .most_bytes = most_image_bytes},
-    {.name = "png",
-     .content = Content::kPages,
-     .sniff = is_png,
-     .parse = parse_image,
-     .most_bytes = most_image_bytes},
-    {.name = "bmp",
-     .content = Content::kPages,
-     .sniff = is_bmp,
-     .parse = parse_image,
-     .most_bytes = most_image_bytes},
-    {.name = "archive", .content = Content::kFiles, .sniff = is_archive, .parse = parse_archive},
-};
+    &kDicomReader, &kTiffReader, &kPngReader, &kBmpReader, &kArchiveReader};
 
 const Reader* sniff_plain(std::string_view head) {
-  const auto* found = std::ranges::find_if(kReaders, [&](const Reader& reader) {
-    return reader.sniff != nullptr && reader.sniff(head);
+  const auto* found = std::ranges::find_if(kReaders, [&](const Reader* reader) {
+    return reader->sniff != nullptr && reader->sniff(head);
   });
-  return found == std::end(kReaders) ? nullptr : found;
+  return found == std::end(kReaders) ? nullptr : *found;
 }
 
 bool is_compressed(const InputFile& file) { return is_gzip(file.text(0, kSniffBytes)); }
@@ -154,7 +63,15 @@ void gunzip(const InputFile& file, std::uint64_t limit, ScratchFile& target) {
 }
 
 Volume parse(const Reader& reader, const Input& input) {
-  Volume volume = reader.parse(input);
+  Volume volume;
+  if (reader.describe != nullptr) {
+    const InputFile file(input.path);
+    const SourceVolume source = reader.describe(file, input.companions, input.task.options);
+    volume = write_canonical(file, source, input.task);
+  } else {
+    volume = reader.parse(input);
+  }
+  if (reader.content == Content::kVolume) take_labels_beside(input.companions, volume);
   if (reader.content != Content::kFiles) volume.format = reader.name;
   return volume;
 }
@@ -178,12 +95,23 @@ class InflatedBeginning {
   ScratchFile scratch_;
 };
 
+// By the plain beginning of a file. Formats with more data behind their samples get more room.
+MostBytes most_plain_bytes(const Reader& reader, const InputFile& beginning,
+                           const ImportTask& task) {
+  if (reader.most_bytes != nullptr) return reader.most_bytes(beginning, task);
+  constexpr std::uint64_t kFooterBytes = std::uint64_t{16} << 20;
+  const SourceVolume volume = reader.describe(beginning, {}, task.options);
+  check_limits(volume, task.limits);
+  return {.file = volume.payload.offset + volume.most_encoded_bytes() + kHeadroomBytes +
+                  (volume.has_footer ? kFooterBytes : 0)};
+}
+
 // The largest inflated size of a compressed file; larger ones are rejected as bombs.
 std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
                                   const ImportTask& task) {
-  if (reader.most_bytes == nullptr) return most_archive_bytes(file.size(), task.limits);
+  if (reader.content == Content::kFiles) return most_archive_bytes(file.size(), task.limits);
   const InflatedBeginning beginning(file, task.scratch);
-  return reader.most_bytes(beginning.file(), task).file;
+  return most_plain_bytes(reader, beginning.file(), task).file;
 }
 
 void check_options(const Reader& reader, const ImportOptions& options) {
@@ -198,7 +126,7 @@ void check_options(const Reader& reader, const ImportOptions& options) {
 
 }  // namespace
 
-std::span<const Reader> readers() { return kReaders; }
+std::span<const Reader* const> readers() { return kReaders; }
 
 const Reader* sniff(std::string_view head) {
   if (is_gzip(head)) return sniff_plain(inflate_head(head, kSniffBytes));
@@ -208,9 +136,9 @@ const Reader* sniff(std::string_view head) {
 const Reader* sniff(const InputFile& file) { return sniff(file.text(0, kSniffBytes)); }
 
 MostBytes most_bytes_of(const Reader& reader, const InputFile& beginning, const ImportTask& task) {
-  if (!is_compressed(beginning)) return reader.most_bytes(beginning, task);
+  if (!is_compressed(beginning)) return most_plain_bytes(reader, beginning, task);
   const InflatedBeginning plain(beginning, task.scratch);
-  MostBytes most = reader.most_bytes(plain.file(), task);
+  MostBytes most = most_plain_bytes(reader, plain.file(), task);
   // Deflate stores incompressible data with a few extra bytes per block.
   constexpr std::uint64_t kStoredShare = 100;
   most.file += most.file / kStoredShare;
@@ -238,8 +166,8 @@ Volume read_input(const Reader& reader, Input input) {
 }
 
 Volume read_raw_input(const Input& input) {
-  tell(kRaw, input);
-  return parse(kRaw, input);
+  tell(kRawReader, input);
+  return parse(kRawReader, input);
 }
 
 }  // namespace isomesh::import

@@ -11,7 +11,7 @@
 
 namespace isomesh::import {
 
-std::span<const Reader> readers();
+std::span<const Reader* const> readers();
 
 // Recognises a file's format by its first bytes, also inside gzip; never by its name. Null if
 // unknown. Thread safe.

@@ -205,12 +205,11 @@ const std::vector<Target>& special_targets() {
 
 std::vector<Target> all_targets() {
   std::vector<Target> all = special_targets();
-  for (const import::Reader& reader : import::readers()) {
+  for (const import::Reader* reader : import::readers()) {
+    const std::string_view name = reader->name;
     // libhdf5 is known to crash on damaged files.
-    if (reader.name == "hdf5" || std::ranges::find(all, reader.name, &Target::name) != all.end()) {
-      continue;
-    }
-    all.push_back({reader.name, [name = reader.name](Bytes bytes) { import_only(name, bytes); }});
+    if (name == "hdf5" || std::ranges::find(all, name, &Target::name) != all.end()) continue;
+    all.push_back({name, [name](Bytes bytes) { import_only(name, bytes); }});
   }
   return all;
 }

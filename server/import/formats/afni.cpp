@@ -57,13 +57,10 @@ std::string_view string_of(const HeaderTexts& attributes, std::string_view name)
 
 std::vector<double> numbers_of(const HeaderTexts& attributes, std::string_view name,
                                std::size_t least) {
-  std::vector<double> numbers;
-  for (const std::string_view word : words(value_of(attributes, name))) {
-    const auto number = parse_double(word);
-    if (!number || !std::isfinite(*number)) {
-      throw_unusable("The AFNI attribute " + in_quotes(name) + " is not a list of numbers.");
-    }
-    numbers.push_back(*number);
+  const std::string_view text = value_of(attributes, name);
+  std::vector<double> numbers = finite_numbers(text);
+  if (numbers.empty() && !text.empty()) {
+    throw_unusable("The AFNI attribute " + in_quotes(name) + " is not a list of numbers.");
   }
   if (numbers.size() >= least) return numbers;
   throw_unusable("The AFNI header's attribute " + in_quotes(name) + " has " +
@@ -72,11 +69,7 @@ std::vector<double> numbers_of(const HeaderTexts& attributes, std::string_view n
 }
 
 std::uint64_t whole_value(double number, std::string_view name) {
-  constexpr double kMost = 1e9;
-  if (number >= 0 && number <= kMost && number == std::floor(number)) {
-    return static_cast<std::uint64_t>(number);
-  }
-  throw_unusable("The AFNI attribute " + in_quotes(name) + " is not plausible.");
+  return plausible_whole(number, "The AFNI attribute " + in_quotes(name));
 }
 
 StoredType type_of(const HeaderTexts& attributes, std::uint64_t volumes) {
@@ -166,8 +159,6 @@ std::string brick_name(const Companions& companions) {
       "files in one ZIP or TAR.");
 }
 
-}  // namespace
-
 bool is_afni(std::string_view head) {
   const auto first = lines(head.substr(0, std::min<std::size_t>(head.size(), 256)));
   return first.size() >= 2 && is_type(first[0]) && value_in(first[1], "name").has_value();
@@ -197,5 +188,13 @@ MostBytes most_afni_bytes(const InputFile& beginning, const ImportTask& task) {
   check_limits(volume, task.limits);
   return {.file = kMostFileBytes, .data = volume.most_encoded_bytes() + kHeadroomBytes};
 }
+
+}  // namespace
+
+constinit const Reader kAfniReader = {.name = "afni",
+                                      .sniff = is_afni,
+                                      .describe = parse_afni,
+                                      .most_bytes = most_afni_bytes,
+                                      .data_names = afni_data_names};
 
 }  // namespace isomesh::import

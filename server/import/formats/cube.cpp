@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
@@ -33,11 +34,9 @@ std::optional<CountLine> count_line(std::optional<std::string_view> line, bool m
   const auto count = parse_int64(parts[0]);
   if (!count) return std::nullopt;
   result.count = *count;
-  for (std::size_t at = 0; at < 3; ++at) {
-    const auto number = parse_double(parts[at + 1]);
-    if (!number || !std::isfinite(*number)) return std::nullopt;
-    result.vector[at] = *number;
-  }
+  const auto numbers = finite_numbers(*line);
+  if (numbers.empty()) return std::nullopt;
+  std::copy_n(numbers.begin() + 1, 3, result.vector.begin());
   if (parts.size() == 5) {
     const auto values = parse_uint64(parts[4]);
     if (!values || *values < 1 || *values > kMostValues) return std::nullopt;
@@ -108,8 +107,6 @@ Geometry geometry_of_header(const CubeHeader& header) {
                       scaled(header.axes[2].vector)});
 }
 
-}  // namespace
-
 bool is_cube(std::string_view head) {
   LineReader lines(head);
   return read_cube_header(lines).has_value();
@@ -130,15 +127,16 @@ SourceVolume parse_cube(const InputFile& file, const Companions& /*companions*/,
   volume.layout.type = StoredType::kFloat32;
   volume.encoding = Encoding::kText;
   const std::uint64_t values = skip_atoms(lines, header->atoms);
-  choose_volume(values,
-                {.what = "their value at each point",
-                 .title = [](std::uint64_t index) { return "value " + std::to_string(index); }},
-                options, volume);
+  choose_volume(values, numbered("their value at each point", "value"), options, volume);
   if (values > 1) volume.chosen.run = 1;
-  volume.payload = {lines.offset(), file.size() - lines.offset()};
+  volume.payload = range_from(file, lines.offset());
   volume.geometry = geometry_of_header(*header);
   volume.notes.push_back(angstrom_note("the cube file"));
   return volume;
 }
+
+}  // namespace
+
+constinit const Reader kCubeReader = {.name = "cube", .sniff = is_cube, .describe = parse_cube};
 
 }  // namespace isomesh::import

@@ -27,11 +27,6 @@ const std::string kItk = "ITKImage/0";
 const std::string kMinc = "minc-2.0";
 const std::string kMincImage = "minc-2.0/image/0";
 
-Difference in_time() {
-  return {.what = "time",
-          .title = [](std::uint64_t index) { return "time " + std::to_string(index); }};
-}
-
 // The samples of one volume in a file of their own, in the byte order of this machine.
 Volume write_volume(const ScratchFile& samples, SourceVolume source, const Input& input) {
   source.chosen = {};
@@ -53,7 +48,7 @@ Planes choose_planes(const Hdf5Array& array, const Input& input, SourceVolume& s
   }
   source.dims = volume_dims(std::span(xyz).first(std::min<std::size_t>(xyz.size(), 3)));
   source.layout.type = array.type();
-  choose_volume(volumes_beyond(xyz), in_time(), input.task.options, source);
+  choose_volume(volumes_beyond(xyz), numbered("time", "time"), input.task.options, source);
   check_limits(source, input.task.limits);
   if (xyz.size() == 4) return {source.chosen.index, 1};
   return {0, array.sizes().front()};
@@ -284,8 +279,6 @@ Volume read_minc(const Hdf5File& file, const Input& input) {
                   ", which cannot be read. Of HDF5 files, images of ITK and MINC 2 can.");
 }
 
-}  // namespace
-
 bool is_hdf5(std::string_view head) { return head.starts_with("\x89HDF\r\n\x1a\n"); }
 
 Volume parse_hdf5(const Input& input) {
@@ -298,5 +291,10 @@ Volume parse_hdf5(const Input& input) {
 MostBytes most_hdf5_bytes(const InputFile& /*beginning*/, const ImportTask& task) {
   return {.file = task.limits.max_sample_bytes + kHeadroomBytes};
 }
+
+}  // namespace
+
+constinit const Reader kHdf5Reader = {
+    .name = "hdf5", .sniff = is_hdf5, .parse = parse_hdf5, .most_bytes = most_hdf5_bytes};
 
 }  // namespace isomesh::import

@@ -1,6 +1,7 @@
 #include "server/import/formats/hdf5_file.h"
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <numeric>
 #include <utility>
@@ -35,18 +36,32 @@ hid_t open_file(const std::filesystem::path& path) {
   return H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id());
 }
 
+struct Hdf5Type {
+  StoredType type;
+  hid_t memory;  // the library's type for samples in memory
+};
+
+const std::array<Hdf5Type, 10>& hdf5_types() {
+  static const std::array<Hdf5Type, 10> types = {{{StoredType::kUint8, H5T_NATIVE_UINT8},
+                                                  {StoredType::kInt8, H5T_NATIVE_INT8},
+                                                  {StoredType::kUint16, H5T_NATIVE_UINT16},
+                                                  {StoredType::kInt16, H5T_NATIVE_INT16},
+                                                  {StoredType::kUint32, H5T_NATIVE_UINT32},
+                                                  {StoredType::kInt32, H5T_NATIVE_INT32},
+                                                  {StoredType::kUint64, H5T_NATIVE_UINT64},
+                                                  {StoredType::kInt64, H5T_NATIVE_INT64},
+                                                  {StoredType::kFloat32, H5T_NATIVE_FLOAT},
+                                                  {StoredType::kFloat64, H5T_NATIVE_DOUBLE}}};
+  return types;
+}
+
 std::optional<StoredType> type_of(hid_t type) {
-  const std::size_t size = H5Tget_size(type);
-  if (H5Tget_class(type) == H5T_FLOAT) {
-    if (size == 4) return StoredType::kFloat32;
-    if (size == 8) return StoredType::kFloat64;
+  for (const auto& [stored, memory] : hdf5_types()) {
+    if (H5Tget_class(type) == H5Tget_class(memory) && H5Tget_size(type) == H5Tget_size(memory) &&
+        H5Tget_sign(type) == H5Tget_sign(memory)) {
+      return stored;
+    }
   }
-  if (H5Tget_class(type) != H5T_INTEGER) return std::nullopt;
-  const bool is_signed = H5Tget_sign(type) == H5T_SGN_2;
-  if (size == 1) return is_signed ? StoredType::kInt8 : StoredType::kUint8;
-  if (size == 2) return is_signed ? StoredType::kInt16 : StoredType::kUint16;
-  if (size == 4) return is_signed ? StoredType::kInt32 : StoredType::kUint32;
-  if (size == 8) return is_signed ? StoredType::kInt64 : StoredType::kUint64;
   return std::nullopt;
 }
 
@@ -57,31 +72,8 @@ StoredType checked_type(hid_t dataset) {
   throw_unusable("The HDF5 file's samples are not single numbers.");
 }
 
-// The library's type for samples in memory.
 hid_t memory_type(StoredType type) {
-  switch (type) {
-    case StoredType::kUint8:
-      return H5T_NATIVE_UINT8;
-    case StoredType::kInt8:
-      return H5T_NATIVE_INT8;
-    case StoredType::kUint16:
-      return H5T_NATIVE_UINT16;
-    case StoredType::kInt16:
-      return H5T_NATIVE_INT16;
-    case StoredType::kUint32:
-      return H5T_NATIVE_UINT32;
-    case StoredType::kInt32:
-      return H5T_NATIVE_INT32;
-    case StoredType::kUint64:
-      return H5T_NATIVE_UINT64;
-    case StoredType::kInt64:
-      return H5T_NATIVE_INT64;
-    case StoredType::kFloat32:
-      return H5T_NATIVE_FLOAT;
-    case StoredType::kFloat64:
-      return H5T_NATIVE_DOUBLE;
-  }
-  throw_damaged_file();
+  return std::ranges::find(hdf5_types(), type, &Hdf5Type::type)->memory;
 }
 
 std::vector<std::uint64_t> sizes_of(hid_t dataset) {

@@ -33,8 +33,6 @@ void set_lattice(const HeaderBytes& header, SourceVolume& volume) {
   volume.geometry.origin[2] = header.at<std::int32_t>(76) / 1000.0;
 }
 
-}  // namespace
-
 bool is_isq(std::string_view head) {
   return head.size() >= kIsqBlockBytes && head.starts_with(kIsqMagic);
 }
@@ -56,9 +54,13 @@ SourceVolume parse_isq(const InputFile& file, const Companions& /*companions*/,
   set_lattice(header, volume);
   choose_volume(1, {}, options, volume);
   const std::uint64_t offset = (static_cast<std::uint64_t>(blocks) + 1) * kIsqBlockBytes;
-  volume.payload = {offset, file.size() - std::min(file.size(), offset)};
+  volume.payload = range_from(file, offset);
   volume.notes.push_back(lps_assumed("An ISQ file"));
   return volume;
 }
+
+}  // namespace
+
+constinit const Reader kIsqReader = {.name = "isq", .sniff = is_isq, .describe = parse_isq};
 
 }  // namespace isomesh::import

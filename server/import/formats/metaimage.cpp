@@ -19,6 +19,7 @@
 namespace isomesh::import {
 namespace {
 
+constexpr std::string_view kMetaImageTitle = "The MetaImage header";
 constexpr std::string_view kLastKey = "ElementDataFile";
 
 struct MetaHeader {
@@ -36,39 +37,26 @@ bool is_header_line(std::string_view line) {
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
-void add_field(HeaderTexts& fields, std::string_view line) {
+void add_line(HeaderTexts& fields, std::string_view line) {
   const std::size_t equals = line.find('=');
   if (equals == std::string_view::npos) {
     throw_unusable("The MetaImage header has a line that is not a field: " + in_quotes(line) + ".");
   }
-  const std::string key(trimmed(line.substr(0, equals)));
-  const std::string_view value = trimmed(line.substr(equals + 1));
-  if (has_control_characters(value)) {
-    throw_unusable("The MetaImage header's field " + in_quotes(key) +
-                   " contains control characters.");
-  }
-  if (!fields.emplace(key, value).second) {
-    throw_unusable("The MetaImage header has the field " + in_quotes(key) + " twice.");
-  }
+  add_field(fields, kMetaImageTitle, std::string(trimmed(line.substr(0, equals))),
+            trimmed(line.substr(equals + 1)));
 }
 
 MetaHeader read_meta_header(const InputFile& file) {
   MetaHeader header;
-  LineReader lines(file, {.header = "The MetaImage header"});
+  LineReader lines(file, {.header = kMetaImageTitle});
   while (const auto line = lines.next_filled()) {
-    add_field(header.fields, *line);
+    add_line(header.fields, *line);
     if (header.fields.contains(kLastKey)) {
       header.bytes = lines.offset();
       return header;
     }
   }
   throw_unusable("The MetaImage header has no end: the field \"ElementDataFile\" is missing.");
-}
-
-std::string_view required(const HeaderTexts& fields, std::string_view name) {
-  const std::string_view value = value_of(fields, name);
-  if (value.empty()) throw_unusable("The MetaImage header has no field " + in_quotes(name) + ".");
-  return value;
 }
 
 bool flag(const HeaderTexts& fields, std::string_view name, bool otherwise) {
@@ -117,19 +105,7 @@ Skip data_skip(const HeaderTexts& fields) {
 
 std::vector<std::uint64_t> sizes_of(const HeaderTexts& fields) {
   constexpr std::uint64_t kMostAxes = 10;
-  const auto count = parse_uint64(required(fields, "NDims"));
-  std::vector<std::uint64_t> sizes;
-  for (const std::string_view word : words(required(fields, "DimSize"))) {
-    const auto size = parse_uint64(word);
-    if (!size)
-      throw_unusable("The MetaImage header's size " + in_quotes(word) + " is not a number.");
-    sizes.push_back(*size);
-  }
-  if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
-    throw_unusable("The MetaImage header's NDims is " + in_quotes(required(fields, "NDims")) +
-                   ", but it has " + std::to_string(sizes.size()) + " sizes.");
-  }
-  return sizes;
+  return required_sizes(fields, kMetaImageTitle, "NDims", "DimSize", kMostAxes);
 }
 
 StoredType type_of(const HeaderTexts& fields) {
@@ -146,7 +122,7 @@ StoredType type_of(const HeaderTexts& fields) {
       {"MET_LONG_LONG", StoredType::kInt64}, {"MET_ULONG_LONG", StoredType::kUint64},
       {"MET_FLOAT", StoredType::kFloat32},   {"MET_DOUBLE", StoredType::kFloat64},
   };
-  const std::string_view name = required(fields, "ElementType");
+  const std::string_view name = required(fields, kMetaImageTitle, "ElementType");
   for (const Row& row : kTypes) {
     if (row.name == name) return row.type;
   }
@@ -223,11 +199,7 @@ CompressedRange payload_of(const InputFile& file, const MetaHeader& header,
 void check_numbers(const HeaderTexts& fields, std::string_view name, std::size_t count) {
   const std::string_view value = value_of(fields, name);
   if (value.empty()) return;
-  const auto numbers = words(value);
-  const auto is_number = [](std::string_view word) {
-    return std::isfinite(parse_double(word).value_or(HUGE_VAL));
-  };
-  if (numbers.size() == count && std::all_of(numbers.begin(), numbers.end(), is_number)) return;
+  if (finite_numbers(value).size() == count) return;
   throw_unusable("The MetaImage header's " + in_quotes(name) + " is not " + std::to_string(count) +
                  " finite numbers.");
 }
@@ -249,24 +221,16 @@ std::string_view one_of(const HeaderTexts& fields, std::initializer_list<std::st
   return result;
 }
 
-// The numbers of a checked field; empty if missing.
-std::vector<double> numbers_of(std::string_view value) {
-  std::vector<double> numbers;
-  for (const std::string_view word : words(value)) {
-    numbers.push_back(parse_double(word).value_or(0));
-  }
-  return numbers;
-}
-
 // MetaImage's space is LPS, as in all programs that write it. Axes beyond the third are omitted.
 Geometry geometry_of_fields(const HeaderTexts& fields, std::size_t axes) {
   const auto matrix =
-      numbers_of(one_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes));
-  const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, axes));
+      finite_numbers(one_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes));
+  const auto origin = finite_numbers(one_of(fields, {"Offset", "Position", "Origin"}, axes));
   // ElementSize is the extent of a sample. It replaces a missing ElementSpacing.
   check_numbers(fields, "ElementSize", axes);
   const std::string_view distances = one_of(fields, {"ElementSpacing"}, axes);
-  const auto spacing = numbers_of(distances.empty() ? value_of(fields, "ElementSize") : distances);
+  const auto spacing =
+      finite_numbers(distances.empty() ? value_of(fields, "ElementSize") : distances);
   Geometry geometry;
   const std::size_t used = std::min<std::size_t>(axes, 3);
   std::copy_n(origin.begin(), std::min(used, origin.size()), geometry.origin.begin());
@@ -292,8 +256,9 @@ std::string timestamp_of(const HeaderTexts& fields, std::uint64_t frame) {
 // if the header has neither an origin nor a spacing for a single such axis.
 std::string place_of(const HeaderTexts& fields, std::span<const std::uint64_t> sizes,
                      std::uint64_t index) {
-  const auto spacing = numbers_of(one_of(fields, {"ElementSpacing"}, sizes.size()));
-  const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, sizes.size()));
+  const auto spacing = finite_numbers(one_of(fields, {"ElementSpacing"}, sizes.size()));
+  const auto origin =
+      finite_numbers(one_of(fields, {"Offset", "Position", "Origin"}, sizes.size()));
   std::string place;
   std::uint64_t rest = index;
   for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
@@ -341,8 +306,6 @@ SourceVolume samples_of(const HeaderTexts& fields, const std::vector<std::uint64
   return volume;
 }
 
-}  // namespace
-
 bool is_metaimage(std::string_view head) {
   const std::size_t end = head.find('\n');
   return end != std::string_view::npos && is_header_line(head.substr(0, end));
@@ -389,5 +352,13 @@ MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& tas
   const std::uint64_t skipped = std::min(data_skip(fields).value_or(kMostSkipped), kMostSkipped);
   return {.file = kMostTextHeaderBytes + kHeadroomBytes, .data = skipped + samples};
 }
+
+}  // namespace
+
+constinit const Reader kMetaImageReader = {.name = "metaimage",
+                                           .sniff = is_metaimage,
+                                           .describe = parse_metaimage,
+                                           .most_bytes = most_metaimage_bytes,
+                                           .data_names = metaimage_data_names};
 
 }  // namespace isomesh::import

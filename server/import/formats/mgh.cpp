@@ -71,8 +71,6 @@ Geometry geometry_of_header(const HeaderBytes& header, SourceVolume& volume) {
   return geometry_of_ras(origin, steps);
 }
 
-}  // namespace
-
 bool is_mgh(std::string_view head) {
   if (head.size() < kMghHeaderBytes) return false;
   const HeaderBytes header(head, true);
@@ -94,14 +92,15 @@ SourceVolume parse_mgh(const InputFile& file, const Companions& /*companions*/,
   volume.dims = volume_dims(std::span(sizes).first(3));
   check_is_lattice(volume.dims);
   volume.layout = {type_of(header.at<std::int32_t>(20)).value(), true, std::nullopt};
-  choose_volume(volumes_beyond(sizes),
-                {.what = "their frame",
-                 .title = [](std::uint64_t index) { return "frame " + std::to_string(index); }},
-                options, volume);
+  choose_volume(volumes_beyond(sizes), numbered("their frame", "frame"), options, volume);
   volume.payload.offset = kMghHeaderBytes;
   volume.has_footer = true;
   volume.geometry = geometry_of_header(header, volume);
   return volume;
 }
+
+}  // namespace
+
+constinit const Reader kMghReader = {.name = "mgh", .sniff = is_mgh, .describe = parse_mgh};
 
 }  // namespace isomesh::import

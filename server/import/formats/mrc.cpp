@@ -156,8 +156,6 @@ std::uint64_t volumes_of(const MrcHeader& header) {
   return static_cast<std::uint64_t>(sections / each);
 }
 
-}  // namespace
-
 bool is_mrc(std::string_view head) { return find_header(head).has_value(); }
 
 SourceVolume parse_mrc(const InputFile& file, const Companions& /*companions*/,
@@ -175,15 +173,16 @@ SourceVolume parse_mrc(const InputFile& file, const Companions& /*companions*/,
   }
   volume.dims = volume_dims(sizes);
   set_type(*header, volume);
-  choose_volume(volumes,
-                {.what = "their place in the stack",
-                 .title = [](std::uint64_t index) { return "volume " + std::to_string(index); }},
-                options, volume);
+  choose_volume(volumes, numbered("their place in the stack", "volume"), options, volume);
   const std::uint64_t offset = kMrcHeaderBytes + static_cast<std::uint64_t>(header->extended_bytes);
-  volume.payload = {offset, file.size() - std::min(file.size(), offset)};
+  volume.payload = range_from(file, offset);
   place(*header, volume);
   volume.notes.push_back(angstrom_note("the MRC file"));
   return volume;
 }
+
+}  // namespace
+
+constinit const Reader kMrcReader = {.name = "mrc", .sniff = is_mrc, .describe = parse_mrc};
 
 }  // namespace isomesh::import

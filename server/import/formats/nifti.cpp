@@ -398,10 +398,6 @@ std::string image_name(const Companions& companions) {
       "TAR, or send the volume as one .nii file.");
 }
 
-}  // namespace
-
-bool is_nifti(std::string_view head) { return begins_as_nifti(head); }
-
 SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
                          const ImportOptions& options) {
   const NiftiHeader header = read_nifti_header(file.text(0, kNiftiHeaderBytes));
@@ -435,5 +431,13 @@ MostBytes most_nifti_bytes(const InputFile& beginning, const ImportTask& task) {
   if (header.is_detached) return {.file = kHeadroomBytes, .data = samples};
   return {.file = samples};
 }
+
+}  // namespace
+
+constinit const Reader kNiftiReader = {.name = "nifti",
+                                       .sniff = begins_as_nifti,
+                                       .describe = parse_nifti,
+                                       .most_bytes = most_nifti_bytes,
+                                       .data_names = nifti_data_names};
 
 }  // namespace isomesh::import

@@ -2,22 +2,25 @@
 #include <array>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/files.h"
 #include "base/text.h"
+#include "proto/samples.h"
 #include "server/import/formats/file_pattern.h"
 #include "server/import/formats/format_readers.h"
-#include "server/import/formats/nrrd_segments.h"
 #include "server/import/formats/nrrd_space.h"
+#include "server/import/labels/label_table.h"
 #include "server/import/source/line_reader.h"
 #include "server/import/source/reader.h"
 
 namespace isomesh::import {
 namespace {
 
+constexpr std::string_view kNrrdTitle = "The NRRD header";
 constexpr std::string_view kDataFile = "datafile";
 
 struct NrrdHeader {
@@ -32,7 +35,7 @@ std::string field_name(std::string_view text) {
   return name;
 }
 
-void add_line(NrrdFields& fields, std::string_view line) {
+void add_nrrd_line(NrrdFields& fields, std::string_view line) {
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) {
     throw_unusable("The NRRD header has a line that is not a field: " + in_quotes(line) + ".");
@@ -44,13 +47,7 @@ void add_line(NrrdFields& fields, std::string_view line) {
     return;
   }
   const std::string name = field_name(line.substr(0, colon));
-  const std::string_view value = trimmed(line.substr(colon + 1));
-  if (has_control_characters(value)) {
-    throw_unusable("The NRRD header's field " + in_quotes(name) + " contains control characters.");
-  }
-  if (!fields.emplace(name, value).second) {
-    throw_unusable("The NRRD header has the field " + in_quotes(name) + " twice.");
-  }
+  add_field(fields, kNrrdTitle, name, trimmed(line.substr(colon + 1)));
 }
 
 bool names_list(const NrrdFields& fields) {
@@ -60,7 +57,7 @@ bool names_list(const NrrdFields& fields) {
 
 NrrdHeader read_nrrd_header(const InputFile& file) {
   NrrdHeader header;
-  LineReader lines(file, {.header = "The NRRD header"});
+  LineReader lines(file, {.header = kNrrdTitle});
   for (bool first = true;; first = false) {
     header.bytes = lines.offset();
     // Only a detached header may end with its file.
@@ -74,20 +71,12 @@ NrrdHeader read_nrrd_header(const InputFile& file) {
       header.bytes = lines.offset();
       return header;
     }
-    if (!first && !line->starts_with('#')) add_line(header.fields, *line);
+    if (!first && !line->starts_with('#')) add_nrrd_line(header.fields, *line);
   }
   throw_unusable("The NRRD header has no end: the empty line after it is missing.");
 }
 
-const std::string& required_field(const NrrdFields& fields, std::string_view name) {
-  const auto found = fields.find(name);
-  if (found == fields.end()) {
-    throw_unusable("The NRRD header has no field " + in_quotes(name) + ".");
-  }
-  return found->second;
-}
-
-StoredType stored_type(const NrrdFields& fields) {
+StoredType nrrd_type(const NrrdFields& fields) {
   using Names = std::vector<std::string_view>;
   static const std::vector<std::pair<StoredType, Names>> types = {
       {StoredType::kInt8, {"signed char", "int8", "int8_t"}},
@@ -105,7 +94,7 @@ StoredType stored_type(const NrrdFields& fields) {
        {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
       {StoredType::kFloat32, {"float"}},
       {StoredType::kFloat64, {"double"}}};
-  const std::string name = lower(required_field(fields, "type"));
+  const std::string name = lower(required(fields, kNrrdTitle, "type"));
   for (const auto& [type, names] : types) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return type;
   }
@@ -115,23 +104,11 @@ StoredType stored_type(const NrrdFields& fields) {
 
 std::vector<std::uint64_t> axis_sizes(const NrrdFields& fields) {
   constexpr std::uint64_t kMostAxes = 16;
-  const auto count = parse_uint64(required_field(fields, "dimension"));
-  std::vector<std::uint64_t> sizes;
-  for (const std::string_view word : words(required_field(fields, "sizes"))) {
-    const auto size = parse_uint64(word);
-    if (!size) throw_unusable("The NRRD header's size " + in_quotes(word) + " is not a number.");
-    sizes.push_back(*size);
-  }
-  if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
-    throw_unusable("The NRRD header's dimension is " +
-                   in_quotes(required_field(fields, "dimension")) + ", but it has " +
-                   std::to_string(sizes.size()) + " sizes.");
-  }
-  return sizes;
+  return required_sizes(fields, kNrrdTitle, "dimension", "sizes", kMostAxes);
 }
 
 Encoding payload_encoding(const NrrdFields& fields) {
-  const std::string name = lower(required_field(fields, "encoding"));
+  const std::string name = lower(required(fields, kNrrdTitle, "encoding"));
   if (name == "raw") return Encoding::kRaw;
   if (name == "gzip" || name == "gz") return Encoding::kDeflate;
   if (name == "text" || name == "txt" || name == "ascii") return Encoding::kText;
@@ -223,7 +200,7 @@ std::vector<std::string> data_names(const InputFile& file, const NrrdHeader& hea
 // A NIfTI file used as data begins with its own header, which some headers ignore.
 bool has_own_header(const std::string& name, const Companions& companions) {
   const std::string head = InputFile(companion(name, companions)).text(0, kSniffBytes);
-  return is_nifti(is_gzip(head) ? inflate_head(head, kSniffBytes) : head);
+  return kNiftiReader.sniff(is_gzip(head) ? inflate_head(head, kSniffBytes) : head);
 }
 
 std::vector<DataFile> data_files(const InputFile& file, const NrrdHeader& header,
@@ -242,6 +219,122 @@ std::vector<DataFile> data_files(const InputFile& file, const NrrdHeader& header
   return data_files_of(names, companions, skip, volume);
 }
 
+// --- Segments ------------------------------------------------------------------------------------
+
+// 3D Slicer's, in private keys
+// (https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html).
+struct Segment {
+  std::uint64_t layer = 0;
+  std::int64_t value = 1;
+  LabelEntry entry;  // its label is not set yet
+};
+
+// Returns an empty text if the header does not have it.
+std::string_view own_value(const NrrdFields& fields, std::size_t segment, std::string_view key) {
+  return value_of(fields, own_key("Segment" + std::to_string(segment) + '_' + std::string(key)));
+}
+
+bool is_told(const NrrdFields& fields, std::size_t segment) {
+  return std::ranges::any_of(
+      std::initializer_list<std::string_view>{"ID", "Name", "LabelValue", "Layer"},
+      [&](std::string_view key) { return !own_value(fields, segment, key).empty(); });
+}
+
+std::int64_t number_of(const NrrdFields& fields, std::size_t segment, std::string_view key,
+                       std::int64_t otherwise) {
+  const std::string_view text = own_value(fields, segment, key);
+  if (text.empty()) return otherwise;
+  if (const auto number = parse_int64(text)) return *number;
+  throw_unusable("The NRRD header's \"Segment" + std::to_string(segment) + '_' + std::string(key) +
+                 "\" is " + in_quotes(text) + ", not a whole number.");
+}
+
+// Three numbers, 0..1.
+std::optional<std::string> color_of(std::string_view text) {
+  const std::vector<std::string_view> parts = words(text);
+  std::array<double, 3> color = {};
+  if (parts.size() != color.size()) return std::nullopt;
+  for (std::size_t at = 0; at < color.size(); ++at) {
+    const auto part = parse_double(parts[at]);
+    if (!part) return std::nullopt;
+    color[at] = *part;
+  }
+  return label_color(color);
+}
+
+// Segments without layers and values are those of old versions: one segment per layer if there are
+// several.
+std::vector<Segment> segments_of(const NrrdFields& fields, std::uint64_t layers) {
+  std::vector<Segment> segments;
+  for (std::size_t at = 0; is_told(fields, at); ++at) {
+    const std::int64_t usual = at < layers ? static_cast<std::int64_t>(at) : 0;
+    const std::int64_t layer = number_of(fields, at, "Layer", usual);
+    if (layer < 0 || static_cast<std::uint64_t>(layer) >= layers) {
+      throw_unusable("The NRRD header's segment " + std::to_string(at) + " is in layer " +
+                     std::to_string(layer) + ", but the file has " + std::to_string(layers) +
+                     " layers.");
+    }
+    segments.push_back({.layer = static_cast<std::uint64_t>(layer),
+                        .value = number_of(fields, at, "LabelValue", 1),
+                        .entry = {.name = label_name(own_value(fields, at, "Name")),
+                                  .color = color_of(own_value(fields, at, "Color"))}});
+  }
+  return segments;
+}
+
+void set_own_values(std::vector<Segment> segments, std::uint64_t layer, SourceVolume& volume) {
+  std::vector<LabelEntry> entries;
+  for (Segment& segment : segments) {
+    if (segment.layer != layer) continue;
+    segment.entry.label = segment.value;
+    entries.push_back(std::move(segment.entry));
+  }
+  volume.labels = label_table(std::move(entries));
+}
+
+bool is_label(std::int64_t value) {
+  return value > 0 && value <= static_cast<std::int64_t>(Volume::kMostLabels);
+}
+
+void set_layers(std::vector<Segment> segments, bool is_interleaved, SourceVolume& volume) {
+  SegmentLayers layers = {.is_interleaved = is_interleaved, .labels = {}};
+  std::int64_t next = 1;
+  for (const Segment& segment : segments) {
+    if (is_label(segment.value)) next = std::max(next, segment.value + 1);
+  }
+  std::set<std::int64_t> taken;
+  std::vector<LabelEntry> entries;
+  for (Segment& segment : segments) {
+    if (segment.value == 0 || layers.labels.contains({segment.layer, segment.value})) continue;
+    const bool keeps = is_label(segment.value) && taken.insert(segment.value).second;
+    const std::int64_t label = keeps ? segment.value : next++;
+    if (!is_label(label))
+      throw_unusable("The segmentation needs labels above 65535, the largest that is supported.");
+    layers.labels[{segment.layer, segment.value}] = static_cast<std::uint32_t>(label);
+    segment.entry.label = label;
+    entries.push_back(std::move(segment.entry));
+  }
+  volume.labels = label_table(std::move(entries));
+  volume.layers = std::move(layers);
+}
+
+bool has_segments(const NrrdFields& fields) { return is_told(fields, 0); }
+
+// Sets `volume.labels`, and `volume.layers` if the file's volumes are layers of integers and
+// `is_layer_chosen` is false. A selected layer has only its own segments. A label is a segment's
+// value; if another layer uses the same value, it is a free number above all. Throws Error
+// kUnusableVolume.
+void set_segments(const NrrdFields& fields, bool is_interleaved, bool is_layer_chosen,
+                  SourceVolume& volume) {
+  std::vector<Segment> segments = segments_of(fields, volume.chosen.count);
+  if (volume.chosen.count == 1 || is_layer_chosen) {
+    return set_own_values(std::move(segments), volume.chosen.index, volume);
+  }
+  set_layers(std::move(segments), is_interleaved, volume);
+}
+
+// --- The volume ----------------------------------------------------------------------------------
+
 // Sets dims, type and encoding, and selects one of several volumes.
 SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
                         const ImportOptions& options) {
@@ -249,7 +342,7 @@ SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
   volume.dims =
       volume_dims(std::span(sizes.lattice).first(std::min<std::size_t>(sizes.lattice.size(), 3)));
   volume.encoding = payload_encoding(fields);
-  volume.layout.type = stored_type(fields);
+  volume.layout.type = nrrd_type(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
   // Layers are consecutive or take turns with each sample.
   const bool is_interleaved = sizes.run == 1;
@@ -262,18 +355,13 @@ SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
     set_segments(fields, is_interleaved, false, volume);
     return volume;
   }
-  choose_volume(
-      sizes.volumes,
-      {.what = sizes.volume_kind == "time" ? "time" : "their " + sizes.volume_kind,
-       .title =
-           [&](std::uint64_t index) { return sizes.volume_kind + ' ' + std::to_string(index); }},
-      options, volume);
+  const std::string& kind = sizes.volume_kind;
+  choose_volume(sizes.volumes, numbered(kind == "time" ? kind : "their " + kind, kind), options,
+                volume);
   if (sizes.volumes > 1 && !is_consecutive) volume.chosen.run = sizes.run;
   set_segments(fields, is_interleaved, true, volume);
   return volume;
 }
-
-}  // namespace
 
 bool is_nrrd(std::string_view head) {
   return head.size() >= 9 && head.starts_with("NRRD000") && head[7] >= '1' && head[7] <= '5' &&
@@ -294,8 +382,7 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
   if (fields.contains(kDataFile)) {
     volume.data_files = data_files(file, header, companions, volume);
   } else {
-    volume.payload.offset = payload_offset(file, header, volume);
-    volume.payload.bytes = file.size() - volume.payload.offset;
+    volume.payload = range_from(file, payload_offset(file, header, volume));
   }
   volume.geometry = nrrd_geometry(fields, sizes.all, options, volume.notes);
   volume.assumes_spacing = !nrrd_has_spacing(fields, sizes.all);
@@ -317,5 +404,13 @@ MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task) {
   if (fields.contains(kDataFile)) return {.file = list, .data = samples};
   return {.file = header.bytes + samples};
 }
+
+}  // namespace
+
+constinit const Reader kNrrdReader = {.name = "nrrd",
+                                      .sniff = is_nrrd,
+                                      .describe = parse_nrrd,
+                                      .most_bytes = most_nrrd_bytes,
+                                      .data_names = nrrd_data_names};
 
 }  // namespace isomesh::import

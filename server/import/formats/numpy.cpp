@@ -50,6 +50,10 @@ std::vector<std::uint64_t> shape_of(std::string_view text) {
   return shape;
 }
 
+bool is_numpy(std::string_view head) {
+  return head.size() >= 8 && head.starts_with(kNpyMagic) && head[6] >= 1 && head[6] <= 3;
+}
+
 NpyHeader read_npy_header(std::string_view head) {
   if (!is_numpy(head) || head.size() < 12) throw_damaged_header();
   const HeaderBytes numbers(head, false);
@@ -105,12 +109,6 @@ std::string text_of(const std::vector<std::uint64_t>& shape) {
   return "(" + text + ")";
 }
 
-}  // namespace
-
-bool is_numpy(std::string_view head) {
-  return head.size() >= 8 && head.starts_with(kNpyMagic) && head[6] >= 1 && head[6] <= 3;
-}
-
 bool may_hold_numpy_volume(std::string_view head) {
   try {
     const NpyHeader header = read_npy_header(head);
@@ -144,20 +142,25 @@ SourceVolume parse_numpy(const InputFile& file, const Companions& /*companions*/
   volume.encoding = row->encoding;
   std::vector<std::uint64_t> sizes = xyz;
   if (has_volumes(header)) sizes.push_back(header.shape.front());
-  choose_volume(volumes_beyond(sizes),
-                {.what = "the array's first index",
-                 .title = [](std::uint64_t index) { return "index " + std::to_string(index); }},
-                options, volume);
+  choose_volume(volumes_beyond(sizes), numbered("the array's first index", "index"), options,
+                volume);
   if (header.is_fortran) {
     volume.stored_axes = {2, 1, 0};
     if (volume.chosen.count > 1) volume.chosen.run = 1;
   }
-  volume.payload = {header.bytes, file.size() - std::min(file.size(), header.bytes)};
+  volume.payload = range_from(file, header.bytes);
   volume.has_spacing = false;
   volume.notes.push_back(
       note_of(NoteCode::kSpaceAssumed,
               "A NumPy array has no patient. Its last three axes were read as z, y and x in LPS."));
   return volume;
 }
+
+}  // namespace
+
+constinit const Reader kNumpyReader = {.name = "numpy",
+                                       .sniff = is_numpy,
+                                       .may_hold_volume = may_hold_numpy_volume,
+                                       .describe = parse_numpy};
 
 }  // namespace isomesh::import

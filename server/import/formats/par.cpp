@@ -12,6 +12,7 @@
 #include "base/text.h"
 #include "server/import/formats/format_readers.h"
 #include "server/import/formats/placing.h"
+#include "server/import/source/header_fields.h"
 #include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
@@ -19,11 +20,10 @@ namespace {
 
 constexpr std::size_t kMostParBytes = std::size_t{8} << 20;
 
-using General = std::map<std::string, std::string, std::less<>>;
 using ImageRow = std::vector<double>;
 
 struct ParHeader {
-  General general;
+  HeaderTexts general;
   std::vector<ImageRow> rows;  // one for each image
 };
 
@@ -83,7 +83,7 @@ ImageRow image_row(std::string_view line) {
 }
 
 // ".    Max. number of slices/locations      :   9": what stands before and behind the colon.
-void add_general(std::string_view line, General& general) {
+void add_general(std::string_view line, HeaderTexts& general) {
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) return;
   general.emplace(lower(trimmed(line.substr(1, colon - 1))), trimmed(line.substr(colon + 1)));
@@ -108,24 +108,14 @@ ParHeader read_par_header(const InputFile& file) {
 Vector3 general_vector(const ParHeader& header, std::string_view beginning) {
   for (const auto& [name, value] : header.general) {
     if (!name.starts_with(beginning)) continue;
-    const auto parts = words(value);
-    Vector3 vector = {};
-    for (std::size_t at = 0; at < 3; ++at) {
-      const auto number = parts.size() == 3 ? parse_double(parts[at]) : std::nullopt;
-      if (!number || !std::isfinite(*number)) break;
-      vector[at] = *number;
-      if (at == 2) return vector;
-    }
+    const auto numbers = finite_numbers(value);
+    if (numbers.size() == 3) return {numbers[0], numbers[1], numbers[2]};
   }
   throw_unusable("The PAR header has no three numbers for " + in_quotes(beginning) + ".");
 }
 
-std::uint64_t whole(double number, const char* what) {
-  constexpr double kMost = 1e9;
-  if (number >= 0 && number <= kMost && number == std::floor(number)) {
-    return static_cast<std::uint64_t>(number);
-  }
-  throw_unusable(std::string("The PAR header's ") + what + " is not plausible.");
+std::uint64_t whole(double number, const std::string& what) {
+  return plausible_whole(number, "The PAR header's " + what);
 }
 
 // --- Geometry ------------------------------------------------------------------------------------
@@ -313,8 +303,6 @@ std::string rec_name(const Companions& companions) {
       "ZIP or TAR.");
 }
 
-}  // namespace
-
 bool is_par(std::string_view head) {
   const std::size_t version = head.find("CLINICAL TRYOUT");
   return head.starts_with('#') && version != std::string_view::npos &&
@@ -359,5 +347,13 @@ MostBytes most_par_bytes(const InputFile& beginning, const ImportTask& task) {
   return {.file = kMostParBytes + kHeadroomBytes,
           .data = most * described.slice_bytes() + kHeadroomBytes};
 }
+
+}  // namespace
+
+constinit const Reader kParReader = {.name = "par",
+                                     .sniff = is_par,
+                                     .describe = parse_par,
+                                     .most_bytes = most_par_bytes,
+                                     .data_names = par_data_names};
 
 }  // namespace isomesh::import

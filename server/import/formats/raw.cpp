@@ -19,8 +19,6 @@ void check_size(const InputFile& file, const RawDescription& description, std::u
                                       std::to_string(file.size()) + " bytes");
 }
 
-}  // namespace
-
 Volume parse_raw(const Input& input) {
   const RawDescription& description = *input.task.options.raw;
   check_raw(description, input.task.limits);
@@ -33,5 +31,9 @@ Volume parse_raw(const Input& input) {
       {file, 0, {stored_type(description.type), description.big_endian, std::nullopt}}, volume,
       input.task.target);
 }
+
+}  // namespace
+
+constinit const Reader kRawReader = {.name = "raw", .parse = parse_raw};
 
 }  // namespace isomesh::import

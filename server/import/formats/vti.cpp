@@ -7,30 +7,183 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "base/xml_reader.h"
 #include "proto/error.h"
 #include "server/import/formats/format_readers.h"
-#include "server/import/formats/vti_document.h"
 #include "server/import/formats/vtk.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import {
 namespace {
+
+struct VtiArray {
+  HeaderTexts attributes;
+  CompressedRange text;  // the byte range between its tags
+};
+
+// The parts of the document that a volume needs.
+struct VtiDocument {
+  HeaderTexts file;
+  HeaderTexts image;
+  HeaderTexts piece;
+  HeaderTexts point_data;
+  HeaderTexts cell_data;
+  std::size_t pieces = 0;
+  std::vector<VtiArray> point_arrays;
+  std::vector<VtiArray> cell_arrays;
+  HeaderTexts appended;
+  std::uint64_t appended_at = 0;  // file offset of its data; 0: none
+};
+
+// Parses a document incrementally up to its appended data, which is not XML.
+class VtiParser : public XmlHandler {
+ public:
+  enum class Until { kImage, kSamples };
+
+  VtiParser(const InputFile& file, Until until) : file_(file), until_(until) {}
+
+  VtiDocument parse() {
+    constexpr std::size_t kXmlPieceBytes = std::size_t{1} << 16;
+    for (std::uint64_t next = 0; !reader_.is_stopped();) {
+      const std::string piece = file_.text(next, kXmlPieceBytes);
+      next += piece.size();
+      const bool last = next >= file_.size();
+      try {
+        reader_.read(piece, last);
+      } catch (const XmlError& error) {
+        throw_unusable("The VTK file is not valid XML: " + std::string(error.what()) + ".");
+      }
+      if (last) break;
+      check_progress(next);
+    }
+    return std::move(document_);
+  }
+
+ private:
+  // expat rescans an unfinished tag or comment with each piece, so their length is bounded.
+  void check_progress(std::uint64_t read) const {
+    constexpr std::uint64_t kLongest = std::uint64_t{1} << 20;
+    if (read > kLongest && reader_.begin() < read - kLongest) {
+      throw_unusable("The VTK file has a tag or a comment of more than " +
+                     std::to_string(kLongest) + " bytes.");
+    }
+  }
+
+  void encoding(std::string_view encoding) override {
+    // Other encodings do not allow reading the samples' text byte by byte.
+    const std::string name = lower(encoding);
+    if (name == "utf-8" || name == "us-ascii" || name == "iso-8859-1") return;
+    throw_unusable("The VTK file's encoding " + in_quotes(name) + " is not supported.");
+  }
+
+  void start_element(std::string_view name, const XmlAttributes& pairs) override {
+    constexpr std::size_t kDeepest = 32;
+    constexpr std::size_t kMostElements = 100'000;
+    // Longer than any name that is looked for. Each element costs a copy of the names around it.
+    constexpr std::size_t kLongestName = 64;
+    if (path_.size() >= kDeepest) throw_unusable("The VTK file's elements are nested too deeply.");
+    if (++elements_ > kMostElements) {
+      throw_unusable("The VTK file has more than the " + std::to_string(kMostElements) +
+                     " elements that are supported.");
+    }
+    path_.emplace_back(name.substr(0, kLongestName));
+    HeaderTexts attributes;
+    pairs.for_each([&](const char* key, const char* value) { attributes.emplace(key, value); });
+    const std::string place = joined_path();
+    if (place == "VTKFile") {
+      document_.file = std::move(attributes);
+      check_kind();
+    } else if (place == "VTKFile/ImageData") {
+      document_.image = std::move(attributes);
+      if (until_ == Until::kImage) reader_.stop();
+    } else if (place == "VTKFile/ImageData/Piece") {
+      document_.piece = std::move(attributes);
+      ++document_.pieces;
+    } else if (place == "VTKFile/ImageData/Piece/PointData") {
+      document_.point_data = std::move(attributes);
+    } else if (place == "VTKFile/ImageData/Piece/CellData") {
+      document_.cell_data = std::move(attributes);
+    } else if (auto* arrays = arrays_at(place)) {
+      add_array(std::move(attributes), *arrays);
+    } else if (place == "VTKFile/AppendedData") {
+      document_.appended = std::move(attributes);
+      document_.appended_at = reader_.end();
+      reader_.stop();
+    }
+  }
+
+  void end_element(std::string_view) override {
+    if (auto* arrays = arrays_at(joined_path())) {
+      CompressedRange& text = arrays->back().text;
+      text.bytes = reader_.begin() - std::min(reader_.begin(), text.offset);
+    }
+    path_.pop_back();
+  }
+
+  void check_kind() const {
+    const std::string_view type = value_of(document_.file, "type");
+    if (type == "ImageData") return;
+    throw_unusable("The VTK file holds " + in_quotes(type) + ", not ImageData.");
+  }
+
+  // The list that an array at this place belongs to; null for no array.
+  std::vector<VtiArray>* arrays_at(std::string_view place) {
+    if (place == "VTKFile/ImageData/Piece/PointData/DataArray") return &document_.point_arrays;
+    if (place == "VTKFile/ImageData/Piece/CellData/DataArray") return &document_.cell_arrays;
+    return nullptr;
+  }
+
+  void add_array(HeaderTexts attributes, std::vector<VtiArray>& arrays) const {
+    constexpr std::size_t kMostArrays = 1000;
+    if (arrays.size() == kMostArrays) {
+      throw_unusable("The VTK file has more than the 1000 arrays that are supported.");
+    }
+    arrays.push_back({std::move(attributes), {reader_.end(), 0}});
+  }
+
+  std::string joined_path() const {
+    std::string path;
+    for (const std::string& name : path_) path += (path.empty() ? "" : "/") + name;
+    return path;
+  }
+
+  const InputFile& file_;
+  const Until until_;
+  VtiDocument document_;
+  std::vector<std::string> path_;
+  std::size_t elements_ = 0;
+  XmlReader reader_{*this};
+};
+
+// Reads the document up to its appended data, which is not XML. Throws Error kUnusableVolume if it
+// is not well-formed, not an image, or uses XML features that VTK does not write.
+VtiDocument read_vti_document(const InputFile& file) {
+  return VtiParser(file, VtiParser::Until::kSamples).parse();
+}
+
+// Reads the image's attributes, which precede anything large. Throws as read_vti_document, also if
+// they are missing because the file is truncated.
+HeaderTexts read_vti_image(const InputFile& beginning) {
+  HeaderTexts image = VtiParser(beginning, VtiParser::Until::kImage).parse().image;
+  if (image.empty()) throw_unusable("The VTK file does not begin with the extent of an image.");
+  return image;
+}
+
+// --- The image -----------------------------------------------------------------------------------
 
 template <std::size_t Count>
 std::array<double, Count> numbers_of(const HeaderTexts& attributes, std::string_view name,
                                      const std::array<double, Count>& otherwise) {
   const std::string_view text = value_of(attributes, name);
   if (text.empty()) return otherwise;
-  const auto parts = words(text);
-  std::array<double, Count> numbers = {};
-  bool valid = parts.size() == Count;
-  for (std::size_t at = 0; valid && at < Count; ++at) {
-    const auto number = parse_double(parts[at]);
-    valid = number && std::isfinite(*number);
-    numbers[at] = number.value_or(0);
+  const auto found = finite_numbers(text);
+  if (found.size() != Count) {
+    throw_unusable("The VTK file's " + in_quotes(name) + " is not " + std::to_string(Count) +
+                   " finite numbers.");
   }
-  if (valid) return numbers;
-  throw_unusable("The VTK file's " + in_quotes(name) + " is not " + std::to_string(Count) +
-                 " finite numbers.");
+  std::array<double, Count> numbers;
+  std::ranges::copy(found, numbers.begin());
+  return numbers;
 }
 
 VtkExtent extent_of(const HeaderTexts& attributes, std::string_view name) {
@@ -226,8 +379,6 @@ void place_samples(const InputFile& file, const VtiDocument& document, const Vti
   volume.vtk.base64 = appended_is_base64(document);
 }
 
-}  // namespace
-
 bool is_vti(std::string_view head) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (head.starts_with(kByteOrderMark)) head.remove_prefix(kByteOrderMark.size());
@@ -272,5 +423,13 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
 MostBytes most_vti_bytes(const InputFile& beginning, const ImportTask& task) {
   return most_vtk_bytes(extent_of(read_vti_image(beginning), "WholeExtent").dims, task);
 }
+
+}  // namespace
+
+constinit const Reader kVtiReader = {.name = "vti",
+                                     .sniff = is_vti,
+                                     .may_hold_volume = may_hold_image,
+                                     .describe = parse_vti,
+                                     .most_bytes = most_vti_bytes};
 
 }  // namespace isomesh::import

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace isomesh::import {
 
@@ -19,6 +21,23 @@ inline std::string_view value_of(const HeaderTexts& texts, std::string_view name
   const auto found = texts.find(name);
   return found == texts.end() ? std::string_view{} : std::string_view(found->second);
 }
+
+// The numbers of a text, separated by white space. Empty unless all are finite.
+std::vector<double> finite_numbers(std::string_view text);
+
+// The same number if it is whole and from 0 to 1e9. Throws Error kUnusableVolume, with `what`
+// before "is not plausible".
+std::uint64_t plausible_whole(double number, const std::string& what);
+
+// Of the header that messages call `title`, "The NRRD header". All throw Error kUnusableVolume:
+// if the value has control characters or the field is there already; if the field is missing or
+// empty; if the sizes are not as many numbers as the field `count` says, from 1 to `most`.
+void add_field(HeaderTexts& texts, std::string_view title, const std::string& name,
+               std::string_view value);
+std::string_view required(const HeaderTexts& texts, std::string_view title, std::string_view name);
+std::vector<std::uint64_t> required_sizes(const HeaderTexts& texts, std::string_view title,
+                                          std::string_view count, std::string_view sizes,
+                                          std::uint64_t most);
 
 // Reads numbers of either byte order. The caller makes sure that `bytes` holds them.
 class HeaderBytes {

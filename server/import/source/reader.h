@@ -37,7 +37,7 @@ struct Input {
 // or other files.
 enum class Content { kVolume, kSlices, kPages, kFiles };
 
-// A row of the table in readers.cpp.
+// How to read a format; readers.cpp lists all of them.
 struct Reader {
   // A row of proto/volume_formats.h, or "archive", which is no volume format.
   std::string_view name;
@@ -47,13 +47,18 @@ struct Reader {
   // False for a file that is recognised but cannot hold a volume, by its beginning, such as a
   // surface. An archive may hold it beside a volume. Null if all may.
   bool (*may_hold_volume)(std::string_view head) = nullptr;
+  // Reads the header and places the samples; the options select one of several volumes. Throws
+  // Error kUnusableVolume. Null for formats with `parse`.
+  SourceVolume (*describe)(const InputFile& file, const Companions& companions,
+                           const ImportOptions& options) = nullptr;
   // Reads the input and writes the task's target. Throws as import_volume does.
   Volume (*parse)(const Input& input) = nullptr;
   // The largest possible size of a file, by its plain beginning: the whole file or at least its
-  // first kBeginningBytes. Null for archives and raw samples. Throws as `parse` does.
+  // first kBeginningBytes. Null for archives and raw samples, and if `describe` says it: a header
+  // in front of its samples. Throws as import_volume does.
   MostBytes (*most_bytes)(const InputFile& beginning, const ImportTask& task) = nullptr;
   // The companions that hold a header's samples and are therefore not volumes of their own. Null
-  // for formats without data files. Throws as `parse` does.
+  // for formats without data files. Throws as import_volume does.
   std::vector<std::string> (*data_names)(const InputFile& file,
                                          const Companions& companions) = nullptr;
 };

@@ -71,6 +71,10 @@ std::uint64_t SourceVolume::most_encoded_bytes() const {
   return stored_bytes() + stored_bytes() / kStoredShare;
 }
 
+CompressedRange range_from(const InputFile& file, std::uint64_t offset) {
+  return {offset, file.size() - std::min(file.size(), offset)};
+}
+
 void check_limits(const SourceVolume& volume, const SizeLimits& limits) {
   check_limits(volume.sample_count(), canonical_type(volume.layout), limits);
 }
@@ -186,6 +190,11 @@ std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
     volume.notes.push_back(trailing_note(more));
   }
   return files;
+}
+
+Difference numbered(const std::string& what, const std::string& name) {
+  return {.what = what,
+          .title = [name](std::uint64_t index) { return name + ' ' + std::to_string(index); }};
 }
 
 std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes) {

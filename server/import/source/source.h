@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/files.h"
 #include "proto/types.h"
 #include "server/import/source/gzip.h"
 #include "server/import/source/names.h"
@@ -155,6 +156,9 @@ struct SourceVolume {
   std::uint64_t most_encoded_bytes() const;
 };
 
+// From there to the end of the file.
+CompressedRange range_from(const InputFile& file, std::uint64_t offset);
+
 // Throws Error kTooLarge if the volume's canonical samples would exceed the limits.
 void check_limits(const SourceVolume& volume, const SizeLimits& limits);
 
@@ -183,6 +187,9 @@ struct Difference {
   std::string what;                                       // for example "time"
   std::function<std::string(std::uint64_t index)> title;  // of one volume, for example "6 s"
 };
+
+// Volumes that are told apart by a number: "frame 0", "frame 1", ...
+Difference numbered(const std::string& what, const std::string& name);
 
 // The number of volumes of a file with these sizes. Throws Error kUnusableVolume for implausible
 // numbers.

@@ -83,10 +83,10 @@ TEST(Readers, KnowNothingElse) {
 
 TEST(Readers, EachHasANameOfItsOwnAndReads) {
   std::set<std::string_view> names;
-  for (const Reader& reader : readers()) {
-    EXPECT_TRUE(names.insert(reader.name).second) << reader.name;
-    EXPECT_NE(reader.parse, nullptr) << reader.name;
-    EXPECT_EQ(reader.sniff == nullptr, reader.name == "raw") << reader.name;
+  for (const Reader* reader : readers()) {
+    EXPECT_TRUE(names.insert(reader->name).second) << reader->name;
+    EXPECT_NE(reader->parse == nullptr, reader->describe == nullptr) << reader->name;
+    EXPECT_EQ(reader->sniff == nullptr, reader->name == "raw") << reader->name;
   }
 }
 
@@ -106,7 +106,7 @@ TEST(Readers, AreNamedWhereNoneReadsAFile) {
 
 TEST(Readers, AreThoseOfTheTableOfFormats) {
   std::set<std::string_view> names;
-  for (const Reader& reader : readers()) names.insert(reader.name);
+  for (const Reader* reader : readers()) names.insert(reader->name);
   names.erase("archive");
   for (const VolumeFormat& format : volume_formats()) {
     EXPECT_EQ(names.erase(format.name), 1) << format.name;
