@@ -1,7 +1,7 @@
 // The elements of a DICOM file, checked against the file's size.
 //
-// GDCM's reader allocates any declared length and follows sequences to any depth. So this parser
-// reads the elements, and GDCM gets only checked pixel data (decode.h).
+// GDCM's reader takes truncated files for complete ones (docs/decisions/dicom-parser.md). So this
+// parser reads the elements, and GDCM gets only checked pixel data (decode.h).
 #pragma once
 
 #include <cstddef>
