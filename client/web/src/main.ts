@@ -54,7 +54,7 @@ function placeOf(route: Route): Place {
 
 const halfDisc = 'M8 2a6 6 0 1 0 0 12A6 6 0 0 0 8 2Zm0 0v12';
 const main = h('main', { id: 'main', tabindex: '-1' });
-const banner = h('div', { class: 'banner', role: 'alert', hidden: true });
+const banner = h('div.banner', { role: 'alert', hidden: true });
 const links = [
   h('a', { href: hashOf([]), 'data-place': 'volumes' }, 'Volumes'),
   h('a', { href: hashOf(['jobs']), 'data-place': 'jobs' }, 'Jobs'),
@@ -81,7 +81,7 @@ function showOrders(): void {
 
 // Shows the state of an upload while other views are open.
 function uploadNote(): HTMLElement {
-  const note = h('a', { class: 'upload-note', href: hashOf([]), hidden: true });
+  const note = h('a.upload-note', { href: hashOf([]), hidden: true });
   uploads.state.watch((state) => {
     note.textContent = state;
     note.hidden = state === '';
@@ -91,21 +91,19 @@ function uploadNote(): HTMLElement {
 
 function shell(): HTMLElement[] {
   return [
-    h('a', { class: 'skip', href: '#main', onClick: (event: Event) => {
+    h('a.skip', { href: '#main', onClick: (event: Event) => {
       event.preventDefault();
       main.focus();
     } }, 'Skip to content'),
-    h(
-      'header',
-      { class: 'top' },
-      h('a', { class: 'brand', href: hashOf([]) }, 'isomesh'),
+    h('header.top', [
+      h('a.brand', { href: hashOf([]) }, 'isomesh'),
       h('nav', { 'aria-label': 'Main' }, ...links),
-      h('span', { class: 'grow' }),
+      h('span.grow'),
       uploadNote(),
       ...tokenButtons(),
       button('Shortcuts', showHelp, { class: 'quiet keys', title: 'Keyboard shortcuts (?)' }),
       button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Switch between light and dark' }),
-    ),
+    ]),
     banner,
     main,
   ];
@@ -140,7 +138,7 @@ async function show(): Promise<void> {
   const isMove = shownPath !== '' && shownPath !== route.path.join('/');
   shownPath = route.path.join('/') || '/';
   main.setAttribute('aria-busy', 'true');
-  const slow = setTimeout(() => main.replaceChildren(h('p', { class: 'loading' }, 'Loading')), 300);
+  const slow = setTimeout(() => main.replaceChildren(h('p.loading', 'Loading')), 300);
   mine.onEnd(() => clearTimeout(slow));
   try {
     const view = await place.show(mine, route);
@@ -156,10 +154,10 @@ async function show(): Promise<void> {
     const failure = asApiError(error);
     if (failure.status === -1 && !(error instanceof ApiError)) console.error(error);
     const again = button('Try again', () => void show());
-    const home = h('a', { class: 'button', href: hashOf([]) }, 'All volumes');
-    const way = failure.link ? h('a', { class: 'button', href: failure.link.href }, failure.link.text) : home;
+    const home = h('a.button', { href: hashOf([]) }, 'All volumes');
+    const way = failure.link ? h('a.button', { href: failure.link.href }, failure.link.text) : home;
     const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
-    main.replaceChildren(h('h1', { class: 'sr-only' }, 'This page cannot be shown'), h('div', { class: 'page-problem' }, shown));
+    main.replaceChildren(h('h1.sr-only', 'This page cannot be shown'), h('div.page-problem', shown));
     // If the server could not be reached, the page tries again when the connection is back.
     if (failure.isUnreachable) onReconnect(mine, () => void show());
   } finally {
@@ -243,7 +241,7 @@ function watchJobs(): void {
     const [place, job] = currentRoute().path;
     if (place === 'jobs' && job === id) return;
     const what = { succeeded: 'is ready', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
-    tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface for ${surfaceInWords(parameters)}`), ` ${what}.`));
+    tell(h('span', h('a', { href: hashOf(['jobs', id]) }, `The surface for ${surfaceInWords(parameters)}`), ` ${what}.`));
   });
   client.submitted.subscribe((id) => watched.add(id));
   watched.start();

@@ -29,7 +29,7 @@ export class Rulers {
   private readonly geometry = new BufferGeometry();
   private readonly lineMaterial: LineBasicMaterial;
   private readonly pointMaterial: PointsMaterial;
-  private readonly labels = h('div', { class: 'ruler-labels', 'aria-hidden': 'true' });
+  private readonly labels = h('div.ruler-labels', { 'aria-hidden': 'true' });
   private readonly middle = new Vector3();
 
   constructor(
@@ -140,7 +140,7 @@ export class Rulers {
     this.geometry.setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
     this.geometry.setDrawRange(0, places.length / 3);
     this.labels.replaceChildren(
-      ...this.rulers.map((ruler) => h('span', {}, labelOf(ruler))),
+      ...this.rulers.map((ruler) => h('span', labelOf(ruler))),
     );
     this.onChange?.();
   }

@@ -4,7 +4,12 @@ type Handler = (event: never) => void;
 export type Attribute = string | number | boolean | null | undefined | Handler;
 export type Child = Node | string | null | undefined | false;
 
-function setAttributes(element: Element, attributes: Record<string, Attribute>): void {
+type Attributes = Readonly<Record<string, Attribute>>;
+type Children = Child | readonly Child[];
+// Attributes come before the children, and may be left out.
+type Content = [Attributes, ...Children[]] | Children[];
+
+function setAttributes(element: Element, attributes: Attributes): void {
   for (const [name, value] of Object.entries(attributes)) {
     if (typeof value === 'function') {
       element.addEventListener(name.replace(/^on/, '').toLowerCase(), value as EventListener);
@@ -16,47 +21,52 @@ function setAttributes(element: Element, attributes: Record<string, Attribute>):
   }
 }
 
-// An element with attributes (functions named onEvent are listeners; true is an empty attribute, false
-// and null none) and children (false and null are left out).
-export function h<K extends keyof HTMLElementTagNameMap>(
-  name: K,
-  attributes: Record<string, Attribute> = {},
-  ...children: Child[]
-): HTMLElementTagNameMap[K] {
-  const element = document.createElement(name);
-  setAttributes(element, attributes);
-  element.append(...children.filter((child): child is Node | string => Boolean(child)));
+function isAttributes(one: Attributes | Children): one is Attributes {
+  return typeof one === 'object' && one !== null && Object.getPrototypeOf(one) === Object.prototype;
+}
+
+function fill(element: Element, classes: readonly string[], content: Content): void {
+  if (classes.length > 0) element.setAttribute('class', classes.join(' '));
+  for (const one of content) {
+    if (isAttributes(one)) setAttributes(element, one);
+    else element.append(...[one].flat().filter((child): child is Node | string => Boolean(child)));
+  }
+}
+
+type Tag = keyof HTMLElementTagNameMap;
+type TagOf<Name> = Name extends `${infer T}.${string}` ? T : Name;
+
+// An element, of classes that follow its name (p.hint.grow), with attributes (functions named onEvent are listeners; true is
+// an empty attribute, false and null none) and children (false and null are left out).
+export function h<Name extends Tag | `${Tag}.${string}`>(name: Name, ...content: Content): HTMLElementTagNameMap[TagOf<Name> & Tag] {
+  const [tag, ...classes] = name.split('.');
+  const element = document.createElement(tag as TagOf<Name> & Tag);
+  fill(element, classes, content);
   return element;
 }
 
 const svgNamespace = 'http://www.w3.org/2000/svg';
 
-export function svg(
-  name: string,
-  attributes: Record<string, Attribute> = {},
-  ...children: Child[]
-): SVGElement {
-  const element = document.createElementNS(svgNamespace, name);
-  setAttributes(element, attributes);
-  element.append(...children.filter((child): child is Node | string => Boolean(child)));
+export function svg(name: string, ...content: Content): SVGElement {
+  const [tag = '', ...classes] = name.split('.');
+  const element = document.createElementNS(svgNamespace, tag);
+  fill(element, classes, content);
   return element;
 }
 
 export function button(
   text: Child,
   onClick: () => void,
-  attributes: Record<string, Attribute> = {},
+  attributes: Attributes = {},
 ): HTMLButtonElement {
   return h('button', { type: 'button', onClick, ...attributes }, text);
 }
 
 // An icon of lines on a grid of 16, for the eye only.
 export function icon(path: string): SVGElement {
-  return svg(
-    'svg',
-    { viewBox: '0 0 16 16', class: 'icon', 'aria-hidden': 'true' },
+  return svg('svg.icon', { viewBox: '0 0 16 16', 'aria-hidden': 'true' }, [
     svg('path', { d: path }),
-  );
+  ]);
 }
 
 let lastId = 0;
@@ -69,9 +79,9 @@ export function uniqueId(prefix: string): string {
 // A label above its control.
 export function field(label: string, control: HTMLElement, hint = ''): HTMLElement {
   if (control.id === '') control.id = uniqueId('field');
-  const note = hint === '' ? null : h('p', { class: 'hint', id: `${control.id}-hint` }, hint);
+  const note = hint === '' ? null : h('p.hint', { id: `${control.id}-hint` }, hint);
   if (note) control.setAttribute('aria-describedby', note.id);
-  return h('div', { class: 'field' }, h('label', { for: control.id }, label), control, note);
+  return h('div.field', h('label', { for: control.id }, label), control, note);
 }
 
 // A list of values and their names, one of which is chosen.
@@ -79,7 +89,7 @@ export function select<T extends string>(
   choices: readonly (readonly [T, string])[],
   value: string | undefined,
   onChange: (value: T) => void = () => undefined,
-  attributes: Record<string, Attribute> = {},
+  attributes: Attributes = {},
 ): HTMLSelectElement {
   const options = choices.map(([name, text]) => h('option', { value: name, selected: name === value }, text));
   const element = h('select', attributes, ...options);
@@ -89,7 +99,7 @@ export function select<T extends string>(
 
 // Terms and what is said of each.
 export function definitions(rows: readonly (readonly [string, Child])[]): HTMLElement {
-  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+  return h('dl', ...rows.flatMap(([name, value]) => [h('dt', name), h('dd', value)]));
 }
 
 export interface Choice<T extends string> {
@@ -106,17 +116,11 @@ export function segmented<T extends string>(
   onChange: (value: T) => void,
 ): HTMLElement {
   const name = uniqueId('choice');
-  return h(
-    'fieldset',
-    { class: 'segmented' },
-    h('legend', {}, label),
-    h(
-      'div',
-      { class: 'segments' },
+  return h('fieldset.segmented', [
+    h('legend', label),
+    h('div.segments', [
       ...choices.map((choice) =>
-        h(
-          'label',
-          { title: choice.title },
+        h('label', { title: choice.title }, [
           h('input', {
             type: 'radio',
             name,
@@ -124,11 +128,11 @@ export function segmented<T extends string>(
             checked: choice.value === value,
             onChange: () => onChange(choice.value),
           }),
-          h('span', {}, choice.label),
-        ),
+          h('span', choice.label),
+        ]),
       ),
-    ),
-  );
+    ]),
+  ]);
 }
 
 // Selects a choice of a row without calling `onChange`.
@@ -140,11 +144,11 @@ export function checkbox(
   label: string,
   isOn: boolean,
   onChange: (isOn: boolean) => void,
-  attributes: Record<string, Attribute> = {},
+  attributes: Attributes = {},
 ): HTMLLabelElement {
   const input = h('input', { type: 'checkbox', checked: isOn, ...attributes });
   input.addEventListener('change', () => onChange(input.checked));
-  return h('label', { class: 'check' }, input, h('span', {}, label));
+  return h('label.check', input, h('span', label));
 }
 
 // Scrolls as little as possible so that the element is in view.

@@ -22,16 +22,14 @@ const keys: [string, string][] = [
 ];
 
 export function showHelp(): void {
-  const dialog = h(
-    'dialog',
-    { class: 'dialog help', 'aria-label': 'Keyboard shortcuts' },
-    h('h2', {}, 'Keyboard shortcuts'),
-    h('dl', {}, ...keys.flatMap(([key, what]) => [
-      h('dt', {}, ...key.split(' ').map((part) => h('kbd', {}, part))),
-      h('dd', {}, what),
+  const dialog = h('dialog.dialog.help', { 'aria-label': 'Keyboard shortcuts' }, [
+    h('h2', 'Keyboard shortcuts'),
+    h('dl', ...keys.flatMap(([key, what]) => [
+      h('dt', ...key.split(' ').map((part) => h('kbd', part))),
+      h('dd', what),
     ])),
-    h('div', { class: 'actions' }, button('Close', () => dialog.close(), { autofocus: true })),
-  );
+    h('div.actions', button('Close', () => dialog.close(), { autofocus: true })),
+  ]);
   dialog.addEventListener('close', () => dialog.remove());
   document.body.append(dialog);
   dialog.showModal();

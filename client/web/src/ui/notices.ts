@@ -4,14 +4,14 @@ import { button, h, type Child } from './dom';
 
 const shownFor = 6000;
 
-const stack = h('div', { class: 'toasts', role: 'status', 'aria-live': 'polite' });
+const stack = h('div.toasts', { role: 'status', 'aria-live': 'polite' });
 
 export function mountNotices(parent: HTMLElement): void {
   parent.append(stack);
 }
 
 export function tell(content: Child): void {
-  const toast = h('div', { class: 'toast' }, content);
+  const toast = h('div.toast', content);
   stack.append(toast);
   setTimeout(() => toast.remove(), shownFor);
 }
@@ -19,13 +19,11 @@ export function tell(content: Child): void {
 export function tellError(error: unknown): void {
   if (error instanceof DOMException && error.name === 'AbortError') return;
   const failure = asApiError(error);
-  const toast = h(
-    'div',
-    { class: 'toast bad', role: 'alert' },
-    h('strong', {}, failure.title),
-    h('span', {}, failure.detail),
+  const toast = h('div.toast.bad', { role: 'alert' }, [
+    h('strong', failure.title),
+    h('span', failure.detail),
     button('Close', () => toast.remove(), { class: 'quiet' }),
-  );
+  ]);
   stack.append(toast);
   setTimeout(() => toast.remove(), 3 * shownFor);
 }
@@ -42,30 +40,26 @@ export function pendingRefusal(error: ApiError, ...actions: Child[]): HTMLElemen
 
 function refusalWith(error: ApiError, advice: string, actions: readonly Child[]): HTMLElement {
   const faults = error.faults.filter(({ message }) => !error.detail.includes(message));
-  return h(
-    'div',
-    { class: 'refusal', role: 'alert' },
-    h('h2', {}, error.title),
-    h('p', {}, error.detail),
+  return h('div.refusal', { role: 'alert' }, [
+    h('h2', error.title),
+    h('p', error.detail),
     faults.length > 0 &&
-      h('ul', {}, ...faults.map(({ field, message }) => h('li', {}, h('b', {}, field), ` ${message}`))),
-    advice !== '' && h('p', { class: 'advice' }, advice),
-    actions.length > 0 && h('div', { class: 'actions' }, ...actions),
-  );
+      h('ul', ...faults.map(({ field, message }) => h('li', h('b', field), ` ${message}`))),
+    advice !== '' && h('p.advice', advice),
+    actions.length > 0 && h('div.actions', ...actions),
+  ]);
 }
 
 // Shows a dialog; resolves with whether the person agrees.
 function showDialog(title: string, content: Child, action: HTMLButtonElement, dialog: HTMLDialogElement): Promise<boolean> {
   return new Promise((resolve) => {
     dialog.append(
-      h('h2', {}, title),
-      h('div', {}, content),
-      h(
-        'div',
-        { class: 'actions' },
+      h('h2', title),
+      h('div', content),
+      h('div.actions', [
         button('Cancel', () => dialog.close(), { autofocus: true }),
         action,
-      ),
+      ]),
     );
     dialog.addEventListener('close', () => {
       dialog.remove();
@@ -78,14 +72,14 @@ function showDialog(title: string, content: Child, action: HTMLButtonElement, di
 
 // Resolves with true when the person agrees.
 export function ask(title: string, text: string, action: string): Promise<boolean> {
-  const dialog = h('dialog', { class: 'dialog', 'aria-label': title });
+  const dialog = h('dialog.dialog', { 'aria-label': title });
   const agree = button(action, () => dialog.close('yes'), { class: 'danger' });
-  return showDialog(title, h('p', {}, text), agree, dialog);
+  return showDialog(title, h('p', text), agree, dialog);
 }
 
 // Resolves with the text that the person enters, which may be empty, or null.
 export async function askText(title: string, text: string, action: string): Promise<string | null> {
-  const dialog = h('dialog', { class: 'dialog', 'aria-label': title });
+  const dialog = h('dialog.dialog', { 'aria-label': title });
   const input = h('input', { type: 'text', value: text, maxlength: 255, 'aria-label': title });
   const agree = button(action, () => dialog.close('yes'), { class: 'primary' });
   input.addEventListener('keydown', (event) => {

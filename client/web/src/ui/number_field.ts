@@ -6,7 +6,7 @@ import { numberOf, stepped, textFault, type Steps } from './numbers';
 export class NumberField {
   readonly input: HTMLInputElement;
   // The reason why the number is not valid, to be shown near the input.
-  readonly fault = h('p', { class: 'fault', id: uniqueId('fault'), hidden: true });
+  readonly fault = h('p.fault', { id: uniqueId('fault'), hidden: true });
 
   constructor(
     private steps: Steps,

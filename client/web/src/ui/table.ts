@@ -24,10 +24,8 @@ export function table(columns: readonly string[], unseen: readonly string[], row
   const heads = columns.map((name) =>
     h('th', { scope: 'col', role: 'columnheader' }, h('span', { class: unseen.includes(name) ? 'sr-only' : '' }, name)),
   );
-  return h(
-    'table',
-    { class: 'jobs', role: 'table' },
+  return h('table.jobs', { role: 'table' }, [
     h('thead', { role: 'rowgroup' }, row({}, ...heads)),
     h('tbody', { role: 'rowgroup' }, ...rows),
-  );
+  ]);
 }

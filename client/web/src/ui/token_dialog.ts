@@ -11,21 +11,17 @@ export function watchToken(onToken: () => void): void {
   const open = (): void => {
     if (dialog) return;
     const input = h('input', { type: 'password', autocomplete: 'off', required: true, name: 'token' });
-    const form = h(
-      'form',
-      { method: 'dialog' },
-      h('h2', {}, 'This server requires a token'),
-      h(
-        'p',
-        {},
+    const form = h('form', { method: 'dialog' }, [
+      h('h2', 'This server requires a token'),
+      h('p', [
         token.value === ''
           ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
           : 'This server does not accept the token. It may have expired.',
-      ),
+      ]),
       field('Token', input),
-      h('div', { class: 'actions' }, h('button', { class: 'primary', type: 'submit' }, 'Continue')),
-    );
-    const made = h('dialog', { class: 'dialog', 'aria-label': 'Token' }, form);
+      h('div.actions', h('button.primary', { type: 'submit' }, 'Continue')),
+    ]);
+    const made = h('dialog.dialog', { 'aria-label': 'Token' }, form);
     dialog = made;
     form.addEventListener('submit', (event) => {
       event.preventDefault();

@@ -22,7 +22,7 @@ const most = 4;
 
 function numbersOf(job: Job): HTMLElement {
   const { mesh } = job;
-  if (!mesh) return h('p', {}, job.state);
+  if (!mesh) return h('p', job.state);
   const { extracted, smoothed } = mesh.volume_mm3;
   const percent = extracted === 0 ? 0 : (100 * (smoothed - extracted)) / Math.abs(extracted);
   const work = job.timing.total - job.timing.queue;
@@ -60,19 +60,17 @@ class Cell {
   readonly element: HTMLElement;
   private readonly status: HTMLElement;
   private readonly view: HTMLElement;
-  private readonly numbers = h('div', { class: 'cell-numbers' });
-  private readonly angles = h('div', { class: 'cell-angles' });
+  private readonly numbers = h('div.cell-numbers');
+  private readonly angles = h('div.cell-angles');
 
   constructor(job: Job, title: string) {
-    this.status = h('p', { class: 'cell-status', role: 'status' }, job.state);
-    this.view = h('div', { class: 'cell-view' }, this.status);
-    this.element = h(
-      'section',
-      { class: 'cell', 'aria-label': title },
-      h('header', {}, h('h2', {}, h('a', { href: hashOf(['jobs', job.id]) }, title)), this.numbers),
+    this.status = h('p.cell-status', { role: 'status' }, job.state);
+    this.view = h('div.cell-view', this.status);
+    this.element = h('section.cell', { 'aria-label': title }, [
+      h('header', h('h2', h('a', { href: hashOf(['jobs', job.id]) }, title)), this.numbers),
       this.view,
       this.angles,
-    );
+    ]);
   }
 
   showProgress({ state, stage, progress }: Job): void {
@@ -108,31 +106,25 @@ class Comparison {
     const [only, ...others] = new Set(jobs.map(({ volume }) => volume));
     const title = only !== undefined && others.length === 0 ? `Compare, ${volumes.nameOf(only)}` : 'Compare';
     const cells = jobs.map((job, place) => this.cellFor(job, titles[place] ?? ''));
-    this.element = h(
-      'div',
-      { class: 'compare', 'data-count': cells.length, 'data-title': `Compare ${titles.join(', ')}` },
+    this.element = h('div.compare', { 'data-count': cells.length, 'data-title': `Compare ${titles.join(', ')}` }, [
       this.head(title, jobs.map(({ id }) => id)),
-      h('div', { class: 'grid' }, ...cells),
-    );
+      h('div.grid', ...cells),
+    ]);
     this.noteCamera = cameraNote(scope);
   }
 
   private head(title: string, jobs: readonly string[]): HTMLElement {
     const style = styleOfText(this.look.get('style') ?? '');
-    return h(
-      'div',
-      { class: 'section-head' },
-      h('h1', {}, title),
-      h(
-        'div',
-        { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all surfaces' },
+    return h('div.section-head', [
+      h('h1', title),
+      h('div.tool-group', { role: 'toolbar', 'aria-label': 'View of all surfaces' }, [
         ...viewButtons((name) => this.panes[0]?.look(name), () => this.panes[0]?.fit()),
         this.styleButton('Flat', style.shading === 'flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
         this.styleButton('Edges', style.wireframe, (isOn) => ({ wireframe: isOn })),
-      ),
-      h('span', { class: 'hint grow' }, 'All views turn together.'),
-      h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'Show in one scene'),
-    );
+      ]),
+      h('span.hint.grow', 'All views turn together.'),
+      h('a.button', { href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'Show in one scene'),
+    ]);
   }
 
   // Switches a style of all surfaces.

@@ -34,8 +34,8 @@ export async function togetherView(scope: Scope, route: Route): Promise<HTMLElem
 
 class Together {
   readonly element: HTMLElement;
-  private readonly view = h('div', { class: 'viewport' });
-  private readonly status = h('p', { class: 'hint', role: 'status' });
+  private readonly view = h('div.viewport');
+  private readonly status = h('p.hint', { role: 'status' });
   private readonly looks: SurfaceLook[];
   // Of which job and label, and the number and colour of that in the scene.
   private readonly parts: { at: number; label: number | undefined; id: number; colour: string }[] = [];
@@ -48,18 +48,14 @@ class Together {
     private readonly query: URLSearchParams,
   ) {
     this.looks = looksOfText(query.get('looks') ?? '', jobs.map(hasLabels));
-    this.element = h(
-      'div',
-      { class: 'job together', 'data-title': `In one scene: ${titles.join(', ')}` },
-      h('div', { class: 'stage-area' }, h('div', { class: 'pane' }, this.view, this.tools())),
-      h(
-        'aside',
-        { class: 'panel', 'aria-label': 'Surfaces' },
-        h('header', { class: 'panel-head' }, h('h1', {}, 'Surfaces in one scene'), this.status),
-        h('ul', { class: 'surfaces' }, ...jobs.map((job, at) => this.row(job, at, titles[at] ?? ''))),
-        h('p', { class: 'hint' }, 'Each surface has the position that its volume gives. Surfaces from different examinations may not align.'),
-      ),
-    );
+    this.element = h('div.job.together', { 'data-title': `In one scene: ${titles.join(', ')}` }, [
+      h('div.stage-area', h('div.pane', this.view, this.tools())),
+      h('aside.panel', { 'aria-label': 'Surfaces' }, [
+        h('header.panel-head', h('h1', 'Surfaces in one scene'), this.status),
+        h('ul.surfaces', ...jobs.map((job, at) => this.row(job, at, titles[at] ?? ''))),
+        h('p.hint', 'Each surface has the position that its volume gives. Surfaces from different examinations may not align.'),
+      ]),
+    ]);
     // The canvas takes its size from the page, so the view has to be in it first.
     requestAnimationFrame(() => {
       this.begin().catch((error: unknown) => {
@@ -69,19 +65,13 @@ class Together {
   }
 
   private tools(): HTMLElement {
-    return h(
-      'div',
-      { class: 'tools' },
-      h(
-        'div',
-        { class: 'toolbar', role: 'toolbar', 'aria-label': 'View' },
-        h(
-          'div',
-          { class: 'tool-group' },
+    return h('div.tools', [
+      h('div.toolbar', { role: 'toolbar', 'aria-label': 'View' }, [
+        h('div.tool-group', [
           ...viewButtons((name) => this.surface?.look(name), () => this.surface?.fit()),
-        ),
-      ),
-    );
+        ]),
+      ]),
+    ]);
   }
 
   private row(job: Job, at: number, title: string): HTMLElement {
@@ -100,19 +90,15 @@ class Together {
     });
     const opacity = h('input', { type: 'range', min: 0.1, max: 1, step: 0.05, value: look.opacity, 'aria-label': `Opacity of ${title}` });
     opacity.addEventListener('input', () => change({ opacity: opacity.valueAsNumber }));
-    return h(
-      'li',
-      { 'data-job': job.id },
+    return h('li', { 'data-job': job.id }, [
       colour,
-      h(
-        'div',
-        { class: 'surface-row' },
+      h('div.surface-row', [
         checkbox(title, look.isShown, (isShown) => change({ isShown })),
         hasLabels(job) ? own : null,
-        h('label', { class: 'surface-opacity' }, h('span', {}, 'Opacity'), opacity),
-        h('span', { class: 'faint' }, h('a', { href: hashOf(['jobs', job.id]) }, 'open'), ` ${formatCount(job.mesh?.triangles ?? 0)} triangles`),
-      ),
-    );
+        h('label.surface-opacity', h('span', 'Opacity'), opacity),
+        h('span.faint', h('a', { href: hashOf(['jobs', job.id]) }, 'open'), ` ${formatCount(job.mesh?.triangles ?? 0)} triangles`),
+      ]),
+    ]);
   }
 
   // Each surface is a part of its own, and of a job by labels each label is; they share its look, but for colours.

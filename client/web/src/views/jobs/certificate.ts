@@ -22,53 +22,41 @@ export function histogramPath({ histogram, max_mm: max }: DistanceSummary, most:
 function chart({ from_mesh: mesh, from_extracted: extracted, found_mm: most }: Certificate): HTMLElement | null {
   if (most === 0) return null;
   const top = Math.max(1, ...mesh.histogram, ...extracted.histogram);
-  return h(
-    'figure',
-    { class: 'distribution distances' },
-    svg(
-      'svg',
-      {
-        viewBox: `0 0 ${width} ${height}`,
-        preserveAspectRatio: 'none',
-        role: 'img',
-        'aria-label': `Distribution of the distances from 0 to ${millimetres(most)} millimetres, in both directions`,
-      },
-      svg('path', { class: 'after', d: histogramPath(mesh, most, top) }),
-      svg('path', { class: 'before', d: histogramPath(extracted, most, top) }),
-    ),
-    h(
-      'div',
-      { class: 'distribution-axis', 'aria-hidden': 'true' },
-      h('span', {}, '0'),
-      h('span', {}, `${millimetres(most)} mm`),
-    ),
-    h('figcaption', {}, 'Filled: from the file. Line: to the file. The height shows the logarithm of the number of points.'),
-  );
+  return h('figure.distribution.distances', [
+    svg('svg', {
+      viewBox: `0 0 ${width} ${height}`,
+      preserveAspectRatio: 'none',
+      role: 'img',
+      'aria-label': `Distribution of the distances from 0 to ${millimetres(most)} millimetres, in both directions`,
+    }, [
+      svg('path.after', { d: histogramPath(mesh, most, top) }),
+      svg('path.before', { d: histogramPath(extracted, most, top) }),
+    ]),
+    h('div.distribution-axis', { 'aria-hidden': 'true' }, [
+      h('span', '0'),
+      h('span', `${millimetres(most)} mm`),
+    ]),
+    h('figcaption', 'Filled: from the file. Line: to the file. The height shows the logarithm of the number of points.'),
+  ]);
 }
 
 function bothWays({ from_mesh: mesh, from_extracted: extracted }: Certificate): HTMLElement {
   const row = (name: string, title: string, distances: DistanceSummary): HTMLElement =>
-    h(
-      'tr',
-      { title },
+    h('tr', { title }, [
       h('th', { scope: 'row' }, name),
       ...[distances.max_mm, distances.p99_mm, distances.mean_mm].map((value) =>
-        h('td', { class: 'number' }, millimetres(value)),
+        h('td.number', millimetres(value)),
       ),
-    );
-  return h(
-    'table',
-    { class: 'both-ways' },
-    h('caption', { class: 'sr-only' }, 'Distances in millimetres'),
-    h(
-      'tr',
-      {},
+    ]);
+  return h('table.both-ways', [
+    h('caption.sr-only', 'Distances in millimetres'),
+    h('tr', [
       h('th', { scope: 'col' }, 'mm'),
-      ...['largest', '99th percentile', 'mean'].map((name) => h('th', { scope: 'col', class: 'number' }, name)),
-    ),
+      ...['largest', '99th percentile', 'mean'].map((name) => h('th.number', { scope: 'col' }, name)),
+    ]),
     row('from the file', 'From the file to the extracted surface; shows what was added', mesh),
     row('to the file', 'From the extracted surface to the file; shows what was left out', extracted),
-  );
+  ]);
 }
 
 function spent({ budget_mm: budget }: Certificate, allowed: number | null | undefined): HTMLElement | null {
@@ -78,14 +66,14 @@ function spent({ budget_mm: budget }: Certificate, allowed: number | null | unde
     ['fewer triangles', budget.simplification],
     ['rounding', budget.quantisation],
   ] as const;
-  const bar = h('div', { class: 'budget', 'aria-hidden': 'true' });
+  const bar = h('div.budget', { 'aria-hidden': 'true' });
   for (const [name, value] of parts) {
     const part = h('span', { class: `of-${name.split(' ').at(-1)}`, title: `${name} ${millimetres(value)} mm` });
     part.style.flexGrow = String(Math.max(0, value / allowed));
     bar.append(part);
   }
   const words = parts.map(([name, value]) => `${name} ${millimetres(value)}`).join(', ');
-  return h('div', { class: 'spent' }, bar, h('p', { class: 'hint' }, `The allowed ${formatValue(allowed)} mm are divided into: ${words} mm.`));
+  return h('div.spent', bar, h('p.hint', `The allowed ${formatValue(allowed)} mm are divided into: ${words} mm.`));
 }
 
 // Null if nothing was measured or the surface is empty.
@@ -95,24 +83,20 @@ export function certificateBody(job: Job): HTMLElement | null {
   const allowed = job.parameters.max_error_mm;
   const isOne = Object.keys(job.mesh?.files ?? {}).length === 1;
   const file = meshFormatTitle(certificate.file);
-  return h(
-    'div',
-    { class: 'certificate' },
-    h(
-      'p',
-      {},
-      h('b', {}, `${millimetres(certificate.found_mm)} mm`),
+  return h('div.certificate', [
+    h('p', [
+      h('b', `${millimetres(certificate.found_mm)} mm`),
       ` is the largest distance that was found between the ${file} file and the extracted surface.`,
       isOne ? '' : ' Every other file is at least as near.',
       typeof allowed === 'number' ? ` Allowed: ${formatValue(allowed)} mm.` : '',
-    ),
+    ]),
     typeof certificate.bound_mm === 'number'
-      ? h('p', {}, 'Proven: no point of any file or of the extracted surface is more than ', h('b', {}, `${millimetres(certificate.bound_mm)} mm`), ' from the other.')
-      : h('p', { class: 'hint' }, `Measured at points, not proven for all. ${certificate.why_unproven ?? ''}`),
+      ? h('p', 'Proven: no point of any file or of the extracted surface is more than ', h('b', `${millimetres(certificate.bound_mm)} mm`), ' from the other.')
+      : h('p.hint', `Measured at points, not proven for all. ${certificate.why_unproven ?? ''}`),
     bothWays(certificate),
     chart(certificate),
     spent(certificate, allowed),
-  );
+  ]);
 }
 
 export function intersectionsText({ quality }: MeshSummary): Child {
@@ -122,16 +106,14 @@ export function intersectionsText({ quality }: MeshSummary): Child {
   const [first] = found.places;
   const at = first ? ` The first pair is at ${first.map(formatSize).join(', ')} mm.` : '';
   const pairs = found.pairs === 1 ? '1 pair' : `${formatCount(found.pairs)} pairs`;
-  return h('span', { class: 'attention', title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
+  return h('span.attention', { title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
 }
 
 // For a surface whose volume would be a number without a meaning.
 export function openText({ parameters, mesh }: Job, make: MakeVariant): Child {
-  if (mesh?.quality.closed) return h('span', { class: 'attention' }, 'none: the triangles disagree about which side is outside');
-  return h(
-    'span',
-    { class: 'attention' },
+  if (mesh?.quality.closed) return h('span.attention', 'none: the triangles disagree about which side is outside');
+  return h('span.attention', [
     'none: the surface is open. ',
     !parameters.close && button('Close it', () => make({ close: true }), { class: 'link', title: 'Starts a job that closes the surface at the border of the volume' }),
-  );
+  ]);
 }

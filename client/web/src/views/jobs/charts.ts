@@ -39,30 +39,24 @@ export function totalOf(timing: Durations, more: Durations = {}): number {
 
 export function waterfall(steps: readonly Step[], total: number): HTMLElement {
   const all = Math.max(total, ...steps.map(({ begin, duration }) => begin + duration)) || 1;
-  return h(
-    'table',
-    { class: 'waterfall' },
-    h('caption', { class: 'sr-only' }, 'Time of each stage'),
+  return h('table.waterfall', [
+    h('caption.sr-only', 'Time of each stage'),
     ...steps.map(({ name, begin, duration }) => {
       const bar = h('span', { class: `bar of-${name}` });
       bar.style.marginLeft = `${(100 * begin) / all}%`;
       bar.style.width = `${Math.max(0.6, (100 * duration) / all)}%`;
-      return h(
-        'tr',
-        {},
+      return h('tr', [
         h('th', { scope: 'row' }, name),
-        h('td', { class: 'track' }, bar),
-        h('td', { class: 'number' }, formatMilliseconds(duration)),
-      );
+        h('td.track', bar),
+        h('td.number', formatMilliseconds(duration)),
+      ]);
     }),
-    h(
-      'tr',
-      { class: 'total' },
+    h('tr.total', [
       h('th', { scope: 'row' }, 'total'),
-      h('td', {}),
-      h('td', { class: 'number' }, formatMilliseconds(total)),
-    ),
-  );
+      h('td'),
+      h('td.number', formatMilliseconds(total)),
+    ]),
+  ]);
 }
 
 // The outline of bars that fill the width, whose heights are these shares of the height.
@@ -94,25 +88,19 @@ export function distributionChart(
     const isTiny = value > 0 && value < 10 ** -digits;
     return `${isTiny ? `< ${10 ** -digits}` : formatNumber(value, digits)}${unit}`;
   };
-  return h(
-    'figure',
-    { class: 'distribution' },
-    svg(
-      'svg',
-      {
-        viewBox: `0 0 ${width} ${height}`,
-        role: 'img',
-        'aria-label': `${title}: mean ${change ? `${said(extracted.mean)} ${change.before} and ${said(smoothed.mean)} ${change.after}` : said(smoothed.mean)}`,
-      },
-      svg('path', { class: 'after', d: outline(smoothed) }),
-      ...(change ? [svg('path', { class: 'before', d: outline(extracted) })] : []),
-    ),
-    h('div', { class: 'distribution-axis', 'aria-hidden': 'true' }, h('span', {}, `0${unit}`), h('span', {}, `${most}${unit}`)),
-    h(
-      'figcaption',
-      {},
-      h('b', {}, title),
+  return h('figure.distribution', [
+    svg('svg', {
+      viewBox: `0 0 ${width} ${height}`,
+      role: 'img',
+      'aria-label': `${title}: mean ${change ? `${said(extracted.mean)} ${change.before} and ${said(smoothed.mean)} ${change.after}` : said(smoothed.mean)}`,
+    }, [
+      svg('path.after', { d: outline(smoothed) }),
+      ...(change ? [svg('path.before', { d: outline(extracted) })] : []),
+    ]),
+    h('div.distribution-axis', { 'aria-hidden': 'true' }, h('span', `0${unit}`), h('span', `${most}${unit}`)),
+    h('figcaption', [
+      h('b', title),
       ` mean ${change ? `${said(extracted.mean)} \u2192 ` : ''}${said(smoothed.mean)}, minimum ${said(smoothed.min)}`,
-    ),
-  );
+    ]),
+  ]);
 }

@@ -38,9 +38,7 @@ export function exportActions(job: Job, volume: Volume | null): HTMLElement | nu
     title: isLarge ? 'Starts a job with fewer triangles; save its surface as USDZ afterwards' : 'Saves a file that phones show in augmented reality (AR)',
   });
   const canMake = volume !== null;
-  return h(
-    'div',
-    { class: 'make exports' },
+  return h('div.make.exports', [
     canMake &&
       !isForPrinting(job) &&
       !isByLabels(parameters) &&
@@ -54,5 +52,5 @@ export function exportActions(job: Job, volume: Volume | null): HTMLElement | nu
         class: 'chip',
         title: 'Saves the measurements and the SHA-256 of each file',
       }),
-  );
+  ]);
 }

@@ -45,25 +45,21 @@ function titleOf(parameters: JobParameters): string {
 }
 
 function head(job: Job, volume: Volume | null): HTMLElement {
-  return h(
-    'header',
-    { class: 'panel-head' },
-    h('h1', {}, titleOf(job.parameters)),
-    h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'The volume was erased'),
-    h('p', {}, inWords(job.parameters)),
-    h(
-      'p',
-      { class: 'links' },
+  return h('header.panel-head', [
+    h('h1', titleOf(job.parameters)),
+    h('p.of-volume', volume ? volumeName(volume) : 'The volume was erased'),
+    h('p', inWords(job.parameters)),
+    h('p.links', [
       volume && h('a', { href: changeLink(job) }, 'Change parameters'),
-      h('span', { class: 'faint' }, `job ${shortId(job.id)}`),
-    ),
-  );
+      h('span.faint', `job ${shortId(job.id)}`),
+    ]),
+  ]);
 }
 
 class ProgressPanel {
   readonly element: HTMLElement;
   private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Progress of the job' });
-  private readonly text = h('p', { role: 'status', class: 'progress-text' });
+  private readonly text = h('p.progress-text', { role: 'status' });
   private readonly steps = new Map<string, HTMLElement>();
 
   constructor(job: Job) {
@@ -74,16 +70,14 @@ class ProgressPanel {
         tellError(error);
       });
     });
-    for (const name of stagesOf(job)) this.steps.set(name, h('li', {}, name));
-    this.element = h(
-      'section',
-      { class: 'panel-section progress-panel' },
-      h('h2', {}, 'Progress'),
-      h('ol', { class: 'stages' }, ...this.steps.values()),
+    for (const name of stagesOf(job)) this.steps.set(name, h('li', name));
+    this.element = h('section.panel-section.progress-panel', [
+      h('h2', 'Progress'),
+      h('ol.stages', ...this.steps.values()),
       this.bar,
       this.text,
-      h('div', { class: 'actions' }, cancel),
-    );
+      h('div.actions', cancel),
+    ]);
   }
 
   show(job: Job): void {
@@ -110,9 +104,9 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   surfaceDrawing().catch(() => undefined);
   const first = await client.getJob(route.path[1] ?? '');
   const volume = await volumeOf(first);
-  const stageArea = h('div', { class: 'stage-area' });
-  const panel = h('aside', { class: 'panel', 'aria-label': 'Job' });
-  const element = h('div', { class: 'job', 'data-state': first.state }, stageArea, panel);
+  const stageArea = h('div.stage-area');
+  const panel = h('aside.panel', { 'aria-label': 'Job' });
+  const element = h('div.job', { 'data-state': first.state }, stageArea, panel);
 
   // A tab in the background says how far its job is.
   const name = [titleOf(first.parameters), volume && volumeName(volume)].filter(Boolean).join(', ');
@@ -136,7 +130,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
 
   const progress = new ProgressPanel(first);
   progress.show(first);
-  stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is ready.')));
+  stageArea.append(h('div.waiting', h('p', 'The surface appears here when it is ready.')));
   panel.append(head(first, volume), progress.element);
   client.follow(first.id, scope.signal, (job) => {
     element.dataset.state = job.state;
@@ -153,11 +147,11 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
 }
 
 function showFailure(job: Job, volume: Volume | null, stageArea: HTMLElement, panel: HTMLElement): void {
-  const change = h('a', { href: changeLink(job), class: 'button primary' }, 'Change parameters');
+  const change = h('a.button.primary', { href: changeLink(job) }, 'Change parameters');
   const body = job.error
     ? refusal(errorOfProblem(job.error), change)
-    : h('div', { class: 'refusal' }, h('h2', {}, 'Cancelled'), h('p', {}, 'The job was cancelled and made no surface.'), h('div', { class: 'actions' }, change));
-  stageArea.replaceChildren(h('div', { class: 'waiting' }, body));
+    : h('div.refusal', h('h2', 'Cancelled'), h('p', 'The job was cancelled and made no surface.'), h('div.actions', change));
+  stageArea.replaceChildren(h('div.waiting', body));
   panel.replaceChildren(head(job, volume), timings(job));
 }
 
@@ -185,7 +179,7 @@ function showSurface(
   panel.replaceChildren(
     head(job, volume),
     ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
-    section('Numbers', mesh.empty ? h('p', { class: 'warning' }, emptyReason(job, volume)) : numbers(job, mesh)),
+    section('Numbers', mesh.empty ? h('p.warning', emptyReason(job, volume)) : numbers(job, mesh)),
     accuracy(job) ?? '',
     times,
     downloads(job, volume),

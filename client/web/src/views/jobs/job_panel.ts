@@ -16,7 +16,7 @@ import { certificateBody, intersectionsText, openText } from './certificate';
 import { distributionChart, stepsOf, totalOf, waterfall, type Durations } from './charts';
 
 export function section(title: string, ...children: Child[]): HTMLElement {
-  return h('section', { class: 'panel-section' }, h('h2', {}, title), ...children);
+  return h('section.panel-section', h('h2', title), ...children);
 }
 
 function change(before: number, after: number): string {
@@ -37,24 +37,22 @@ function trianglesText({ triangles, simplified }: MeshSummary): Child {
     triangles: 'stopped at the requested number',
     topology: 'fewer would open or fold the surface, or change its boundary',
   }[simplified.bound_by];
-  return h(
-    'span',
-    { title: `Simplification ${bound}` },
+  return h('span', { title: `Simplification ${bound}` }, [
     formatCount(triangles),
-    h('span', { class: 'faint' }, ` simplified from ${formatCount(simplified.triangles_before)}; ${bound}`),
-  );
+    h('span.faint', ` simplified from ${formatCount(simplified.triangles_before)}; ${bound}`),
+  ]);
 }
 
 function changedText(before: number, after: number, unit: string, stage: Change | null): Child {
-  const since = stage && h('span', { class: 'faint' }, `${change(before, after)}, ${sized(before, unit)} ${stage.before}`);
-  return h('span', {}, sized(after, unit), since);
+  const since = stage && h('span.faint', `${change(before, after)}, ${sized(before, unit)} ${stage.before}`);
+  return h('span', sized(after, unit), since);
 }
 
 // People often want only the largest connected component.
 function componentsText(job: Job, { components }: MeshSummary): Child {
   if (components < 2 || isByLabels(job.parameters)) return formatCount(components);
   const keep = (): void => makeVariant(job)({ components: { keep: 1, min_triangles: null } });
-  return h('span', {}, `${formatCount(components)} `, button('Keep the largest', keep, { class: 'link', title: 'Starts a job that drops all other connected components' }));
+  return h('span', `${formatCount(components)} `, button('Keep the largest', keep, { class: 'link', title: 'Starts a job that drops all other connected components' }));
 }
 
 export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
@@ -77,7 +75,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
       'Closed',
       mesh.quality.closed
         ? 'yes'
-        : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} boundary edges`),
+        : h('span.attention', `no, ${formatCount(mesh.boundary_edges)} boundary edges`),
     ],
     ['Connected components', componentsText(job, mesh)],
     ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
@@ -99,13 +97,11 @@ export function quality({ parameters }: Job, mesh: MeshSummary): HTMLElement {
   const { aspect_ratio: aspect, smallest_angle_deg: angle } = mesh.quality;
   return section(
     'Triangle quality',
-    h(
-      'div',
-      { class: 'distributions' },
+    h('div.distributions', [
       distributionChart('Radius ratio', aspect, 1, '', stage),
       distributionChart('Smallest angle', angle, 60, '\u00b0', stage),
-    ),
-    stage && h('p', { class: 'hint' }, `Filled: ${stage.after}. Line: ${stage.before}.`),
+    ]),
+    stage && h('p.hint', `Filled: ${stage.after}. Line: ${stage.before}.`),
   );
 }
 
@@ -140,31 +136,27 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
   };
   return section(
     'Download',
-    h(
-      'div',
-      { class: 'downloads' },
+    h('div.downloads', [
       ...[...meshFormats, 'zip'].flatMap((format) => {
         const file = files[format];
         return file
           ? [
               button(
-                h('span', {}, h('b', {}, meshFormatTitle(format)), ` ${formatBytes(file.bytes)}`),
+                h('span', h('b', meshFormatTitle(format)), ` ${formatBytes(file.bytes)}`),
                 () => void saveFile(file.href, name(format), file.bytes).catch(tellError),
                 { 'data-format': format },
               ),
             ]
           : [];
       }),
-    ),
+    ]),
     missing.length > 0 &&
-      h(
-        'div',
-        { class: 'make' },
-        h('span', { class: 'faint' }, 'Also make:'),
+      h('div.make', [
+        h('span.faint', 'Also make:'),
         ...missing.map((format) =>
           button(meshFormatTitle(format), () => void make(format), { class: 'chip' }),
         ),
-      ),
+      ]),
     exportActions(job, volume),
   );
 }
@@ -213,15 +205,13 @@ export function compareSection(job: Job): HTMLElement {
   };
   return section(
     'Compare',
-    h(
-      'div',
-      { class: 'stack' },
+    h('div.stack', [
       ...comparisons
         .map(({ title, variants }) => ({ title, variants: variants.filter(takes) }))
         .filter(({ variants }) => variants.length > 1)
         .map(({ title, variants }) => button(title, () => void start(variants))),
-    ),
-    h('p', { class: 'hint' }, 'Starts the jobs that are missing. The list of jobs can compare any other jobs.'),
+    ]),
+    h('p.hint', 'Starts the jobs that are missing. The list of jobs can compare any other jobs.'),
   );
 }
 
@@ -257,16 +247,14 @@ export function againSection(job: Job): HTMLElement {
   const shown = h('input', { readonly: true, value: `${origin}/${hashOf(['jobs', job.id])}`, 'aria-label': 'Link to this surface' });
   shown.addEventListener('focus', () => (shown.value = link()));
   const block = (name: string, text: string): HTMLElement =>
-    h(
-      'details',
-      { class: 'snippet' },
-      h('summary', {}, name),
+    h('details.snippet', [
+      h('summary', name),
       h('pre', { tabindex: '0' }, text),
       copyButton(() => text),
-    );
+    ]);
   return section(
     'Repeat this job',
-    h('div', { class: 'link-row' }, shown, copyButton(link)),
+    h('div.link-row', shown, copyButton(link)),
     block('With the isomesh command', texts.isomesh),
     block('With curl', texts.curl),
     block('With the C++ library', texts.library),

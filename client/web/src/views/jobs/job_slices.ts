@@ -17,7 +17,7 @@ import { SliceView, type SliceHost } from '../slices/slice_view';
 const bins = 1024;
 
 class JobSlices {
-  readonly element = h('section', { class: 'slices', 'aria-label': 'Slices' });
+  readonly element = h('section.slices', { 'aria-label': 'Slices' });
   // The point where the slices meet, for the cross on the surface and the address.
   onCursor: ((cursor: Vec3) => void) | null = null;
   cursor: Vec3;

@@ -29,19 +29,17 @@ function pacsItem({ name, last_success: success, last_failure: failure, reason }
     : success === null
       ? 'not contacted yet'
       : `answered ${formatTime(success)}`;
-  return h(
-    'li',
-    { 'data-pacs': name },
+  return h('li', { 'data-pacs': name }, [
     h('span', { class: `state ${isDown ? 'failed' : success === null ? 'queued' : 'succeeded'}` }),
-    h('b', {}, name),
+    h('b', name),
     h('span', { class: isDown ? 'attention' : 'faint' }, text),
-  );
+  ]);
 }
 
 class Orders {
   readonly element: HTMLElement;
-  private readonly pacs = h('ul', { class: 'pacs', 'aria-label': 'PACS' });
-  private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Orders' });
+  private readonly pacs = h('ul.pacs', { 'aria-label': 'PACS' });
+  private readonly body = h('div.queue-body', { tabindex: '0', role: 'region', 'aria-label': 'Orders' });
   private readonly more = button('Older orders', () => this.showMore(), { hidden: true });
   private orders: Order[] = [];
   private pages = 1; // that are shown
@@ -58,14 +56,12 @@ class Orders {
       noteInAddress({ state: chosen });
       this.refresh().catch(tellError);
     });
-    this.element = h(
-      'div',
-      { class: 'queue orders' },
-      h('div', { class: 'section-head' }, h('h1', {}, 'Orders'), h('span', { class: 'grow' }), field('State', choice)),
+    this.element = h('div.queue.orders', [
+      h('div.section-head', h('h1', 'Orders'), h('span.grow'), field('State', choice)),
       this.pacs,
       this.body,
-      h('div', { class: 'actions' }, this.more),
-    );
+      h('div.actions', this.more),
+    ]);
   }
 
   async refresh(): Promise<void> {
@@ -101,7 +97,7 @@ class Orders {
     const none = this.state === '' ? 'No orders yet.' : `No orders are ${this.state}.`;
     const shown =
       this.orders.length === 0
-        ? h('p', { class: 'empty' }, none)
+        ? h('p.empty', none)
         : table(columns, ['Action'], this.orders.map((each) => this.row(each, now)));
     keepFocus(this.body, 'order', () => this.body.replaceChildren(shown));
   }
@@ -118,12 +114,12 @@ class Orders {
       cell(h('span', { class: `state ${dots[state] ?? state}` }), state),
       cell(
         h('span', { class: isBad ? 'attention' : '' }, text),
-        next === '' ? null : h('span', { class: 'next-attempt' }, next),
-        h('span', { class: 'order-links' }, ...made),
+        next === '' ? null : h('span.next-attempt', next),
+        h('span.order-links', ...made),
       ),
-      cell(source.pacs, h('span', { class: 'of-volume', title: source.series }, source.series)),
+      cell(source.pacs, h('span.of-volume', { title: source.series }, source.series)),
       cell(rule ?? surfaceInWords(parameters)),
-      cell(h('span', { class: 'faint' }, formatTime(created))),
+      cell(h('span.faint', formatTime(created))),
       cell(this.action(order)),
     );
   }

@@ -21,12 +21,10 @@ const unseen = ['Choose', 'Action'];
 
 function progressOf(job: Job): Node | string {
   if (job.state === 'running') {
-    return h(
-      'span',
-      { class: 'inline-progress' },
+    return h('span.inline-progress', [
       h('progress', { max: 1, value: job.progress, 'aria-label': `Progress of ${shortId(job.id)}` }),
       ` ${job.stage}`,
-    );
+    ]);
   }
   if (job.mesh) return `${formatCount(job.mesh.triangles)} triangles`;
   if (job.error) return job.error.detail;
@@ -42,8 +40,8 @@ function stateCell(job: Job, place: number | undefined): HTMLElement {
 function surfaceCell(job: Job, volume: string): HTMLElement {
   return cell(
     h('a', { href: hashOf(['jobs', job.id]) }, surfaceInWords(job.parameters)),
-    h('span', { class: 'faint' }, ` ${inWords(job.parameters)}`),
-    h('span', { class: 'of-volume' }, volume),
+    h('span.faint', ` ${inWords(job.parameters)}`),
+    h('span.of-volume', volume),
   );
 }
 
@@ -65,18 +63,16 @@ interface Row {
 
 class Queue {
   readonly element: HTMLElement;
-  private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Jobs' });
+  private readonly body = h('div.queue-body', { tabindex: '0', role: 'region', 'aria-label': 'Jobs' });
   private readonly compare: HTMLButtonElement;
   private readonly together: HTMLButtonElement;
   private readonly more: HTMLButtonElement;
   private readonly chosen = new Set<string>();
-  private readonly note = h(
-    'p',
-    { class: 'hint', hidden: true },
+  private readonly note = h('p.hint', { hidden: true }, [
     `More than ${mostOfState} jobs wait. The list has the newest ${mostOfState} of them, without their places.`,
-  );
+  ]);
   private readonly table = table(columns, unseen, []);
-  private readonly empty = h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.');
+  private readonly empty = h('p.empty', 'No jobs yet. Choose a volume to begin.');
   private readonly list = new JobList(client);
   private rows = new Map<string, Row>();
   private readonly volumes = new KnownVolumes();
@@ -88,21 +84,17 @@ class Queue {
       title: 'Shows two to eight surfaces, each in its own colour',
     });
     this.more = button('Older jobs', () => void this.showMore().catch(tellError), { hidden: true });
-    this.element = h(
-      'div',
-      { class: 'queue' },
-      h(
-        'div',
-        { class: 'section-head' },
-        h('h1', {}, 'Jobs'),
-        h('span', { class: 'hint grow' }, 'Stat jobs run first, then routine, then bulk. Within a priority, owners take turns.'),
+    this.element = h('div.queue', [
+      h('div.section-head', [
+        h('h1', 'Jobs'),
+        h('span.hint.grow', 'Stat jobs run first, then routine, then bulk. Within a priority, owners take turns.'),
         this.together,
         this.compare,
-      ),
+      ]),
       this.note,
       this.body,
-      h('div', { class: 'actions' }, this.more),
-    );
+      h('div.actions', this.more),
+    ]);
   }
 
   get isBusy(): boolean {
@@ -173,7 +165,7 @@ class Queue {
       surfaceCell(job, volume),
       cell(progressOf(job)),
       cell(time),
-      cell(h('span', { class: 'faint' }, formatTime(job.created))),
+      cell(h('span.faint', formatTime(job.created))),
       cell(isFinal(job.state) ? '' : this.cancelButton(job)),
     );
   }

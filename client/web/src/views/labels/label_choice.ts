@@ -23,7 +23,7 @@ interface Box {
 
 export class LabelChoice {
   readonly element: HTMLElement;
-  private readonly body = h('div', { class: 'label-choice' });
+  private readonly body = h('div.label-choice');
   private background: number;
   private asking: AbortController | null = null;
   private labels: readonly VolumeLabel[] = [];
@@ -43,7 +43,7 @@ export class LabelChoice {
     private readonly onLook: () => void,
   ) {
     this.background = start.background ?? 0;
-    this.element = h('div', { class: 'label-choice' }, this.body, opacityControl(), this.backgroundField());
+    this.element = h('div.label-choice', this.body, opacityControl(), this.backgroundField());
     scope.onEnd(() => this.asking?.abort());
     this.ask(start.labels);
   }
@@ -88,7 +88,7 @@ export class LabelChoice {
   private show(labels: readonly VolumeLabel[], start: Choice['labels']): void {
     this.labels = labels;
     if (labels.length === 0) {
-      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background. The volume has no labels.'));
+      this.body.replaceChildren(h('p.warning', 'All samples are background. The volume has no labels.'));
       return;
     }
     const wanted = Array.isArray(start) ? new Set(start) : null;
@@ -142,7 +142,7 @@ export class LabelChoice {
       else this.chosen.delete(label.label);
       this.changed();
     });
-    const size = h('span', { class: 'faint number' });
+    const size = h('span.faint.number');
     const box = {
       element: h('li', { 'data-label': label.label }, swatchOf(colourOf(label)), check, size),
       input: check.querySelector('input') as HTMLInputElement,

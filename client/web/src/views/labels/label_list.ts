@@ -41,15 +41,13 @@ export class LabelList {
       (label) => this.rowOf(label).element,
       (found) => `${formatCount(found)} of ${formatCount(labels.length)} labels`,
     );
-    this.element = h(
-      'section',
-      { class: 'panel-section label-list' },
-      h('h2', {}, 'Labels'),
+    this.element = h('section.panel-section.label-list', [
+      h('h2', 'Labels'),
       ...search.elements(
         button('Show all', () => state.showAll(), { title: 'Show every label (e)' }),
         button('Hide all', () => state.hideAll()),
       ),
-    );
+    ]);
     this.element.append(opacityControl());
     search.fill();
     scope.onEnd(state.hidden.subscribe(() => this.update()));
@@ -82,19 +80,15 @@ export class LabelList {
       title: 'Hide all other labels',
     });
     const row = {
-      element: h(
-        'li',
-        { 'data-label': label.label },
+      element: h('li', { 'data-label': label.label }, [
         colour,
-        h(
-          'div',
-          { class: 'label-text' },
+        h('div.label-text', [
           check,
-          h('span', { class: 'faint' }, `${formatCount(label.triangles)} triangles, ${volumeText(label)}`),
-        ),
+          h('span.faint', `${formatCount(label.triangles)} triangles, ${volumeText(label)}`),
+        ]),
         alone,
         ...this.downloads(label, title),
-      ),
+      ]),
       shown,
       colour,
       alone,

@@ -7,5 +7,5 @@ export const labelOpacity = new Signal(0.75);
 export function opacityControl(): HTMLElement {
   const input = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: labelOpacity.value, 'aria-label': 'Opacity of labels in slices' });
   input.addEventListener('input', () => (labelOpacity.value = input.valueAsNumber));
-  return h('label', { class: 'label-opacity' }, h('span', {}, 'Labels in slices'), input);
+  return h('label.label-opacity', h('span', 'Labels in slices'), input);
 }

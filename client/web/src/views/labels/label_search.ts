@@ -8,14 +8,14 @@ const mostRows = 500;
 
 // Not an attribute, which the content policy would not take.
 export function swatchOf(colour: string): HTMLElement {
-  const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
+  const swatch = h('span.swatch', { 'aria-hidden': 'true' });
   swatch.style.backgroundColor = colour;
   return swatch;
 }
 
 export class LabelSearch<Label extends Named> {
-  readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
-  readonly count = h('p', { class: 'hint', role: 'status' });
+  readonly list = h('ul.labels', { 'aria-label': 'Labels' });
+  readonly count = h('p.hint', { role: 'status' });
   readonly input = h('input', { type: 'search', placeholder: 'Name or value', 'aria-label': 'Search the labels' });
 
   // `rowOf` gives a label's row, the same one each time; `summary` says in words how many there are, of which so many
@@ -30,7 +30,7 @@ export class LabelSearch<Label extends Named> {
 
   // The box with what is done to all that is found, the rows, and how many there are.
   elements(...tools: Child[]): HTMLElement[] {
-    return [h('div', { class: 'label-tools' }, this.input, ...tools), this.list, this.count];
+    return [h('div.label-tools', this.input, ...tools), this.list, this.count];
   }
 
   get found(): readonly Label[] {

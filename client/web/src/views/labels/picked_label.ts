@@ -8,7 +8,7 @@ import { swatchOf } from './label_search';
 
 export class PickedLabel {
   // Announces what is picked.
-  readonly element = h('div', { class: 'picked-label', role: 'status' });
+  readonly element = h('div.picked-label', { role: 'status' });
 
   constructor(
     scope: Scope,
@@ -39,8 +39,8 @@ export class PickedLabel {
     }
     this.element.replaceChildren(
       swatchOf(this.state.colours.value.get(picked.label) ?? ''),
-      h('b', {}, labelTitle(picked)),
-      h('span', {}, `volume ${volumeText(picked)}, area ${areaText(picked)}`),
+      h('b', labelTitle(picked)),
+      h('span', `volume ${volumeText(picked)}, area ${areaText(picked)}`),
       button('Hide', () => this.hide(), { class: 'quiet', title: 'Hide this label (h)' }),
       button('Only', () => this.isolate(), { class: 'quiet', title: 'Hide all other labels, or show them again (o)' }),
     );

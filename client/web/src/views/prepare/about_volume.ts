@@ -12,12 +12,10 @@ import { uploads } from '../volumes/upload_panel';
 function ignoredNote(volume: Volume): HTMLElement | null {
   const { ignored } = volume;
   if (ignored.length === 0) return null;
-  return h(
-    'details',
-    { class: 'more' },
-    h('summary', {}, skippedText([volume])),
-    h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
-  );
+  return h('details.more', [
+    h('summary', skippedText([volume])),
+    h('ul', ...ignored.map(({ name, reason }) => h('li', h('b', name), `: ${reason}`))),
+  ]);
 }
 
 // Reads the file once more by the form that was not used, and shows the progress where uploads are.
@@ -35,18 +33,16 @@ function notesOf(volume: Volume): HTMLElement | null {
   const { notes } = volume;
   if (notes.length === 0) return null;
   const texts = noteTexts(volume);
-  return h(
-    'ul',
-    { class: 'notes', 'aria-label': 'Notes' },
+  return h('ul.notes', { 'aria-label': 'Notes' }, [
     ...notes.map(({ code, detail }, place) =>
       h('li', { 'data-note': code }, texts[place], ' ', code === 'forms-differ' && otherFormButton(volume, detail)),
     ),
-  );
+  ]);
 }
 
 // The volume's name, which a person can change.
 function nameHeading(volume: Volume, onRenamed: () => void): HTMLElement {
-  const text = h('span', {}, volumeName(volume));
+  const text = h('span', volumeName(volume));
   const rename = async (): Promise<void> => {
     const name = await askText('Name of this volume', volume.name ?? '', 'Rename');
     if (name === null) return;
@@ -58,7 +54,7 @@ function nameHeading(volume: Volume, onRenamed: () => void): HTMLElement {
       tellError(error);
     }
   };
-  return h('h1', {}, text, ' ', button('Rename', () => void rename(), { class: 'quiet' }));
+  return h('h1', text, ' ', button('Rename', () => void rename(), { class: 'quiet' }));
 }
 
 function factsOf(volume: Volume): string {
@@ -75,31 +71,27 @@ function factsOf(volume: Volume): string {
 
 // How to move in slices.
 export function sliceHelp(): HTMLElement {
-  return h(
-    'details',
-    { class: 'more slice-help' },
-    h('summary', {}, 'How to use the slices'),
-    h(
-      'ul',
-      {},
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Drag'), ' in a slice: change window and level'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Drag sideways'), ' in a slice: change window and level; drag up or down: scroll the page'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next or previous slice'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', {}, 'Shift and drag'), ': move; 0: show the whole slice'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Two fingers'), ': zoom and move'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': move the other slices to this point'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: use the value at this point as the iso-value; in a slab, the value in its middle slice'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' beside a slider, or the button there: show one view alone, or all'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below a slice: choose the slice'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': move the other slices to this point'),
-    h('li', {}, h('b', {}, 'Line in the histogram'), ': drag it to change the iso-value', h('span', { class: 'by-mouse' }, '; the arrow keys move it too')),
-    ),
-  );
+  return h('details.more.slice-help', [
+    h('summary', 'How to use the slices'),
+    h('ul', [
+    h('li.by-mouse', h('b', 'Drag'), ' in a slice: change window and level'),
+    h('li.by-touch', h('b', 'Drag sideways'), ' in a slice: change window and level; drag up or down: scroll the page'),
+    h('li.by-mouse', h('b', 'Wheel'), ' or arrow keys: next or previous slice'),
+    h('li.by-mouse', h('b', 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', 'Shift and drag'), ': move; 0: show the whole slice'),
+    h('li.by-touch', h('b', 'Two fingers'), ': zoom and move'),
+    h('li.by-mouse', h('b', 'Click'), ': move the other slices to this point'),
+    h('li.by-mouse', h('b', 'Double click'), ' or i: use the value at this point as the iso-value; in a slab, the value in its middle slice'),
+    h('li.by-mouse', h('b', 'Double click'), ' beside a slider, or the button there: show one view alone, or all'),
+    h('li.by-touch', h('b', 'Slider'), ' below a slice: choose the slice'),
+    h('li.by-touch', h('b', 'Tap'), ': move the other slices to this point'),
+    h('li', h('b', 'Line in the histogram'), ': drag it to change the iso-value', h('span.by-mouse', '; the arrow keys move it too')),
+    ]),
+  ]);
 }
 
 // Its name and what it is.
 export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement {
-  return h('header', { class: 'about' }, nameHeading(volume, onRenamed), h('p', { class: 'facts' }, factsOf(volume)));
+  return h('header.about', nameHeading(volume, onRenamed), h('p.facts', factsOf(volume)));
 }
 
 // The notes and the skipped files of the upload.

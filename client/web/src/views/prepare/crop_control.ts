@@ -8,8 +8,8 @@ import { wholeBox, within, type Box } from '../../volume/crop';
 
 export class CropControl {
   readonly element: HTMLElement;
-  private readonly numbers = h('div', { class: 'crop-numbers' });
-  private readonly size = h('p', { class: 'hint' });
+  private readonly numbers = h('div.crop-numbers');
+  private readonly size = h('p.hint');
   private readonly fields: [NumberField, NumberField][];
   private box: Box | null;
 
@@ -30,14 +30,14 @@ export class CropControl {
     this.fields = [0, 1, 2].map((axis) => [field(axis, 0), field(axis, 1)]);
     this.numbers.append(
       ...this.fields.flatMap(([low, high], axis) => [
-        h('div', { class: 'crop-axis' }, h('span', { 'aria-hidden': 'true' }, 'xyz'[axis] ?? ''), low.input, h('span', { 'aria-hidden': 'true' }, '\u2013'), high.input),
+        h('div.crop-axis', h('span', { 'aria-hidden': 'true' }, 'xyz'[axis] ?? ''), low.input, h('span', { 'aria-hidden': 'true' }, '\u2013'), high.input),
         low.fault,
         high.fault,
       ]),
       this.size,
     );
     const toggle = checkbox('Crop to a box', box !== null, (isOn) => this.onChange(isOn ? middleOf(volume) : null));
-    this.element = h('div', { class: 'crop', 'data-parameter': 'crop', title: parameterOf('crop').help }, toggle, this.numbers);
+    this.element = h('div.crop', { 'data-parameter': 'crop', title: parameterOf('crop').help }, toggle, this.numbers);
     this.show(box);
   }
 

@@ -55,11 +55,9 @@ export function errorSlider(
     set(error);
   });
   show(value);
-  return h(
-    'div',
-    { class: 'field error-slider' },
-    h('div', { class: 'slider-head' }, h('label', { for: id }, label), words),
+  return h('div.field.error-slider', [
+    h('div.slider-head', h('label', { for: id }, label), words),
     slider,
     outcome,
-  );
+  ]);
 }

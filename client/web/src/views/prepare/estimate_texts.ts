@@ -4,7 +4,7 @@ import { definitions, h } from '../../ui/dom';
 import { formatBytes, formatCount, formatMilliseconds, meshFormatTitle } from '../../ui/format';
 
 function warning(text: string): HTMLElement {
-  return h('p', { class: 'warning' }, text);
+  return h('p.warning', text);
 }
 
 export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElement[] {

@@ -11,9 +11,9 @@ const baseline = 82;
 
 export class HistogramView {
   readonly element: HTMLElement;
-  private readonly line = svg('line', { class: 'iso-line', y1: 0, y2: baseline });
-  private readonly grip = h('span', { class: 'iso-grip' });
-  private readonly band = svg('rect', { class: 'window-band', y: 0, height: baseline });
+  private readonly line = svg('line.iso-line', { y1: 0, y2: baseline });
+  private readonly grip = h('span.iso-grip');
+  private readonly band = svg('rect.window-band', { y: 0, height: baseline });
   private readonly thumb: HTMLElement;
   // The visible range. It leaves out outliers, which make most of some volumes' range.
   private readonly low: number;
@@ -33,8 +33,7 @@ export class HistogramView {
     if (!(this.high > this.low)) this.high = this.low + 1;
     this.step = niceStep([this.low, this.high], isInteger);
     const marks = ticks([this.low, this.high], 5);
-    this.thumb = h('div', {
-      class: 'histogram',
+    this.thumb = h('div.histogram', {
       role: 'slider',
       tabindex: '0',
       'aria-label': 'Iso-value',
@@ -42,15 +41,12 @@ export class HistogramView {
       'aria-valuemax': this.high,
     });
     this.thumb.append(
-      svg(
-        'svg',
-        { viewBox: `0 0 ${width} ${height}`, preserveAspectRatio: 'none', 'aria-hidden': 'true' },
+      svg('svg', { viewBox: `0 0 ${width} ${height}`, preserveAspectRatio: 'none', 'aria-hidden': 'true' }, [
         this.band,
-        svg('path', { class: 'bars', d: this.outline(histogram) }),
-        svg('line', { class: 'axis', x1: 0, x2: width, y1: baseline, y2: baseline }),
+        svg('path.bars', { d: this.outline(histogram) }),
+        svg('line.axis', { x1: 0, x2: width, y1: baseline, y2: baseline }),
         ...marks.map((value) =>
-          svg('line', {
-            class: 'axis',
+          svg('line.axis', {
             x1: this.toX(value),
             x2: this.toX(value),
             y1: baseline,
@@ -58,17 +54,15 @@ export class HistogramView {
           }),
         ),
         this.line,
-      ),
+      ]),
       this.grip,
-      h(
-        'div',
-        { class: 'ticks', 'aria-hidden': 'true' },
+      h('div.ticks', { 'aria-hidden': 'true' }, [
         ...marks.map((value) => {
-          const label = h('span', {}, formatValue(value, this.high - this.low));
+          const label = h('span', formatValue(value, this.high - this.low));
           label.style.left = `${(100 * this.toX(value)) / width}%`;
           return label;
         }),
-      ),
+      ]),
     );
     this.element = this.thumb;
     this.listen();

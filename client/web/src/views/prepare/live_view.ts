@@ -40,9 +40,9 @@ function inBytes(map: LabelMap): LabelMap {
 
 export class LiveView {
   readonly element: HTMLElement;
-  private readonly view = h('div', { class: 'live-picture' });
-  private readonly state = h('p', { class: 'slice-state', role: 'status' });
-  private readonly place = h('span', { class: 'live-place' });
+  private readonly view = h('div.live-picture');
+  private readonly state = h('p.slice-state', { role: 'status' });
+  private readonly place = h('span.live-place');
   private surface: LiveSurface | null = null;
   private preview: Preview | null = null;
   private iso: number | null = null;
@@ -64,12 +64,10 @@ export class LiveView {
     private readonly scope: Scope,
   ) {
     this.choice = this.lookChoice();
-    this.element = h(
-      'figure',
-      { class: 'slice live' },
-      h('div', { class: 'slice-picture' }, this.view, this.state),
-      h('figcaption', {}, this.choice, this.place),
-    );
+    this.element = h('figure.slice.live', [
+      h('div.slice-picture', this.view, this.state),
+      h('figcaption', this.choice, this.place),
+    ]);
     scope.onEnd(() => {
       clearTimeout(this.retry);
       this.loading?.abort();
@@ -81,16 +79,12 @@ export class LiveView {
   private lookChoice(): HTMLElement {
     const names = looksFor(this.host.volume);
     this.look = names.find((name) => name === this.host.look) ?? '';
-    const choice = h(
-      'select',
-      { 'aria-label': 'Kind of preview', class: 'look', title: 'The surface at the iso-value, or volume rendering' },
+    const choice = h('select.look', { 'aria-label': 'Kind of preview', title: 'The surface at the iso-value, or volume rendering' }, [
       h('option', { value: '' }, 'Surface'),
-      h(
-        'optgroup',
-        { label: 'Volume rendering' },
+      h('optgroup', { label: 'Volume rendering' }, [
         ...names.map((name) => h('option', { value: name, selected: name === this.look }, name.charAt(0).toUpperCase() + name.slice(1))),
-      ),
-    );
+      ]),
+    ]);
     choice.addEventListener('change', () => {
       this.look = choice.value as LookName | '';
       this.host.setLook(this.look);

@@ -179,7 +179,7 @@ function formatsControl(parameter: Parameter, host: FormHost): Control {
       // The page shows this one.
       format === 'glb' ? { disabled: true } : {},
     );
-  const element = h('fieldset', { class: 'boxes' }, h('legend', {}, labelOf(parameter)), ...meshFormats.map(box));
+  const element = h('fieldset.boxes', h('legend', labelOf(parameter)), ...meshFormats.map(box));
   return { element };
 }
 
@@ -223,19 +223,15 @@ export function parameterForm(host: FormHost, isOpen: boolean): HTMLElement {
   };
   const offered = shown.filter((parameter) => isOfKind(parameter, host.job()) && !host.hides.includes(parameter.name));
   const rowsOf = (rows: readonly (readonly string[])[]): HTMLElement[] =>
-    rows.map((names) => h('div', { class: 'row' }, ...names.map(parameterOf).filter((one) => offered.includes(one)).map(elementFor)));
+    rows.map((names) => h('div.row', ...names.map(parameterOf).filter((one) => offered.includes(one)).map(elementFor)));
   const others = offered.filter(({ name }) => ![...front, ...behind].flat().includes(name));
-  return h(
-    'div',
-    { class: 'parameters' },
+  return h('div.parameters', [
     ...rowsOf(front),
-    h(
-      'details',
-      { class: 'more', open: isOpen },
-      h('summary', {}, 'More'),
+    h('details.more', { open: isOpen }, [
+      h('summary', 'More'),
       ...rowsOf(behind),
-      h('div', { class: 'pair' }, ...others.filter(isNumber).map(elementFor)),
+      h('div.pair', ...others.filter(isNumber).map(elementFor)),
       ...others.filter((parameter) => !isNumber(parameter)).map(elementFor),
-    ),
-  );
+    ]),
+  ]);
 }

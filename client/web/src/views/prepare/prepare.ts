@@ -69,22 +69,22 @@ class Prepare {
   // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
   private readonly crop: CropControl | null;
   private readonly isoField = new IsoField((iso) => this.takeIso(iso), (isGood) => this.mark('iso', isGood));
-  private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
+  private readonly estimate = h('div.estimate', { 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
   private readonly isoPart: HTMLElement;
   private readonly labelPart = h('div');
-  private readonly kind = h('div', { class: 'kind' });
+  private readonly kind = h('div.kind');
   private labelChoice: LabelChoice | null = null;
   private hasLabel = true;
   // The controls in which something stands that is no value of theirs.
   private readonly faulty = new Set<string>();
   private readonly form = h('div');
   private readonly surfaceKind = segmented('Kind of surface', kinds, 'smooth', (kind) => this.setSurfaceKind(kind));
-  private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
+  private readonly simplified = h('p.hint', { 'aria-live': 'polite' });
   private readonly problem = h('div');
-  private readonly windowText = h('span', { class: 'window-text faint' });
+  private readonly windowText = h('span.window-text.faint');
   private readonly windowChoice: WindowChoice | null;
-  private readonly resetWindow = h('button', { type: 'button', class: 'chip' }, 'Reset window');
+  private readonly resetWindow = h('button.chip', { type: 'button' }, 'Reset window');
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
   private isStarting = false;
@@ -116,7 +116,7 @@ class Prepare {
     this.live = this.liveView(route, host);
     this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box), (isGood) => this.mark('crop', isGood));
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
-    this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
+    this.isoPart = h('div.by-iso', this.isoRow(), this.histogram.element);
     this.element = this.layout(common);
     this.kind.append(this.kindChoice() ?? '');
     this.showKind();
@@ -272,13 +272,9 @@ class Prepare {
   private layout(common: Window): HTMLElement {
     const { volume } = this;
     const area = paneArea(this.scope, [...this.slices, { element: this.live.element, name: 'the preview' }, this.oblique]);
-    const element = h(
-      'div',
-      { class: 'prepare', 'data-title': volumeName(volume) },
+    const element = h('div.prepare', { 'data-title': volumeName(volume) }, [
       area,
-      h(
-        'section',
-        { class: 'panel', 'aria-label': 'Parameters' },
+      h('section.panel', { 'aria-label': 'Parameters' }, [
         aboutVolume(volume, () => (element.dataset.title = volumeName(volume))),
         this.kind,
         this.isoPart,
@@ -294,16 +290,16 @@ class Prepare {
         sliceHelp(),
         this.estimate,
         this.problem,
-        h('div', { class: 'run' }, this.run, h('span', { class: 'hint by-mouse' }, 'Ctrl + Enter')),
-      ),
-    );
+        h('div.run', this.run, h('span.hint.by-mouse', 'Ctrl + Enter')),
+      ]),
+    ]);
     return element;
   }
 
   // The window of the slices, and the way back to the usual one.
   private windowRow(common: Window): HTMLElement {
     this.resetWindow.addEventListener('click', () => this.setWindow(common));
-    return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, this.resetWindow);
+    return h('div.window-row', this.windowText, h('span.grow'), this.undoButton, this.resetWindow);
   }
 
   private setCursor(cursor: Vec3): void {
@@ -322,12 +318,10 @@ class Prepare {
     const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
       button(`${name} ${formatValue(iso, span)}`, () => this.setIso(shortened(iso, span)), { class: 'chip' }),
     );
-    return h(
-      'div',
-      { class: 'iso-row' },
+    return h('div.iso-row', [
       this.isoField.element,
-      h('div', { class: 'presets', role: 'group', 'aria-label': 'Presets' }, ...chips),
-    );
+      h('div.presets', { role: 'group', 'aria-label': 'Presets' }, ...chips),
+    ]);
   }
 
   private setIso(iso: number): void {
@@ -365,7 +359,7 @@ class Prepare {
     clearTimeout(this.estimateTimer);
     this.estimating?.abort();
     this.estimate.classList.remove('stale');
-    this.estimate.replaceChildren(h('p', { class: 'warning' }, text));
+    this.estimate.replaceChildren(h('p.warning', text));
   }
 
   private update(): void {
@@ -427,7 +421,7 @@ class Prepare {
     const [fault] = error.faults;
     const text = fault ? `${fault.field}: ${fault.message}` : error.detail;
     this.estimate.classList.remove('stale');
-    this.estimate.replaceChildren(error.status === 404 ? '' : h('p', { class: 'warning' }, text));
+    this.estimate.replaceChildren(error.status === 404 ? '' : h('p.warning', text));
   }
 
   private async start(): Promise<void> {

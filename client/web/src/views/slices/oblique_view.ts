@@ -30,7 +30,7 @@ export class ObliqueView {
   readonly name = 'the oblique plane';
   // It is to be drawn anew in the slices.
   readonly changes = new Signal(0);
-  private readonly canvas = h('canvas', { tabindex: '0', role: 'img', width: pixels, height: pixels, class: 'oblique-picture' });
+  private readonly canvas = h('canvas.oblique-picture', { tabindex: '0', role: 'img', width: pixels, height: pixels });
   private readonly turn = this.slider('Turn');
   private readonly tilt = this.slider('Tilt');
   private angles: Angles = { turn: Math.PI / 6, tilt: 0 };
@@ -41,12 +41,10 @@ export class ObliqueView {
     private readonly host: ObliqueHost,
     private readonly scope: Scope,
   ) {
-    this.element = h(
-      'figure',
-      { class: 'slice oblique', hidden: true },
-      h('div', { class: 'slice-picture' }, this.canvas),
-      h('figcaption', {}, h('span', { class: 'slice-title' }, 'Oblique'), h('label', {}, 'Turn', this.turn), h('label', {}, 'Tilt', this.tilt)),
-    );
+    this.element = h('figure.slice.oblique', { hidden: true }, [
+      h('div.slice-picture', this.canvas),
+      h('figcaption', h('span.slice-title', 'Oblique'), h('label', 'Turn', this.turn), h('label', 'Tilt', this.tilt)),
+    ]);
     for (const slider of [this.turn, this.tilt]) {
       slider.addEventListener('input', () => this.set({ turn: this.turn.valueAsNumber / degrees, tilt: this.tilt.valueAsNumber / degrees }));
     }

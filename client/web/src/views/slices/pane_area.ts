@@ -15,7 +15,7 @@ export const paneLayout = new Signal<Layout>('grid');
 const corners = 'M2.5 6V2.5H6M10 2.5h3.5V6M13.5 10v3.5H10M6 13.5H2.5V10';
 
 export function paneArea(scope: Scope, panes: readonly Pane[]): HTMLElement {
-  const area = h('section', { class: 'slices', 'aria-label': 'Slices' }, ...panes.map(({ element }) => element));
+  const area = h('section.slices', { 'aria-label': 'Slices' }, ...panes.map(({ element }) => element));
   makeEnlargeable(area, panes);
   scope.onEnd(paneLayout.watch((layout) => (area.dataset.layout = layout)));
   return area;

@@ -68,7 +68,7 @@ export class SliceLayers {
   private wereLabels = false;
   // Are for values.
   private readonly valueControls: HTMLElement[];
-  private readonly choice = h('select', {}, h('option', { value: '' }, 'None'));
+  private readonly choice = h('select', h('option', { value: '' }, 'None'));
   private next: string | null = null;
   private isListing = false;
   private readonly opacity = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': 'Opacity of the overlay' });
@@ -101,7 +101,7 @@ export class SliceLayers {
     const slabControls = this.slabControls();
     const obliqueControl = this.obliqueControl();
     this.valueControls = [...slabControls, obliqueControl];
-    this.element = h('div', { class: 'stack' }, h('div', { class: 'row slice-layers' }, over, ...slabControls), obliqueControl);
+    this.element = h('div.stack', h('div.row.slice-layers', over, ...slabControls), obliqueControl);
     // Without the list nothing can be laid over, and everything else works.
     void this.list().then((hasSome) => (over.hidden = !hasSome), () => undefined);
   }

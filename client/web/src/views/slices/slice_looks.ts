@@ -117,7 +117,7 @@ export class WindowChoice {
     setWindow: (window: Window) => void,
   ) {
     const windows = [['Usual', usual] as const, ...ctWindows];
-    this.choice = h('select', {}, ...windows.map(([name]) => h('option', { value: name }, name)), this.custom);
+    this.choice = h('select', ...windows.map(([name]) => h('option', { value: name }, name)), this.custom);
     this.choice.addEventListener('change', () => {
       const chosen = windows.find(([name]) => name === this.choice.value);
       if (chosen) setWindow(chosen[1]);
@@ -140,17 +140,13 @@ export function sliceControls(windows: WindowChoice | null, measures: SliceMeasu
     { value: 'angle', label: 'Angle', title: 'Click three points; the angle is at the second' },
     { value: 'area', label: 'Area', title: 'Click the corners; a double click closes it' },
   ] as const;
-  return h(
-    'div',
-    { class: 'slice-controls' },
-    h(
-      'div',
-      { class: 'row' },
+  return h('div.slice-controls', [
+    h('div.row', [
       windows?.element,
       lookChoice('Colours', colourNames, sliceColours),
       layoutChoice(),
       lookChoice('Coordinates', spaces, sliceSpace),
-    ),
+    ]),
     segmented<MeasureKind | 'none'>('Measure in slices', kinds, 'none', (kind) => (measures.kind.value = kind === 'none' ? null : kind)),
-  );
+  ]);
 }

@@ -36,7 +36,7 @@ export function rounded({ low, high }: ValueRange, [from, to]: Window): Reading 
 }
 
 export class SliceReadout {
-  readonly element = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
+  readonly element = h('p.slice-value', { 'aria-hidden': 'true' });
   // Under the pointer; null: none, and the place where the slices meet is told.
   private pointed: Vec3 | null = null;
 
@@ -53,8 +53,8 @@ export class SliceReadout {
     const where = placeText(toPatient(this.host.volume, place), sliceSpace.value, this.host.volume.spacing);
     const text = [value, where].filter(Boolean).join(' \u00b7 ');
     if (this.element.textContent === text) return;
-    const reading = value !== '' && h('span', { class: 'slice-reading' }, value);
-    this.element.replaceChildren(...[reading, h('span', { class: 'slice-where' }, text.slice(value.length))].filter((part) => part !== false));
+    const reading = value !== '' && h('span.slice-reading', value);
+    this.element.replaceChildren(...[reading, h('span.slice-where', text.slice(value.length))].filter((part) => part !== false));
   }
 
   // Says what is seen at that place.

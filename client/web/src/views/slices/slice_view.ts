@@ -74,11 +74,11 @@ export class SliceView {
   readonly element: HTMLElement;
   private readonly canvas = h('canvas', { tabindex: '0', role: 'img' });
   private readonly slider: HTMLInputElement;
-  private readonly place = h('span', { class: 'slice-place' });
+  private readonly place = h('span.slice-place');
   private readonly layout: SlicePlane;
   private readonly buffer = document.createElement('canvas');
   private readonly loader: SliceLoader;
-  private readonly state = h('p', { class: 'slice-state', role: 'status' });
+  private readonly state = h('p.slice-state', { role: 'status' });
   private readonly readout: SliceReadout;
   private readonly zoom: SliceZoom;
   private readonly crop: SliceCrop | null;
@@ -112,12 +112,10 @@ export class SliceView {
       labels: () => host.state().labels,
     });
     this.zoom = new SliceZoom(this.canvas, scope, () => this.draw());
-    this.element = h(
-      'figure',
-      { class: 'slice', 'data-plane': plane },
-      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.readout.element, this.zoom.element),
-      h('figcaption', {}, h('span', { class: 'slice-title' }, titles[plane]), this.slider, this.place),
-    );
+    this.element = h('figure.slice', { 'data-plane': plane }, [
+      h('div.slice-picture', this.canvas, this.state, this.readout.element, this.zoom.element),
+      h('figcaption', h('span.slice-title', titles[plane]), this.slider, this.place),
+    ]);
     this.loader = new SliceLoader(host.source, this.layout.normal, scope, {
       onChange: () => this.draw(),
       onRefused: (error) => host.onError(error),

@@ -35,7 +35,7 @@ function greyBitmap({ width, height, values }: Resliced): Promise<ImageBitmap> {
 }
 
 export class CutTool {
-  readonly element = h('div', { class: 'cut-controls', hidden: true });
+  readonly element = h('div.cut-controls', { hidden: true });
   // For the address: which slice, and on which side what stays; '' where nothing is cut.
   onChange: ((text: string) => void) | null = null;
   isOn = false;
@@ -136,7 +136,7 @@ export class CutTool {
 
   private slider(range: { min: number; max: number; step: number; value: number }, textOf: (value: number) => string, onValue: (value: number) => void): HTMLElement[] {
     const slider = h('input', { type: 'range', ...range, 'aria-label': 'Position of the cut' });
-    const place = h('span', { class: 'cut-place' }, textOf(range.value));
+    const place = h('span.cut-place', textOf(range.value));
     slider.addEventListener('input', () => {
       onValue(slider.valueAsNumber);
       place.textContent = textOf(slider.valueAsNumber);

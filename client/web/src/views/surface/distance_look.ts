@@ -13,7 +13,7 @@ const restDelay = 60;
 type Top = keyof Reach;
 
 export class DistanceLook {
-  readonly legend = h('div', { class: 'legend', hidden: true, role: 'group', 'aria-label': 'Distance from the scan' });
+  readonly legend = h('div.legend', { hidden: true, role: 'group', 'aria-label': 'Distance from the scan' });
   readonly toggle = button('Distance', () => this.set(!this.isOn), {
     'aria-pressed': 'false',
     title: 'Colour the surface by its distance from the scan (d)',
@@ -23,8 +23,8 @@ export class DistanceLook {
   isOn = false;
   private reach: Reach | null = null;
   private top: Top = 'p99';
-  private readonly ends = h('div', { class: 'legend-ends' });
-  private readonly value = h('output', { class: 'legend-value' });
+  private readonly ends = h('div.legend-ends');
+  private readonly value = h('output.legend-value');
   private timer = 0;
 
   constructor(
@@ -32,7 +32,7 @@ export class DistanceLook {
     private readonly surface: Surface,
     private readonly onChange: (isOn: boolean) => void,
   ) {
-    const bar = h('div', { class: 'legend-bar', 'aria-hidden': 'true' });
+    const bar = h('div.legend-bar', { 'aria-hidden': 'true' });
     bar.style.backgroundImage = cssGradient();
     const tops = [
       { value: 'p99', label: '99 %', title: 'The colours end at the 99th percentile of the distances' },
@@ -79,7 +79,7 @@ export class DistanceLook {
     this.surface.setDistanceTop(top);
     const texts = top === 0 ? ['0 mm everywhere'] : ['0', millimetres(top / 2), `${millimetres(top)} mm`];
     if (this.top === 'p99' && top > 0) texts[2] += ' or more';
-    this.ends.replaceChildren(...texts.map((text) => h('span', {}, text)));
+    this.ends.replaceChildren(...texts.map((text) => h('span', text)));
   }
 
   private moved({ clientX, clientY, buttons }: PointerEvent): void {

@@ -23,7 +23,7 @@ export function keepOnlyAt(...points: Vec3[]): Partial<JobParameters> {
 }
 
 export class PickedPart {
-  readonly element = h('div', { class: 'picked-part', role: 'status', hidden: true });
+  readonly element = h('div.picked-part', { role: 'status', hidden: true });
   private readonly parts: number;
   private asked = 0;
 
@@ -64,7 +64,7 @@ export class PickedPart {
       ? [isClosed && `volume ${formatValue(part.volume)} mm\u00b3`, `area ${formatValue(part.area)} mm\u00b2`, `${formatCount(part.triangles)} triangles`]
       : [`at ${point.map((value) => formatSize(value)).join(', ')} mm`];
     this.element.replaceChildren(
-      h('span', {}, `One of ${formatCount(this.parts)} connected components: ${size.filter(Boolean).join(', ')}`),
+      h('span', `One of ${formatCount(this.parts)} connected components: ${size.filter(Boolean).join(', ')}`),
       button('Keep only this component', () => this.make(keepOnlyAt(point)), {
         class: 'link',
         title: 'Starts a job that drops all other components',

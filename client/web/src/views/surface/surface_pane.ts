@@ -50,10 +50,10 @@ export class SurfacePane {
   // A place of the surface was clicked.
   onPoint: ((point: Vec3) => void) | null = null;
   private surface: Surface | null = null;
-  private readonly view = h('div', { class: 'viewport' });
-  private readonly status = h('div', { class: 'load-status', role: 'status' });
+  private readonly view = h('div.viewport');
+  private readonly status = h('div.load-status', { role: 'status' });
   private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Loading the surface' });
-  private readonly announcement = h('div', { class: 'sr-only', 'aria-live': 'polite' });
+  private readonly announcement = h('div.sr-only', { 'aria-live': 'polite' });
   private readonly pickedLabel: PickedLabel;
   private readonly pickedPart: PickedPart;
   private distance: DistanceLook | null = null;
@@ -81,8 +81,8 @@ export class SurfacePane {
   ) {
     this.pickedLabel = new PickedLabel(scope, options.labels);
     this.pickedPart = new PickedPart(scope, job, makeVariant(job));
-    this.element = h('div', { class: 'pane' }, this.view, this.announcement);
-    this.view.append(h('div', { class: 'load' }, this.bar, this.status));
+    this.element = h('div.pane', this.view, this.announcement);
+    this.view.append(h('div.load', this.bar, this.status));
   }
 
   // Shows the mesh; resolves once all of it is there.
@@ -110,14 +110,12 @@ export class SurfacePane {
     } catch (error) {
       if (this.scope.isOver) return null;
       this.view.append(
-        h(
-          'div',
-          { class: 'overlay' },
+        h('div.overlay', [
           refusal(
             asApiError(error),
             button('Reload', () => window.location.reload(), { class: 'primary' }),
           ),
-        ),
+        ]),
       );
       return null;
     }
@@ -207,7 +205,7 @@ export class SurfacePane {
 
   private say(text: string, ...more: Node[]): void {
     this.bar.parentElement?.remove();
-    this.view.append(h('div', { class: 'overlay message' }, h('p', {}, text), ...more));
+    this.view.append(h('div.overlay.message', h('p', text), ...more));
   }
 
   private prepareSurface(surface: Surface): void {
@@ -222,7 +220,7 @@ export class SurfacePane {
     this.distance = distance;
     if (this.options.volume) this.cut = new CutTool(this.scope, this.job, this.options.volume, this.options.labels, surface, this.view);
     const tools = [this.toolbar(surface, distance), this.cut?.element ?? '', this.pickedLabel.element, this.pickedPart.element];
-    this.element.append(h('div', { class: 'tools' }, ...tools), distance.legend);
+    this.element.append(h('div.tools', ...tools), distance.legend);
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     if (this.options.hasKeys) {
       this.scope.listen(window, 'keydown', (event: KeyboardEvent) => this.toolKey(event, surface));
@@ -286,31 +284,23 @@ export class SurfacePane {
   private toolbar(surface: Surface, distance: DistanceLook): HTMLElement {
     const { opacity } = this;
     opacity.addEventListener('input', () => this.setStyle({ opacity: opacity.valueAsNumber }));
-    return h(
-      'div',
-      { class: 'toolbar', role: 'toolbar', 'aria-label': 'View' },
-      h(
-        'div',
-        { class: 'tool-group' },
+    return h('div.toolbar', { role: 'toolbar', 'aria-label': 'View' }, [
+      h('div.tool-group', [
         ...viewButtons((name) => this.look(name), () => surface.fit(), true),
-      ),
-      h(
-        'div',
-        { class: 'tool-group' },
+      ]),
+      h('div.tool-group', [
         this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
         this.toggle('wireframe', 'Edges', 'Wireframe: show only the edges (w)', () => this.toggleWires()),
         distance.toggle,
-        h('label', { class: 'opacity' }, h('span', {}, 'Opacity'), opacity),
-      ),
-      h(
-        'div',
-        { class: 'tool-group' },
+        h('label.opacity', h('span', 'Opacity'), opacity),
+      ]),
+      h('div.tool-group', [
         this.options.volume && this.toggle('cut', 'Cut', 'Cut the surface along a slice (c)', () => this.toggleCut()),
         this.options.onSlices && this.toggle('slices', 'Slices', 'Show slices beside the surface (x)', () => this.options.onSlices?.()),
         this.toggle('measure', 'Measure', 'Measure the distance between two points (m)', () => this.toggleMeasure()),
         button('Picture', () => void this.savePicture(surface), { title: 'Save this view as a PNG file' }),
-      ),
-    );
+      ]),
+    ]);
   }
 
   private toggleFlat(): void {
@@ -336,7 +326,7 @@ export class SurfacePane {
       return;
     }
     const make = (): void => makeVariant(job)({ distances: true, formats: withGlb(job.parameters.formats) });
-    tell(h('span', {}, 'The file of this surface holds no distances. ', button('Make one that does', make, { class: 'link' })));
+    tell(h('span', 'The file of this surface holds no distances. ', button('Make one that does', make, { class: 'link' })));
   }
 
   private toggleCut(): void {

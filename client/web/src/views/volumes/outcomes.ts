@@ -37,7 +37,7 @@ export function rejected(outcome: Outcome, choices: Choices, error: ApiError): O
 function storedRow({ id, dims }: Volume, name: string, wasThere: boolean): Node[] {
   return [
     h('a', { href: hashOf(['volumes', id]) }, name),
-    h('span', { class: 'faint' }, `${formatDims(dims)}, ${wasThere ? 'already stored' : 'stored'}`),
+    h('span.faint', `${formatDims(dims)}, ${wasThere ? 'already stored' : 'stored'}`),
   ];
 }
 
@@ -49,8 +49,8 @@ function refusedRow(
   onAgain: (choices: Choices) => void,
 ): (Node | false)[] {
   return [
-    h('b', {}, name),
-    h('p', {}, questionOf(error, choices) || error.detail || error.title),
+    h('b', name),
+    h('p', questionOf(error, choices) || error.detail || error.title),
     acceptButton(error, choices, onAgain),
     ...choiceLists(asked, choices, files, onAgain),
   ];
@@ -65,18 +65,14 @@ export function outcomeList(
   const row = (outcome: Outcome): HTMLElement => {
     const { member, volume, wasThere, error } = outcome;
     const name = member === dicomMember ? 'DICOM files' : member;
-    return h(
-      'li',
-      { 'data-member': member, class: !error ? 'stored' : questionOf(error, outcome.choices) ? 'asked' : 'refused' },
+    return h('li', { 'data-member': member, class: !error ? 'stored' : questionOf(error, outcome.choices) ? 'asked' : 'refused' }, [
       ...(volume ? storedRow(volume, name, wasThere) : []),
       ...(error ? refusedRow(error, name, outcome, files, (choices) => onAgain(outcome, choices)) : []),
-    );
+    ]);
   };
   const skipped = skippedText(outcomes.flatMap(({ volume }) => volume ?? []));
-  return h(
-    'div',
-    { class: 'stack' },
-    h('ul', { class: 'outcomes', 'aria-label': 'Volumes in the upload' }, ...outcomes.map(row)),
-    skipped !== '' && h('p', { class: 'skipped' }, skipped),
-  );
+  return h('div.stack', [
+    h('ul.outcomes', { 'aria-label': 'Volumes in the upload' }, ...outcomes.map(row)),
+    skipped !== '' && h('p.skipped', skipped),
+  ]);
 }

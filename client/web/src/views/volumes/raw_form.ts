@@ -20,12 +20,10 @@ function triple(label: string, values: Triple): TripleField {
     return made;
   });
   return {
-    element: h(
-      'fieldset',
-      { class: 'triple' },
-      h('legend', {}, label),
+    element: h('fieldset.triple', [
+      h('legend', label),
       ...fields.map(({ input }) => input),
-    ),
+    ]),
     read: () => fields.map(({ value }) => value ?? NaN) as Triple,
     check: (fits, rule) => {
       for (const one of fields) one.mark(one.textFault || (one.value === null || fits(one.value) ? '' : rule));
@@ -45,7 +43,7 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
   const type = select(Object.keys(sampleBytes).map((name) => [name, name]), described.type);
   const chosenType = (): SampleType => type.value as SampleType;
   const order = select([['little', 'little-endian'], ['big', 'big-endian']], described.byteOrder);
-  const fault = h('p', { class: 'warning', role: 'status' });
+  const fault = h('p.warning', { role: 'status' });
   const submit = button(
     'Upload as raw samples',
     () =>
@@ -66,17 +64,15 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
     fault.textContent = missing;
     submit.disabled = missing !== '';
   };
-  const form = h(
-    'div',
-    { class: 'raw' },
-    h('h3', {}, 'Are these raw samples?'),
-    h('p', {}, 'Enter the number of samples along x, y and z. x changes fastest.'),
+  const form = h('div.raw', [
+    h('h3', 'Are these raw samples?'),
+    h('p', 'Enter the number of samples along x, y and z. x changes fastest.'),
     dims.element,
-    h('div', { class: 'pair' }, field('Type', type), field('Byte order', order)),
+    h('div.pair', field('Type', type), field('Byte order', order)),
     spacing.element,
     fault,
-    h('div', { class: 'actions' }, submit),
-  );
+    h('div.actions', submit),
+  ]);
   form.addEventListener('input', check);
   if (described !== unknown) check();
   return form;

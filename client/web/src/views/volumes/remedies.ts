@@ -56,14 +56,12 @@ function tree(rows: readonly Row[], found: ReadonlyMap<string, Peek>): HTMLEleme
   if (groups.length === 1) return inside(groups[0]?.series ?? []);
   const patients = [...new Set(groups.map(({ patient }) => patient))];
   return patients.map((patient) =>
-    h(
-      'li',
-      { class: 'choice-group' },
-      h('b', {}, patient || 'Other patients'),
+    h('li.choice-group', [
+      h('b', patient || 'Other patients'),
       ...groups
         .filter((group) => group.patient === patient)
-        .map(({ studyTitle, series }) => h('div', { class: 'choice-study' }, h('span', { class: 'faint' }, studyTitle || 'Study'), h('ul', {}, ...inside(series)))),
-    ),
+        .map(({ studyTitle, series }) => h('div.choice-study', h('span.faint', studyTitle || 'Study'), h('ul', ...inside(series)))),
+    ]),
   );
 }
 
@@ -76,12 +74,12 @@ function choiceList(
 ): HTMLElement {
   const rows = choices.map(({ value, title }) => {
     const thumbnail = h('canvas', { width: 1, height: 1, 'aria-hidden': 'true', hidden: parameter !== 'series' });
-    const facts = h('span', { class: 'faint' });
-    const text = h('span', { class: 'choice-text' }, h('b', {}, title === '' ? `${nouns[parameter]} ${value}` : title), facts);
-    return { value, thumbnail, facts, element: h('li', {}, button(h('span', { class: 'choice' }, thumbnail, text), () => onChoice(value))) };
+    const facts = h('span.faint');
+    const text = h('span.choice-text', h('b', title === '' ? `${nouns[parameter]} ${value}` : title), facts);
+    return { value, thumbnail, facts, element: h('li', button(h('span.choice', thumbnail, text), () => onChoice(value))) };
   });
-  const own = parameter === 'spacing' && h('li', {}, spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
-  const list = h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
+  const own = parameter === 'spacing' && h('li', spacingForm(choices.some(({ value }) => value === answered) ? '' : answered, onChoice));
+  const list = h('ul.choices', { 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element), own);
   if (parameter === 'series') {
     peekAtSeries(files.map(({ file }) => file), choices.map(({ value }) => value)).then(
       (found) => {
@@ -98,7 +96,7 @@ function choiceList(
   }
   const [only] = files;
   if (parameter !== 'volume' || !only || files.length > 1) return list;
-  return h('div', { class: 'stack' }, timeChoice(choices, only.file, onChoice), list);
+  return h('div.stack', timeChoice(choices, only.file, onChoice), list);
 }
 
 // For the server, or why they cannot be sent.
@@ -113,7 +111,7 @@ export function spacingOf(text: string): { value: string; fault: '' } | { value:
 
 // Other distances than those that the server offers.
 function spacingForm(answered: string, onChoice: (value: string) => void): HTMLElement {
-  const fault = h('p', { class: 'fault', id: uniqueId('fault'), role: 'alert', hidden: true });
+  const fault = h('p.fault', { id: uniqueId('fault'), role: 'alert', hidden: true });
   const input = h('input', {
     type: 'text',
     value: answered,
@@ -128,7 +126,7 @@ function spacingForm(answered: string, onChoice: (value: string) => void): HTMLE
     fault.hidden = text === '';
   };
   input.addEventListener('input', () => mark(''));
-  const form = h('form', { class: 'choice' }, input, h('button', { type: 'submit' }, 'Use these millimetres along x, y and z'), fault);
+  const form = h('form.choice', input, h('button', { type: 'submit' }, 'Use these millimetres along x, y and z'), fault);
   form.addEventListener('submit', (event) => {
     event.preventDefault();
     const spacing = spacingOf(input.value);

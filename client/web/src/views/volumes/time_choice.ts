@@ -34,7 +34,7 @@ export function timeChoice(choices: readonly Choice[], file: Blob, onChoice: (va
   };
   slider.addEventListener('input', show);
   const use = button('Use this one', () => onChoice(chosen()?.value ?? ''), { class: 'primary' });
-  const element = h('div', { class: 'time-choice', hidden: true }, canvas, h('div', { class: 'time-choice-controls' }, title, slider, use));
+  const element = h('div.time-choice', { hidden: true }, canvas, h('div.time-choice-controls', title, slider, use));
   const reading = new AbortController();
   use.addEventListener('click', () => reading.abort());
   const take = (index: number, picture: Picture): void => {

@@ -36,8 +36,8 @@ export class UploadPanel {
   readonly state = new Signal<string>(idle);
   // Called after an upload whose volumes are not opened.
   onStored: (() => void) | null = null;
-  private readonly body = h('div', { class: 'drop-body' });
-  private readonly queue = h('p', { class: 'upload-queue', role: 'status', hidden: true });
+  private readonly body = h('div.drop-body');
+  private readonly queue = h('p.upload-queue', { role: 'status', hidden: true });
   private readonly fileInput = h('input', { type: 'file', multiple: true, hidden: true, 'data-pick': 'files' });
   private readonly folderInput = h('input', { type: 'file', webkitdirectory: true, hidden: true, 'data-pick': 'folder' });
   private running: AbortController | null = null;
@@ -46,14 +46,12 @@ export class UploadPanel {
   private waiting: Gathered[] = [];
 
   constructor() {
-    this.element = h(
-      'section',
-      { class: 'drop', 'aria-label': 'Upload a volume' },
+    this.element = h('section.drop', { 'aria-label': 'Upload a volume' }, [
       this.body,
       this.queue,
       this.fileInput,
       this.folderInput,
-    );
+    ]);
     this.takeChosenFiles();
     this.showIdle();
   }
@@ -197,7 +195,7 @@ export class UploadPanel {
     const path = ['volumes', volume.id];
     if (!isPanelShown() || this.waiting.length > 0) {
       this.onStored?.();
-      tell(h('span', {}, h('a', { href: hashOf(path) }, volumeName(volume)), ' was uploaded.'));
+      tell(h('span', h('a', { href: hashOf(path) }, volumeName(volume)), ' was uploaded.'));
       return;
     }
     // Its page shows the notes of the file that came first.
@@ -229,24 +227,22 @@ export class UploadPanel {
     this.state.value = idle;
     this.body.replaceChildren(
       icon(arrow),
-      h('h2', {}, 'Drop a volume here'),
-      h('p', {}, `${volumeFormats.map(({ title }) => title).join(', ')}: a file, a folder, or a ZIP or TAR archive`),
-      h(
-        'div',
-        { class: 'actions' },
+      h('h2', 'Drop a volume here'),
+      h('p', `${volumeFormats.map(({ title }) => title).join(', ')}: a file, a folder, or a ZIP or TAR archive`),
+      h('div.actions', [
         button('Choose files', () => this.fileInput.click(), { class: 'primary' }),
         button('Choose a folder', () => this.folderInput.click()),
-      ),
+      ]),
     );
   }
 
   private showRunning({ name, count }: Gathered, progress: UploadProgress, controller: AbortController): void {
     this.element.classList.add('busy');
     this.body.replaceChildren(
-      h('h2', {}, count > 1 ? `${name} (${count} files)` : name),
+      h('h2', count > 1 ? `${name} (${count} files)` : name),
       progress.bar,
       progress.text,
-      h('div', { class: 'actions' }, button('Cancel', () => controller.abort())),
+      h('div.actions', button('Cancel', () => controller.abort())),
     );
   }
 
@@ -272,8 +268,8 @@ export class UploadPanel {
     this.element.classList.remove('busy');
     this.state.value = 'Upload: your choice is needed';
     if (!isPanelShown()) tell(h('a', { href: hashOf([]) }, `${name}: ${question}`));
-    const asked = h('div', { role: 'status' }, h('h2', {}, question), h('p', {}, name));
-    this.body.replaceChildren(asked, ...lists, h('div', { class: 'actions' }, this.otherButton()));
+    const asked = h('div', { role: 'status' }, h('h2', question), h('p', name));
+    this.body.replaceChildren(asked, ...lists, h('div.actions', this.otherButton()));
     this.reveal();
   }
 
@@ -296,7 +292,7 @@ export class UploadPanel {
     this.body.replaceChildren(
       h('h2', { role: 'status' }, `${stored} of ${outcomes.length} volumes in the upload were stored`),
       outcomeList(outcomes, gathered.files, (_, choices) => void this.send(gathered, { choices, outcomes })),
-      h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
+      h('div.actions', button('Upload another', () => this.showIdle())),
     );
     this.reveal();
     this.onStored?.();

@@ -7,7 +7,7 @@ const stillAfter = 3000;
 
 export class UploadProgress {
   readonly bar: HTMLProgressElement;
-  readonly text = h('p', { class: 'upload-status', role: 'status' });
+  readonly text = h('p.upload-status', { role: 'status' });
   private readonly began = performance.now();
   private still = 0;
 

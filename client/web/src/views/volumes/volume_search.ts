@@ -28,7 +28,7 @@ export class VolumeSearch {
   constructor(onChange: () => void) {
     const titles = Object.entries(orders).map(([value, { title }]) => [value, title] as const);
     this.order = select(titles, 'newest', onChange, { 'aria-label': 'Sort volumes' });
-    this.element = h('div', { class: 'volume-search', role: 'search' }, this.input, this.order);
+    this.element = h('div.volume-search', { role: 'search' }, this.input, this.order);
     this.input.addEventListener('input', onChange);
   }
 

@@ -40,10 +40,9 @@ async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal:
 }
 
 function thumbnail(volume: Volume, scope: Scope): HTMLElement {
-  const canvas = h('canvas', {
+  const canvas = h('canvas.thumbnail', {
     width: thumbnailPixels,
     height: thumbnailPixels,
-    class: 'thumbnail',
     'aria-hidden': 'true',
   });
   // Only what comes into sight is fetched.
@@ -86,29 +85,21 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
   };
   const name = volumeName(volume);
   const kind = volumeKind(volume);
-  return h(
-    'li',
-    { class: 'card', 'data-volume': volume.id },
-    h(
-      'a',
-      { href: hashOf(['volumes', volume.id]), class: 'card-link' },
+  return h('li.card', { 'data-volume': volume.id }, [
+    h('a.card-link', { href: hashOf(['volumes', volume.id]) }, [
       thumbnail(volume, scope),
-      h(
-        'span',
-        { class: 'card-text' },
+      h('span.card-text', [
         h('strong', { title: name }, name),
-        h('span', {}, name === kind ? volume.type : kind),
-        h('span', {}, formatSpacing(volume.spacing)),
-        h('span', { class: 'faint' }, `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
-      ),
-    ),
-    h(
-      'div',
-      { class: 'card-actions' },
+        h('span', name === kind ? volume.type : kind),
+        h('span', formatSpacing(volume.spacing)),
+        h('span.faint', `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
+      ]),
+    ]),
+    h('div.card-actions', [
       button('Rename', () => void rename(), { class: 'quiet', 'aria-label': `Rename ${volumeName(volume)}` }),
       button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${volumeName(volume)}` }),
-    ),
-  );
+    ]),
+  ]);
 }
 
 export function jobLine(job: Job): string {
@@ -121,18 +112,14 @@ function surfaceRow(job: Job, volume: string): HTMLElement {
     : job.state === 'running'
       ? `${Math.round(100 * job.progress)} %`
       : job.state;
-  return h(
-    'li',
-    {},
-    h(
-      'a',
-      { href: hashOf(['jobs', job.id]) },
+  return h('li', [
+    h('a', { href: hashOf(['jobs', job.id]) }, [
       h('span', { class: `state ${job.state}`, title: job.state }),
-      h('span', { class: 'grow' }, h('b', {}, volume), ` ${jobLine(job)}`),
-      h('span', { class: 'number' }, result),
-      h('span', { class: 'faint' }, formatTime(job.created)),
-    ),
-  );
+      h('span.grow', h('b', volume), ` ${jobLine(job)}`),
+      h('span.number', result),
+      h('span.faint', formatTime(job.created)),
+    ]),
+  ]);
 }
 
 export async function volumesView(scope: Scope): Promise<HTMLElement> {
@@ -147,9 +134,9 @@ class Home {
   private readonly known = new KnownVolumes();
   // The contents of each card, and its element.
   private readonly cards = new Map<string, { text: string; card: HTMLElement }>();
-  private readonly list = h('ul', { class: 'cards' });
-  private readonly count = h('span', { class: 'count' });
-  private readonly surfaces = h('ul', { class: 'rows' });
+  private readonly list = h('ul.cards');
+  private readonly count = h('span.count');
+  private readonly surfaces = h('ul.rows');
   private readonly more = button('Older volumes', () => void this.showMore().catch(tellError), { hidden: true });
   private readonly finding = new VolumeSearch(() => void this.search().catch(tellError));
   private newest: readonly Volume[] = [];
@@ -160,48 +147,36 @@ class Home {
   private isSearching = false;
 
   // For a first-time user.
-  private readonly intro = h(
-    'figure',
-    { class: 'intro', hidden: true },
-    h('figcaption', {}, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.'),
+  private readonly intro = h('figure.intro', { hidden: true }, [
+    h('figcaption', 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.'),
     h('img', { src: introPicture, width: 560, height: 220, alt: 'Left: a slice of a head\u2019s CT with the outline of the bone. Right: the surface of the skull.' }),
-  );
-  private readonly noVolumes = h(
-    'li',
-    { class: 'empty' },
-    h('p', {}, 'No volumes yet. Drop a file above, or'),
+  ]);
+  private readonly noVolumes = h('li.empty', [
+    h('p', 'No volumes yet. Drop a file above, or'),
     button('try a sample', () => void import('../../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()]), tellError), {
       class: 'link',
       title: 'Makes and uploads a simple head of 112 \u00d7 112 \u00d7 112 samples',
     }),
-  );
+  ]);
 
   constructor(private readonly scope: Scope) {
-    this.element = h(
-      'div',
-      { class: 'home' },
-      h('h1', { class: 'sr-only' }, 'Volumes and surfaces'),
+    this.element = h('div.home', [
+      h('h1.sr-only', 'Volumes and surfaces'),
       this.intro,
       uploads.element,
-      h(
-        'section',
-        { 'aria-labelledby': 'volumes-title' },
-        h('div', { class: 'section-head' }, h('h2', { id: 'volumes-title' }, 'Volumes ', this.count), this.finding.element),
+      h('section', { 'aria-labelledby': 'volumes-title' }, [
+        h('div.section-head', h('h2', { id: 'volumes-title' }, 'Volumes ', this.count), this.finding.element),
         this.list,
-        h('div', { class: 'actions' }, this.more),
-      ),
-      h(
-        'section',
-        { 'aria-labelledby': 'surfaces-title' },
-        h(
-          'div',
-          { class: 'section-head' },
+        h('div.actions', this.more),
+      ]),
+      h('section', { 'aria-labelledby': 'surfaces-title' }, [
+        h('div.section-head', [
           h('h2', { id: 'surfaces-title' }, 'Recent surfaces'),
           h('a', { href: hashOf(['jobs']) }, 'All jobs'),
-        ),
+        ]),
         this.surfaces,
-      ),
-    );
+      ]),
+    ]);
     uploads.onStored = () => void this.refresh().catch(tellError);
     scope.onEnd(() => (uploads.onStored = null));
   }
@@ -237,7 +212,7 @@ class Home {
     this.intro.hidden = page.volumes.length > 0 || shown.length > 0;
     this.showVolumes([...page.volumes, ...this.older]);
     this.surfaces.replaceChildren(...shown.map((job) => surfaceRow(job, this.known.nameOf(job.volume))));
-    if (shown.length === 0) this.surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
+    if (shown.length === 0) this.surfaces.append(h('li.empty', 'No surfaces yet.'));
   }
 
   private async showMore(): Promise<void> {
@@ -288,7 +263,7 @@ class Home {
     const all = `${formatCount(volumes.length)}${this.next === null ? '' : '+'}`;
     this.count.textContent = volumes.length === 0 ? '' : this.finding.isOn ? `${formatCount(shown.length)} of ${all}` : all;
     if (volumes.length === 0) cards.push(this.noVolumes);
-    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume matches the search.'));
+    else if (cards.length === 0) cards.push(h('li.empty', 'No volume matches the search.'));
     const isSame = cards.length === this.list.children.length && cards.every((card, at) => card === this.list.children[at]);
     if (isSame) return;
     const focused = document.activeElement;
