@@ -5,10 +5,10 @@
 
 #include <meshoptimizer.h>
 
+#include "proto/mesh_summary.h"
 #include "server/jobs/making/stage_times.h"
 #include "server/mesh/measure/distance.h"
 #include "tests/bench/label_stages.h"
-#include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"
 #include "tests/bench/timing.h"
@@ -39,27 +39,23 @@ Decimated meshoptimizer_alone(const mesh::SurfaceView& surface, std::size_t tria
   return result;
 }
 
-MeshParameters parameters_of(const AccuracyPlan& plan) {
-  MeshParameters parameters;
-  parameters.passes = plan.passes;
-  parameters.formats = {MeshFormat::kDrc};
-  return parameters;
+// Distances of nothing where they were not measured.
+Json row_of(const std::string& name, std::uint64_t triangles, const DistanceSummary& to_scan,
+            const DistanceSummary& from_scan) {
+  const auto mm = [&](double value) { return to_scan.points > 0 ? Json(value) : Json(); };
+  return {{"name", name},
+          {"triangles", triangles},
+          {"max_to_scan_mm", mm(to_scan.max_mm)},
+          {"max_from_scan_mm", mm(from_scan.max_mm)},
+          {"rms_from_scan_mm", mm(from_scan.rms_mm)}};
 }
 
-Approximation row_of(std::string name, const JobFigures& job) {
-  const Timing& timing = job.timing;
-  Approximation row = {.name = std::move(name),
-                       .triangles = job.mesh.triangles,
-                       .simplify_ms = timing.simplify,
-                       .certify_ms = timing.certify,
-                       .encode_ms = timing.encode,
-                       .bytes = job.bytes};
-  row.job_ms = timing.extract + timing.smooth + timing.simplify + timing.encode + timing.certify;
-  if (job.mesh.certificate) {
-    row.to_scan = job.mesh.certificate->from_mesh;
-    row.from_scan = job.mesh.certificate->from_extracted;
-  }
-  return row;
+void add_times(double simplify_ms, const Timing& timing, Json& row) {
+  row["simplify_ms"] = if_measured(simplify_ms);
+  row["certify_ms"] = if_measured(timing.certify);
+  row["encode_ms"] = if_measured(timing.encode);
+  row["job_ms"] = if_measured(timing.extract + timing.smooth + timing.simplify + timing.encode +
+                              timing.certify);
 }
 
 class Measurement {
@@ -78,34 +74,42 @@ class Measurement {
     peers_.insert(peers_.end(), slow.begin(), slow.end());
   }
 
-  std::vector<Approximation> run() {
-    MeshParameters parameters = parameters_of(plan_);
-    job_.run_job(parameters, false);  // maps the memory
-    rows_.push_back(row_of("no bound", job_.run_job(parameters, false)));
-    rows_.push_back(row_of("no bound, certified", job_.run_job(parameters, true)));
+  Json run() {
+    MeshParameters parameters = job_to(MeshFormat::kDrc, plan_.passes);
+    job_.run_job(parameters);  // maps the memory
+    add_job("no bound", parameters, false);
+    add_job("no bound, certified", parameters, true);
     for (const double error : plan_.errors_mm) {
       parameters.max_error_mm = error;
-      rows_.push_back(row_of("E = " + fixed(error, 2) + " mm", job_.run_job(parameters, true)));
-      rows_.back().error_mm = error;
-      const std::uint64_t triangles = rows_.back().triangles;
+      const std::uint64_t triangles = add_job("E = " + fixed(error, 2) + " mm", parameters, true);
       for (const DecimationPeer& peer : peers_) add_peer(peer, triangles);
     }
     return rows_;
   }
 
  private:
+  // Returns the number of triangles.
+  std::uint64_t add_job(const std::string& name, const MeshParameters& parameters, bool certify) {
+    const JobFigures job = job_.run_job(parameters, certify);
+    const auto certificate =
+        job.mesh.certificate.value_or(decltype(job.mesh.certificate)::value_type{});
+    rows_.push_back(
+        row_of(name, job.mesh.triangles, certificate.from_mesh, certificate.from_extracted));
+    add_times(job.timing.simplify, job.timing, rows_.back());
+    rows_.back()["bytes"] = job.bytes;
+    return job.mesh.triangles;
+  }
+
   void add_peer(const DecimationPeer& peer, std::size_t triangles) {
     Decimated decimated;
-    Approximation row;
-    row.name = peer.name;
-    row.is_peer = true;
-    row.simplify_ms = time_ms({[&] { decimated = peer.run(smoothed_.mesh(), triangles); }});
-    row.triangles = decimated.triangles.size();
+    const double ms = time_ms({[&] { decimated = peer.run(smoothed_.mesh(), triangles); }});
     const mesh::Certificate found =
         mesh::certify({decimated.positions, decimated.triangles}, extracted_.mesh(), {});
-    row.to_scan = found.from_mesh;
-    row.from_scan = found.from_reference;
-    rows_.push_back(std::move(row));
+    rows_.push_back(
+        row_of(peer.name, decimated.triangles.size(), found.from_mesh, found.from_reference));
+    add_times(ms, {}, rows_.back());
+    rows_.back()["job_ms"] = Json();
+    rows_.back()["bytes"] = Json();
   }
 
   const AccuracyPlan& plan_;
@@ -113,39 +117,39 @@ class Measurement {
   Stages smoothed_;
   Stages job_;
   std::vector<DecimationPeer> peers_;
-  std::vector<Approximation> rows_;
+  Json rows_ = Json::array();
 };
 
 }  // namespace
 
-std::vector<Approximation> measure_approximations(const Samples& samples,
-                                                  const AccuracyPlan& plan) {
+Json measure_approximations(const Samples& samples, const AccuracyPlan& plan) {
   set_threads(plan.threads);
   Peers::set_threads(plan.threads);
   return Measurement(samples, plan).run();
 }
 
-CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan) {
+Json measure_certify(const Samples& samples, const AccuracyPlan& plan) {
   set_threads(plan.threads);
   Stages extracted(samples, {.iso = plan.iso});
   extracted.extract();
   Stages smoothed(samples, {.iso = plan.iso});
   smoothed.extract();
   smoothed.smooth(plan.passes);
-  CertifyTime time;
-  time.threads = plan.threads;
-  time.ms =
-      median_ms({[&] { time.certificate = mesh::certify(smoothed.mesh(), extracted.mesh(), {}); }},
-                kCertifyRuns);
-  time.points = time.certificate.from_mesh.points + time.certificate.from_reference.points;
-  return time;
+  mesh::Certificate found;
+  const double ms = median_ms(
+      {[&] { found = mesh::certify(smoothed.mesh(), extracted.mesh(), {}); }}, kCertifyRuns);
+  return Json::array({{{"threads", plan.threads},
+                       {"points", found.from_mesh.points + found.from_reference.points},
+                       {"certify_ms", ms},
+                       {"max_to_scan_mm", found.from_mesh.max_mm},
+                       {"max_from_scan_mm", found.from_reference.max_mm}}});
 }
 
-std::vector<UnevenTime> measure_uneven(int threads) {
+Json measure_uneven(int threads) {
   constexpr std::uint32_t kSide = 20;
   constexpr std::uint32_t kLabels = 4;
   set_threads(threads);
-  std::vector<UnevenTime> times;
+  Json rows = Json::array();
   for (const double spacing : {1, 100, 1000}) {
     Samples samples;
     samples.dims = {kSide, kSide, kSide};
@@ -158,53 +162,15 @@ std::vector<UnevenTime> measure_uneven(int threads) {
     stages.extract();
     const mesh::SurfaceSize size = {stages.size().triangles, stages.size().vertices};
     const jobs::VolumeSize volume = {kSide * kSide * kSide, 1, spacing};
-    UnevenTime time = {.spacing_z = spacing, .triangles = size.triangles};
     const Timing timing = stages.run_job(true).timing;
-    time.certify_ms = timing.certify;
-    time.job_ms = timing.extract + timing.smooth + timing.encode + timing.certify;
-    time.expected_ms = jobs::stage_times(size, size, volume, stages.parameters(), true).certify;
-    times.push_back(time);
-  }
-  return times;
-}
-
-Json to_json(const std::vector<UnevenTime>& times) {
-  Json rows = Json::array();
-  for (const UnevenTime& time : times) {
-    rows.push_back({{"spacing_z", time.spacing_z},
-                    {"triangles", time.triangles},
-                    {"certify_ms", time.certify_ms},
-                    {"job_ms", time.job_ms},
-                    {"expected_certify_ms", time.expected_ms}});
+    rows.push_back({{"spacing_z", spacing},
+                    {"triangles", size.triangles},
+                    {"certify_ms", timing.certify},
+                    {"job_ms", timing.extract + timing.smooth + timing.encode + timing.certify},
+                    {"expected_ms",
+                     jobs::stage_times(size, size, volume, stages.parameters(), true).certify}});
   }
   return rows;
-}
-
-Json to_json(const std::vector<Approximation>& approximations) {
-  Json rows = Json::array();
-  for (const Approximation& row : approximations) {
-    const auto mm = [&](double value) { return row.to_scan.points > 0 ? Json(value) : Json(); };
-    rows.push_back({{"name", row.name},
-                    {"is_peer", row.is_peer},
-                    {"triangles", row.triangles},
-                    {"max_to_scan_mm", mm(row.to_scan.max_mm)},
-                    {"max_from_scan_mm", mm(row.from_scan.max_mm)},
-                    {"rms_from_scan_mm", mm(row.from_scan.rms_mm)},
-                    {"simplify_ms", if_measured(row.simplify_ms)},
-                    {"certify_ms", if_measured(row.certify_ms)},
-                    {"encode_ms", if_measured(row.encode_ms)},
-                    {"job_ms", if_measured(row.job_ms)},
-                    {"bytes", row.bytes > 0 ? Json(row.bytes) : Json()}});
-  }
-  return rows;
-}
-
-Json to_json(const CertifyTime& time) {
-  return {{"threads", time.threads},
-          {"points", time.points},
-          {"certify_ms", time.ms},
-          {"max_to_scan_mm", time.certificate.from_mesh.max_mm},
-          {"max_from_scan_mm", time.certificate.from_reference.max_mm}};
 }
 
 }  // namespace isomesh::bench

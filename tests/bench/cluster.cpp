@@ -17,7 +17,6 @@
 #include "server/store/postgresql/job_store.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/bench/daemon.h"
-#include "tests/bench/numbers.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/timing.h"
 #include "tests/support/files.h"
@@ -81,9 +80,8 @@ std::string half_and_most(std::vector<double> times) {
          milliseconds(times[times.size() * 99 / 100]);
 }
 
-Finding finding(const std::string& name, const std::string& what, const std::string& ours,
-                double value, const std::string& peer = {}) {
-  return {"cluster/" + name, what, ours, peer, value, std::nullopt};
+std::string counted(std::size_t count, const std::string& what) {
+  return std::to_string(count) + ' ' + what + (count == 1 ? "" : "s");
 }
 
 std::string a_second(double count, double ms) { return fixed(count * 1000 / ms, 0) + " a second"; }
@@ -183,11 +181,12 @@ void measure_daemons(Postgres& postgres, const std::filesystem::path& program,
   for (const std::size_t count : {1U, 2U, 3U}) {
     const Cluster cluster(program, postgres.new_place(), count);
     const double ms = time_small_jobs([&](std::size_t n) { return cluster.client(n); }, count);
-    findings.push_back(finding("jobs/" + std::to_string(count),
-                               "jobs of 32^3 samples, " + std::to_string(count) +
-                                   (count == 1 ? " daemon" : " daemons") +
-                                   " of one worker on PostgreSQL / one on SQLite",
-                               a_second(kSmallJobs, ms), ms / alone, a_second(kSmallJobs, alone)));
+    findings.push_back({"jobs of 32^3 samples, " + counted(count, "daemon") +
+                            " of one worker on PostgreSQL / one on SQLite",
+                        a_second(kSmallJobs, ms),
+                        a_second(kSmallJobs, alone),
+                        ms / alone,
+                        {}});
   }
 }
 
@@ -216,11 +215,9 @@ Finding measure_takeover(Postgres& postgres, const std::filesystem::path& progra
     times.push_back(ms_since(killed));
     other.cancel(id);
   }
-  return finding("takeover",
-                 "a killed daemon's job runs at another, with --lease-seconds " +
-                     std::to_string(kLeaseSeconds) + ", the slowest of " +
-                     std::to_string(kTakeovers),
-                 milliseconds(*std::ranges::max_element(times)), *std::ranges::max_element(times));
+  return timed("a killed daemon's job runs at another, with --lease-seconds " +
+                   std::to_string(kLeaseSeconds) + ", the slowest of " + std::to_string(kTakeovers),
+               *std::ranges::max_element(times));
 }
 
 // --- The queue alone
@@ -268,10 +265,11 @@ Finding measure_submit(Node& node, std::size_t connections, int first) {
     }
   });
   const double ms = ms_since(begin);
-  return finding("submit/" + std::to_string(connections),
-                 "submission, " + std::to_string(connections) +
-                     (connections == 1 ? " connection" : " connections"),
-                 a_second(kSubmissions, ms) + ", " + half_and_most(times), ms / kSubmissions);
+  return {"submission, " + counted(connections, "connection"),
+          a_second(kSubmissions, ms) + ", " + half_and_most(times),
+          "",
+          ms / kSubmissions,
+          {}};
 }
 
 Finding measure_queue(Node& node, std::size_t connections, int count) {
@@ -279,10 +277,11 @@ Finding measure_queue(Node& node, std::size_t connections, int count) {
   const auto times = side_by_side(
       connections, count, [&](std::size_t thread, int) { claim_and_finish(node.jobs, thread); });
   const double ms = ms_since(begin);
-  return finding("queue/" + std::to_string(connections),
-                 "claim and finish, " + std::to_string(connections) +
-                     (connections == 1 ? " connection" : " connections"),
-                 a_second(count, ms) + ", " + half_and_most(times), ms / count);
+  return {"claim and finish, " + counted(connections, "connection"),
+          a_second(count, ms) + ", " + half_and_most(times),
+          "",
+          ms / count,
+          {}};
 }
 
 // From a submission's answer at one node until another has claimed it.
@@ -301,8 +300,11 @@ Finding measure_wake(Node& one, Node& other, int first) {
     worker.join();
     times.push_back(std::chrono::duration<double, std::milli>(claimed - submitted).count());
   }
-  return finding("wake", "from a submission at one daemon to its end at another without work",
-                 half_and_most(times), median(times));
+  return {"from a submission at one daemon to its end at another without work",
+          half_and_most(times),
+          "",
+          median(times),
+          {}};
 }
 
 void measure_stores(Postgres& postgres, std::vector<Finding>& findings) {

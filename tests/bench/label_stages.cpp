@@ -6,7 +6,6 @@
 #include <type_traits>
 
 #include "server/jobs/making/make_labels.h"
-#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/stairs/stairs.h"
 #include "server/mesh/stairs/unfold.h"
 
@@ -98,8 +97,8 @@ void LabelStages::smooth(const mesh::SmoothOptions& options) {
   mesh::smooth(options, {}, surface_.mesh);
 }
 
-void LabelStages::measure() const {
-  mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {});
+std::vector<mesh::LabelMeasure> LabelStages::measure() const {
+  return mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {});
 }
 
 JobFigures LabelStages::run_job(bool certify) {
@@ -108,13 +107,6 @@ JobFigures LabelStages::run_job(bool certify) {
                             std::span<const codec::Sink> sinks, jobs::Progress& progress) {
                           return jobs::make_labels(array, request, sinks, progress, surface_);
                         });
-}
-
-Walls LabelStages::walls() const {
-  const mesh::Mesh& mesh = surface_.mesh;
-  return {{mesh.positions.begin(), mesh.positions.end()},
-          {mesh.triangles.begin(), mesh.triangles.end()},
-          {surface_.sides.begin(), surface_.sides.end()}};
 }
 
 }  // namespace isomesh::bench

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/labels/labels.h"
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/smooth/smooth.h"
-#include "tests/bench/label_walls.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
 
@@ -32,7 +32,8 @@ class LabelStages {
   void smooth(const mesh::SmoothOptions& options);
   void remove_stairs();              // the default of jobs by labels
   std::size_t count_folded() const;  // triangles, see unfold.h
-  void measure() const;              // topology, area and volume of each label
+  // Topology, area and volume of each label.
+  std::vector<mesh::LabelMeasure> measure() const;
   // A job to a GLB.
   JobFigures run_job(bool certify = false);
 
@@ -40,7 +41,6 @@ class LabelStages {
   const std::vector<std::int64_t>& labels() const { return options_.labels; }
   const std::vector<mesh::LabelVoxels>& voxels() const { return voxels_; }  // of those labels
   MeshSize size() const { return {surface_.mesh.positions.size(), surface_.mesh.triangles.size()}; }
-  Walls walls() const;
   const mesh::SeparatingSurface& surface() const { return surface_; }
 
  private:

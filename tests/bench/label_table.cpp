@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "tests/bench/label_shapes.h"
 #include "tests/bench/label_stages.h"
-#include "tests/bench/numbers.h"
 #include "tests/support/points.h"
 
 namespace isomesh::bench {
@@ -16,6 +16,28 @@ namespace {
 using test::cross;
 using test::length;
 using test::minus;
+
+constexpr std::size_t kPlacements = 4;
+
+enum class StairSmoothing { kLabels, kLaplacian };
+
+// Means over some placements of a shape, unless told otherwise.
+struct ShapeFigures {
+  double outer_area = 0;  // of walls to the background
+  double worst_outer_area = 0;
+  double inner_area = 0;  // of walls between labels
+  // Volume enclosed by a label, relative to its voxels: the worst change, then the extremes of the
+  // quotient.
+  double worst_volume = 0;
+  double least_volume = 0;
+  double most_volume = 0;
+  double distance = 0;  // of a triangle's centre, weighted by area
+  double worst_distance = 0;
+  double worst_face = 0;
+  double curve_length = 0;
+  double folded = 0;  // triangles, in percent
+  double triangles = 0;
+};
 
 ShapePoint point_of(const mesh::Vec3& v) { return {v[0], v[1], v[2]}; }
 
@@ -31,7 +53,7 @@ void run(LabelStages& stages, const Samples& samples, StairSmoothing smoothing) 
 class Placement {
  public:
   Placement(const LabelShape& shape, const Samples& samples, LabelStages& stages)
-      : shape_(shape), stages_(stages), walls_(stages.walls()) {
+      : shape_(shape), stages_(stages), mesh_(stages.surface().mesh) {
     const std::array<double, 3>& spacing = samples.geometry.spacing;
     sample_ = std::cbrt(spacing[0] * spacing[1] * spacing[2]);
   }
@@ -42,7 +64,7 @@ class Placement {
     add_volumes();
     if (shape_.curve_length > 0)
       figures_.curve_length = percent(length_of_curves() / shape_.curve_length);
-    const auto triangles = static_cast<double>(walls_.triangles.size());
+    const auto triangles = static_cast<double>(mesh_.triangles.size());
     figures_.folded = 100 * static_cast<double>(stages_.count_folded()) / triangles;
     figures_.triangles = triangles;
     return figures_;
@@ -52,10 +74,10 @@ class Placement {
   void look_at_triangles() {
     double sum = 0;
     double all = 0;
-    for (std::size_t t = 0; t < walls_.triangles.size(); ++t) {
-      const auto& [a, b, c] = walls_.triangles[t];
-      const std::array corners = {point_of(walls_.positions[a]), point_of(walls_.positions[b]),
-                                  point_of(walls_.positions[c])};
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const auto& [a, b, c] = mesh_.triangles[t];
+      const std::array corners = {point_of(mesh_.positions[a]), point_of(mesh_.positions[b]),
+                                  point_of(mesh_.positions[c])};
       const double area =
           length(cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]))) / 2;
       ShapePoint centre;
@@ -82,7 +104,7 @@ class Placement {
     const auto value = [&](std::uint16_t number) {
       return number == 0 ? 0 : static_cast<int>(stages_.labels()[number - 1U]);
     };
-    const mesh::WallSides sides = walls_.sides[triangle];
+    const mesh::WallSides sides = stages_.surface().sides[triangle];
     return std::minmax(value(sides.front), value(sides.back));
   }
 
@@ -101,10 +123,10 @@ class Placement {
   }
 
   void add_volumes() {
-    const auto enclosed = enclosed_volumes(walls_, stages_.labels().size());
+    const auto measured = stages_.measure();
     figures_.least_volume = std::numeric_limits<double>::infinity();
-    for (std::size_t n = 0; n < enclosed.size(); ++n) {
-      const double quotient = enclosed[n] / stages_.voxels()[n].volume_mm3;
+    for (std::size_t n = 0; n < measured.size(); ++n) {
+      const double quotient = measured[n].extent.volume_mm3 / stages_.voxels()[n].volume_mm3;
       figures_.worst_volume = std::max(figures_.worst_volume, std::abs(percent(quotient)));
       figures_.least_volume = std::min(figures_.least_volume, quotient);
       figures_.most_volume = std::max(figures_.most_volume, quotient);
@@ -114,7 +136,7 @@ class Placement {
   // The number of edges with other than two triangles.
   double length_of_curves() const {
     std::map<std::pair<std::uint32_t, std::uint32_t>, int> triangles;
-    for (const mesh::Triangle& triangle : walls_.triangles) {
+    for (const mesh::Triangle& triangle : mesh_.triangles) {
       for (std::size_t i = 0; i < 3; ++i) {
         ++triangles[std::minmax(triangle[i], triangle[(i + 1) % 3])];
       }
@@ -123,14 +145,14 @@ class Placement {
     for (const auto& [edge, count] : triangles) {
       if (count == 2) continue;
       sum += length(
-          minus(point_of(walls_.positions[edge.first]), point_of(walls_.positions[edge.second])));
+          minus(point_of(mesh_.positions[edge.first]), point_of(mesh_.positions[edge.second])));
     }
     return sum;
   }
 
   const LabelShape& shape_;
   LabelStages& stages_;
-  const Walls walls_;
+  const mesh::Mesh& mesh_;
   double sample_ = 0;
   std::map<ShapeSides, double> areas_;
   ShapeFigures figures_;
@@ -165,13 +187,11 @@ Json row_of(const std::string& shape, const ShapePoint& spacing, StairSmoothing 
           {"triangles", static_cast<std::uint64_t>(figures.triangles)}};
 }
 
-}  // namespace
-
 ShapeFigures measure_shape(const std::string& name, double radius, const ShapePoint& spacing,
-                           StairSmoothing smoothing, std::size_t placements) {
+                           StairSmoothing smoothing) {
   ShapeFigures all = {.least_volume = std::numeric_limits<double>::infinity()};
-  const double share = 1 / static_cast<double>(placements);
-  for (std::size_t place = 0; place < placements; ++place) {
+  const double share = 1 / static_cast<double>(kPlacements);
+  for (std::size_t place = 0; place < kPlacements; ++place) {
     const LabelShape shape = label_shape(name, radius, spacing, place);
     const Samples samples = sample_shape(shape, spacing);
     LabelStages stages(samples);
@@ -192,31 +212,40 @@ ShapeFigures measure_shape(const std::string& name, double radius, const ShapePo
   return all;
 }
 
-VolumeFigures measure_volumes(const Samples& samples, StairSmoothing smoothing) {
+Json volume_row(const Samples& samples, StairSmoothing smoothing) {
   constexpr std::uint64_t kLeastVoxels = 1001;
+  constexpr double kMuch = 0.5;  // percent
   LabelStages stages(samples);
   run(stages, samples, smoothing);
-  const Walls walls = stages.walls();
-  const auto enclosed = enclosed_volumes(walls, stages.labels().size());
-  VolumeFigures figures;
+  const auto measured = stages.measure();
+  std::uint64_t labels = 0;
+  std::uint64_t far_off = 0;
   double sum = 0;
-  for (std::size_t n = 0; n < enclosed.size(); ++n) {
+  double worst = 0;
+  std::int64_t worst_label = 0;
+  for (std::size_t n = 0; n < measured.size(); ++n) {
     const mesh::LabelVoxels& label = stages.voxels()[n];
     if (label.voxels < kLeastVoxels) continue;
-    const double change = percent(enclosed[n] / label.volume_mm3);
-    ++figures.labels;
+    const double change = percent(measured[n].extent.volume_mm3 / label.volume_mm3);
+    ++labels;
     sum += std::abs(change);
-    if (std::abs(change) > 0.5) ++figures.beyond_half;
-    if (std::abs(change) <= std::abs(figures.worst)) continue;
-    figures.worst = change;
-    figures.worst_label = label.label;
+    if (std::abs(change) > kMuch) ++far_off;
+    if (std::abs(change) <= std::abs(worst)) continue;
+    worst = change;
+    worst_label = label.label;
   }
-  figures.mean = figures.labels == 0 ? 0 : sum / static_cast<double>(figures.labels);
-  figures.folded = 100 * static_cast<double>(stages.count_folded()) /
-                   static_cast<double>(walls.triangles.size());
-  return figures;
+  return {{"segmentation", samples.name},
+          {"smoothing", name_of(smoothing)},
+          {"labels", labels},
+          {"mean_%", labels == 0 ? 0 : sum / static_cast<double>(labels)},
+          {"worst_%", worst},
+          {"worst_label", worst_label},
+          {"beyond_0.5_%", far_off},
+          {"folded_%", 100 * static_cast<double>(stages.count_folded()) /
+                           static_cast<double>(stages.size().triangles)}};
 }
 
+// Every `step`-th slice, with the spacing that they then have.
 Samples every_slice(const Samples& samples, std::uint32_t step) {
   Samples result = samples;
   result.dims.z = (samples.dims.z + step - 1) / step;
@@ -232,7 +261,9 @@ Samples every_slice(const Samples& samples, std::uint32_t step) {
   return padded(result);  // what was dropped may have been the background above
 }
 
-Json shape_table(std::size_t placements) {
+}  // namespace
+
+Json shape_table() {
   const std::vector<std::pair<std::string, double>> shapes = {{"ball", 3},
                                                               {"ball", 5},
                                                               {"ball", 10},
@@ -256,7 +287,7 @@ Json shape_table(std::size_t placements) {
     for (const auto& [name, radius] : shapes) {
       for (const StairSmoothing smoothing : {StairSmoothing::kLabels, StairSmoothing::kLaplacian}) {
         rows.push_back(row_of(name + ' ' + fixed(radius, 0), spacing, smoothing,
-                              measure_shape(name, radius, spacing, smoothing, placements)));
+                              measure_shape(name, radius, spacing, smoothing)));
       }
     }
   }
@@ -269,15 +300,7 @@ Json volume_table(const std::vector<Samples>& segmentations) {
     for (const std::uint32_t step : {1U, 3U}) {
       const Samples samples = every_slice(whole, step);
       for (const StairSmoothing smoothing : {StairSmoothing::kLabels, StairSmoothing::kLaplacian}) {
-        const VolumeFigures figures = measure_volumes(samples, smoothing);
-        rows.push_back({{"segmentation", samples.name},
-                        {"smoothing", name_of(smoothing)},
-                        {"labels", figures.labels},
-                        {"mean_%", figures.mean},
-                        {"worst_%", figures.worst},
-                        {"worst_label", figures.worst_label},
-                        {"beyond_0.5_%", figures.beyond_half},
-                        {"folded_%", figures.folded}});
+        rows.push_back(volume_row(samples, smoothing));
       }
     }
   }

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <numbers>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include "server/mesh/measure/distance.h"
@@ -45,6 +45,8 @@ double smallest_angle(const mesh::Vec3& a, const mesh::Vec3& b, const mesh::Vec3
          std::numbers::pi;
 }
 
+double percent(double share) { return 100 * share; }
+
 // Adds what all triangles' smallest angles are.
 void add_angles(const Stages& stages, Json& row) {
   std::vector<double> angles;
@@ -60,32 +62,33 @@ void add_angles(const Stages& stages, Json& row) {
   const auto percentile = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 100);
   std::ranges::nth_element(angles, percentile);
   row["mean_angle_deg"] = sum / count;
-  row["percentile_1_angle_deg"] = *percentile;
+  row["1_%_below_deg"] = *percentile;
   row["least_angle_deg"] = *std::min_element(angles.begin(), percentile + 1);
-  row["small_angles"] =
-      static_cast<double>(std::ranges::count_if(angles, [](double a) { return a < kSmallDeg; })) /
-      count;
+  const auto small = std::ranges::count_if(angles, [](double a) { return a < kSmallDeg; });
+  row["below_20_deg_%"] = percent(static_cast<double>(small) / count);
 }
 
 // `extracted`: the surface before smoothing.
 Json row_of(const Way& way, double step_mm, const mesh::TriangleGrid& extracted, Stages& stages) {
   stages.extract();
   const double before_mm3 = stages.volume_mm3();
-  Json row = {{"smoothing", way.passes == 0 ? "none" : to_string(way.smoothing)},
-              {"passes", way.passes},
-              {"triangles", stages.size().triangles}};
-  const Timed smoothing = {[&] { stages.smooth(way.passes, way.smoothing); },
-                           [&] { stages.extract(); }};
-  row["ms"] = median_ms(way.passes == 0 ? Timed{smoothing.prepare} : smoothing, kRuns);
+  std::string smoothing = "none";
+  if (way.passes > 0) {
+    smoothing = std::string(to_string(way.smoothing)) + ", " + std::to_string(way.passes);
+  }
+  Json row = {{"smoothing", smoothing}, {"triangles", stages.size().triangles}};
+  const Timed extract = {[&] { stages.extract(); }};
+  const Timed smooth = {[&] { stages.smooth(way.passes, way.smoothing); }, extract.run};
+  row["ms"] = median_ms(way.passes == 0 ? extract : smooth, kRuns);
   row["distance_steps"] = mesh::measure_distance(stages.mesh(), extracted, {}).max_mm / step_mm;
-  row["volume_kept"] = stages.volume_mm3() / before_mm3;
+  row["volume_%"] = percent(stages.volume_mm3() / before_mm3 - 1);
   add_angles(stages, row);
   return row;
 }
 
 }  // namespace
 
-Subject ball_subject() {
+Samples ball() {
   constexpr std::uint32_t kSize = 64;
   constexpr double kRadius = 27;
   // Off the samples, so that no symmetry flatters a lattice.
@@ -106,26 +109,23 @@ Subject ball_subject() {
       }
     }
   }
-  return {std::move(samples), {{"radius 27", 0}}};
+  return samples;
 }
 
-Json measure_lattices(const Subject& subject) {
-  const double step_mm = std::ranges::min(subject.samples.geometry.spacing);
+Json measure_lattices(const Samples& samples, double iso) {
+  const double step_mm = std::ranges::min(samples.geometry.spacing);
   Json rows = Json::array();
   for (const Scheme scheme : {Scheme::kSix, Scheme::kFive, Scheme::kBcc}) {
     for (const bool regularize : {false, true}) {
-      const Surface surface = {.iso = subject.levels.front().iso,
-                               .scheme = scheme,
-                               .close = true,
-                               .regularize = regularize};
-      Stages reference(subject.samples, surface);
+      const Surface surface = {
+          .iso = iso, .scheme = scheme, .close = true, .regularize = regularize};
+      Stages reference(samples, surface);
       reference.extract();
       const mesh::TriangleGrid extracted(reference.mesh(), {});
-      Stages stages(subject.samples, surface);
+      Stages stages(samples, surface);
       for (const Way& way : kWays) {
-        Json row = {{"volume", title_of(subject.samples, subject.levels.front())},
-                    {"scheme", to_string(scheme)},
-                    {"regularize", regularize}};
+        Json row = {
+            {"volume", samples.name}, {"scheme", to_string(scheme)}, {"regularised", regularize}};
         row.update(row_of(way, step_mm, extracted, stages));
         rows.push_back(row);
       }

@@ -1,17 +1,18 @@
 #include "tests/bench/machine.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <iostream>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <draco/core/draco_version.h>
 #include <sys/utsname.h>
 
-#include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 
 namespace isomesh::bench {
@@ -57,9 +58,9 @@ std::string load() {
   return average >= 0 ? fixed(average, 1) + " before the run" : "unknown";
 }
 
-}  // namespace
-
 int processors() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+
+}  // namespace
 
 void warn_when_busy() {
   constexpr double kQuiet = 0.7;
@@ -68,8 +69,8 @@ void warn_when_busy() {
             << processors() << " cores); these figures will be too bad\n";
 }
 
-std::vector<std::pair<std::string, std::string>> describe_machine() {
-  return {
+Json describe_machine() {
+  const std::vector<std::pair<const char*, std::string>> facts = {
       {"processor", value_in("/proc/cpuinfo", "model name")},
       {"cores", std::to_string(processors())},
       {"memory", memory()},
@@ -81,6 +82,9 @@ std::vector<std::pair<std::string, std::string>> describe_machine() {
       {"load", load()},
       {"date", today()},
   };
+  Json rows = Json::array();
+  for (const auto& [name, value] : facts) rows.push_back({{"machine", name}, {"", value}});
+  return rows;
 }
 
 }  // namespace isomesh::bench

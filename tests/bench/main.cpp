@@ -16,18 +16,21 @@
 
 #include "server/jobs/making/memory.h"
 #include "tests/bench/accuracy.h"
-#include "tests/bench/benchmarks.h"
+#include "tests/bench/budget.h"
 #include "tests/bench/cluster.h"
+#include "tests/bench/findings.h"
 #include "tests/bench/label_stages.h"
 #include "tests/bench/label_table.h"
 #include "tests/bench/labels.h"
+#include "tests/bench/lattices.h"
 #include "tests/bench/machine.h"
 #include "tests/bench/memory.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/ratios.h"
-#include "tests/bench/report.h"
 #include "tests/bench/service.h"
+#include "tests/bench/stage_table.h"
 #include "tests/bench/stages.h"
+#include "tests/bench/surface_nets.h"
 
 namespace isomesh::bench {
 namespace {
@@ -40,7 +43,6 @@ struct Options {
   std::optional<double> iso;
   int threads = 0;  // 0: one and two
   std::vector<std::uint32_t> sizes = {64, 128, 256, 512};
-  bool large = false;
   bool json = false;
   std::string filter = ".";
   std::filesystem::path surface_nets_root;
@@ -64,97 +66,110 @@ void load(const Options& options, Plan& plan) {
   plan.volume = std::move(loaded.samples);
 }
 
+std::vector<int> thread_counts(const Options& options) {
+  return options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
+}
+
 Plan plan_of(const Options& options) {
   Plan plan;
-  plan.json = options.json;
   plan.filter = options.filter;
   plan.field_sizes = options.sizes;
-  if (options.large) plan.field_sizes.push_back(1024);
   std::ranges::sort(plan.field_sizes);
-  plan.threads = options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
+  plan.threads = thread_counts(options);
   load(options, plan);
   return plan;
 }
 
 std::string missing_peers() { return peers_available() ? "" : peers_description() + '\n'; }
 
-// Prints tables one by one for a terminal, or all of them as one JSON document at the end.
+// Prints tables one by one in Markdown, or all of them as one JSON document at the end.
 class Output {
  public:
   explicit Output(bool json) : json_(json) {}
 
-  void add(const std::string& heading, const std::vector<Finding>& findings) {
-    add(heading, to_json(findings), to_table(findings));
+  void add(const std::string& heading, const std::vector<Finding>& findings,
+           const std::string& about = {}) {
+    add(heading, to_json(findings), about);
   }
-  void add(const std::string& heading, const Json& rows) { add(heading, rows, to_text(rows)); }
+  void add(const std::string& heading, const Json& rows, const std::string& about = {}) {
+    document_[heading] = rows;
+    if (json_ || rows.empty()) return;
+    std::cout << "## " << heading << "\n\n";
+    if (!about.empty()) std::cout << about << "\n\n";
+    std::cout << to_markdown(rows) << std::endl;
+  }
 
   void end(const std::string& notes = missing_peers()) {
-    document["peers"] = {{"available", peers_available()}, {"description", peers_description()}};
-    std::cout << (json_ ? document.dump(2) + '\n' : notes);
+    document_["peers"] = {{"available", peers_available()}, {"description", peers_description()}};
+    if (json_) std::cout << document_.dump(2) << '\n';
+    std::cerr << notes;
   }
-
-  Json document;
 
  private:
-  void add(const std::string& heading, const Json& rows, const std::string& text) {
-    document[heading] = rows;
-    if (!json_ && !rows.empty()) std::cout << heading << '\n' << text << std::endl;
-  }
-
   const bool json_;
+  Json document_;
 };
 
 int run(const Options& options) {
   const Plan plan = plan_of(options);
-  if (!plan.json) {
-    for (const auto& [key, value] : describe_machine()) std::cout << key << ": " << value << '\n';
-    std::cout << std::endl;
-  }
-  Output output(plan.json);
-  const std::string document = run_benchmarks(plan);
-  if (!document.empty()) output.document = Json::parse(document);
-  output.add("ratios", measure_findings(plan));
+  Output output(options.json);
+  output.add("Machine", describe_machine());
+  output.add("Stages", measure_stages(plan));
+  output.add("Ratios", measure_ratios(plan));
   output.end();
   return 0;
+}
+
+// Of a ball, and of the real volume.
+Json lattices_of(const Plan& plan) {
+  set_threads(plan.threads.back());
+  Json rows = measure_lattices(ball(), kBallIso);
+  if (!plan.volume) return rows;
+  for (const Json& row : measure_lattices(*plan.volume, plan.iso)) rows.push_back(row);
+  return rows;
+}
+
+int run_lattices(const Options& options) {
+  const Plan plan = plan_of(options);
+  Output output(options.json);
+  output.add("Lattices and smoothings", lattices_of(plan));
+  output.end();
+  return 0;
+}
+
+int run_budget(const Options& options) {
+  const Json rows = measure_budget();
+  Output output(options.json);
+  output.add("Budget", rows);
+  output.end("");
+  return std::ranges::all_of(rows, [](const Json& row) { return row.at("within"); }) ? 0 : 1;
 }
 
 std::filesystem::path daemon_beside_this() {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "isomeshd";
 }
 
-int run_service(const Options& options, const std::filesystem::path& daemon) {
+std::vector<Finding> service_findings(const Options& options, const std::filesystem::path& daemon) {
   ServicePlan plan = {.daemon = daemon,
                       .volume = options.volume.empty() ? kDefaultVolume : options.volume,
                       .iso = options.iso.value_or(kDefaultIso),
                       .threads = options.threads};
   if (!options.volume.empty() && !options.iso) plan.iso = load_volume(plan.volume).suggested_iso;
+  return measure_service(plan);
+}
+
+int run_service(const Options& options, const std::filesystem::path& daemon) {
   Output output(options.json);
-  output.add("service", measure_service(plan));
+  output.add("Service", service_findings(options, daemon));
   output.end();
   return 0;
 }
 
 int run_cluster(const Options& options, const std::filesystem::path& daemon) {
   Output output(options.json);
-  output.add("cluster", measure_cluster(daemon));
+  output.add("Cluster", measure_cluster(daemon));
   output.end("");
   return 0;
-}
-
-int run_report(const std::filesystem::path& folder, ReportPlan plan,
-               const std::vector<std::string>& sections) {
-  plan.sections = sections;
-  std::filesystem::create_directories(folder);
-  const std::filesystem::path path = folder / "report.json";
-  std::ofstream file(path);
-  file << measure_report(plan).dump(2) << std::endl;
-  if (!file) throw std::runtime_error("cannot write " + path.string());
-  std::cout << path.string() << '\n';
-  return 0;
-}
-
-std::vector<int> thread_counts(const Options& options) {
-  return options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
 }
 
 std::string count_of(int threads) {
@@ -162,7 +177,7 @@ std::string count_of(int threads) {
 }
 
 // The tables of `isomesh-bench labels`.
-constexpr std::array kLabelTables = {"times", "sharing", "shapes", "volumes"};
+constexpr std::array kLabelTables = {"times", "shapes", "volumes"};
 
 int run_labels(const Options& options, std::uint32_t body_samples,
                const std::vector<std::string>& tables) {
@@ -181,13 +196,8 @@ int run_labels(const Options& options, std::uint32_t body_samples,
                  measure_label_findings(samples, {count, options.surface_nets_root}));
     }
   }
-  for (const Samples& samples : all) {
-    if (!has("sharing")) continue;
-    output.add(samples.name + ", gaps and overlaps",
-               to_json(measure_label_quality(samples, {counts.back(), options.surface_nets_root})));
-  }
   set_threads(counts.back());
-  if (has("shapes")) output.add("shapes", shape_table(kShapePlacements));
+  if (has("shapes")) output.add("shapes", shape_table());
   if (has("volumes")) output.add("volumes of labels over 1 000 voxels", volume_table(all));
   const bool without_nets = options.surface_nets_root.empty();
   output.end(missing_peers() + (without_nets ? kNoSurfaceNets + std::string("\n") : ""));
@@ -205,12 +215,47 @@ int run_accuracy(const Options& options, AccuracyPlan plan, bool only_certify) {
   for (const int threads : thread_counts(options)) {
     plan.threads = threads;
     if (only_certify) {
-      output.add(count_of(threads), Json::array({to_json(measure_certify(samples, plan))}));
-      output.add("labels of 20^3 samples, " + count_of(threads), to_json(measure_uneven(threads)));
+      output.add(count_of(threads), measure_certify(samples, plan));
+      output.add("labels of 20^3 samples, " + count_of(threads), measure_uneven(threads));
       continue;
     }
     if (threads < 2 && options.threads == 0) continue;  // each run takes minutes
-    output.add(count_of(threads), to_json(measure_approximations(samples, plan)));
+    output.add(count_of(threads), measure_approximations(samples, plan));
+  }
+  output.end();
+  return 0;
+}
+
+int run_report(const Options& options, const std::filesystem::path& daemon) {
+  const Plan plan = plan_of(options);
+  if (!options.json) std::cout << "# What `isomesh-bench report` measured\n\n";
+  Output output(options.json);
+  output.add("Machine", describe_machine());
+  output.add(
+      "What a user gets", service_findings(options, daemon),
+      "A daemon of one worker, measured over HTTP by the C++ client, beside the peers in the "
+      "same run. A job's times are those that it reports, from the samples on the disk to "
+      "the file on the disk. The peers have their samples in memory and write no file.");
+  output.add("Against the peers and the goals", measure_ratios(plan),
+             "The kernels and a job's way through them in one process, without the service. Ratios "
+             "are medians over pairs of runs, ours and the peer's in turn.");
+  output.add("Lattices and smoothings", lattices_of(plan),
+             "Surfaces are closed where they meet the volume's border. *ms* is the time of "
+             "extraction where nothing is smoothed, otherwise that of smoothing. *distance_steps* "
+             "is the largest distance of a vertex or a centre of a triangle from the extracted "
+             "surface.");
+  output.add(
+      "Time and memory against size", measure_growth(plan),
+      "A field whose surface grows with n^2; six tetrahedra, five passes. Memory is the peak "
+      "of a process of its own that holds the samples and runs the stage once; *least* is "
+      "samples + mesh.");
+  if (plan.volume) {
+    output.add(
+        "One number for the error",
+        measure_approximations(*plan.volume, {.iso = plan.iso, .threads = plan.threads.back()}),
+        "Jobs to drc of five passes. *Scan* is the surface as it was extracted. The peers "
+        "have the smoothed surface in memory and make as many triangles of it; they know no "
+        "bound.");
   }
   output.end();
   return 0;
@@ -237,7 +282,6 @@ int run_program(int argc, char** argv) {
       ->check(CLI::Range(1, 1024));
   app.add_option("--size", options.sizes, "Sizes of the synthetic field")
       ->check(CLI::Range(8, 2048));
-  app.add_flag("--large", options.large, "The synthetic field at 1024^3 too");
   app.add_option("--filter", options.filter, "Only what has a name that this expression matches")
       ->check(check_filter);
   app.add_flag("--json", options.json, "One JSON document instead of text");
@@ -248,17 +292,6 @@ int run_program(int argc, char** argv) {
                  "out without it")
       ->envname("ISOMESH_SURFACE_NETS_ROOT")
       ->check(CLI::ExistingDirectory);
-
-  std::filesystem::path folder;
-  CLI::App* report = app.add_subcommand(
-      "report", "Measure the paper's tables and figures again, for tests/bench/report.py");
-  report->add_option("DIR", folder, "Where report.json goes")->required();
-  std::vector<std::string> sections;
-  report->add_option("--only", sections, "Sections to measure; several are separated by commas")
-      ->delimiter(',')
-      ->check(
-          CLI::IsMember(std::vector<std::string>(kReportSections.begin(), kReportSections.end())));
-  report->fallthrough();
 
   std::filesystem::path daemon = daemon_beside_this();
   CLI::App* service =
@@ -273,11 +306,23 @@ int run_program(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   cluster->fallthrough();
 
+  CLI::App* report = app.add_subcommand(
+      "report", "Print all tables of tests/bench/REPORT.md, one after the other");
+  report->fallthrough();
+  CLI::App* lattices = app.add_subcommand(
+      "lattices",
+      "Every lattice, plain and regularised, and every smoothing of a ball and of "
+      "--volume: triangles, angles, volume, distance and time");
+  lattices->fallthrough();
+  CLI::App* budget = app.add_subcommand(
+      "budget", "Fail if a stage takes more than twice its usual share of a plain loop's time");
+  budget->fallthrough();
+
   std::uint32_t samples = 300;
   CLI::App* labels = app.add_subcommand(
       "labels",
       "Separate all labels of --volume, or of a synthetic body and of Debian's atlases, beside the "
-      "peers: times, gaps, overlaps and volumes; and how true simple shapes become");
+      "peers: times; and the areas, volumes and distances of simple shapes");
   labels->add_option("--samples", samples, "Of the synthetic body along each axis")
       ->check(CLI::Range(64, 1024));
   std::vector<std::string> tables;
@@ -313,13 +358,15 @@ int run_program(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
   if (*memory) return run_memory_command(stage, size_or_file, threads);
+  if (*budget) return run_budget(options);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
   if (*cluster) return run_cluster(options, daemon);
   accuracy.with_peers = !only_fast;
   if (*simplify || *certify) return run_accuracy(options, accuracy, bool(*certify));
   if (*labels) return run_labels(options, samples, tables);
-  return *report ? run_report(folder, usual_plan(daemon), sections) : run(options);
+  if (*lattices) return run_lattices(options);
+  return *report ? run_report(options, daemon) : run(options);
 }
 
 }  // namespace

@@ -1,19 +1,16 @@
 #include "tests/bench/memory.h"
 
-#include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <sstream>
-
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "tests/bench/label_body.h"
 #include "tests/bench/label_stages.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
+#include "tests/support/process.h"
 
 namespace isomesh::bench {
 namespace {
@@ -58,7 +55,7 @@ PeakMemory run_stage(const std::string& stage, const Samples& field) {
   }
   Stages stages(field, surface);
   if (stage == kJobStage) {
-    memory.output_bytes = stages.run_job(kPasses, MeshFormat::kDrc);
+    memory.output_bytes = stages.run_job(job_to(MeshFormat::kDrc, kPasses)).bytes;
     return memory;
   }
   stages.extract();
@@ -77,51 +74,13 @@ Samples samples_of(const std::string& stage, const std::string& size_or_file) {
   return stage == kLabelJobStage ? label_body(size) : synthetic_field(size);
 }
 
-std::string own_path() {
-  std::string path(4096, '\0');
-  const ssize_t length = readlink("/proc/self/exe", path.data(), path.size());
-  path.resize(length > 0 ? static_cast<std::size_t>(length) : 0);
-  return path;
-}
-
-// Runs this program with arguments and returns what it prints; empty when it fails.
-std::string run_self(std::vector<std::string> arguments) {
-  const std::string path = own_path();
-  int ends[2];
-  if (path.empty() || pipe(ends) != 0) return {};
-  std::vector<char*> argv;
-  arguments.insert(arguments.begin(), path);
-  argv.reserve(arguments.size() + 1);
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  posix_spawn_file_actions_addclose(&actions, ends[0]);
-  posix_spawn_file_actions_addclose(&actions, ends[1]);
-  pid_t child = 0;
-  const int failure = posix_spawn(&child, path.c_str(), &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  close(ends[1]);
-  std::string printed;
-  char block[256];
-  for (ssize_t got = 1; failure == 0 && got > 0;) {
-    got = read(ends[0], block, sizeof block);
-    if (got > 0) printed.append(block, static_cast<std::size_t>(got));
-  }
-  close(ends[0]);
-  int status = 1;
-  if (failure != 0 || waitpid(child, &status, 0) != child || status != 0) return {};
-  return printed;
-}
-
 }  // namespace
 
 std::optional<PeakMemory> measure_memory(const std::string& stage, const std::string& size_or_file,
                                          int threads) {
+  const std::string self = std::filesystem::read_symlink("/proc/self/exe");
   std::istringstream answer(
-      run_self({kMemoryCommand, stage, size_or_file, std::to_string(threads)}));
+      test::run({self, kMemoryCommand, stage, size_or_file, std::to_string(threads)}).output);
   PeakMemory memory;
   if (answer >> memory.peak_bytes >> memory.input_bytes >> memory.output_bytes >>
       memory.layer_bytes) {

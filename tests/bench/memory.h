@@ -21,22 +21,17 @@ struct PeakMemory {
   std::uint64_t input_bytes = 0;
   std::uint64_t output_bytes = 0;  // the mesh, or what was encoded
   std::uint64_t layer_bytes = 0;   // the bound that smoothing gives of its own memory
-
-  double ratio() const {
-    return static_cast<double>(peak_bytes) / static_cast<double>(input_bytes + output_bytes);
-  }
 };
 
-inline constexpr const char* kExtractStage = "extract";
-inline constexpr const char* kSmoothStage = "smooth";       // extract, connectivity and 5 passes
-inline constexpr const char* kJobStage = "job";             // with the encoder
-inline constexpr const char* kLabelJobStage = "label-job";  // to a GLB
+inline constexpr const char* kExtractStage = "extraction";
+inline constexpr const char* kSmoothStage = "extraction + smoothing";  // 5 passes
+inline constexpr const char* kJobStage = "job";                        // with the encoder
+inline constexpr const char* kLabelJobStage = "label-job";             // to a GLB
 inline constexpr const char* kPeerExtractStage = "flying-edges";
 inline constexpr const char* kPeerJobStage = "peer-pipeline";
 
 // On the synthetic field of that size, six tetrahedra; by labels, on the body of that size or on a
-// file of labels. Empty, with the reason on standard error,
-// when the process could not be run or did not answer.
+// file of labels. Empty, with a message on standard error, if the process does not answer.
 std::optional<PeakMemory> measure_memory(const std::string& stage, const std::string& size_or_file,
                                          int threads);
 

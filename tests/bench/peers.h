@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "server/mesh/measure/surface_view.h"
-#include "tests/bench/label_walls.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
 
@@ -37,13 +36,11 @@ class Peers {
   static void set_threads(int threads);
 
   void flying_edges();
-  void marching_cubes();
   // One run a label, of which all meshes are kept.
   void discrete_flying_edges(std::span<const std::int64_t> labels);
   // Smooths each of them by itself as VTK's example GenerateModelsFromLabels does:
   // vtkWindowedSincPolyDataFilter with 15 passes and a pass band of 0.001, coordinates normalised.
   void smooth_labels();
-  Walls label_walls() const;  // what the last of these two left
   // These take the last Flying Edges mesh, which they keep.
   void smooth(int passes);         // vtkSmoothPolyDataFilter
   void windowed_sinc(int passes);  // vtkWindowedSincPolyDataFilter

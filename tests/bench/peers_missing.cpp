@@ -17,10 +17,8 @@ Peers::Peers(const Samples&, double) { throw std::logic_error(peers_description(
 Peers::~Peers() = default;
 void Peers::set_threads(int) {}
 void Peers::flying_edges() {}
-void Peers::marching_cubes() {}
 void Peers::discrete_flying_edges(std::span<const std::int64_t>) {}
 void Peers::smooth_labels() {}
-Walls Peers::label_walls() const { return {}; }
 void Peers::smooth(int) {}
 void Peers::windowed_sinc(int) {}
 std::uint64_t Peers::draco() const { return 0; }

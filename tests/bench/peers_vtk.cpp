@@ -4,15 +4,16 @@
 #include <malloc.h>
 #include <vtkCellArray.h>
 #include <vtkDataArray.h>
+#include <vtkDecimatePro.h>
 #include <vtkDiscreteFlyingEdges3D.h>
 #include <vtkFloatArray.h>
 #include <vtkFlyingEdges3D.h>
 #include <vtkImageData.h>
-#include <vtkMarchingCubes.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkQuadricDecimation.h>
 #include <vtkSmartPointer.h>
 #include <vtkSmoothPolyDataFilter.h>
 #include <vtkTypeInt32Array.h>
@@ -102,18 +103,63 @@ std::uint64_t draco_of(vtkPolyData* mesh) {
   return encode_in_one_call(positions_of(mesh), corners_of(mesh));
 }
 
-void append(vtkPolyData* mesh, mesh::WallSides sides, Walls& walls) {
-  if (mesh->GetNumberOfPolys() == 0) return;
-  const auto first = static_cast<std::uint32_t>(walls.positions.size());
-  const auto positions = positions_of(mesh);
-  walls.positions.insert(walls.positions.end(), positions.begin(), positions.end());
-  const auto corners = corners_of(mesh);
-  for (std::size_t c = 0; c < corners.size(); c += 3) {
-    walls.triangles.push_back({first + static_cast<std::uint32_t>(corners[c]),
-                               first + static_cast<std::uint32_t>(corners[c + 1]),
-                               first + static_cast<std::uint32_t>(corners[c + 2])});
-    walls.sides.push_back(sides);
+vtkSmartPointer<vtkPolyData> to_vtk(const mesh::SurfaceView& surface) {
+  const vtkNew<vtkPoints> points;
+  points->SetDataTypeToFloat();
+  points->SetNumberOfPoints(static_cast<vtkIdType>(surface.positions.size()));
+  for (std::size_t v = 0; v < surface.positions.size(); ++v) {
+    points->SetPoint(static_cast<vtkIdType>(v), surface.positions[v].data());
   }
+  const vtkNew<vtkCellArray> polys;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const vtkIdType corners[] = {a, b, c};
+    polys->InsertNextCell(3, corners);
+  }
+  auto result = vtkSmartPointer<vtkPolyData>::New();
+  result->SetPoints(points);
+  result->SetPolys(polys);
+  return result;
+}
+
+Decimated from_vtk(vtkPolyData* data) {
+  Decimated result;
+  for (vtkIdType v = 0; v < data->GetNumberOfPoints(); ++v) {
+    const double* at = data->GetPoint(v);
+    result.positions.push_back(
+        {static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])});
+  }
+  vtkCellArray* polys = data->GetPolys();
+  polys->InitTraversal();
+  vtkIdType count = 0;
+  const vtkIdType* corners = nullptr;
+  while (polys->GetNextCell(count, corners) != 0) {
+    if (count != 3) continue;  // lines that a decimation may leave are no surface
+    result.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
+                                static_cast<std::uint32_t>(corners[1]),
+                                static_cast<std::uint32_t>(corners[2])});
+  }
+  return result;
+}
+
+double reduction(const mesh::SurfaceView& surface, std::size_t triangles) {
+  return 1 - static_cast<double>(triangles) / static_cast<double>(surface.triangles.size());
+}
+
+Decimated quadric(const mesh::SurfaceView& surface, std::size_t triangles) {
+  const vtkNew<vtkQuadricDecimation> filter;
+  filter->SetInputData(to_vtk(surface));
+  filter->SetTargetReduction(reduction(surface, triangles));
+  filter->Update();
+  return from_vtk(filter->GetOutput());
+}
+
+Decimated pro(const mesh::SurfaceView& surface, std::size_t triangles) {
+  const vtkNew<vtkDecimatePro> filter;
+  filter->SetInputData(to_vtk(surface));
+  filter->SetTargetReduction(reduction(surface, triangles));
+  filter->PreserveTopologyOn();
+  filter->Update();
+  return from_vtk(filter->GetOutput());
 }
 
 }  // namespace
@@ -142,8 +188,6 @@ void Peers::set_threads(int threads) { set_vtk_threads(threads); }
 
 void Peers::flying_edges() { vtk_->mesh = contour<vtkFlyingEdges3D>(vtk_->image, vtk_->iso); }
 
-void Peers::marching_cubes() { vtk_->other = contour<vtkMarchingCubes>(vtk_->image, vtk_->iso); }
-
 void Peers::discrete_flying_edges(std::span<const std::int64_t> labels) {
   vtk_->labels.clear();
   for (const std::int64_t label : labels) {
@@ -167,14 +211,6 @@ void Peers::smooth_labels() {
     filter->Update();
     mesh = filter->GetOutput();
   }
-}
-
-Walls Peers::label_walls() const {
-  Walls walls;
-  for (std::size_t l = 0; l < vtk_->labels.size(); ++l) {
-    append(vtk_->labels[l], {0, static_cast<std::uint16_t>(l + 1)}, walls);
-  }
-  return walls;
 }
 
 void Peers::smooth(int passes) {
@@ -203,6 +239,10 @@ void Peers::release() {
 MeshSize Peers::size() const {
   return {static_cast<std::uint64_t>(vtk_->mesh->GetNumberOfPoints()),
           static_cast<std::uint64_t>(vtk_->mesh->GetNumberOfPolys())};
+}
+
+std::vector<DecimationPeer> decimation_peers() {
+  return {{"vtkQuadricDecimation", quadric}, {"vtkDecimatePro", pro}};
 }
 
 }  // namespace isomesh::bench

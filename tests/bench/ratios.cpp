@@ -3,13 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <functional>
-#include <iomanip>
 #include <regex>
-#include <sstream>
 
 #include "tests/bench/draco_call.h"
 #include "tests/bench/memory.h"
-#include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"
 #include "tests/bench/timing.h"
@@ -22,6 +19,7 @@ constexpr Goal kExtractGoal = {0.5};
 constexpr Goal kFreshMemoryGoal = {0.6};
 constexpr Goal kBccGoal = {1.5};
 constexpr Goal kRegularGoal = {1.4};
+constexpr Goal kRegularBccGoal = {2};
 constexpr Goal kSmoothRateGoal = {200, false};   // Mvertex-passes/s
 constexpr Goal kSmoothFactorGoal = {40, false};  // times vtkSmoothPolyDataFilter
 constexpr Goal kDrcJobGoal = {0.35};
@@ -34,6 +32,7 @@ constexpr Goal kDecodeGoal = {1.05};
 constexpr Goal kGrowthGoal = {1.1};  // linear within the noise
 constexpr std::uint32_t kCompareSize = 256;
 constexpr std::uint32_t kMemorySize = 256;
+constexpr const char* kPipeline = " / Flying Edges + windowed sinc (20) + Draco";
 
 double rate(const MeshSize& size, int passes, double ms) {
   return static_cast<double>(size.vertices) * passes / ms / 1000;
@@ -41,74 +40,57 @@ double rate(const MeshSize& size, int passes, double ms) {
 
 std::string rate_text(double rate) { return fixed(rate, 0) + " Mvp/s"; }
 
+MeshParameters without_normals() {
+  MeshParameters parameters;
+  parameters.normals = false;
+  return parameters;
+}
+
 // The findings about one volume.
 class Comparison {
  public:
-  Comparison(const Samples& samples, double iso, int threads,
-             const std::function<bool(std::string)>& wanted, std::vector<Finding>& findings)
+  Comparison(const Samples& samples, double iso, const Plan& plan, std::vector<Finding>& findings)
       : samples_(samples),
         stages_(samples, {.iso = iso}),
         iso_(iso),
-        threads_(threads),
-        wanted_(wanted),
+        threads_(plan.threads.back()),
+        filter_(plan.filter),
         findings_(findings) {
     stages_.extract();
   }
 
   void run() {
-    if (wanted("smooth_rate")) compare_smoothing();
-    compare_with_plain("extract_regular", "regularised", Scheme::kSix, true, kRegularGoal);
-    compare_with_plain("extract_bcc", "body-centred", Scheme::kBcc, false, kBccGoal);
-    compare_with_plain("extract_bcc_regular", "body-centred, regularised", Scheme::kBcc, true,
-                       kBccGoal);
+    compare_smoothing();
+    compare_with_plain("regularised", Scheme::kSix, true, kRegularGoal);
+    compare_with_plain("body-centred", Scheme::kBcc, false, kBccGoal);
+    compare_with_plain("body-centred, regularised", Scheme::kBcc, true, kRegularBccGoal);
     compare_encoding();
     if (!peers_available()) return;
-    if (wanted("extract_reused_memory")) compare_extraction("extract_reused_memory", false);
-    if (wanted("extract_fresh_memory")) compare_extraction("extract_fresh_memory", true);
-    if (wanted("stages_glb")) compare_stages();
-    for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
-      const std::string name = "job_" + std::string(to_string(format));
-      if (wanted(name)) compare_job(name, format);
-    }
+    compare_with_peers();
   }
 
  private:
-  std::string full(const std::string& name) const { return "ratio/" + name + "/" + samples_.name; }
-  bool wanted(const std::string& name) const { return wanted_(full(name)); }
-
-  void add(const std::string& name, const std::string& what, const Paired& times, Goal goal) {
-    findings_.push_back({full(name), what + ", " + samples_.name, milliseconds(times.ours_ms),
-                         milliseconds(times.peer_ms), times.ratio, goal});
+  bool wanted(const std::string& what) const {
+    return std::regex_search(what + ", " + samples_.name, filter_);
   }
 
-  void compare_extraction(const std::string& name, bool fresh) {
-    Peers peers(samples_, iso_);
-    const Timed ours = {[&] { stages_.extract(); },
-                        [&, fresh] {
-                          if (fresh) stages_.release_memory();
-                        }};
-    const Timed theirs = {[&] { peers.flying_edges(); }, [&] { peers.release(); }};
-    add(name,
-        std::string("extraction, 6 tetrahedra, ") + (fresh ? "fresh" : "reused") +
-            " memory / Flying Edges",
-        time_in_pairs(ours, theirs), fresh ? kFreshMemoryGoal : kExtractGoal);
+  void add(const std::string& what, const Timed& ours, const Timed& theirs, Goal goal) {
+    if (!wanted(what)) return;
+    findings_.push_back(compared(what + ", " + samples_.name, time_in_pairs(ours, theirs), goal));
   }
 
-  void compare_with_plain(const std::string& name, const std::string& what, Scheme scheme,
-                          bool regularize, Goal goal) {
-    if (!wanted(name)) return;
+  void compare_with_plain(const std::string& what, Scheme scheme, bool regularize, Goal goal) {
     Stages other(samples_, {.iso = iso_, .scheme = scheme, .regularize = regularize});
-    const Timed ours = {[&] { other.extract(); }};
-    const Timed plain = {[&] { stages_.extract(); }};
-    add(name, "extraction, " + what + " / plain, 6 tetrahedra", time_in_pairs(ours, plain), goal);
+    add("extraction, " + what + " / plain, 6 tetrahedra", {[&] { other.extract(); }},
+        {[&] { stages_.extract(); }}, goal);
   }
 
   void compare_smoothing() {
+    const std::string what = "smoothing, 5 passes with connectivity, Mvertex-passes/s";
+    if (!wanted(what)) return;
     const Timed ours = {[&] { stages_.smooth(kPasses); }, [&] { stages_.extract(); }};
-    const std::string what = "smoothing, 5 passes with connectivity";
     if (!peers_available()) {
-      const double ms = median_ms(ours, kPairs);
-      add_rate(what, rate(stages_.size(), kPasses, ms));
+      add_rate(what, rate(stages_.size(), kPasses, median_ms(ours, kPairs)));
       return;
     }
     Peers peers(samples_, iso_);
@@ -120,116 +102,96 @@ class Comparison {
     const double scale =
         static_cast<double>(stages_.size().vertices) / static_cast<double>(peers.size().vertices);
     add_rate(what, our_rate);
-    findings_.push_back(
-        {full("smooth_factor"), "rate of that / vtkSmoothPolyDataFilter, " + samples_.name,
-         rate_text(our_rate), rate_text(peer_rate), scale / times.ratio, kSmoothFactorGoal});
+    findings_.push_back({"rate of that / vtkSmoothPolyDataFilter, " + samples_.name,
+                         rate_text(our_rate), rate_text(peer_rate), scale / times.ratio,
+                         kSmoothFactorGoal});
   }
 
   void add_rate(const std::string& what, double our_rate) {
-    findings_.push_back({full("smooth_rate"), what + ", Mvertex-passes/s, " + samples_.name,
-                         rate_text(our_rate), "", our_rate, kSmoothRateGoal});
+    findings_.push_back(
+        {what + ", " + samples_.name, rate_text(our_rate), "", our_rate, kSmoothRateGoal});
   }
 
   // Our streams beside those that libdraco makes of the same smoothed mesh with the same
   // parameters.
   void compare_encoding() {
-    if (!wanted("draco_stream") && !wanted("draco_stream_one_thread") && !wanted("draco_blocks") &&
-        !wanted("draco_bytes") && !wanted("draco_decode")) {
-      return;
-    }
     stages_.extract();
     stages_.smooth(kPasses);
     const auto peer = [&] {
       return encode_in_one_call(stages_.positions(), stages_.triangles(), DracoParameters{});
     };
     const Timed theirs = {[&] { peer(); }};
-    const Timed stream = {[&] { stages_.encode(Encoding::kEdgebreakerWhole); }};
-    const Timed blocks = {[&] { stages_.encode(Encoding::kEdgebreakerChunks); }};
-    if (wanted("draco_stream")) {
-      add("draco_stream", "drc / libdraco, same parameters", time_in_pairs(stream, theirs),
-          kStreamGoal);
-    }
-    if (wanted("draco_blocks")) {
-      add("draco_blocks", "glb / libdraco's one stream", time_in_pairs(blocks, theirs),
-          kBlocksGoal);
-    }
-    if (wanted("draco_stream_one_thread")) {
-      set_threads(1);
-      add("draco_stream_one_thread", "drc on one thread / libdraco", time_in_pairs(stream, theirs),
-          kStreamOnOneThreadGoal);
-      set_threads(threads_);
-    }
+    const Timed stream = {[&] { stages_.encode(MeshFormat::kDrc); }};
+    add("drc / libdraco, same parameters", stream, theirs, kStreamGoal);
+    add("glb / libdraco's one stream",
+        {[&] { stages_.encode(MeshFormat::kGlb, without_normals()); }}, theirs, kBlocksGoal);
+    set_threads(1);
+    add("drc on one thread / libdraco", stream, theirs, kStreamOnOneThreadGoal);
+    set_threads(threads_);
+    const std::string bytes = "bytes of drc / libdraco's";
+    const std::string decoding = "libdraco's decoding of drc / of its own stream";
+    if (!wanted(bytes) && !wanted(decoding)) return;
     const std::string ours_drc = stages_.drc();
     const std::string peer_drc = peer();
-    if (wanted("draco_bytes")) {
-      findings_.push_back(
-          {full("draco_bytes"), "bytes of drc / libdraco's, " + samples_.name,
-           std::to_string(ours_drc.size()), std::to_string(peer_drc.size()),
-           static_cast<double>(ours_drc.size()) / static_cast<double>(peer_drc.size()),
-           kBytesGoal});
-    }
-    if (wanted("draco_decode")) {
-      add("draco_decode", "libdraco's decoding of drc / of its own stream",
-          time_in_pairs({[&] { decode_in_one_call(ours_drc); }},
-                        {[&] { decode_in_one_call(peer_drc); }}),
-          kDecodeGoal);
-    }
+    findings_.push_back(
+        {bytes + ", " + samples_.name, std::to_string(ours_drc.size()),
+         std::to_string(peer_drc.size()),
+         static_cast<double>(ours_drc.size()) / static_cast<double>(peer_drc.size()), kBytesGoal});
+    add(decoding, {[&] { decode_in_one_call(ours_drc); }}, {[&] { decode_in_one_call(peer_drc); }},
+        kDecodeGoal);
   }
 
-  // Compares exactly the stages of the peers' pipeline; a job also measures quality.
-  void compare_stages() {
+  void compare_with_peers() {
     Peers peers(samples_, iso_);
-    const Timed ours = {[&] {
+    const auto release = [&] { peers.release(); };
+    const auto extract = [&] { stages_.extract(); };
+    const Timed flying_edges = {[&] { peers.flying_edges(); }, release};
+    const Timed pipeline = {[&] { peers.pipeline(); }, release};
+    add("extraction, 6 tetrahedra, reused memory / Flying Edges", {extract}, flying_edges,
+        kExtractGoal);
+    add("extraction, 6 tetrahedra, fresh memory / Flying Edges",
+        {extract, [&] { stages_.release_memory(); }}, flying_edges, kFreshMemoryGoal);
+    // Exactly the stages of the peers' pipeline; a job also measures quality.
+    const auto stages_alone = [&] {
       stages_.extract();
       stages_.smooth(kPasses);
-      stages_.encode(Encoding::kEdgebreakerChunks);
-    }};
-    const Timed theirs = {[&] { peers.pipeline(); }, [&] { peers.release(); }};
-    add("stages_glb", "extraction + smoothing + glb / Flying Edges + windowed sinc (20) + Draco",
-        time_in_pairs(ours, theirs), kGlbJobGoal);
-  }
-
-  void compare_job(const std::string& name, MeshFormat format) {
-    Peers peers(samples_, iso_);
-    const Timed ours = {[&] { stages_.run_job(kPasses, format); }};
-    const Timed theirs = {[&] { peers.pipeline(); }, [&] { peers.release(); }};
-    add(name,
-        "whole job to " + std::string(to_string(format)) +
-            " / Flying Edges + windowed sinc (20) + Draco",
-        time_in_pairs(ours, theirs), format == MeshFormat::kDrc ? kDrcJobGoal : kGlbJobGoal);
+      stages_.encode(MeshFormat::kGlb, without_normals());
+    };
+    add(std::string("extraction + smoothing + glb") + kPipeline, {stages_alone}, pipeline,
+        kGlbJobGoal);
+    const auto job = [&](MeshFormat format) {
+      return Timed{[&, format] { stages_.run_job(job_to(format, kPasses)); }};
+    };
+    add(std::string("whole job to drc") + kPipeline, job(MeshFormat::kDrc), pipeline, kDrcJobGoal);
+    add(std::string("whole job to glb") + kPipeline, job(MeshFormat::kGlb), pipeline, kGlbJobGoal);
   }
 
   const Samples& samples_;
   Stages stages_;
-  double iso_;
-  int threads_;
-  const std::function<bool(std::string)>& wanted_;
+  const double iso_;
+  const int threads_;
+  const std::regex filter_;
   std::vector<Finding>& findings_;
 };
 
 Finding growth_of_time(const std::vector<std::uint32_t>& sizes) {
   std::vector<std::array<double, 2>> points;
-  std::string ours;
   for (const std::uint32_t size : sizes) {
     const Samples field = synthetic_field(size);
     Stages stages(field, {.iso = kFieldIso});
     stages.extract();  // to warm up
+    const auto both = [&] {
+      stages.extract();
+      stages.smooth(kPasses);
+    };
     constexpr int kRuns = 5;
-    const double ms = median_ms({[&] {
-                                  stages.extract();
-                                  stages.smooth(kPasses);
-                                }},
-                                kRuns);
+    const double ms = median_ms({both}, kRuns);
     points.push_back({static_cast<double>(field.dims.samples() + stages.size().triangles), ms});
   }
-  ours = milliseconds(points.front()[1]) + " .. " + milliseconds(points.back()[1]);
-  return {"ratio/growth_of_time",
-          "exponent of extraction + smoothing time over samples + triangles, " +
+  return {"exponent of extraction + smoothing time over samples + triangles, " +
               std::to_string(sizes.front()) + "^3 to " + std::to_string(sizes.back()) + "^3",
-          ours,
-          "",
-          log_log_slope(points),
-          kGrowthGoal};
+          milliseconds(points.front()[1]) + " .. " + milliseconds(points.back()[1]), "",
+          log_log_slope(points), kGrowthGoal};
 }
 
 // Peak over input + output + O(slice): what each thread may hold of planes while it walks through
@@ -244,89 +206,37 @@ std::optional<Finding> memory_of(const std::string& stage, int threads) {
   if (stage == kSmoothStage) slices += memory->layer_bytes;
   const auto allowed =
       static_cast<double>(memory->input_bytes + memory->output_bytes + slices + kConstant);
-  return Finding{"ratio/memory_" + stage,
-                 "peak memory of " +
-                     std::string(stage == kExtractStage ? "extraction" : "extraction + smoothing") +
-                     " / (input + output + slices), field-" + std::to_string(kMemorySize),
-                 mebibytes(memory->peak_bytes),
-                 "",
-                 static_cast<double>(memory->peak_bytes) / allowed,
-                 Goal{1}};
+  return Finding{"peak memory of " + stage + " / (input + output + slices), field-" +
+                     std::to_string(kMemorySize),
+                 mebibytes(memory->peak_bytes), "",
+                 static_cast<double>(memory->peak_bytes) / allowed, Goal{1}};
 }
 
 }  // namespace
 
-bool Finding::reached() const {
-  return !goal || (goal->at_most ? value <= goal->value : value >= goal->value);
-}
-
-std::vector<Finding> measure_findings(const Plan& plan) {
-  const std::regex filter(plan.filter);
-  const std::function<bool(std::string)> wanted = [&](const std::string& name) {
-    return std::regex_search(name, filter);
-  };
+std::vector<Finding> measure_ratios(const Plan& plan) {
   const int threads = plan.threads.back();
   set_threads(threads);
   Peers::set_threads(threads);
 
   std::vector<Finding> findings;
-  if (plan.volume) Comparison(*plan.volume, plan.iso, threads, wanted, findings).run();
+  if (plan.volume) Comparison(*plan.volume, plan.iso, plan, findings).run();
   const auto& sizes = plan.field_sizes;
   if (!sizes.empty()) {
     const bool has_usual = std::ranges::find(sizes, kCompareSize) != sizes.end();
     const Samples field = synthetic_field(has_usual ? kCompareSize : sizes.front());
-    Comparison(field, kFieldIso, threads, wanted, findings).run();
+    Comparison(field, kFieldIso, plan, findings).run();
   }
+  const std::regex filter(plan.filter);
   constexpr std::size_t kFewestForGrowth = 3;
-  if (sizes.size() >= kFewestForGrowth && wanted("ratio/growth_of_time")) {
+  if (sizes.size() >= kFewestForGrowth && std::regex_search("exponent of time", filter)) {
     findings.push_back(growth_of_time(sizes));
   }
+  if (!std::regex_search("peak memory", filter)) return findings;
   for (const char* stage : {kExtractStage, kSmoothStage}) {
-    if (!wanted(std::string("ratio/memory_") + stage)) continue;
     if (const auto finding = memory_of(stage, threads)) findings.push_back(*finding);
   }
   return findings;
-}
-
-std::string to_table(const std::vector<Finding>& findings) {
-  std::size_t width = 0;
-  for (const Finding& finding : findings) width = std::max(width, finding.what.size());
-  std::ostringstream text;
-  const auto row = [&](const std::string& what, const std::string& ours, const std::string& peer,
-                       const std::string& value, const std::string& goal,
-                       const std::string& verdict) {
-    text << std::left << std::setw(static_cast<int>(width) + 2) << what << std::right
-         << std::setw(20) << ours << std::setw(12) << peer << std::setw(9) << value << std::setw(10)
-         << goal << "  " << verdict << '\n';
-  };
-  row("", "isomesh", "peer", "value", "goal", "");
-  for (const Finding& finding : findings) {
-    const std::string goal =
-        finding.goal ? (finding.goal->at_most ? "<= " : ">= ") + fixed(finding.goal->value, 2) : "";
-    row(finding.what, finding.ours, finding.peer, fixed(finding.value, finding.value < 10 ? 2 : 0),
-        goal,
-        !finding.goal       ? ""
-        : finding.reached() ? "reached"
-                            : "NOT REACHED");
-  }
-  return text.str();
-}
-
-Json to_json(const std::vector<Finding>& findings) {
-  Json rows = Json::array();
-  for (const Finding& finding : findings) {
-    Json row = {{"name", finding.name},
-                {"what", finding.what},
-                {"isomesh", finding.ours},
-                {"value", finding.value}};
-    if (!finding.peer.empty()) row["peer"] = finding.peer;
-    if (finding.goal) {
-      row[finding.goal->at_most ? "goal_at_most" : "goal_at_least"] = finding.goal->value;
-      row["reached"] = finding.reached();
-    }
-    rows.push_back(std::move(row));
-  }
-  return rows;
 }
 
 }  // namespace isomesh::bench

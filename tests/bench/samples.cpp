@@ -27,20 +27,6 @@ struct Waves {
   std::vector<float> cosine;
 };
 
-// One axis of a resampling: between which two samples each new one lies, and how far along.
-struct AxisMap {
-  AxisMap(std::uint32_t from, std::uint32_t to) : low(to), share(to) {
-    for (std::uint32_t i = 0; i < to; ++i) {
-      const double place = static_cast<double>(i) * (from - 1) / (to - 1);
-      low[i] = std::min(static_cast<std::uint32_t>(place), from - 2);
-      share[i] = static_cast<float>(place - low[i]);
-    }
-  }
-
-  std::vector<std::uint32_t> low;
-  std::vector<float> share;
-};
-
 }  // namespace
 
 LoadedVolume load_volume(const std::filesystem::path& path) {
@@ -87,43 +73,6 @@ Samples synthetic_field(std::uint32_t n) {
     }
   });
   return field;
-}
-
-Samples resample(const Samples& samples, const mesh::Dims& dims) {
-  const mesh::Dims from = samples.dims;
-  const AxisMap x_map(from.x, dims.x);
-  const AxisMap y_map(from.y, dims.y);
-  const AxisMap z_map(from.z, dims.z);
-
-  Samples result;
-  result.name = samples.name;
-  result.type = SampleType::kFloat32;
-  result.dims = dims;
-  result.geometry = samples.geometry;
-  result.geometry.spacing[0] *= (from.x - 1.0) / (dims.x - 1.0);
-  result.geometry.spacing[1] *= (from.y - 1.0) / (dims.y - 1.0);
-  result.geometry.spacing[2] *= (from.z - 1.0) / (dims.z - 1.0);
-  result.bytes.resize(dims.samples() * sizeof(float));
-  auto* out = reinterpret_cast<float*>(result.bytes.data());
-  visit_samples(samples, [&](const auto* in) {
-    const std::size_t row = from.x;
-    const std::size_t plane = row * from.y;
-    for (std::uint32_t k = 0; k < dims.z; ++k) {
-      for (std::uint32_t j = 0; j < dims.y; ++j) {
-        for (std::uint32_t i = 0; i < dims.x; ++i) {
-          const auto* corner = in + z_map.low[k] * plane + y_map.low[j] * row + x_map.low[i];
-          const auto along_x = [&](std::size_t offset) {
-            return std::lerp(static_cast<float>(corner[offset]),
-                             static_cast<float>(corner[offset + 1]), x_map.share[i]);
-          };
-          const float near = std::lerp(along_x(0), along_x(row), y_map.share[j]);
-          const float far = std::lerp(along_x(plane), along_x(plane + row), y_map.share[j]);
-          *out++ = std::lerp(near, far, z_map.share[k]);
-        }
-      }
-    }
-  });
-  return result;
 }
 
 }  // namespace isomesh::bench

@@ -50,8 +50,4 @@ LoadedVolume load_volume(const std::filesystem::path& path);
 inline constexpr double kFieldIso = 127.5;
 Samples synthetic_field(std::uint32_t n);
 
-// The same box of space on another lattice, trilinear, as float32. Both lattices need two samples
-// along each axis at least.
-Samples resample(const Samples& samples, const mesh::Dims& dims);
-
 }  // namespace isomesh::bench

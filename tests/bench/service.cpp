@@ -9,7 +9,6 @@
 #include "client/isomesh/client.h"
 #include "tests/api/http.h"
 #include "tests/bench/daemon.h"
-#include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
@@ -27,8 +26,6 @@ constexpr Goal kUploadGoal = {10};   // milliseconds
 constexpr std::uint32_t kSmallSize = 32;
 constexpr std::uint32_t kUploadSize = 128;  // 2 MiB of uint8
 constexpr int kSmallRuns = 51;
-
-double wall_ms(const std::function<void()>& run) { return time_ms({run}); }
 
 // Iso-values whose jobs do the same work and are yet not the same job, so that no mesh is taken
 // from an earlier one: so little below a value that no sample lies between.
@@ -76,22 +73,6 @@ class Jobs {
   IsoValues isos_;
 };
 
-Paired in_pairs(const std::function<double()>& ours, const std::function<double()>& peer) {
-  ours();
-  peer();
-  std::vector<double> our_times;
-  std::vector<double> peer_times;
-  std::vector<double> ratios;
-  for (int pair = 0; pair < kPairs; ++pair) {
-    const bool we_first = pair % 2 == 0;
-    if (we_first) our_times.push_back(ours());
-    peer_times.push_back(peer());
-    if (!we_first) our_times.push_back(ours());
-    ratios.push_back(our_times.back() / peer_times.back());
-  }
-  return {median(our_times), median(peer_times), median(ratios)};
-}
-
 std::string raw_query(std::uint32_t size) {
   const std::string n = std::to_string(size);
   return "dims=" + n + ',' + n + ',' + n + "&type=uint8";
@@ -115,17 +96,11 @@ Finding small_request(const Daemon& daemon) {
   for (int run = 0; run <= kSmallRuns; ++run) {
     const std::string target =
         "/v1/mesh?" + raw_query(kSmallSize) + "&format=glb&iso=" + std::to_string(isos.next());
-    const double ms = wall_ms(
-        [&] { expect(test::answer_to(daemon.url(), test::request("POST", target, body)), 200); });
+    const double ms = time_ms(
+        {[&] { expect(test::answer_to(daemon.url(), test::request("POST", target, body)), 200); }});
     if (run > 0) times.push_back(ms);
   }
-  const double ms = median(times);
-  return {"service/small_request",
-          "32^3 samples in, mesh out, one request, ms",
-          milliseconds(ms),
-          "",
-          ms,
-          kSmallJobGoal};
+  return timed("32^3 samples in, mesh out, one request", median(times), kSmallJobGoal);
 }
 
 Finding small_upload(const Daemon& daemon) {
@@ -133,15 +108,14 @@ Finding small_upload(const Daemon& daemon) {
   std::vector<double> times;
   for (int run = 0; run <= kSmallRuns; ++run) {
     ++body.front();  // another volume
-    const double ms = wall_ms([&] {
+    const double ms = time_ms({[&] {
       expect(test::answer_to(daemon.url(),
                              test::request("POST", "/v1/volumes?" + raw_query(kUploadSize), body)),
              201);
-    });
+    }});
     if (run > 0) times.push_back(ms);
   }
-  const double ms = median(times);
-  return {"service/upload", "upload of 2 MiB, ms", milliseconds(ms), "", ms, kUploadGoal};
+  return timed("upload of 2 MiB", median(times), kUploadGoal);
 }
 
 void compare_with_peers(const Daemon& daemon, const ServicePlan& plan,
@@ -157,19 +131,18 @@ void compare_with_peers(const Daemon& daemon, const ServicePlan& plan,
     return time_ms({[&] { peers.flying_edges(); }, [&] { peers.release(); }});
   };
   const auto add = [&](const std::string& what, MeshFormat format, const Measured& measured,
-                       const std::function<double()>& peer, const std::string& short_name,
-                       Goal goal) {
-    const Paired times = in_pairs([&] { return jobs.run(format, measured); }, peer);
-    findings.push_back({"service/" + short_name + '/' + name, what + ", " + name,
-                        milliseconds(times.ours_ms), milliseconds(times.peer_ms), times.ratio,
-                        goal});
+                       const std::function<double()>& peer, Goal goal) {
+    const auto ours = [&] { return jobs.run(format, measured); };
+    ours();
+    peer();
+    findings.push_back(compared(what + ", " + name, pair_times(ours, peer, kPairs), goal));
   };
   const std::string pipeline_name = " / Flying Edges + windowed sinc (20) + Draco";
-  add("job to drc" + pipeline_name, MeshFormat::kDrc, without_queue, pipeline, "job_drc", kDrcGoal);
-  add("job to glb" + pipeline_name, MeshFormat::kGlb, without_queue, pipeline, "job_glb", kGlbGoal);
-  add(
-      "extraction as the job reports it / Flying Edges", MeshFormat::kGlb,
-      [](const Timing& timing) { return timing.extract; }, flying_edges, "extract", kExtractGoal);
+  add("job to drc" + pipeline_name, MeshFormat::kDrc, without_queue, pipeline, kDrcGoal);
+  add("job to glb" + pipeline_name, MeshFormat::kGlb, without_queue, pipeline, kGlbGoal);
+  const auto extract = [](const Timing& timing) { return timing.extract; };
+  add("extraction as the job reports it / Flying Edges", MeshFormat::kGlb, extract, flying_edges,
+      kExtractGoal);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "tests/bench/ratios.h"
+#include "tests/bench/findings.h"
 
 namespace isomesh::bench {
 

@@ -40,33 +40,14 @@ mesh::Lattice<T> lattice_of(const Samples& samples, const T* data) {
   return {data, samples.dims, mesh::lattice_to_space(samples.geometry)};
 }
 
-constexpr int kSequentialSpeed = 10;
-
-}  // namespace
-
-const char* name_of(Encoding encoding) {
-  switch (encoding) {
-    case Encoding::kEdgebreakerWhole:
-      return "edgebreaker_whole";
-    case Encoding::kSequentialWhole:
-      return "sequential_whole";
-    case Encoding::kEdgebreakerChunks:
-      return "edgebreaker_chunks";
-    case Encoding::kSequentialChunks:
-      return "sequential_chunks";
-    case Encoding::kGlb:
-      return "glb";
-    case Encoding::kMergedGlb:
-      return "glb_merged";
-    case Encoding::kMeshoptGlb:
-      return "glb_meshopt";
-    case Encoding::kStl:
-      break;
-  }
-  return "stl";
+mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing) {
+  MeshParameters parameters;
+  parameters.passes = passes;
+  parameters.smoothing = smoothing;
+  return jobs::smooth_options(parameters);
 }
 
-bool is_parallel(Encoding encoding) { return encoding != Encoding::kSequentialWhole; }
+}  // namespace
 
 void set_threads(int threads) { mesh::set_thread_count(threads); }
 
@@ -83,13 +64,6 @@ void Stages::extract() {
     const mesh::ExtractOptions options = options_of(surface_);
     mesh::extract_surface(lattice, options, mesh::count_surface(lattice, options, {}), {}, mesh_);
   });
-}
-
-mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing) {
-  MeshParameters parameters;
-  parameters.passes = passes;
-  parameters.smoothing = smoothing;
-  return jobs::smooth_options(parameters);
 }
 
 mesh::SmoothOptions laplacian_by_labels(const Samples& samples) {
@@ -110,9 +84,9 @@ std::uint64_t Stages::smoothing_memory(int passes) const {
   });
 }
 
-void Stages::measure() const { mesh::measure_topology(mesh_, {}); }
+void Stages::measure_topology() const { mesh::measure_topology(mesh_, {}); }
 
-std::uint64_t Stages::encode_as(MeshFormat format, const MeshParameters& parameters) const {
+std::uint64_t Stages::encode(MeshFormat format, const MeshParameters& parameters) const {
   codec::Provenance provenance;
   provenance.iso = surface_.iso;
   provenance.dims = {samples_.dims.x, samples_.dims.y, samples_.dims.z};
@@ -121,35 +95,6 @@ std::uint64_t Stages::encode_as(MeshFormat format, const MeshParameters& paramet
   CountingSink counting;
   codec::encode(mesh_, format, provenance, {}, counting.sink());
   return counting.bytes;
-}
-
-std::uint64_t Stages::encode(Encoding encoding) const {
-  MeshParameters parameters;
-  switch (encoding) {
-    case Encoding::kEdgebreakerWhole:
-      return encode_as(MeshFormat::kDrc, parameters);
-    case Encoding::kSequentialWhole:
-      parameters.draco.speed = kSequentialSpeed;
-      return encode_as(MeshFormat::kDrc, parameters);
-    case Encoding::kEdgebreakerChunks:
-      parameters.normals = false;
-      return encode_as(MeshFormat::kGlb, parameters);
-    case Encoding::kSequentialChunks:
-      parameters.normals = false;
-      parameters.draco.speed = kSequentialSpeed;
-      return encode_as(MeshFormat::kGlb, parameters);
-    case Encoding::kMergedGlb:
-      parameters.merge = true;
-      return encode_as(MeshFormat::kGlb, parameters);
-    case Encoding::kMeshoptGlb:
-      parameters.glb_codec = GlbCodec::kMeshopt;
-      return encode_as(MeshFormat::kGlb, parameters);
-    case Encoding::kGlb:
-      return encode_as(MeshFormat::kGlb, parameters);
-    case Encoding::kStl:
-      break;
-  }
-  return encode_as(MeshFormat::kStl, parameters);
 }
 
 std::string Stages::drc() const {
@@ -182,13 +127,6 @@ JobFigures run_job(const Samples& samples, const MeshParameters& parameters, dou
   return figures;
 }
 
-std::uint64_t Stages::run_job(int passes, MeshFormat format) {
-  MeshParameters parameters;
-  parameters.passes = passes;
-  parameters.formats = {format};
-  return run_job(parameters, false).bytes;
-}
-
 JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
   MeshParameters parameters = asked;
   parameters.scheme = surface_.scheme;
@@ -211,10 +149,15 @@ MeshSize Stages::size() const { return {mesh_.positions.size(), mesh_.triangles.
 
 double Stages::volume_mm3() const { return mesh::measure_extent(mesh_, {}).volume_mm3; }
 
-mesh::Shapes Stages::shapes() const { return mesh::measure_shapes(mesh_, {}); }
-
 std::uint64_t Stages::mesh_bytes() const {
   return positions().size_bytes() + triangles().size_bytes();
+}
+
+MeshParameters job_to(MeshFormat format, int passes) {
+  MeshParameters parameters;
+  parameters.passes = passes;
+  parameters.formats = {format};
+  return parameters;
 }
 
 }  // namespace isomesh::bench

@@ -2,16 +2,13 @@
 // changes there is followed here and nowhere else.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
-#include "server/mesh/measure/shapes.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/bench/samples.h"
@@ -32,31 +29,6 @@ struct MeshSize {
   std::uint64_t triangles = 0;
 };
 
-// Draco's two methods, which the encoder chooses between by its speed: edgebreaker at the default
-// speed, sequential at the highest.
-enum class Encoding {
-  kEdgebreakerWhole,  // a `drc` file
-  kSequentialWhole,
-  kEdgebreakerChunks,  // a `glb` file without normals
-  kSequentialChunks,
-  kGlb,  // as a job makes it unless it says otherwise, with normals
-  kMergedGlb,
-  kMeshoptGlb,
-  kStl,
-};
-inline constexpr std::array kEncodings = {Encoding::kEdgebreakerWhole,
-                                          Encoding::kSequentialWhole,
-                                          Encoding::kEdgebreakerChunks,
-                                          Encoding::kSequentialChunks,
-                                          Encoding::kGlb,
-                                          Encoding::kMergedGlb,
-                                          Encoding::kMeshoptGlb,
-                                          Encoding::kStl};
-
-const char* name_of(Encoding encoding);
-// True when it runs on more than one thread.
-bool is_parallel(Encoding encoding);
-
 // The answer of a job.
 struct JobFigures {
   MeshSummary mesh;
@@ -74,8 +46,6 @@ JobFigures run_job(const Samples& samples, const MeshParameters& parameters, dou
 // Threads that the stages run on, 1 at least. Not while one runs.
 void set_threads(int threads);
 
-// As a job that asks for the method has them.
-mesh::SmoothOptions smooth_options(int passes, Smoothing smoothing);
 // As a job by labels has them that asks for Laplacian smoothing and for nothing else.
 mesh::SmoothOptions laplacian_by_labels(const Samples& samples);
 
@@ -94,24 +64,20 @@ class Stages {
 
   // The memory that smoothing says it needs beside the mesh, in bytes.
   std::uint64_t smoothing_memory(int passes) const;
-  // Topology.
-  void measure() const;
+  void measure_topology() const;
   // The number of bytes.
-  std::uint64_t encode(Encoding encoding) const;
+  std::uint64_t encode(MeshFormat format, const MeshParameters& parameters = {}) const;
   // A `drc` file with the parameters of a job that gives none.
   std::string drc() const;
-  // Runs a job from the samples in memory to the bytes of its one file, without the disk. Returns
-  // the number of bytes.
-  std::uint64_t run_job(int passes, MeshFormat format);
-  // The same of a job that asks for more; the surface is this one's, whatever the parameters say.
-  JobFigures run_job(const MeshParameters& parameters, bool certify);
+  // Runs a job from the samples in memory to the bytes of its files, without the disk. The surface
+  // is this one's, whatever the parameters say.
+  JobFigures run_job(const MeshParameters& parameters, bool certify = false);
 
   // Gives the memory back to the system, so that the next run meets pages that are not mapped.
   void release_memory();
 
   MeshSize size() const;
   double volume_mm3() const;
-  mesh::Shapes shapes() const;
   std::span<const mesh::Vec3> positions() const { return mesh_.positions.span(); }
   std::span<const mesh::Triangle> triangles() const { return mesh_.triangles.span(); }
   const mesh::Mesh& mesh() const { return mesh_; }
@@ -119,11 +85,12 @@ class Stages {
   std::uint64_t mesh_bytes() const;
 
  private:
-  std::uint64_t encode_as(MeshFormat format, const MeshParameters& parameters) const;
-
   const Samples& samples_;
   Surface surface_;
   mesh::Mesh mesh_;
 };
+
+// Passes and a format; all else as a job has it that gives nothing.
+MeshParameters job_to(MeshFormat format, int passes);
 
 }  // namespace isomesh::bench

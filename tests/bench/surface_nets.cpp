@@ -1,7 +1,5 @@
 #include "tests/bench/surface_nets.h"
 
-#include <algorithm>
-#include <cstring>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -49,35 +47,22 @@ std::vector<std::string> python_of(const fs::path& root) {
   return {loader.string(), "--library-path", path, python.string()};
 }
 
-template <class T>
-std::vector<T> read_array(const fs::path& path) {
-  const std::string bytes = test::read_file(path);
-  std::vector<T> values(bytes.size() / sizeof(T));
-  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
-  return values;
-}
-
 }  // namespace
 
 SurfaceNets::SurfaceNets(const fs::path& root, const Samples& samples,
-                         std::vector<std::int64_t> labels, int threads)
+                         const std::vector<std::int64_t>& labels, int threads)
     : command_(python_of(root)),
       environment_({"PYTHONHOME=" + (root / "usr").string(), "VTK_SMP_BACKEND_IN_USE=TBB",
-                    "VTK_SMP_MAX_THREADS=" + std::to_string(threads)}),
-      labels_(std::move(labels)) {
+                    "VTK_SMP_MAX_THREADS=" + std::to_string(threads)}) {
   const std::string bytes(reinterpret_cast<const char*>(samples.bytes.data()),
                           samples.bytes.size());
   test::write_file(folder_ / "samples", bytes);
   const mesh::Dims dims = samples.dims;
-  const nlohmann::json order = {{"samples", folder_ / "samples"},
-                                {"type", to_string(samples.type)},
-                                {"dims", {dims.x, dims.y, dims.z}},
-                                {"origin", samples.geometry.origin},
-                                {"spacing", samples.geometry.spacing},
-                                {"labels", labels_},
-                                {"passes", kSurfaceNetsPasses},
-                                {"runs", 1},
-                                {"output", folder_.path()}};
+  const nlohmann::json order = {
+      {"samples", folder_ / "samples"},      {"type", to_string(samples.type)},
+      {"dims", {dims.x, dims.y, dims.z}},    {"origin", samples.geometry.origin},
+      {"spacing", samples.geometry.spacing}, {"labels", labels},
+      {"passes", kSurfaceNetsPasses}};
   command_.insert(command_.end(), {ISOMESH_SURFACE_NETS_SCRIPT, order.dump()});
 }
 
@@ -87,29 +72,8 @@ double SurfaceNets::run_ms() {
     throw std::runtime_error("surface_nets.py failed: " + finished.errors);
   }
   const auto answer = nlohmann::json::parse(finished.output);
-  description_ = "VTK " + answer.at("version").get<std::string>() + " with its SMP backend " +
-                 answer.at("backend").get<std::string>();
   peak_bytes_ = answer.at("bytes").get<std::uint64_t>();
-  return answer.at("milliseconds").at(0).get<double>();
-}
-
-Walls SurfaceNets::walls() const {
-  Walls walls;
-  walls.positions = read_array<mesh::Vec3>(folder_ / "points");
-  for (const auto& corners : read_array<std::array<std::int64_t, 3>>(folder_ / "triangles")) {
-    walls.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
-                               static_cast<std::uint32_t>(corners[1]),
-                               static_cast<std::uint32_t>(corners[2])});
-  }
-  const auto number = [&](double label) {
-    const auto found = std::ranges::find(labels_, static_cast<std::int64_t>(label));
-    return found == labels_.end() ? std::uint16_t{0}
-                                  : static_cast<std::uint16_t>(found - labels_.begin() + 1);
-  };
-  for (const auto& [one, other] : read_array<std::array<double, 2>>(folder_ / "sides")) {
-    walls.sides.push_back({number(one), number(other)});
-  }
-  return walls;
+  return answer.at("milliseconds").get<double>();
 }
 
 }  // namespace isomesh::bench

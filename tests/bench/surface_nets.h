@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "tests/bench/label_walls.h"
 #include "tests/bench/samples.h"
 #include "tests/support/files.h"
 
@@ -26,24 +25,20 @@ class SurfaceNets {
   // debootstrap makes it, or "/" where that is the system itself; nothing in it is changed and no
   // privilege is needed. Throws std::runtime_error that says what is missing there.
   SurfaceNets(const std::filesystem::path& root, const Samples& samples,
-              std::vector<std::int64_t> labels, int threads);
+              const std::vector<std::int64_t>& labels, int threads);
 
   // The time of one run from samples to points and triangles in memory, after one that warms up.
   // Throws std::runtime_error with what the process wrote when it fails.
   double run_ms();
 
-  Walls walls() const;  // of the last run; the winding of its triangles tells nothing
   // The peak of that run's memory, with the samples and without libraries; as memory.h has it. 0
   // before the first run.
   std::uint64_t peak_bytes() const { return peak_bytes_; }
-  const std::string& description() const { return description_; }  // empty before the first run
 
  private:
   std::vector<std::string> command_;
   std::vector<std::string> environment_;
-  std::vector<std::int64_t> labels_;
   test::TemporaryFolder folder_;
-  std::string description_;
   std::uint64_t peak_bytes_ = 0;
 };
 

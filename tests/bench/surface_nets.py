@@ -6,12 +6,8 @@ Usage: surface_nets.py ORDER, a JSON object of
   "dims", "origin", "spacing"
   "labels"      to separate; "background" is 0
   "passes"      of the filter's smoothing
-  "runs"        after one that warms up
-  "output"      an existing folder
-Prints one JSON object: "version" and "backend" of VTK, "milliseconds" of each run, from samples to
-points and triangles in memory, and "bytes", the peak of the memory of the first run, with the
-samples. Writes the last run's "points" (float32), "triangles" (int64)
-and "sides" (float64, both labels of each triangle) into the folder.
+Prints one JSON object: "milliseconds" of a run after one that warms up, from samples to points and
+triangles in memory, and "bytes", the peak of the memory of the first run, with the samples.
 """
 import json
 import pathlib
@@ -19,8 +15,8 @@ import sys
 import time
 
 import numpy
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkLogger, vtkSMPTools, vtkVersion
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkLogger
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkSurfaceNets3D
 
@@ -47,10 +43,6 @@ def own_status(field):
     raise KeyError(field)
 
 
-def write(array, kind, path):
-    vtk_to_numpy(array).astype(kind).tofile(path)
-
-
 def main(order):
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_WARNING)
     samples = numpy.fromfile(order["samples"], dtype=order["type"])
@@ -62,25 +54,11 @@ def main(order):
 
     pathlib.Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     before = own_status("VmRSS")
-    peak = None
-    times = []
-    for _ in range(order["runs"] + 1):
-        mesh = None  # freed before the next run begins
-        begin = time.perf_counter()
-        mesh = surface_nets(image, order["labels"], order["passes"])
-        times.append(1000 * (time.perf_counter() - begin))
-        peak = peak or own_status("VmHWM") - before + samples.nbytes
-
-    folder = pathlib.Path(order["output"])
-    write(mesh.GetPoints().GetData(), numpy.float32, folder / "points")
-    write(mesh.GetPolys().GetConnectivityArray(), numpy.int64, folder / "triangles")
-    write(mesh.GetCellData().GetArray("BoundaryLabels"), numpy.float64, folder / "sides")
-    print(json.dumps({
-        "version": vtkVersion.GetVTKVersion(),
-        "backend": vtkSMPTools.GetBackend(),
-        "milliseconds": times[1:],
-        "bytes": peak,
-    }))
+    surface_nets(image, order["labels"], order["passes"])
+    peak = own_status("VmHWM") - before + samples.nbytes
+    begin = time.perf_counter()
+    surface_nets(image, order["labels"], order["passes"])
+    print(json.dumps({"milliseconds": 1000 * (time.perf_counter() - begin), "bytes": peak}))
 
 
 main(json.loads(sys.argv[1]))
