@@ -22,8 +22,8 @@ struct SchedulingAttributes {
 };
 
 // The kernel's minimum.
-constexpr std::uint64_t kPromptSlice_ns = 100'000;
-constexpr std::uint64_t kUsualSlice_ns = 0;
+constexpr std::uint64_t kPromptSliceNs = 100'000;
+constexpr std::uint64_t kUsualSliceNs = 0;
 
 // Direct system calls: the C library has names for them only since glibc 2.41. All other attributes
 // stay unchanged. An older kernel, or a sandbox that forbids the calls, keeps the usual slices.
@@ -41,9 +41,9 @@ void set_slice(std::uint64_t slice_ns) {
 void be_nicer(int by) {
   if (by == 0) return;
   std::ignore = ::nice(by);
-  set_slice(kUsualSlice_ns);
+  set_slice(kUsualSliceNs);
 }
 
-void be_prompt() { set_slice(kPromptSlice_ns); }
+void be_prompt() { set_slice(kPromptSliceNs); }
 
 }  // namespace isomesh
