@@ -11,7 +11,6 @@ import {
   LinearFilter,
   LineBasicMaterial,
   LineSegments,
-  Matrix3,
   Mesh,
   NearestFilter,
   RawShaderMaterial,
@@ -19,27 +18,26 @@ import {
   RGFormat,
   Scene,
   PerspectiveCamera,
-  Vector3,
   WebGLRenderer,
+  type IUniform,
   type WebGLRenderTarget,
 } from 'three';
 import { sumsOf, type Look } from '../volume/looks';
-import { blockSize, type Preview } from '../volume/preview';
+import type { Preview } from '../volume/preview';
 import { compile } from './compile';
 import {
   crossColour,
   crossOf,
   crossOpacity,
-  cropOf,
   isSoftwareName,
-  lookingOf,
   placeOfSamples,
-  surfaceColour,
+  valuesOf,
   type LivePainter,
   type LivePicture,
   type LiveScene,
 } from './live_painter';
 import { fragmentShader, vertexShader } from './live_shader';
+import { sceneFields } from './live_walk';
 import { Painting } from './painting';
 
 // The textures and buffers that the shader reads.
@@ -70,13 +68,20 @@ function letGo({ samples, blocks }: Drawable): void {
   blocks.dispose();
 }
 
-function tablesOf(look: Look): { table: DataTexture; sums: DataTexture } {
-  const table = new DataTexture(look.table, 256, 1);
-  table.minFilter = LinearFilter;
-  table.magFilter = LinearFilter;
-  const sums = new DataTexture(sumsOf(look), 257, 1, RedFormat, FloatType);
-  for (const texture of [table, sums]) texture.needsUpdate = true;
-  return { table, sums };
+interface Tables {
+  look: DataTexture | null;
+  sums: DataTexture | null;
+}
+
+const noTables: Tables = { look: null, sums: null };
+
+function tablesOf(given: Look): Tables {
+  const look = new DataTexture(given.table, 256, 1);
+  look.minFilter = LinearFilter;
+  look.magFilter = LinearFilter;
+  const sums = new DataTexture(sumsOf(given), 257, 1, RedFormat, FloatType);
+  for (const texture of [look, sums]) texture.needsUpdate = true;
+  return { look, sums };
 }
 
 export class GlPainter implements LivePainter {
@@ -87,27 +92,9 @@ export class GlPainter implements LivePainter {
   onLost: (() => void) | null = null;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly uniforms = {
-    samples: { value: null as Data3DTexture | null },
-    blocks: { value: null as Data3DTexture | null },
-    blockSize: { value: blockSize },
-    dims: { value: new Vector3(2, 2, 2) },
-    eye: { value: new Vector3() },
-    toNormal: { value: new Matrix3() },
-    towardsLight: { value: new Vector3() },
-    towardsEye: { value: new Vector3() },
-    colour: { value: new Vector3(...surfaceColour) },
-    iso: { value: 0.5 },
-    reach: { value: 1 },
-    isThrough: { value: false },
-    isOfLabels: { value: false },
-    look: { value: null as DataTexture | null },
-    sums: { value: null as DataTexture | null },
-    edges: { value: 0 },
-    isCropped: { value: false },
-    cropLow: { value: new Vector3() },
-    cropHigh: { value: new Vector3(1, 1, 1) },
-  };
+  private readonly uniforms = Object.fromEntries(
+    ['samples', 'blocks', 'look', 'sums', ...sceneFields.map(([name]) => name)].map((name): [string, IUniform<unknown>] => [name, { value: null }]),
+  );
   private readonly box: Mesh<BoxGeometry, RawShaderMaterial>;
   private readonly cross = new LineSegments(
     new BufferGeometry(),
@@ -116,6 +103,7 @@ export class GlPainter implements LivePainter {
   private readonly painting: Painting;
   private readonly known = new Map<Preview, Drawable>();
   private look: Look | null = null;
+  private tables = noTables;
   private readonly over = new AbortController();
 
   // Throws where WebGL 2 is missing.
@@ -168,8 +156,7 @@ export class GlPainter implements LivePainter {
   dispose(): void {
     this.over.abort();
     this.keep(new Set());
-    this.uniforms.look.value?.dispose();
-    this.uniforms.sums.value?.dispose();
+    this.useLook(null);
     this.box.geometry.dispose();
     this.box.material.dispose();
     this.cross.geometry.dispose();
@@ -181,39 +168,25 @@ export class GlPainter implements LivePainter {
   }
 
   private use(scene: LiveScene): void {
-    const { uniforms, box, cross } = this;
-    const { preview, kind } = scene;
+    const { box, cross } = this;
+    const { preview } = scene;
     const made = this.known.get(preview) ?? drawable(preview);
     this.known.set(preview, made);
-    uniforms.samples.value = made.samples;
-    uniforms.blocks.value = made.blocks;
-    uniforms.dims.value.set(...preview.dims);
-    uniforms.iso.value = scene.iso;
-    uniforms.reach.value = scene.reach;
-    uniforms.isThrough.value = kind === 'through';
-    uniforms.isOfLabels.value = kind === 'labels';
     if (scene.look !== this.look) this.useLook(scene.look);
-    uniforms.isCropped.value = scene.crop !== null;
-    [uniforms.cropLow.value, uniforms.cropHigh.value] = cropOf(scene);
+    const { samples, blocks } = made;
+    for (const [name, value] of Object.entries({ samples, blocks, ...this.tables, ...valuesOf(scene) })) Object.assign(this.uniforms[name] as object, { value });
     box.matrix.copy(placeOfSamples(preview));
     box.matrixWorldNeedsUpdate = true;
-    uniforms.toNormal.value.setFromMatrix4(box.matrix).invert().transpose();
-    const { eye, towardsEye, towardsLight } = lookingOf(scene);
-    uniforms.eye.value = eye;
-    uniforms.towardsEye.value = towardsEye;
-    uniforms.towardsLight.value = towardsLight;
     cross.visible = scene.cursor !== null;
     const positions = cross.geometry.getAttribute('position') as BufferAttribute;
     positions.copyArray(crossOf(scene)).needsUpdate = true;
   }
 
   private useLook(look: Look | null): void {
-    const { look: table, sums, edges } = this.uniforms;
     this.look = look;
-    table.value?.dispose();
-    sums.value?.dispose();
-    if (look) ({ table: table.value, sums: sums.value } = tablesOf(look));
-    edges.value = look?.edges ?? 0;
+    this.tables.look?.dispose();
+    this.tables.sums?.dispose();
+    this.tables = look ? tablesOf(look) : noTables;
   }
 }
 

@@ -1,24 +1,22 @@
 // Paints a preview by WebGPU: the walk along the rays is a compute shader.
-import { Color, Matrix4, type Vector3 } from 'three';
+import { Color, Matrix4 } from 'three';
 import { sumsOf, type Look } from '../volume/looks';
-import { blockSize, type Preview } from '../volume/preview';
+import type { Preview } from '../volume/preview';
 import { overShader, walkShader, workgroup } from './live_gpu_shader';
+import { sceneFields } from './live_walk';
 import {
   crossColour,
   crossOf,
   crossOpacity,
-  cropOf,
   isSoftwareName,
-  lookingOf,
   placeOfSamples,
-  surfaceColour,
+  valuesOf,
   type LivePainter,
   type LivePicture,
   type LiveScene,
 } from './live_painter';
 
 const sceneFloats = 84;
-const kinds = { surface: 0, through: 1, labels: 2 } as const;
 
 // Width, height and, of a volume, depth.
 type Size = readonly [number, number, number?];
@@ -133,29 +131,21 @@ export class GpuPainter implements LivePainter {
 
   // In the order of the shader's structure.
   private write(scene: LiveScene, { width, height }: LivePicture, rows: [number, number]): void {
-    const { preview, camera, iso, reach, kind, look, crop } = scene;
-    const ofSamples = placeOfSamples(preview);
-    const toScreen = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(ofSamples);
-    const toNormal = ofSamples.clone().setPosition(0, 0, 0).invert().transpose();
-    const { eye, towardsEye, towardsLight } = lookingOf(scene);
-    const [low, high] = cropOf(scene);
-    const four = (vector: Vector3, last: number): number[] => [...vector.toArray(), last];
+    const { preview, camera, cursor } = scene;
+    const toScreen = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(placeOfSamples(preview));
+    const values = valuesOf(scene);
+    const common = sceneFields.flatMap(([name]) => {
+      const value = values[name];
+      return typeof value === 'number' ? value : value.toArray();
+    });
     const floats = [
-      ...toScreen.clone().invert().elements,
-      ...toScreen.elements,
-      ...toNormal.elements,
-      ...four(eye, iso),
-      ...four(towardsLight, reach),
-      ...four(towardsEye, look?.edges ?? 0),
-      ...surfaceColour,
-      kinds[kind],
-      ...four(low, crop ? 1 : 0),
-      ...four(high, blockSize),
-      ...preview.dims,
-      scene.cursor ? crossOpacity : 0,
+      ...common,
+      cursor ? crossOpacity : 0,
       // As it stands in a style sheet.
       ...new Color(crossColour).convertLinearToSRGB().toArray(),
       1,
+      ...toScreen.clone().invert().elements,
+      ...toScreen.elements,
       width,
       height,
       ...rows,

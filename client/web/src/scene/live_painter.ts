@@ -1,7 +1,8 @@
 // What a preview shows, and who paints it: WebGPU where the browser has it, WebGL 2 elsewhere. Both walk the same rays.
 import { Matrix4, Vector3, type PerspectiveCamera } from 'three';
 import type { Look } from '../volume/looks';
-import type { Preview } from '../volume/preview';
+import { blockSize, type Preview } from '../volume/preview';
+import { kinds, type SceneField } from './live_walk';
 
 export interface LiveScene {
   preview: Preview;
@@ -13,7 +14,7 @@ export interface LiveScene {
   // The length of a step, in samples; a longer one may pass over what is thinner.
   reach: number;
   // The surface at the iso-value, a look through the samples, or labels by the look's colours.
-  kind: 'surface' | 'through' | 'labels';
+  kind: keyof typeof kinds;
   look: Look | null;
   // What of the volume is drawn, in parts of its samples along each axis; null for all of it.
   crop: readonly [Vector3, Vector3] | null;
@@ -50,7 +51,7 @@ export interface LivePainter {
 }
 
 // The colour of the surface, and of the lines over it with their opacity.
-export const surfaceColour = [0.86, 0.84, 0.78] as const;
+const surfaceColour = new Vector3(0.86, 0.84, 0.78);
 export const crossColour = '#2ce0cb';
 export const crossOpacity = 0.45;
 
@@ -72,19 +73,27 @@ export function crossOf({ preview, cursor }: LiveScene): Float32Array<ArrayBuffe
   return points;
 }
 
-// What is drawn of the volume, in samples.
-export function cropOf({ preview, crop }: LiveScene): [Vector3, Vector3] {
-  const last = new Vector3(...preview.dims).subScalar(1);
+// What the shader takes of a scene: places in samples, directions as unit vectors in millimetres.
+export function valuesOf({ preview, camera, target, iso, reach, kind, look, crop }: LiveScene): Record<SceneField, number | Vector3 | Matrix4> {
+  const ofSamples = placeOfSamples(preview);
+  const dims = new Vector3(...preview.dims);
+  const last = dims.clone().subScalar(1);
   const [low, high] = crop ?? [new Vector3(0, 0, 0), new Vector3(1, 1, 1)];
-  return [low.clone().multiply(last), high.clone().multiply(last)];
-}
-
-// The eye in samples, and in millimetres unit vectors to it and to the light.
-export function lookingOf({ preview, camera, target }: LiveScene): { eye: Vector3; towardsEye: Vector3; towardsLight: Vector3 } {
   return {
-    eye: camera.position.clone().applyMatrix4(placeOfSamples(preview).invert()),
-    towardsEye: camera.position.clone().sub(target).normalize(),
+    toNormal: ofSamples.clone().setPosition(0, 0, 0).invert().transpose(),
+    eye: camera.position.clone().applyMatrix4(ofSamples.clone().invert()),
+    iso,
     towardsLight: new Vector3(-0.35, 0.5, 1).transformDirection(camera.matrixWorld),
+    reach,
+    towardsEye: camera.position.clone().sub(target).normalize(),
+    edges: look?.edges ?? 0,
+    colour: surfaceColour,
+    kind: kinds[kind],
+    cropLow: low.clone().multiply(last),
+    isCropped: crop ? 1 : 0,
+    cropHigh: high.clone().multiply(last),
+    blockSize,
+    dims,
   };
 }
 
