@@ -1,15 +1,18 @@
-// The functions that PostgreSQL runs for isomesh; each executes one method in one round trip.
+// The verbs of the queue as functions of PostgreSQL. Each is one round trip: claims wait for each
+// other, so several statements from outside would slow all daemons. The caller computes the records
+// of jobs by the rules in job_rules.h, as SQLite's queue does.
 #include "server/store/postgresql/schema.h"
 
 namespace isomesh::store::postgresql {
 
 // Created again with each new version of the schema, so a changed function needs a new one.
 const char* const kFunctions = R"sql(
--- Of those that make the same mesh: who submits one looks whether there is a mesh while nobody stores it.
+-- The key of an advisory lock for all equal jobs. A submission holds it shared while it looks for a finished mesh, so
+-- that none is stored meanwhile.
 CREATE OR REPLACE FUNCTION alike_lock(p_owner text, p_key text) RETURNS bigint LANGUAGE sql IMMUTABLE AS
   $$ SELECT hashtextextended(p_owner || chr(10) || p_key, 18) $$;
 
--- A job that the caller has locked, or made, is over. p_blobs are those of its mesh: objects of `blob` and `bytes`.
+-- Ends a job. The caller has locked or inserted its row. p_blobs: the blobs of its mesh, objects of `blob` and `bytes`.
 CREATE OR REPLACE FUNCTION end_job(p_job text, p_state int, p_record text, p_stage int, p_ended_by bigint, p_node uuid,
                                    p_blobs jsonb) RETURNS void LANGUAGE plpgsql AS $$
 DECLARE j record; now_us bigint := isomesh_now();
@@ -29,13 +32,17 @@ BEGIN
            CASE WHEN p_state = {job.succeeded} THEN 1 ELSE 0 END);
 END $$;
 
--- p has what a row of jobs has, and
---   latest     the job that made the like of it last, as the caller has seen it; null where there was none
---   reuses     whether it ends at once with the mesh of that job, which is in `blobs`
---   most       how many jobs may be queued
---   has_share  whether the queue has room for one more of its owner
--- The outcome is 'new', 'known' or 'conflict' (its key made that job before, with the same request or another one),
--- 'full', 'no share', 'no volume', or 'look again' where `latest` is another one by now.
+-- Stores a job. p has the columns of jobs, and
+--   latest     the latest succeeded job that is equal, as the caller saw it; null: none
+--   reuses     true: the job ends at once with the mesh of `latest`, whose blobs are in `blobs`
+--   most       the limit of queued jobs
+--   has_share  true: the owner may queue another job
+-- Outcomes:
+--   new          the job is stored
+--   known        its idempotency key made the returned job, by the same request
+--   conflict     as known, but by another request
+--   full, no share, no volume
+--   look again   `latest` is out of date: repeat with the present one
 CREATE OR REPLACE FUNCTION submit_job(p jsonb) RETURNS TABLE(outcome text, job text) LANGUAGE plpgsql AS $$
 DECLARE s record; old record; n bigint; latest text;
 BEGIN
@@ -43,7 +50,7 @@ BEGIN
     id text, owner text, priority int, volume text, result_key text, accepted bigint, receiver text, url text,
     idempotency_key text, request_digest text, record text, cost bigint, version int, node uuid, latest text,
     reuses boolean, blobs jsonb, most bigint, has_share boolean);
-  IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = s.id) THEN  -- asked again after a lost connection
+  IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = s.id) THEN  -- repeated after a lost connection
     RETURN QUERY SELECT 'new', s.id;
     RETURN;
   END IF;
@@ -59,7 +66,7 @@ BEGIN
   IF NOT FOUND THEN RETURN QUERY SELECT 'no volume', NULL::text; RETURN; END IF;
   PERFORM pg_advisory_xact_lock_shared(alike_lock(s.owner, s.result_key));
   IF s.reuses THEN
-    -- Not to expire before this one names its blobs, too.
+    -- The other job must not expire before this one names its blobs.
     PERFORM 1 FROM jobs j WHERE j.id = s.latest AND j.state = {job.succeeded} FOR KEY SHARE;
     IF NOT FOUND THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
   ELSE
@@ -67,7 +74,7 @@ BEGIN
       WHERE j.owner = s.owner AND j.result_key = s.result_key AND j.state = {job.succeeded} ORDER BY j.id DESC LIMIT 1;
     IF latest IS DISTINCT FROM s.latest THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
     SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = {job.queued} LIMIT s.most) AS q;
-    IF n > s.most - 256 THEN           -- near the limit: one at a time, counted again
+    IF n > s.most - 256 THEN           -- near the limit, submissions count one after the other
       PERFORM pg_advisory_xact_lock(hashtext('isomesh queue'), hashtext(current_schema()));
       SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = {job.queued} LIMIT s.most) AS q;
       IF n >= s.most THEN RETURN QUERY SELECT 'full', NULL::text; RETURN; END IF;
@@ -79,7 +86,7 @@ BEGIN
     VALUES(s.id, s.owner, {job.queued}, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url,
            s.idempotency_key, s.request_digest, s.record, s.cost, s.version)
     ON CONFLICT DO NOTHING;
-  IF NOT FOUND THEN                    -- two with one key
+  IF NOT FOUND THEN                    -- another submission with this key was faster
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
       WHERE j.owner = s.owner AND j.idempotency_key = s.idempotency_key;
     RETURN QUERY SELECT CASE WHEN old.digest = s.request_digest THEN 'known' ELSE 'conflict' END, old.id;
@@ -94,10 +101,10 @@ BEGIN
   RETURN QUERY SELECT 'new', s.id;
 END $$;
 
--- A claim that is lost with the database's power is made again, so it does not wait for the disk. The fence is
--- never one that a lost claim had: the time is in it. Claims are made one after the other, so that each sees the turns
--- that the others have taken. Jobs of a newer version than p_newest wait for a newer daemon. An older one is not claimed
--- but returned without a fence: the caller adopts it and claims again.
+-- Claims the next job for a lease of p_lease. Does not wait for the disk: if a power failure of the database reverts the
+-- claim, the job is claimed again, and the time in its fence makes that one greater. Claims run one after the other, so
+-- each sees the turns that the others took. Jobs of a newer version than p_newest stay for newer daemons. A job of an older
+-- version is returned unclaimed, without a fence: the caller updates it to its own version and calls again.
 CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint, p_newest int)
 RETURNS TABLE(id text, fence bigint, attempts int, owner text, record text, accepted bigint, claimed bigint)
 LANGUAGE plpgsql AS $$
@@ -120,7 +127,7 @@ BEGIN
     END IF;
     SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted, j.cost, j.version INTO c FROM jobs j
       WHERE j.id = turn.id AND j.state = {job.queued} FOR UPDATE;
-    CONTINUE WHEN NOT FOUND;           -- cancelled meanwhile
+    CONTINUE WHEN NOT FOUND;           -- cancelled since the first SELECT
     IF c.version < p_newest THEN
       RETURN QUERY SELECT c.id, NULL::bigint, c.attempts, c.owner, c.record, c.accepted, now_us;
       RETURN;
@@ -128,7 +135,7 @@ BEGIN
     f := greatest(c.fence + 1, now_us);
     INSERT INTO runs(job, fence, owner, result_key, node, worker, claimed, lease_until)
       VALUES(c.id, f, c.owner, c.result_key, p_node, p_worker, now_us, now_us + p_lease);
-    -- Nothing of a higher priority is ready.
+    -- No job of a higher priority is ready, so nobody there is owed a turn.
     DELETE FROM turns t WHERE (t.priority, t.finish_tag) <= (turn.priority, turn.start_tag);
     INSERT INTO turns AS t VALUES(turn.priority, c.owner, turn.start_tag, turn.start_tag + c.cost)
       ON CONFLICT ON CONSTRAINT turns_pkey DO UPDATE SET start_tag = excluded.start_tag, finish_tag = excluded.finish_tag;
@@ -140,8 +147,8 @@ BEGIN
   END LOOP;
 END $$;
 
--- Null when the lease is lost, otherwise whether the run is to stop. One that ran out while the database was away is
--- renewed, too: nobody has taken the job while the row is there.
+-- Renews a lease. Returns null if it is lost, otherwise whether the run should stop. A lease that expired during an outage
+-- of the database is renewed too: while its row exists, nobody else has the job.
 CREATE OR REPLACE FUNCTION renew_run(p_job text, p_fence bigint, p_lease bigint, p_stage int, p_progress float8,
                                      p_timings text) RETURNS boolean LANGUAGE plpgsql AS $$
 DECLARE stops boolean; now_us bigint := isomesh_now();
@@ -152,17 +159,18 @@ BEGIN
   RETURN stops;
 END $$;
 
--- p has
---   id, fence, node  whose run ends
---   is_again         whether the same was asked for before
---   ends_others      it is somebody else's lease, which has to be over, unless it is of an earlier life of the node
---   state, record    of the job from now on; queued: without a record, and with
---   delay, waiting_for, counts: when it may run again, what it waits for, whether this was an attempt
---   cancelled        the record, should it have been asked to stop
---   blobs            of the mesh of one that succeeded
---   alike            those like it that end with it, as far as the caller knows: objects of `id` and `record`
---   newest           the version of those that the caller can read
--- The outcome is 'lost' (the lease), 'done', or 'alike': these jobs are to be told of, too.
+-- Ends a run. p has
+--   id, fence, node  the run, and the daemon that calls
+--   is_again         true: this repeats a call with unknown outcome
+--   ends_others      true: the run belongs to another daemon. Its lease must have expired, unless that daemon was an
+--                    earlier process on the caller's data folder
+--   state, record    the job's new state. If that is queued, no record but
+--   delay, waiting_for, counts: when it may run again, what it waits for, whether this attempt counts
+--   cancelled        the record to use if the job was cancelled
+--   blobs            the mesh's, if it succeeded
+--   alike            equal queued jobs that the caller knows of, which end with it: objects of `id` and `record`
+--   newest           the newest version of a job that the caller can read
+-- Outcomes: 'lost' (the lease), 'done', or 'alike': nothing has changed; repeat with the returned equal jobs in `alike`.
 CREATE OR REPLACE FUNCTION finish_run(p jsonb) RETURNS TABLE(outcome text, id text, record text, accepted bigint)
 LANGUAGE plpgsql AS $$
 DECLARE s record; j record; r record; other record;
@@ -205,7 +213,7 @@ BEGIN
     PERFORM end_job(s.id, {job.succeeded}, s.record, {stage.done}, s.fence, s.node, s.blobs);
     FOR other IN SELECT t.id, t.record FROM jsonb_to_recordset(s.alike) AS t(id text, record text) LOOP
       PERFORM 1 FROM jobs a WHERE a.id = other.id AND a.state = {job.queued} FOR UPDATE;
-      CONTINUE WHEN NOT FOUND;         -- cancelled meanwhile
+      CONTINUE WHEN NOT FOUND;         -- cancelled since the caller read it
       PERFORM end_job(other.id, {job.succeeded}, other.record, {stage.done}, NULL, s.node, s.blobs);
     END LOOP;
   ELSE
@@ -214,7 +222,7 @@ BEGIN
   RETURN QUERY SELECT 'done', NULL::text, NULL::text, 0::bigint;
 END $$;
 
--- The state that the job is in afterwards.
+-- Cancels a queued job, or asks the run of a running one to stop. Returns the state after that; null: no such job.
 CREATE OR REPLACE FUNCTION cancel_job(p_job text, p_record text, p_node uuid) RETURNS int LANGUAGE plpgsql AS $$
 DECLARE s int;
 BEGIN
@@ -227,7 +235,7 @@ BEGIN
   RETURN s;
 END $$;
 
--- Takes deliveries for one node: no receiver is told more at once than `p_most`, over all nodes.
+-- Reserves due callbacks for a node and returns them. Over all nodes, at most p_most for each receiver are reserved.
 CREATE OR REPLACE FUNCTION take_callbacks(p_node uuid, p_now bigint, p_most int, p_hold bigint)
 RETURNS TABLE(job text, url text, body text, attempts int, created bigint) LANGUAGE plpgsql AS $$
 DECLARE now_us bigint := isomesh_now();
