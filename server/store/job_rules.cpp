@@ -1,11 +1,9 @@
 #include "server/store/job_rules.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/clock.h"
 #include "base/sha256.h"
-#include "base/share.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/json_values.h"
@@ -42,19 +40,6 @@ std::string result_key(const std::string& volume, const std::vector<Note>& notes
   return sha256_of(text);
 }
 
-std::int64_t turn_cost_us(double expected_ms) {
-  constexpr double kLeast = 1;
-  constexpr double kMost = 24.0 * 3600 * 1000;
-  const double bounded = std::isnan(expected_ms) ? kMost : std::clamp(expected_ms, kLeast, kMost);
-  return std::llround(bounded * 1000);
-}
-
-void throw_no_volume(bool is_gone) {
-  const std::string detail =
-      is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
-  throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
-}
-
 std::optional<Job> readable_job(const std::string& record, const std::string& id,
                                 const std::string& volume, bool is_newer) {
   try {
@@ -88,29 +73,43 @@ Job damaged_job(const JobColumns& columns) {
 
 void throw_damaged_job() { throw Error(ErrorCode::kInternal, kDamagedJob, {{"id", kDamagedJob}}); }
 
-void throw_newer_job() {
-  throw Error(ErrorCode::kUnavailable,
-              "a newer version of the service accepted this job, and this daemon cannot read it: "
-              "try again");
-}
-
-void throw_no_job(bool is_gone) {
-  if (is_gone) throw Error(ErrorCode::kGone, "the job has expired");
-  throw Error(ErrorCode::kNotFound, "there is no job with this id");
-}
-
-bool has_share_of_queue(const JobSpec& spec, const QueueShare& waiting, std::size_t max_queued) {
-  constexpr std::size_t kStatShare = 8;
-  const bool is_stat = spec.parameters.priority == Priority::kStat;
-  const std::size_t room = is_stat ? std::max<std::size_t>(max_queued / kStatShare, 1) : max_queued;
-  return has_share(spec.owner, waiting.own, room - std::min(room, waiting.queued));
-}
-
 std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& options) {
   constexpr int kGrowth = 4;
   std::chrono::milliseconds delay = options.retry_delay;
   for (int n = 1; n < attempts; ++n) delay *= kGrowth;
   return delay;
+}
+
+double milliseconds_between(std::int64_t begin_us, std::int64_t end_us) {
+  return static_cast<double>(std::max<std::int64_t>(end_us - begin_us, 1)) / 1000;
+}
+
+void start_run(Job& job, std::int64_t accepted_us, std::int64_t now_us) {
+  job.state = JobState::kRunning;
+  job.stage = Stage::kLoad;
+  job.waiting_for.reset();
+  job.started = timestamp_of(from_us(now_us));
+  job.timing.queue = milliseconds_between(accepted_us, now_us);
+}
+
+JobState state_after(const Outcome& outcome, int attempt, const JobStoreOptions& options) {
+  if (outcome.mesh) return JobState::kSucceeded;
+  if (!outcome.error) return JobState::kCancelled;
+  return outcome.may_retry && attempt < options.attempts ? JobState::kQueued : JobState::kFailed;
+}
+
+void end_job(Job& job, JobState state, std::int64_t accepted_us, std::int64_t now_us) {
+  job.state = state;
+  job.waiting_for.reset();
+  job.finished = timestamp_of(from_us(now_us));
+  if (state == JobState::kCancelled) job.error.reset();
+  job.timing.total = milliseconds_between(accepted_us, now_us);
+}
+
+void skip_run(Job& job, std::int64_t accepted_us, std::int64_t now_us) {
+  job.reused = true;
+  job.timing = {};
+  job.timing.queue = milliseconds_between(accepted_us, now_us);
 }
 
 void give_timing(Job& job, const Timing& timing) {
@@ -142,34 +141,10 @@ std::vector<Blob> blobs_of(const MeshSummary& mesh) {
   return blobs;
 }
 
-bool have_same_blobs(const MeshSummary& one, const MeshSummary& other) {
-  return std::ranges::equal(blobs_of(one), blobs_of(other), {}, &Blob::key, &Blob::key);
-}
-
-bool is_there(const MeshSummary& mesh, const BlobStore& blobs) {
-  return std::ranges::all_of(blobs_of(mesh),
-                             [&](const Blob& blob) { return blobs.size(blob.key) == blob.bytes; });
-}
-
 bool is_intact(const MeshSummary& mesh, const BlobStore& blobs) {
-  return std::ranges::all_of(
-      blobs_of(mesh), [&](const Blob& blob) { return is_there_and_intact(blobs, blob.key, {}); });
-}
-
-void throw_other_version() {
-  throw Error(ErrorCode::kGone,
-              "the stored mesh is damaged, and this version would make a different one: submit the "
-              "job again");
-}
-
-void throw_volume_gone() {
-  throw Error(
-      ErrorCode::kGone,
-      "the stored mesh is damaged, and its volume no longer exists: upload the volume again");
-}
-
-bool concerns(const Event& event, const Viewer& viewer, const std::string& job) {
-  return (!viewer || *viewer == event.owner) && (job.empty() || job == event.job);
+  return std::ranges::all_of(blobs_of(mesh), [&](const Blob& blob) {
+    return blobs.size(blob.key) == blob.bytes && is_there_and_intact(blobs, blob.key, {});
+  });
 }
 
 }  // namespace isomesh::store

@@ -15,17 +15,11 @@ namespace isomesh::store {
 
 // Retry-After of rejected submissions.
 inline constexpr std::chrono::seconds kRetryAfter{1};
-// Minimum interval between progress events of a run.
-inline constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
 
 // Equal for all jobs whose results have the same bytes and properties. `notes` are the volume's; a
 // mesh carries some of them.
 std::string result_key(const std::string& volume, const std::vector<Note>& notes,
                        const JobParameters& parameters, const std::string& mesher_version);
-
-// Cost of a job's turn in the queue, in microseconds: its expected run time, between 1 ms and a
-// day, so that no job is free.
-std::int64_t turn_cost_us(double expected_ms);
 
 // The columns of a job, which can be read without its record.
 struct JobColumns {
@@ -52,27 +46,24 @@ Job damaged_job(const JobColumns& columns);
 
 // Throws Error kInternal.
 [[noreturn]] void throw_damaged_job();
-// Throws Error kUnavailable: another daemon can respond.
-[[noreturn]] void throw_newer_job();
-
-// Throws Error kNotFound, or kGone if the job's volume has expired.
-[[noreturn]] void throw_no_volume(bool is_gone);
-// Throws Error kNotFound, or kGone if the job has expired.
-[[noreturn]] void throw_no_job(bool is_gone);
-
-// Number of queued jobs, of all owners and of one.
-struct QueueShare {
-  std::size_t queued = 0;
-  std::size_t own = 0;
-};
-
-// True if the queue has room for another job of the owner: the owner's share of it (base/share.h).
-// Urgent jobs share an eighth of the queue, because all others wait for them. For an urgent job
-// `waiting` counts urgent jobs only.
-bool has_share_of_queue(const JobSpec& spec, const QueueShare& waiting, std::size_t max_queued);
 
 // Delay before the next attempt of a job that has failed that often.
 std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& options);
+
+// Milliseconds between two times of the tables; always positive.
+double milliseconds_between(std::int64_t begin_us, std::int64_t end_us);
+
+// What the verbs of the queue do to a job's record. Times are those of the tables; `accepted_us` is
+// that of the submission.
+//
+// A claim at `now_us`.
+void start_run(Job& job, std::int64_t accepted_us, std::int64_t now_us);
+// The state after a run with that outcome, unless the job was cancelled: kQueued if it runs again.
+JobState state_after(const Outcome& outcome, int attempt, const JobStoreOptions& options);
+// An end at `now_us`.
+void end_job(Job& job, JobState state, std::int64_t accepted_us, std::int64_t now_us);
+// An end with the mesh of an equal job that ran instead; call end_job() then.
+void skip_run(Job& job, std::int64_t accepted_us, std::int64_t now_us);
 
 // Copies the times or the progress of a run into the job; keeps its time in the queue.
 void give_timing(Job& job, const Timing& timing);
@@ -84,18 +75,7 @@ void give_mesh(Job& job, const MeshSummary& mesh);
 // The blobs of the mesh: its files and the file of its labels.
 std::vector<Blob> blobs_of(const MeshSummary& mesh);
 
-bool have_same_blobs(const MeshSummary& one, const MeshSummary& other);
-
-// is_there: every blob of the mesh exists with its size. is_intact: their bytes are also correct,
-// which requires reading them.
-bool is_there(const MeshSummary& mesh, const BlobStore& blobs);
+// True if every blob of the mesh exists with its size and its bytes, which are read for that.
 bool is_intact(const MeshSummary& mesh, const BlobStore& blobs);
-
-// Thrown by remake() if this version would make a different mesh.
-[[noreturn]] void throw_other_version();
-[[noreturn]] void throw_volume_gone();
-
-// True if the viewer may see the event and it is of that job (empty: any).
-bool concerns(const Event& event, const Viewer& viewer, const std::string& job);
 
 }  // namespace isomesh::store

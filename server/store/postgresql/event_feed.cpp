@@ -1,14 +1,11 @@
 #include "server/store/postgresql/event_feed.h"
 
 #include <algorithm>
-
-#include "server/store/job_rules.h"
+#include <utility>
 
 namespace isomesh::store::postgresql {
 namespace {
 
-constexpr std::size_t kMostRecent = 4000;
-constexpr std::size_t kMostEvents = 500;
 // The lower bits of an event's number are its place in the transaction. Events that are not stored
 // use the upper half of these places, after all stored ones.
 constexpr int kPlaceBits = 20;
@@ -39,19 +36,22 @@ Event event_of(const Rows& row, const std::string& node) {
           .is_elsewhere = row.text(8) != node};
 }
 
+// The first transaction that may not have ended. If the database was copied to another server,
+// events may have numbers that this server has not reached yet. They are removed.
+std::int64_t horizon_of(Database& database) {
+  database.query(
+      "DELETE FROM events WHERE tx >= pg_snapshot_xmax(pg_current_snapshot())::text::bigint");
+  Rows row = database.query(std::string("SELECT ") + kHorizon);
+  row.next();
+  return row.integer(0);
+}
+
 }  // namespace
 
-EventFeed::EventFeed(Database& database) : database_(database) {
-  // If the database was copied to another server, events may have numbers that this server has not
-  // reached yet. They are removed.
-  database_.query(
-      "DELETE FROM events WHERE tx >= pg_snapshot_xmax(pg_current_snapshot())::text::bigint");
-  Rows row = database_.query(std::string("SELECT ") + kHorizon);
-  row.next();
-  const Lock lock(mutex_);
-  end_ = row.integer(0);
-  last_ = complete_after_ = number_of(end_, 0) - 1;
-}
+EventFeed::EventFeed(Database& database) : EventFeed(database, horizon_of(database)) {}
+
+EventFeed::EventFeed(Database& database, std::int64_t end)
+    : RecentEvents(number_of(end, 0) - 1), database_(database), end_(end) {}
 
 void EventFeed::fetch() {
   const Lock fetching(fetching_);
@@ -75,15 +75,13 @@ void EventFeed::fetch() {
     if (rows.is_null(0)) continue;
     // Progress of a run precedes its end.
     number_told(rows.integer(0));
-    const Event event = event_of(rows, database_.node());
+    Event event = event_of(rows, database_.node());
     if (event.is_elsewhere && event.state == JobState::kRunning) has_runs_elsewhere_ = true;
-    remember({event, true});
+    append(std::move(event), true);
     is_new = true;
   }
   number_told(end_);
-  if (!is_new && !has_told) return;
-  ++generation_;
-  changed_.notify_all();
+  if (is_new || has_told) wake_readers();
 }
 
 // The transaction that writes a run's end also deletes the run's row. So a run with a row has not
@@ -130,8 +128,7 @@ void EventFeed::tell(Event event, std::int64_t after) {
   const Lock lock(mutex_);
   told_.push_back({std::move(event), after});
   number_told(end_);
-  ++generation_;
-  changed_.notify_all();
+  wake_readers();
 }
 
 void EventFeed::number_told(std::int64_t before) {
@@ -143,79 +140,36 @@ void EventFeed::number_told(std::int64_t before) {
     }
     told.event.id = std::max(last_ + 1, number_of(told.after, 0) + kFirstTold);
     // Progress is dropped if thousands of events came while no transaction ended.
-    if (told.event.id < number_of(before, 0)) remember({std::move(told.event), false});
+    if (told.event.id < number_of(before, 0)) append(std::move(told.event), false);
   }
   told_ = std::move(later);
 }
 
-void EventFeed::remember(Entry entry) {
-  last_ = entry.id();
-  recent_.push_back(std::move(entry));
-  if (recent_.size() <= kMostRecent) return;
-  complete_after_ = recent_.front().id();
-  recent_.pop_front();
+void EventFeed::append(Event event, bool is_kept) {
+  last_ = event.id;
+  remember(std::move(event), is_kept);
 }
 
-EventFeed::Recent EventFeed::recent(const Viewer& viewer, const std::string& job,
-                                    std::uint64_t since) const {
-  const Lock lock(mutex_);
-  Recent result;
-  result.generation = generation_;
-  result.end = end_;
-  // The database removes a job's events with the job, but this list does not.
-  result.is_complete = job.empty() && since >= complete_after_;
-  const auto begin = std::ranges::upper_bound(recent_, since, {}, &Entry::id);
-  for (auto entry = begin; entry != recent_.end(); ++entry) {
-    const bool is_wanted = result.is_complete || !entry->is_kept;
-    if (is_wanted && concerns(entry->event, viewer, job)) result.events.push_back(entry->event);
-  }
-  return result;
-}
+std::uint64_t EventFeed::end() const { return number_of(end_, 0); }
 
 std::vector<Event> EventFeed::kept(const Viewer& viewer, const std::string& job,
-                                   std::uint64_t since, std::int64_t end) {
-  Rows rows =
-      database_.query(std::string("SELECT ") + kColumns +
-                          " FROM events WHERE (tx, place) > (?1, ?2) AND tx < "
-                          "?3 AND " +
-                          (job.empty() ? "?4 = ''" : "job = ?4") + " AND " +
-                          (viewer ? "owner = ?5" : "?5 IS NULL") + " ORDER BY tx, place LIMIT ?6",
-                      transaction_of(since), place_of(since), end, job, viewer, kMostEvents);
+                                   std::uint64_t since, std::uint64_t end,
+                                   std::size_t limit) const {
+  Rows rows = database_.query(
+      std::string("SELECT ") + kColumns +
+          " FROM events WHERE (tx, place) > (?1, ?2) AND tx < "
+          "?3 AND " +
+          (job.empty() ? "?4 = ''" : "job = ?4") + " AND " +
+          (viewer ? "owner = ?5" : "?5 IS NULL") + " ORDER BY tx, place LIMIT ?6",
+      transaction_of(since), place_of(since), transaction_of(end), job, viewer, limit);
   std::vector<Event> events;
   while (rows.next()) events.push_back(event_of(rows, database_.node()));
   return events;
 }
 
-std::vector<Event> EventFeed::events(const Viewer& viewer, const std::string& job,
-                                     std::uint64_t since, std::chrono::milliseconds timeout) {
-  const auto deadline = Clock::now() + timeout;
-  fetch();
-  while (true) {
-    Recent seen = recent(viewer, job, since);
-    std::vector<Event>& events = seen.events;
-    if (!seen.is_complete) {
-      const std::vector<Event> old = kept(viewer, job, since, seen.end);
-      events.insert(events.end(), old.begin(), old.end());
-      std::ranges::sort(events, {}, &Event::id);
-    }
-    if (events.size() > kMostEvents) events.resize(kMostEvents);
-    Lock lock(mutex_);
-    if (!events.empty() || closed_ || Clock::now() >= deadline) return events;
-    changed_.wait_until(lock, deadline, [&]() ISOMESH_REQUIRES(mutex_) {
-      return generation_ != seen.generation || closed_;
-    });
-  }
-}
-
 std::uint64_t EventFeed::last() const {
   const Lock lock(mutex_);
   return last_;
-}
-
-void EventFeed::close() {
-  const Lock lock(mutex_);
-  closed_ = true;
-  changed_.notify_all();
 }
 
 }  // namespace isomesh::store::postgresql

@@ -1,16 +1,14 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "base/mutex.h"
-#include "server/store/job_store.h"
 #include "server/store/postgresql/database.h"
+#include "server/store/sql/recent_events.h"
 
 namespace isomesh::store::postgresql {
 
@@ -19,10 +17,8 @@ namespace isomesh::store::postgresql {
 // An event's number consists of the transaction that wrote it and its place there. Transactions do
 // not end in the order of their numbers. So reading stops before the first transaction that is
 // still open, and a reader that continues after a number it has seen misses nothing. Thread safe.
-class EventFeed {
+class EventFeed : public RecentEvents {
  public:
-  using Clock = std::chrono::steady_clock;
-
   // Starts after all existing events. `database` must outlive this object.
   explicit EventFeed(Database& database);
 
@@ -39,36 +35,22 @@ class EventFeed {
   // Adds an event that is not stored; it comes after those of the transaction `after`.
   void tell(Event event, std::int64_t after);
 
-  // As JobStore::events.
-  std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
-                            std::chrono::milliseconds timeout);
-
   std::uint64_t last() const;
 
-  void close();
-
  private:
-  struct Entry {
-    Event event;
-    bool is_kept = false;
-
-    std::uint64_t id() const { return event.id; }
-  };
   struct Told {
     Event event;
     std::int64_t after = 0;
   };
-  struct Recent {
-    std::vector<Event> events;
-    bool is_complete = false;  // false: stored events must be read from the database
-    std::uint64_t generation = 0;
-    std::int64_t end = 0;  // the first transaction not yet read
-  };
 
-  Recent recent(const Viewer& viewer, const std::string& job, std::uint64_t since) const;
+  // `end` is the first transaction not yet read.
+  EventFeed(Database& database, std::int64_t end);
+
+  std::uint64_t end() const override ISOMESH_REQUIRES(mutex_);
   std::vector<Event> kept(const Viewer& viewer, const std::string& job, std::uint64_t since,
-                          std::int64_t end);
-  void remember(Entry entry) ISOMESH_REQUIRES(mutex_);
+                          std::uint64_t end, std::size_t limit) const override;
+  // Adds an event; it has the greatest number so far.
+  void append(Event event, bool is_kept) ISOMESH_REQUIRES(mutex_);
   // Numbers the unstored events whose transaction is before `before`.
   void number_told(std::int64_t before) ISOMESH_REQUIRES(mutex_);
 
@@ -83,16 +65,8 @@ class EventFeed {
   Mutex fetching_;
   std::map<std::string, Seen> seen_ ISOMESH_GUARDED_BY(fetching_);  // by job
   std::atomic<bool> has_runs_elsewhere_ = false;
-  mutable Mutex mutex_;
-  mutable Condition changed_;
-  std::int64_t end_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the first transaction not yet read
-  std::uint64_t last_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;
-  std::deque<Entry> recent_ ISOMESH_GUARDED_BY(mutex_);  // by number
-  // recent_ holds all events with greater numbers than this.
-  std::uint64_t complete_after_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::int64_t end_ ISOMESH_GUARDED_BY(mutex_);        // the first transaction not yet read
   std::vector<Told> told_ ISOMESH_GUARDED_BY(mutex_);  // whose transaction is not yet read
-  bool closed_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace isomesh::store::postgresql

@@ -72,32 +72,15 @@ std::vector<Blob> blobs_told(const MeshSummary* mesh) {
   return mesh == nullptr ? std::vector<Blob>() : blobs_of(*mesh);
 }
 
-void end(Job& job, JobState state, std::int64_t accepted, std::int64_t now) {
-  job.state = state;
-  job.waiting_for.reset();
-  job.finished = timestamp_of_us(now);
-  if (state == JobState::kCancelled) job.error.reset();
-  job.timing.total = milliseconds_between(accepted, now);
-}
-
 }  // namespace
 
-Submission PostgresJobStore::submit(const JobSpec& spec) {
-  const std::int64_t now = database_.now_us();
-  Job job;
-  job.id = time_ordered_id(store::from_us(now));
-  job.parameters = spec.parameters;
-  job.created = timestamp_of_us(now);
-  // Repeated if another process stored or removed an equal job meanwhile.
-  for (int tries = 0; tries < 20; ++tries) {
-    if (auto submission = try_to_submit(spec, job)) return std::move(*submission);
-  }
-  throw Error(ErrorCode::kUnavailable,
-              "the same job is submitted and removed too often: try again");
-}
-
-std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, Job job) {
+std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec) {
   const std::int64_t accepted = database_.now_us();
+  const Time now = store::from_us(accepted);
+  Job job;
+  job.id = time_ordered_id(now);
+  job.parameters = spec.parameters;
+  job.created = timestamp_of(now);
   const Asked found =
       database_.read([&](SqlConnection& connection) { return look_up(connection, spec); })
           .value_or(Asked{});
@@ -107,7 +90,7 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
   if (mesh != nullptr) {
     job.reused = true;
     give_mesh(job, *mesh);
-    end(job, JobState::kSucceeded, accepted, database_.now_us());
+    end_job(job, JobState::kSucceeded, accepted, database_.now_us());
   }
   const bool has_room = mesh != nullptr || blobs_.has_room();
   const auto& callback = spec.parameters.callback;
@@ -220,7 +203,7 @@ void PostgresJobStore::fail_damaged(const std::string& id, std::uint64_t fence) 
       database_.read([&](SqlConnection& connection) { return find(connection, std::nullopt, id); });
   if (!row) return;  // removed meanwhile
   Job job = row->job;
-  end(job, JobState::kFailed, row->accepted, database_.now_us());
+  end_job(job, JobState::kFailed, row->accepted, database_.now_us());
   Ending ending;
   ending.state = JobState::kFailed;
   ending.record = to_record(job);
@@ -234,11 +217,7 @@ Lease PostgresJobStore::begin_run(const Rows& claimed, const Job& job, Steady as
   run.job = job;
   run.fence = static_cast<std::uint64_t>(claimed.integer(1));
   run.accepted = claimed.integer(5);
-  run.job.state = JobState::kRunning;
-  run.job.stage = Stage::kLoad;
-  run.job.waiting_for.reset();
-  run.job.started = timestamp_of_us(claimed.integer(6));
-  run.job.timing.queue = milliseconds_between(run.accepted, claimed.integer(6));
+  start_run(run.job, run.accepted, claimed.integer(6));
   run.claimed = asked;
   run.lease_until = asked + lease;
   run.transaction = claimed.integer(7);
@@ -291,27 +270,18 @@ Standing PostgresJobStore::renew(const Lease& lease, const Progress& progress,
 bool PostgresJobStore::finish(const Lease& lease, const Outcome& outcome) {
   const auto run = live_run(lease);
   if (!run) return false;
-  const std::int64_t now = database_.now_us();
   Job job = run->job;
   if (outcome.mesh) give_timing(job, outcome.timing);
   Ending ending;
   ending.cancelled = to_record(cancelled(job, run->accepted));
-  if (!outcome.mesh && !outcome.error) {
-    ending.state = JobState::kCancelled;
-    ending.record = ending.cancelled;
-  } else if (outcome.mesh) {
-    ending.mesh = &*outcome.mesh;
-    ending.state = JobState::kSucceeded;
-    give_mesh(job, *outcome.mesh);
-  } else if (outcome.may_retry && lease.attempt < options_.attempts) {
+  ending.state = state_after(outcome, lease.attempt, options_);
+  if (ending.state == JobState::kQueued) {
     ending.delay = delay_after(lease.attempt, options_);
     ending.counts = true;
   } else {
-    ending.state = JobState::kFailed;
     job.error = outcome.error;
-  }
-  if (ending.state == JobState::kSucceeded || ending.state == JobState::kFailed) {
-    end(job, ending.state, run->accepted, now);
+    if (outcome.mesh) give_mesh(job, *(ending.mesh = &*outcome.mesh));
+    end_job(job, ending.state, run->accepted, database_.now_us());
     ending.record = to_record(job);
   }
   if (!end_run(lease.id, lease.fence, ending)) return false;
@@ -403,12 +373,9 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
         continue;
       }
       Job other = *std::move(readable);
-      const std::int64_t accepted = rows.integer(3);
-      other.reused = true;
-      other.timing = {};
-      other.timing.queue = milliseconds_between(accepted, now);
+      skip_run(other, rows.integer(3), now);
       give_mesh(other, *ending.mesh);
-      end(other, JobState::kSucceeded, accepted, now);
+      end_job(other, JobState::kSucceeded, rows.integer(3), now);
       alike.push_back({rows.text(1), to_record(other)});
     } while (rows.next());
     asked.put("alike", alike);
@@ -461,7 +428,7 @@ std::string PostgresJobStore::cancelled_record(const Row& row) const {
 }
 
 Job PostgresJobStore::cancelled(Job job, std::int64_t accepted) const {
-  end(job, JobState::kCancelled, accepted, database_.now_us());
+  end_job(job, JobState::kCancelled, accepted, database_.now_us());
   return job;
 }
 

@@ -87,37 +87,18 @@ void PostgresJobStore::forget_events(Time before) {
   database_.run(Change::kRepeatable, "DELETE FROM events WHERE at < ?1", database_.to_us(before));
 }
 
-std::optional<PostgresJobStore::Made> PostgresJobStore::made_like(const std::string& owner,
-                                                                  const std::string& key) const {
-  Rows row = database_.query(
-      select_ +
-          "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = {job.succeeded} ORDER BY j.id "
-          "DESC LIMIT 1",
-      owner, key);
-  if (!row.next()) return std::nullopt;
-  const Job job = row_of(row).job;
-  Made made = {job.id, job.mesh};
-  const bool is_usable = made.mesh && is_there(*made.mesh, blobs_) && is_intact(*made.mesh, blobs_);
-  if (!is_usable) made.mesh.reset();
-  return made;
-}
-
 PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
   Row row = read_row(rows, 12, rows.integer(16) > options_.job_version);
   row.job.state = rows.choice(6, JobState::kCancelled);
   if (!rows.is_null(7)) row.job.waiting_for = rows.choice(7, WaitingFor::kDisk);
   if (row.job.state != JobState::kRunning || rows.is_null(8)) return row;
-  row.job.stage = Stage::kLoad;
-  row.job.started = timestamp_of_us(rows.integer(8));
+  start_run(row.job, row.accepted, rows.integer(8));
   if (!rows.is_null(9)) {
     row.job.stage = rows.choice(9, Stage::kDone);
     row.job.progress = rows.real(10);
-    row.job.timing = readable_timing(rows.text(11));
+    give_timing(row.job, readable_timing(rows.text(11)));
   }
-  row.job.timing.queue = milliseconds_between(row.accepted, rows.integer(8));
   return row;
 }
-
-std::string timestamp_of_us(std::int64_t us) { return timestamp_of(store::from_us(us)); }
 
 }  // namespace isomesh::store::postgresql

@@ -21,7 +21,6 @@ class PostgresJobStore : public SqlJobStore {
   // `database` and `blobs` must outlive this object.
   PostgresJobStore(Database& database, BlobStore& blobs, JobStoreOptions options);
 
-  Submission submit(const JobSpec& spec) override;
   std::optional<Lease> claim(const std::string& worker, std::chrono::milliseconds lease) override;
   Standing renew(const Lease& lease, const Progress& progress,
                  std::chrono::milliseconds length) override;
@@ -32,6 +31,7 @@ class PostgresJobStore : public SqlJobStore {
   Job cancel(const Viewer& viewer, const std::string& id) override;
   std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                             std::chrono::milliseconds timeout) const override {
+    feed_.fetch();
     return feed_.events(viewer, job, since, timeout);
   }
   std::uint64_t last_event() const override { return feed_.last(); }
@@ -42,12 +42,8 @@ class PostgresJobStore : public SqlJobStore {
 
  private:
   struct Ending;
-  // The latest result of an equal job.
-  struct Made {
-    std::string job;
-    std::optional<MeshSummary> mesh;  // empty if its blobs are incomplete
-  };
 
+  std::optional<Submission> try_to_submit(const JobSpec& spec) override;
   Row row_of(const Rows& rows) const override;
   std::optional<std::chrono::microseconds> until_ready() const override;
   void tell(Event event, std::int64_t transaction) override {
@@ -55,9 +51,6 @@ class PostgresJobStore : public SqlJobStore {
   }
   void close_events() override { feed_.close(); }
 
-  std::optional<Made> made_like(const std::string& owner, const std::string& key) const;
-  // One attempt; empty if equal jobs changed meanwhile, so that the caller must retry.
-  std::optional<Submission> try_to_submit(const JobSpec& spec, Job job);
   Job cancelled(Job job, std::int64_t accepted) const;
   std::string cancelled_record(const Row& row) const;
   // Claims the next job in the database; empty if none is ready. Sets `asked` to the time of the
@@ -88,7 +81,5 @@ class PostgresJobStore : public SqlJobStore {
   mutable EventFeed feed_;
   Messages messages_;  // last: its thread uses the other members
 };
-
-std::string timestamp_of_us(std::int64_t us);
 
 }  // namespace isomesh::store::postgresql

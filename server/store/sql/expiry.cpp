@@ -39,6 +39,15 @@ std::vector<Blob> read_blobs(Rows rows) {
   return blobs;
 }
 
+std::uint64_t sum_of_blobs(SqlDatabase& database, const std::string& table,
+                           const std::string& key) {
+  Rows row =
+      database.query("SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM " +
+                     table + " GROUP BY " + key + ") AS each");
+  row.next();
+  return row.count(0);
+}
+
 OwnedBytes read_owned_bytes(Rows rows) {
   OwnedBytes bytes;
   while (rows.next()) bytes[rows.text(0)] = rows.count(1);

@@ -19,6 +19,9 @@ std::vector<Expirable> read_expirable(const SqlDatabase& database, RecordKind ki
 // From rows of key and bytes.
 std::vector<Blob> read_blobs(Rows rows);
 
+// Total size of the blobs that column `key` of the table names; each counts once.
+std::uint64_t sum_of_blobs(SqlDatabase& database, const std::string& table, const std::string& key);
+
 // From rows of owner and sum of bytes.
 OwnedBytes read_owned_bytes(Rows rows);
 

@@ -1,7 +1,9 @@
 #include "server/store/sql/job_store.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "base/share.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "server/store/damaged_records.h"
@@ -13,13 +15,28 @@ namespace isomesh::store {
 namespace {
 
 constexpr DamagedTable kJobs = {"jobs", "SELECT record FROM jobs j", "j.id", "j.id DESC"};
+// Minimum interval between progress events of a run.
+constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
+
+// Cost of a job's turn: its expected run time, between 1 ms and a day, so that no job is free.
+std::int64_t turn_cost_us(double expected_ms) {
+  constexpr double kLeast = 1;
+  constexpr double kMost = 24.0 * 3600 * 1000;
+  const double bounded = std::isnan(expected_ms) ? kMost : std::clamp(expected_ms, kLeast, kMost);
+  return std::llround(bounded * 1000);
+}
 
 }  // namespace
 
 // --- Queries
 
 SqlJobStore::Row SqlJobStore::intact(Row row) {
-  if (row.is_damaged) row.is_newer ? throw_newer_job() : throw_damaged_job();
+  if (row.is_newer && row.is_damaged) {
+    throw Error(ErrorCode::kUnavailable,
+                "a newer version of the service accepted this job, and this daemon cannot read "
+                "it: try again");
+  }
+  if (row.is_damaged) throw_damaged_job();
   return row;
 }
 
@@ -132,7 +149,8 @@ std::optional<SqlJobStore::Row> SqlJobStore::find(SqlConnection& connection, con
 SqlJobStore::Row SqlJobStore::found(SqlConnection& connection, const Viewer& viewer,
                                     const std::string& id) const {
   if (auto row = find(connection, viewer, id)) return *std::move(row);
-  throw_no_job(has_expired(connection, viewer, id));
+  if (has_expired(connection, viewer, id)) throw Error(ErrorCode::kGone, "the job has expired");
+  throw Error(ErrorCode::kNotFound, "there is no job with this id");
 }
 
 SqlJobStore::Row SqlJobStore::read_row(const Rows& rows, int columns, bool is_newer) {
@@ -176,7 +194,30 @@ Job SqlJobStore::with_progress(const Row& row) const {
   return job;
 }
 
-// --- Before a submission
+// --- Submissions
+
+Submission SqlJobStore::submit(const JobSpec& spec) {
+  constexpr int kTries = 20;
+  for (int tries = 0; tries < kTries; ++tries) {
+    if (auto submission = try_to_submit(spec)) return *std::move(submission);
+  }
+  throw Error(ErrorCode::kUnavailable,
+              "the same job is submitted and removed too often: try again");
+}
+
+std::optional<SqlJobStore::Made> SqlJobStore::made_like(const std::string& owner,
+                                                        const std::string& result_key) const {
+  Rows row = records_.query(
+      select_ +
+          "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = {job.succeeded} ORDER BY j.id "
+          "DESC LIMIT 1",
+      owner, result_key);
+  if (!row.next()) return std::nullopt;
+  const Job job = row_of(row).job;
+  Made made = {job.id, job.mesh};
+  if (made.mesh && !is_intact(*made.mesh, blobs_)) made.mesh.reset();
+  return made;
+}
 
 std::optional<SqlJobStore::Asked> SqlJobStore::look_up(SqlConnection& connection,
                                                        const JobSpec& spec) const {
@@ -191,32 +232,30 @@ std::optional<SqlJobStore::Asked> SqlJobStore::look_up(SqlConnection& connection
 }
 
 void SqlJobStore::throw_no_volume_of(SqlConnection& connection, const JobSpec& spec) {
-  throw_no_volume(has_expired(connection, spec.owner, spec.parameters.volume));
+  const bool is_gone = has_expired(connection, spec.owner, spec.parameters.volume);
+  const std::string detail =
+      is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
+  throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
 }
 
+// Urgent jobs share an eighth of the queue, because all others wait for them.
 bool SqlJobStore::has_share(SqlConnection& connection, const JobSpec& spec) const {
+  constexpr std::size_t kStatShare = 8;
   if (spec.owner.empty()) return true;
+  const bool is_stat = spec.parameters.priority == Priority::kStat;
   Rows row = connection.query(
       "SELECT count(*), count(CASE WHEN owner = ?1 THEN 1 END) FROM jobs WHERE state = "
-      "{job.queued} AND (?2 = "
-      "0 OR priority = ?3)",
-      spec.owner, spec.parameters.priority == Priority::kStat, Priority::kStat);
+      "{job.queued} AND (?2 = 0 OR priority = ?3)",
+      spec.owner, is_stat, Priority::kStat);
   row.next();
-  return has_share_of_queue(spec, {row.count(0), row.count(1)}, options_.max_queued);
+  const std::size_t room =
+      is_stat ? std::max<std::size_t>(options_.max_queued / kStatShare, 1) : options_.max_queued;
+  return isomesh::has_share(spec.owner, row.count(1), room - std::min(room, row.count(0)));
 }
 
 bool SqlJobStore::is_repaired(const Job& job) const {
   return job.error && to_error(*job.error).code() == ErrorCode::kUnusableVolume &&
          is_there_and_intact(blobs_, job.parameters.volume, {});
-}
-
-bool SqlJobStore::is_whole(const Job& job) const {
-  const auto is_intact = [this](const std::string& blob) {
-    return is_there_and_intact(blobs_, blob, {});
-  };
-  if (!job.mesh || (job.mesh->label_list && !is_intact(job.mesh->label_list->sha256))) return false;
-  return std::ranges::all_of(job.mesh->files,
-                             [&](const auto& file) { return is_intact(file.second.sha256); });
 }
 
 Job SqlJobStore::remake(const std::string& id) {
@@ -227,7 +266,11 @@ Job SqlJobStore::remake(const std::string& id) {
     spec.parameters = row.job.parameters;
     spec.parameters.callback.reset();
     const auto asked = look_up(connection, spec);
-    if (asked && row.result_key != asked->result_key) throw_other_version();
+    if (asked && row.result_key != asked->result_key) {
+      throw Error(ErrorCode::kGone,
+                  "the stored mesh is damaged, and this version would make a different one: submit "
+                  "the job again");
+    }
     Rows rows = connection.query(
         select_ +
             "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.id > ?3 ORDER BY j.id DESC LIMIT 1",
@@ -238,14 +281,17 @@ Job SqlJobStore::remake(const std::string& id) {
   });
   // Outside the transaction, because this may read the whole volume or the files. The job that
   // makes it again may have ended since the damage was seen.
-  if (like && !is_repaired(*like) && (like->error || !is_final(like->state) || is_whole(*like))) {
+  const auto is_whole = [&] { return like->mesh && is_intact(*like->mesh, blobs_); };
+  if (like && !is_repaired(*like) && (like->error || !is_final(like->state) || is_whole())) {
     return *like;
   }
   try {
     return job_of(submit(spec));
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
-    throw_volume_gone();
+    throw Error(
+        ErrorCode::kGone,
+        "the stored mesh is damaged, and its volume no longer exists: upload the volume again");
   }
 }
 
@@ -350,13 +396,7 @@ Expired SqlJobStore::expire(std::span<const Expirable> jobs, std::uint64_t enoug
       });
 }
 
-std::uint64_t SqlJobStore::named_bytes() const {
-  Rows row = records_.query(
-      "SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM meshes GROUP BY blob) "
-      "AS each");
-  row.next();
-  return row.count(0);
-}
+std::uint64_t SqlJobStore::named_bytes() const { return sum_of_blobs(records_, "meshes", "blob"); }
 
 OwnedBytes SqlJobStore::owned_bytes() const {
   return read_owned_bytes(records_.query(
@@ -366,10 +406,6 @@ OwnedBytes SqlJobStore::owned_bytes() const {
 
 void SqlJobStore::forget_expired(Time before) {
   records_.run(Change::kRepeatable, "DELETE FROM expired WHERE at < ?1", records_.to_us(before));
-}
-
-double milliseconds_between(std::int64_t begin_us, std::int64_t end_us) {
-  return static_cast<double>(std::max<std::int64_t>(end_us - begin_us, 1)) / 1000;
 }
 
 }  // namespace isomesh::store

@@ -14,10 +14,12 @@
 
 namespace isomesh::store {
 
-// The part of the job store that is the same for all databases: queries and expiry. Each engine
-// implements the queue and the runs. Thread safe.
+// The part of the job store that is the same for all databases: queries, expiry, and what a
+// submission reads. Each engine implements the verbs of the queue as its transactions; job_rules.h
+// has what they do to jobs, fair_queue.h whose turn it is. Thread safe.
 class SqlJobStore : public JobStore {
  public:
+  Submission submit(const JobSpec& spec) override;
   Job remake(const std::string& id) override;
   bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) override;
   Job get(const Viewer& viewer, const std::string& id) const override;
@@ -54,6 +56,11 @@ class SqlJobStore : public JobStore {
     std::string result_key;
     std::int64_t cost_us = 0;
   };
+  // The latest succeeded job with a result key.
+  struct Made {
+    std::string job;
+    std::optional<MeshSummary> mesh;  // empty if its blobs are incomplete or damaged
+  };
   // A run claimed by this process.
   struct Live {
     std::uint64_t fence = 0;
@@ -77,6 +84,8 @@ class SqlJobStore : public JobStore {
         select_(std::move(select)),
         records_(database) {}
 
+  // One attempt; empty if equal jobs changed meanwhile, so that the caller must retry.
+  virtual std::optional<Submission> try_to_submit(const JobSpec& spec) = 0;
   virtual Row row_of(const Rows& rows) const = 0;
   // Time until the first waiting job can be claimed; empty if none waits.
   virtual std::optional<std::chrono::microseconds> until_ready() const = 0;
@@ -100,10 +109,13 @@ class SqlJobStore : public JobStore {
   Job with_progress(const Row& row) const;
   // Empty if the volume is missing.
   std::optional<Asked> look_up(SqlConnection& connection, const JobSpec& spec) const;
+  // Reads the blobs of the mesh.
+  std::optional<Made> made_like(const std::string& owner, const std::string& result_key) const;
   // Throws Error kNotFound, or kGone if the volume has expired.
   [[noreturn]] static void throw_no_volume_of(SqlConnection& connection, const JobSpec& spec);
   bool is_full(SqlConnection& connection) const;
-  // True if the queue has room for another job of the owner.
+  // True if the queue has room for another job of the owner: the owner's share of it
+  // (base/share.h).
   bool has_share(SqlConnection& connection, const JobSpec& spec) const;
 
   // Null if this process has no such run.
@@ -133,8 +145,6 @@ class SqlJobStore : public JobStore {
                                    const std::string& after, std::size_t limit) const;
   // True if the job failed because of a damaged volume that is intact now.
   bool is_repaired(const Job& job) const;
-  // True if the files of a job that succeeded are there and intact.
-  bool is_whole(const Job& job) const;
 
   SqlDatabase& records_;
 
@@ -143,9 +153,6 @@ class SqlJobStore : public JobStore {
   // Increments whenever a job may have become ready.
   std::uint64_t work_generation_ ISOMESH_GUARDED_BY(work_mutex_) = 0;
 };
-
-// Milliseconds between two times of the tables; always positive.
-double milliseconds_between(std::int64_t begin_us, std::int64_t end_us);
 
 inline std::int64_t microseconds(std::chrono::milliseconds time) {
   return std::chrono::microseconds(time).count();

@@ -254,11 +254,7 @@ Expired SqlVolumeStore::expire(std::span<const Expirable> volumes, std::uint64_t
 }
 
 std::uint64_t SqlVolumeStore::named_bytes() const {
-  Rows row = database_.query(
-      "SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM volumes GROUP BY id) "
-      "AS each");
-  row.next();
-  return row.count(0);
+  return sum_of_blobs(database_, "volumes", "id");
 }
 
 OwnedBytes SqlVolumeStore::owned_bytes() const {

@@ -1,16 +1,22 @@
 #include "server/store/sqlite/event_log.h"
 
 #include <algorithm>
-
-#include "server/store/job_rules.h"
-#include "server/store/sqlite/database.h"
+#include <utility>
 
 namespace isomesh::store {
 namespace {
 
-constexpr std::size_t kMostRecent = 4000;
+std::uint64_t greatest_event(Database& database) {
+  const Reading reading(database.reader());
+  Rows query = reading->query("SELECT coalesce(max(id), 0) FROM events");
+  query.next();
+  return static_cast<std::uint64_t>(query.integer(0));
+}
 
 }  // namespace
+
+EventLog::EventLog(Database& database)
+    : RecentEvents(greatest_event(database)), database_(database) {}
 
 std::uint64_t EventLog::reserve(Event event) {
   const Lock lock(mutex_);
@@ -22,81 +28,56 @@ std::uint64_t EventLog::reserve(Event event) {
 void EventLog::withdraw(std::size_t count) {
   const Lock lock(mutex_);
   reserved_.resize(reserved_.size() - count);
-  ++generation_;
-  changed_.notify_all();
+  wake_readers();
 }
 
 void EventLog::end_transaction(bool is_committed) {
   const Lock lock(mutex_);
   if (is_committed) {
-    for (Event& event : reserved_) remember({std::move(event), true});
+    for (Event& event : reserved_) remember(std::move(event), true);
   }
   reserved_.clear();
-  ++generation_;
-  changed_.notify_all();
+  wake_readers();
 }
 
 void EventLog::tell(Event event) {
   const Lock lock(mutex_);
   event.id = next_number();
-  remember({std::move(event), false});
-  ++generation_;
-  changed_.notify_all();
+  remember(std::move(event), false);
+  wake_readers();
 }
 
-std::uint64_t EventLog::end() const {
+std::uint64_t EventLog::last() const {
   const Lock lock(mutex_);
-  return reserved_.empty() ? last_ + 1 : reserved_.front().id;
+  return end() - 1;
 }
 
-EventLog::Recent EventLog::recent(const Viewer& viewer, const std::string& job, std::uint64_t since,
-                                  std::uint64_t end) const {
-  const Lock lock(mutex_);
-  Recent result;
-  result.is_complete = job.empty() && since >= complete_after_;
-  const auto begin = std::ranges::upper_bound(recent_, since, {}, &Entry::id);
-  for (auto entry = begin; entry != recent_.end() && entry->id() < end; ++entry) {
-    const bool is_wanted = result.is_complete || !entry->is_kept;
-    if (is_wanted && concerns(entry->event, viewer, job)) result.events.push_back(entry->event);
-  }
-  return result;
-}
-
-std::uint64_t EventLog::generation() const {
-  const Lock lock(mutex_);
-  return generation_;
-}
-
-void EventLog::wait_beyond(std::uint64_t generation, Clock::time_point deadline) const {
-  Lock lock(mutex_);
-  changed_.wait_until(lock, deadline, [&]() ISOMESH_REQUIRES(mutex_) {
-    return generation_ != generation || closed_;
-  });
-}
-
-void EventLog::close() {
-  const Lock lock(mutex_);
-  closed_ = true;
-  changed_.notify_all();
-}
-
-bool EventLog::is_closed() const {
-  const Lock lock(mutex_);
-  return closed_;
-}
+std::uint64_t EventLog::end() const { return reserved_.empty() ? last_ + 1 : reserved_.front().id; }
 
 std::uint64_t EventLog::next_number() {
   last_ = std::max(last_ + 1, static_cast<std::uint64_t>(now_us()));
   return last_;
 }
 
-// Unstored events added while a transaction was open have greater numbers than its events.
-void EventLog::remember(Entry entry) {
-  const auto place = std::ranges::upper_bound(recent_, entry.id(), {}, &Entry::id);
-  recent_.insert(place, std::move(entry));
-  if (recent_.size() <= kMostRecent) return;
-  complete_after_ = std::max(complete_after_, recent_.front().id());
-  recent_.pop_front();
+std::vector<Event> EventLog::kept(const Viewer& viewer, const std::string& job, std::uint64_t since,
+                                  std::uint64_t end, std::size_t limit) const {
+  const Reading reading(database_.reader());
+  const std::string sql =
+      std::string("SELECT id, owner, job, kind, state, stage, progress FROM events WHERE ") +
+      (job.empty() ? "?1 = ''" : "job = ?1") + " AND id > ?2 AND id < ?3" +
+      (viewer ? " AND owner = ?4" : " AND ?4 IS NULL") + " ORDER BY id LIMIT ?5";
+  Rows row = reading->query(sql, job, since, end, viewer, limit);
+  std::vector<Event> events;
+  while (row.next()) {
+    events.push_back({.id = static_cast<std::uint64_t>(row.integer(0)),
+                      .owner = row.text(1),
+                      .job = row.text(2),
+                      .kind = row.choice(3, EventKind::kDone),
+                      .state = row.choice(4, JobState::kCancelled),
+                      .stage = row.choice(5, Stage::kDone),
+                      .progress = row.real(6)});
+  }
+  return events;
 }
 
 }  // namespace isomesh::store

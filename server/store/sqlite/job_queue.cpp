@@ -10,13 +10,6 @@
 #include "server/store/sqlite/job_store.h"
 
 namespace isomesh::store {
-namespace {
-
-double milliseconds_since(std::int64_t begin_us) {
-  return milliseconds_between(begin_us, now_us());
-}
-
-}  // namespace
 
 std::optional<Submission> SqliteJobStore::known(Connection& connection, const JobSpec& spec) const {
   if (spec.idempotency_key.empty()) return std::nullopt;
@@ -35,14 +28,16 @@ std::optional<Submission> SqliteJobStore::known(Connection& connection, const Jo
       Submission::Kind::kExisting, with_progress(found(connection, std::nullopt, id)), {}};
 }
 
-Submission SqliteJobStore::submit(const JobSpec& spec) {
+std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
+  // Blobs are read before the transaction, because others wait for the transaction.
+  const auto before =
+      database_.read([&](SqlConnection& connection) { return look_up(connection, spec); });
+  const auto made = before ? made_like(spec.owner, before->result_key) : std::nullopt;
   Row row;
   row.owner = spec.owner;
-  // Read before the transaction, because others wait for the transaction.
-  const auto spoilt = spoilt_mesh_for(spec);
   {
     Change change(*this);
-    if (auto before = known(change.connection(), spec)) return *std::move(before);
+    if (auto earlier = known(change.connection(), spec)) return *std::move(earlier);
     const auto asked = look_up(change.connection(), spec);
     if (!asked) throw_no_volume_of(change.connection(), spec);
     row.result_key = asked->result_key;
@@ -51,12 +46,14 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;
     row.job.created = timestamp();
-    const auto mesh = mesh_like(change.connection(), row.owner, row.result_key, spoilt);
+    const std::string latest = latest_like(change.connection(), row);
+    if (latest != (made ? made->job : "")) return std::nullopt;
+    const auto mesh = made ? made->mesh : std::nullopt;
     if (refusing_ || (!mesh && is_full(change.connection()))) {
-      return {Submission::Kind::kBusy, {}, kRetryAfter};
+      return Submission{Submission::Kind::kBusy, {}, kRetryAfter};
     }
     if (!mesh && !has_share(change.connection(), spec)) {
-      return {Submission::Kind::kOwnersShare, {}, kRetryAfter};
+      return Submission{Submission::Kind::kOwnersShare, {}, kRetryAfter};
     }
     if (!mesh && !blobs_.has_room()) {
       throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
@@ -78,7 +75,15 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     change.commit();
   }
   if (!is_final(row.job.state)) wake_a_worker();
-  return {Submission::Kind::kNew, row.job, {}};
+  return Submission{Submission::Kind::kNew, row.job, {}};
+}
+
+std::string SqliteJobStore::latest_like(Connection& connection, const Row& row) {
+  Rows latest = connection.query(
+      "SELECT max(id) FROM jobs WHERE owner = ?1 AND result_key = ?2 AND state = {job.succeeded}",
+      row.owner, row.result_key);
+  latest.next();
+  return latest.is_null(0) ? "" : latest.text(0);
 }
 
 std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
@@ -178,11 +183,7 @@ std::optional<Lease> SqliteJobStore::claim_next(const std::string& worker,
   Row& row = *next;
   row.fence += 1;
   row.attempts += 1;
-  row.job.state = JobState::kRunning;
-  row.job.stage = Stage::kLoad;
-  row.job.waiting_for.reset();
-  row.job.started = timestamp();
-  row.job.timing.queue = milliseconds_since(row.accepted);
+  start_run(row.job, row.accepted, now);
   change->run(
       "UPDATE jobs SET state = {job.running}, attempts = ?, fence = ?, claimed = ?, worker = ?, "
       "waiting_for = NULL, record = ? WHERE id = ?",
@@ -261,17 +262,17 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
     if (!held) return false;
     Row& row = *held;
     if (outcome.mesh) give_timing(row.job, outcome.timing);
-    if (row.cancelling || (!outcome.mesh && !outcome.error)) {
-      end(change, row, JobState::kCancelled);
-    } else if (outcome.mesh) {
+    const JobState state =
+        row.cancelling ? JobState::kCancelled : state_after(outcome, row.attempts, options_);
+    has_mesh = state == JobState::kSucceeded;
+    if (has_mesh) {
       succeed(change, row, *outcome.mesh);
       succeed_alike(change, row, *outcome.mesh);
-      has_mesh = true;
-    } else if (outcome.may_retry && row.attempts < options_.attempts) {
+    } else if (state == JobState::kQueued) {
       queue_again(change, row, delay_after(row.attempts, options_));
     } else {
       row.job.error = outcome.error;
-      end(change, row, JobState::kFailed);
+      end(change, row, state);
     }
     change.commit();
     return true;
@@ -304,40 +305,32 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
 }
 
 std::size_t SqliteJobStore::reap() {
-  std::vector<std::string> running = ids_in(JobState::kRunning);
-  try {
-    return reap(running);
-  } catch (const Error& error) {
-    if (!is_of_damaged_database(error)) throw;
+  std::size_t reaped = 0;
+  for (const std::string& id : ids_in(JobState::kRunning)) {
+    try {
+      if (reap(id)) ++reaped;
+    } catch (const Error& error) {
+      // A job that is damaged itself stops no other.
+      if (!is_of_damaged_database(error) || can_change(id)) throw;
+      report_damaged("job", id);
+    }
   }
-  // One that is damaged stops no other.
-  std::erase_if(running, [this](const std::string& id) {
-    if (can_change(id)) return false;
-    report_damaged("job", id);
-    return true;
-  });
-  return reap(running);
-}
-
-std::size_t SqliteJobStore::reap(std::span<const std::string> running) {
-  const std::size_t reaped = database_.freeing([&] {
-    Change change(*this);
-    std::vector<Row> rows;
-    for (const std::string& id : running) {
-      auto row = find(change.connection(), std::nullopt, id);
-      if (row && row->job.state == JobState::kRunning) rows.push_back(*std::move(row));
-    }
-    std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
-    for (Row& row : rows) {
-      row.job = with_progress(row);
-      give_back(change, row, std::chrono::milliseconds(0));
-      forget_run(row.job.id, row.fence);
-    }
-    change.commit();
-    return rows.size();
-  });
   if (reaped > 0) wake_all_workers();
   return reaped;
+}
+
+bool SqliteJobStore::reap(const std::string& id) {
+  if (is_held(id)) return false;  // usual, and needs no transaction
+  return database_.freeing([&] {
+    Change change(*this);
+    auto row = find(change.connection(), std::nullopt, id);
+    if (!row || row->job.state != JobState::kRunning || is_held(id)) return false;
+    row->job = with_progress(*row);
+    give_back(change, *row, std::chrono::milliseconds(0));
+    change.commit();
+    forget_run(id, row->fence);
+    return true;
+  });
 }
 
 Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
@@ -370,20 +363,16 @@ std::optional<SqliteJobStore::Row> SqliteJobStore::leased(Connection& connection
   return row;
 }
 
-bool SqliteJobStore::is_held(const std::string& id, std::uint64_t fence) const {
+bool SqliteJobStore::is_held(const std::string& id, std::optional<std::uint64_t> fence) const {
   const Lock lock(live_mutex_);
   const auto run = live_.find(id);
-  return run != live_.end() && run->second.fence == fence &&
+  return run != live_.end() && run->second.fence == fence.value_or(run->second.fence) &&
          run->second.lease_until >= Steady::clock::now();
 }
 
 void SqliteJobStore::end(Change& change, Row& row, JobState state) {
-  row.job.state = state;
-  row.job.waiting_for.reset();
-  row.job.finished = timestamp();
-  if (state == JobState::kCancelled) row.job.error.reset();
-  row.job.timing.total = milliseconds_since(row.accepted);
   const std::int64_t now = now_us();
+  end_job(row.job, state, row.accepted, now);
   change->run("UPDATE jobs SET state = ?, finished = isomesh_kept(?), record = ? WHERE id = ?",
               state, now, to_record(row.job), row.job.id);
   change->run("UPDATE volumes SET used = max(used, isomesh_kept(?)) WHERE owner = ? AND id = ?",
@@ -412,9 +401,7 @@ void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSum
     while (query.next()) alike.push_back(row_of(query));
   }
   for (Row& other : alike) {
-    other.job.reused = true;
-    other.job.timing = {};
-    other.job.timing.queue = milliseconds_since(other.accepted);
+    skip_run(other.job, other.accepted, now_us());
     succeed(change, other, mesh);
   }
 }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -19,7 +18,6 @@ class SqliteJobStore : public SqlJobStore {
   // `database` and `blobs` must outlive this object.
   SqliteJobStore(Database& database, BlobStore& blobs, JobStoreOptions options);
 
-  Submission submit(const JobSpec& spec) override;
   std::optional<Lease> claim(const std::string& worker, std::chrono::milliseconds lease) override;
   Standing renew(const Lease& lease, const Progress& progress,
                  std::chrono::milliseconds length) override;
@@ -29,8 +27,10 @@ class SqliteJobStore : public SqlJobStore {
   std::size_t reap() override;
   Job cancel(const Viewer& viewer, const std::string& id) override;
   std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
-                            std::chrono::milliseconds timeout) const override;
-  std::uint64_t last_event() const override { return log_.end() - 1; }
+                            std::chrono::milliseconds timeout) const override {
+    return log_.events(viewer, job, since, timeout);
+  }
+  std::uint64_t last_event() const override { return log_.last(); }
   bool responds() const override { return true; }
   // Always granted, because a data folder has one process only.
   std::shared_ptr<const void> claim_removal() override { return std::make_shared<char>(); }
@@ -40,6 +40,7 @@ class SqliteJobStore : public SqlJobStore {
  private:
   class Change;
 
+  std::optional<Submission> try_to_submit(const JobSpec& spec) override;
   Row row_of(const Rows& rows) const override;
   std::optional<std::chrono::microseconds> until_ready() const override;
   void tell(Event event, std::int64_t) override { log_.tell(std::move(event)); }
@@ -60,30 +61,25 @@ class SqliteJobStore : public SqlJobStore {
   // True if the job alone can be read and changed. Changes nothing.
   bool can_change(const std::string& id);
   bool can_read(const std::string& id) const;
-  // As reap(), for these jobs only.
-  std::size_t reap(std::span<const std::string> running);
+  // As reap(), for one job; false if it is not lost.
+  bool reap(const std::string& id);
   // Ids of all jobs that are queued or running.
   std::vector<std::string> ids_in(JobState state) const;
   std::string unclaimable() const;
+  // The id of the latest succeeded job with the row's owner and result key; empty if there is none.
+  static std::string latest_like(Connection& connection, const Row& row);
   // The run's job with its last progress. Empty if the lease is lost.
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
   // The job submitted before with the same key.
   std::optional<Submission> known(Connection& connection, const JobSpec& spec) const;
-  // The mesh of an equal job; empty if that is `spoilt`.
-  std::optional<MeshSummary> mesh_like(SqlConnection& connection, const std::string& owner,
-                                       const std::string& result_key,
-                                       const std::optional<MeshSummary>& spoilt) const;
-  // The mesh of an equal job if its blobs are damaged; empty otherwise. Reads the blobs.
-  std::optional<MeshSummary> spoilt_mesh_for(const JobSpec& spec) const;
   void end(Change& change, Row& row, JobState state);
   void succeed(Change& change, Row& row, const MeshSummary& mesh);
   void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh);
   // Queues a job again without counting the attempt, or ends it as cancelled.
   void give_back(Change& change, Row& row, std::chrono::milliseconds delay);
   void queue_again(Change& change, Row& row, std::chrono::milliseconds delay);
-  std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,
-                                 std::uint64_t end) const;
-  bool is_held(const std::string& id, std::uint64_t fence) const;
+  // True if this process has an unexpired lease of the job, of any run if `fence` is empty.
+  bool is_held(const std::string& id, std::optional<std::uint64_t> fence = {}) const;
 
   Database& database_;
   EventLog log_;
