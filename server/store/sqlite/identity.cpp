@@ -15,7 +15,7 @@ namespace {
 
 // Interval of marks while nothing is stored.
 constexpr std::chrono::minutes kBetweenIdleMarks{10};
-// In place of the number of a mark. Smaller than any, so older versions refuse it, too.
+// In place of the number of a mark.
 constexpr std::int64_t kMoved = -1;
 
 bool has_records(Connection& connection) {
@@ -61,8 +61,6 @@ void mark_as_moved(Database& database, const std::string& name) {
 }
 
 void refuse_moved(Connection& connection) {
-  // Records of an older version lack the table.
-  if (!connection.query("SELECT 1 FROM sqlite_schema WHERE name = 'identity'").next()) return;
   if (connection.query("SELECT 1 FROM identity WHERE number = ?", kMoved).next()) throw_moved();
 }
 
@@ -136,8 +134,6 @@ void Identity::check(const Mark& records, const Mark& blobs) const {
     refuse("the storage of volumes and meshes belongs to another database");
   }
   if (!is_recorded && !is_stored) return;  // nothing can be lost
-  // Written by versions without marks.
-  if (records.id.empty() && blobs.id.empty() && is_recorded) return;
   // The database is marked first, so a crash may leave it one ahead.
   if (blobs.id.empty() && records.number == 1) return;
   if (!is_recorded && records.id != blobs.id) {

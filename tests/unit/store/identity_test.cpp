@@ -148,18 +148,6 @@ TEST_F(IdentityTest, AStartThatWasCutShortIsNoMixUp) {
   EXPECT_EQ(refusal(), "");
 }
 
-// The data folder of a version that had no marks yet.
-TEST_F(IdentityTest, AnUnmarkedFolderIsMarked) {
-  live("one");
-  std::filesystem::remove(root() / "blobs/identity");
-  {
-    const DataFolder data(root());
-    Connection(data.records(), Connection::Mode::kWrite).script("DELETE FROM identity");
-  }
-  EXPECT_EQ(refusal(), "");
-  EXPECT_TRUE(std::filesystem::exists(root() / "blobs/identity"));
-}
-
 TEST_F(IdentityTest, RemembersTheTimeThatItHasSeen) {
   live("one");
   {
