@@ -5,6 +5,7 @@
 // only as local files (LocalBlob), whose bytes were verified.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -15,9 +16,12 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/store/expiry.h"
+#include "server/store/file.h"
+#include "server/store/room.h"
 
 namespace isomesh::store {
 
@@ -46,16 +50,8 @@ class BlobWriter {
   virtual Blob store(const std::stop_token& stop) = 0;
 };
 
-// An open blob. Stays readable after the blob is erased. Thread safe.
-class BlobReader {
- public:
-  virtual ~BlobReader() = default;
-
-  virtual std::uint64_t size() const = 0;
-
-  // Reads up to bytes.size() bytes from `offset`; fewer only at the end. Throws Error kInternal.
-  virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const = 0;
-};
+// An open blob. Stays readable after the blob is erased.
+using BlobReader = File;
 
 // A blob as a local file, to be mapped. The file exists while this object does: a remote store
 // keeps its local copy until `held` is released.
@@ -78,15 +74,6 @@ struct Swept {
 
 // Returns true if a record names the blob with that key.
 using Names = std::function<bool(const std::string& key)>;
-// Bytes that need space, and whose they will be.
-struct Incoming {
-  std::string owner = {};
-  std::uint64_t bytes = 0;
-  // Further bytes of the owner that are being written, so no record names them yet.
-  std::uint64_t unfinished = 0;
-};
-// Frees space for the bytes, or throws Error kOutOfSpace.
-using MakeRoom = std::function<void(const Incoming& incoming)>;
 using Steady = std::chrono::steady_clock::time_point;
 
 // Blobs appear atomically and never change. Several daemons may share a store: no daemon erases or
@@ -99,7 +86,9 @@ class BlobStore {
 
   // Limits the total size of all blobs to `max_bytes` (0: no limit but the disk), and sets the
   // function that frees space. Call before anything is stored.
-  virtual void limit_room(std::uint64_t max_bytes, MakeRoom make) = 0;
+  void limit_room(std::uint64_t max_bytes, MakeRoom make) {
+    room_.limit(max_bytes, std::move(make));
+  }
 
   // True if the store responds. Fast, so it can be called often.
   virtual bool responds() const = 0;
@@ -123,11 +112,11 @@ class BlobStore {
 
   // Total size of all blobs, including those in quarantine and those being written. Blobs stored by
   // other daemons are included as of the last sweep().
-  virtual std::uint64_t bytes() const = 0;
+  std::uint64_t bytes() const { return room_.used(); }
 
   // The size that all blobs may reach if nothing else is stored, by the limit and the local disk on
   // which they are written.
-  virtual std::uint64_t capacity() const = 0;
+  std::uint64_t capacity() const { return room_.capacity(disk_capacity()); }
 
   // Turns a finished local file into a blob that survives a crash, and removes the file. `blob` is
   // the recent result of digest_of(file), so that is_intact() need not read it again. `owner`: as
@@ -179,7 +168,17 @@ class BlobStore {
   // Removes blobs that have been in quarantine since before that time and are still unnamed.
   // Returns their number.
   virtual std::size_t empty_quarantine(Time before, const Names& names) = 0;
+
+ protected:
+  Room room_;
+
+ private:
+  // Size of the disk that has the blobs, or on which they are written.
+  virtual std::uint64_t disk_capacity() const = 0;
 };
+
+// The most blobs that one sweep moves into quarantine, out of so many: a tenth, but always a few.
+inline std::size_t most_swept(std::size_t blobs) { return std::max<std::size_t>(16, blobs / 10); }
 
 // As is_intact, but returns false if the blob is missing.
 bool is_there_and_intact(const BlobStore& blobs, const std::string& key,

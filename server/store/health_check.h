@@ -14,8 +14,9 @@ class HealthCheck {
   // Returns the result of `check`, or the last one if it is younger than `valid_for` or a check is
   // running. False if the running check takes longer than `patience`. If `check` throws, so does
   // this, and the result is false.
-  bool passes(std::chrono::milliseconds valid_for, std::chrono::milliseconds patience,
-              const std::function<bool()>& check) {
+  bool passes(const std::function<bool()>& check,
+              std::chrono::milliseconds valid_for = std::chrono::seconds(2),
+              std::chrono::milliseconds patience = std::chrono::seconds(5)) {
     using Clock = std::chrono::steady_clock;
     {
       const Lock lock(mutex_);

@@ -5,15 +5,17 @@
 #include <utility>
 #include <vector>
 
+#include "base/mutex.h"
 #include "server/store/blob_store.h"
 
 namespace isomesh::store {
 
 // The blobs that this process has stored and that no record names yet, each with its holds, which
-// mark it for other daemons (empty names if there are none). Not thread safe.
+// mark it for other daemons (empty names if there are none). Thread safe.
 class UnnamedBlobs {
  public:
   void note(const std::string& key, std::string hold) {
+    const Lock lock(mutex_);
     Stored& stored = blobs_[key];
     stored.holds.push_back(std::move(hold));
     stored.last = Steady::clock::now();
@@ -22,6 +24,7 @@ class UnnamedBlobs {
   // Removes one hold of the blob and returns its name, so that the caller removes it from the
   // store.
   std::string remove(const std::string& key) {
+    const Lock lock(mutex_);
     const auto found = blobs_.find(key);
     if (found == blobs_.end()) return {};
     std::string hold = std::move(found->second.holds.back());
@@ -31,12 +34,14 @@ class UnnamedBlobs {
   }
 
   bool has_since(const std::string& key, Steady since) const {
+    const Lock lock(mutex_);
     const auto found = blobs_.find(key);
     return found != blobs_.end() && found->second.last >= since;
   }
 
   // Removes blobs stored before that; they will not be named any more.
   void forget(Steady before) {
+    const Lock lock(mutex_);
     std::erase_if(blobs_, [&](const auto& blob) { return blob.second.last < before; });
   }
 
@@ -46,7 +51,8 @@ class UnnamedBlobs {
     Steady last;
   };
 
-  std::map<std::string, Stored> blobs_;
+  mutable Mutex mutex_;
+  std::map<std::string, Stored> blobs_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 // Time elapsed since then.

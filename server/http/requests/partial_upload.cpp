@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "base/files.h"
 #include "proto/json_values.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
 namespace isomesh::http {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/log.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
 namespace isomesh::jobs {
 namespace {

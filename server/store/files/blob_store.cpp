@@ -13,14 +13,13 @@
 #include "base/log.h"
 #include "base/sha256.h"
 #include "proto/error.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
 namespace isomesh::store {
 namespace {
 
 // Folders with many thousand files are slow to list, so the first byte of the key selects a folder.
 constexpr std::size_t kPrefix = 2;
-constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 constexpr std::chrono::hours kBelieved{1};
 constexpr std::chrono::minutes kBetweenForgetting{5};
 constexpr const char* kMark = "identity";
@@ -49,28 +48,12 @@ std::string traits_of(const std::filesystem::path& file) {
 // SHA-256 of a file, read block by block.
 Blob digest_of(const File& file, const std::stop_token& stop) {
   Sha256 digest;
-  std::vector<std::byte> block(kBlockBytes);
-  std::uint64_t offset = 0;
-  while (const std::size_t count = file.read_at(offset, block)) {
+  const std::uint64_t bytes = file.read([&](std::span<const std::byte> block) {
     if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
-    digest.update(std::span(block).first(count));
-    offset += count;
-  }
-  return {to_hex(digest.finish()), offset};
+    digest.update(block);
+  });
+  return {to_hex(digest.finish()), bytes};
 }
-
-class FileReader : public BlobReader {
- public:
-  explicit FileReader(File file) : file_(std::move(file)) {}
-
-  std::uint64_t size() const override { return file_.size(); }
-  std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const override {
-    return file_.read_at(offset, bytes);
-  }
-
- private:
-  File file_;
-};
 
 }  // namespace
 
@@ -186,23 +169,6 @@ class FileBlobStore::Writer : public BlobWriter {
   bool is_committed_ = false;
 };
 
-// Registers the check of a blob, so that others that need it wait for its result.
-class FileBlobStore::CheckUnderWay {
- public:
-  CheckUnderWay(const FileBlobStore& store, const std::string& key) : store_(store), key_(key) {}
-  ~CheckUnderWay() {
-    const Lock lock(store_.intact_mutex_);
-    store_.under_check_.erase(key_);
-    store_.checked_.notify_all();
-  }
-  CheckUnderWay(const CheckUnderWay&) = delete;
-  CheckUnderWay& operator=(const CheckUnderWay&) = delete;
-
- private:
-  const FileBlobStore& store_;
-  const std::string& key_;
-};
-
 Blob digest_of(const std::filesystem::path& path) {
   const File file = File::open(path);
   file.begin_sync();
@@ -226,10 +192,8 @@ std::uint64_t FileBlobStore::counted_bytes() const {
 }
 
 bool FileBlobStore::responds() const {
-  constexpr std::chrono::seconds kForHowLong{2};
-  constexpr std::chrono::seconds kPatience{5};
   if (!holds_ && !is_there()) return false;
-  return health_.passes(kForHowLong, kPatience, [this] { return works(); });
+  return health_.passes([this] { return works(); });
 }
 
 bool FileBlobStore::is_empty() const {
@@ -278,11 +242,6 @@ std::uint64_t FileBlobStore::disk_capacity() const {
   return unknown ? std::numeric_limits<std::uint64_t>::max() : space.capacity;
 }
 
-std::uint64_t FileBlobStore::capacity() const {
-  const std::uint64_t disk = disk_capacity();
-  return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
-}
-
 std::unique_ptr<BlobWriter> FileBlobStore::begin(const std::string& owner) {
   check_is_there();
   return std::make_unique<Writer>(*this, owner);
@@ -315,13 +274,10 @@ void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob,
                             const std::string& owner, const std::stop_token& stop) {
   const File source = File::open(file);
   const std::unique_ptr<BlobWriter> writer = begin(owner);
-  std::vector<std::byte> block(kBlockBytes);
-  std::uint64_t offset = 0;
-  while (const std::size_t count = source.read_at(offset, block)) {
+  source.read([&](std::span<const std::byte> block) {
     if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
-    writer->write(std::span(block).first(count));
-    offset += count;
-  }
+    writer->write(block);
+  });
   if (writer->commit().key != blob.key) {
     throw Error(ErrorCode::kInternal, "a file changed while it was copied");
   }
@@ -329,7 +285,7 @@ void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob,
 }
 
 std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
-  return read_in_folder([&] { return std::make_unique<FileReader>(File::open(found(key))); });
+  return read_in_folder([&] { return std::make_unique<File>(File::open(found(key))); });
 }
 
 LocalBlob FileBlobStore::local(const std::string& key) const {
@@ -350,24 +306,20 @@ bool is_there_and_intact(const BlobStore& blobs, const std::string& key,
 bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
   const std::filesystem::path place = read_in_folder([&] { return found(key); });
   const std::string traits = traits_of(place);
-  {
-    Lock lock(intact_mutex_);
-    const bool is_free = checked_.wait(
-        lock, stop, [&]() ISOMESH_REQUIRES(intact_mutex_) { return !under_check_.contains(key); });
-    if (!is_free) throw Error(ErrorCode::kCancelled, "cancelled");
-    const auto known = intact_.find(key);
-    if (known != intact_.end() && known->second.traits == traits &&
-        Steady::clock::now() - known->second.when < kBelieved) {
-      return true;
-    }
-    under_check_.insert(key);
-  }
-  const CheckUnderWay check(*this, key);
+  const KeyedTurns::Turn turn(checks_, key, stop);
+  if (is_believed(key, traits)) return true;
   const File file = read_in_folder([&] { return File::open(found(key)); });
   const bool is_intact = digest_of(file, stop).key == key;
   // Without properties, the shared folder was missing a moment ago.
   if (is_intact && !traits.empty()) believe(key, traits);
   return is_intact;
+}
+
+bool FileBlobStore::is_believed(const std::string& key, const std::string& traits) const {
+  const Lock lock(intact_mutex_);
+  const auto known = intact_.find(key);
+  return known != intact_.end() && known->second.traits == traits &&
+         Steady::clock::now() - known->second.when < kBelieved;
 }
 
 void FileBlobStore::believe(const std::string& key, const std::string& traits) const {
@@ -434,7 +386,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   const std::uint64_t bytes = size_of(path);
   const std::string hold = holds_ ? holds_->hold(key) : "";
   std::string traits;
-  const auto stored = [&](std::uint64_t replaced) ISOMESH_REQUIRES(places_) {
+  const auto stored = [&](std::uint64_t replaced) {
     room_.correct(taken + replaced, bytes);
     unnamed_.note(key, hold);
     traits = traits_of(place);

@@ -13,11 +13,11 @@
 
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
+#include "server/store/file.h"
 #include "server/store/files/data_folder.h"
-#include "server/store/files/files.h"
 #include "server/store/files/folder_holds.h"
-#include "server/store/files/room.h"
 #include "server/store/health_check.h"
+#include "server/store/keyed_turns.h"
 #include "server/store/unnamed_blobs.h"
 
 namespace isomesh::store {
@@ -32,10 +32,6 @@ class FileBlobStore : public BlobStore {
   // Uses any folders. `reserve` is that of the local disk and must outlive this object.
   FileBlobStore(BlobFolders folders, Reserve& reserve);
 
-  void limit_room(std::uint64_t max_bytes, MakeRoom make) override {
-    room_.limit(max_bytes, std::move(make));
-  }
-
   // Creates and removes a file, and compares a shared folder's mark.
   bool responds() const override;
   bool is_shared() const override { return holds_.has_value(); }
@@ -44,8 +40,6 @@ class FileBlobStore : public BlobStore {
   void set_mark(const std::string& text) override;
   std::unique_ptr<BlobWriter> begin(const std::string& owner) override;
   bool has_room() const override;
-  std::uint64_t bytes() const override { return room_.used(); }
-  std::uint64_t capacity() const override;
   void adopt(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
              const std::stop_token& stop) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
@@ -73,7 +67,6 @@ class FileBlobStore : public BlobStore {
 
  private:
   class Writer;
-  class CheckUnderWay;
 
   // The time of a successful check and the file's properties then.
   struct Check {
@@ -98,6 +91,8 @@ class FileBlobStore : public BlobStore {
   template <class Write>
   auto write_in_folder(const Write& write) const;
   std::optional<std::uint64_t> size_now(const std::string& key) const;
+  // True if the file was found intact while it had these properties.
+  bool is_believed(const std::string& key, const std::string& traits) const;
   void believe(const std::string& key, const std::string& traits) const;
   // Publishes `path`, open as `file`, as a blob. `taken` bytes are already taken from the room.
   // Returns the properties of the published file.
@@ -108,8 +103,7 @@ class FileBlobStore : public BlobStore {
   std::filesystem::path found(const std::string& key) const;
   void copy_in(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
                const std::stop_token& stop);
-  // Size of the disk that has the blobs.
-  std::uint64_t disk_capacity() const;
+  std::uint64_t disk_capacity() const override;
   // For a shared folder: erases the blob unless it is held or named. Returns false if it still
   // exists.
   bool take_out(const std::string& key, std::chrono::nanoseconds oldest_hold, const Names& names)
@@ -132,19 +126,17 @@ class FileBlobStore : public BlobStore {
   mutable Mutex mark_mutex_;
   // The database's name in the mark, as read or written first; empty if there is none yet.
   mutable std::string name_ ISOMESH_GUARDED_BY(mark_mutex_);
-  Room room_;
   // Held while a file is moved to its place or is swept, so that a sweep never erases a file that
   // was just stored again.
   Mutex places_;
-  UnnamedBlobs unnamed_ ISOMESH_GUARDED_BY(places_);
+  UnnamedBlobs unnamed_;
   Mutex folders_mutex_;
   // True once all folders are on disk.
   bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;
   mutable Mutex intact_mutex_;
   mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
   mutable Steady next_forgetting_ ISOMESH_GUARDED_BY(intact_mutex_);
-  mutable Condition checked_;
-  mutable std::set<std::string> under_check_ ISOMESH_GUARDED_BY(intact_mutex_);
+  mutable KeyedTurns checks_;  // others wait for the result
 };
 
 }  // namespace isomesh::store

@@ -10,9 +10,6 @@
 namespace isomesh::store {
 namespace {
 
-// One sweep takes at most a tenth of all blobs, but always a few.
-constexpr std::size_t kSweptShare = 10;
-constexpr std::size_t kSweptAtLeast = 16;
 // Age at which files of dead daemons in a shared folder are removed.
 constexpr std::chrono::hours kLongestHold{24};
 constexpr std::chrono::hours kLongestDraft{48};
@@ -29,10 +26,7 @@ std::shared_ptr<const void> FileBlobStore::hold_bytes(const std::string& key) co
 }
 
 void FileBlobStore::mark_named(const std::string& key) {
-  const std::string hold = [&] {
-    const Lock lock(places_);
-    return unnamed_.remove(key);
-  }();
+  const std::string hold = unnamed_.remove(key);
   if (!hold.empty()) holds_->let_go(hold);
 }
 
@@ -105,7 +99,7 @@ std::size_t FileBlobStore::look_again(std::span<const std::string> keys,
 
 Swept FileBlobStore::sweep(Steady spare_since, const Names& names) {
   std::vector<std::string> keys = this->keys();
-  const std::size_t most = std::max(kSweptAtLeast, keys.size() / kSweptShare);
+  const std::size_t most = most_swept(keys.size());
   std::erase_if(keys, names);
   const std::set<std::string> held_by_others = held(age_of(spare_since));
   Swept swept;
@@ -122,7 +116,6 @@ Swept FileBlobStore::sweep(Steady spare_since, const Names& names) {
   }
   swept.quarantined = aside.size() - look_again(aside, age_of(spare_since), names);
   if (holds_) tidy_shared(age_of(spare_since));
-  const Lock lock(places_);
   unnamed_.forget(spare_since);
   return swept;
 }

@@ -14,7 +14,7 @@
 #include "base/ids.h"
 #include "base/log.h"
 #include "proto/error.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
 namespace isomesh::store {
 namespace {
@@ -138,9 +138,7 @@ void DataFolder::check_is_there() const {
 bool DataFolder::works() const { return is_there() && can_write_in(root()); }
 
 bool DataFolder::responds() const {
-  constexpr std::chrono::seconds kForHowLong{2};
-  constexpr std::chrono::seconds kPatience{5};
-  return is_there() && health_.passes(kForHowLong, kPatience, [this] { return works(); });
+  return is_there() && health_.passes([this] { return works(); });
 }
 
 BlobFolders DataFolder::blob_folders() const {

@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "base/ids.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
 namespace isomesh::store {
 namespace {

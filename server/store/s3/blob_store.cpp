@@ -41,31 +41,6 @@ class S3BlobStore::Writer : public BlobWriter {
   std::uint64_t stored_ = 0;
 };
 
-// Registers the fetch of a blob, so that others wait for it.
-class S3BlobStore::Fetching {
- public:
-  Fetching(const S3BlobStore& store, const std::string& key, const std::stop_token& stop)
-      : store_(store), key_(key) {
-    Lock lock(store_.mutex_);
-    const bool is_free = store_.fetched_.wait(lock, stop, [&]() ISOMESH_REQUIRES(store_.mutex_) {
-      return !store_.coming_.contains(key);
-    });
-    if (!is_free) throw Error(ErrorCode::kCancelled, "cancelled");
-    store_.coming_.insert(key);
-  }
-  ~Fetching() {
-    const Lock lock(store_.mutex_);
-    store_.coming_.erase(key_);
-    store_.fetched_.notify_all();
-  }
-  Fetching(const Fetching&) = delete;
-  Fetching& operator=(const Fetching&) = delete;
-
- private:
-  const S3BlobStore& store_;
-  const std::string key_;
-};
-
 S3BlobStore::S3BlobStore(const DataFolder& folder, S3Options options)
     : options_(std::move(options)),
       folder_(folder),
@@ -73,10 +48,7 @@ S3BlobStore::S3BlobStore(const DataFolder& folder, S3Options options)
       cache_(folder.cache_folders(), folder.reserve(), options_.cache_bytes) {}
 
 bool S3BlobStore::responds() const {
-  constexpr std::chrono::seconds kForHowLong{2};
-  constexpr std::chrono::seconds kPatience{5};
-  return folder_.is_there() &&
-         health_.passes(kForHowLong, kPatience, [this] { return client_.responds(); });
+  return folder_.is_there() && health_.passes([this] { return client_.responds(); });
 }
 
 bool S3BlobStore::is_empty() const { return !client_.has_any(kBlobObjects); }
@@ -89,11 +61,6 @@ bool S3BlobStore::has_room() const {
   if (folder_.reserve().has_room()) return true;
   cache_.empty();
   return folder_.reserve().has_room();
-}
-
-std::uint64_t S3BlobStore::capacity() const {
-  const std::uint64_t disk = folder_.reserve().capacity();
-  return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
 }
 
 std::unique_ptr<BlobWriter> S3BlobStore::begin(const std::string& owner) {
@@ -127,7 +94,6 @@ void S3BlobStore::store(const Blob& blob, const File& bytes, const std::string& 
     client_.try_to_erase(hold);
     throw;
   }
-  const Lock lock(mutex_);
   unnamed_.note(blob.key, hold);
 }
 
@@ -182,7 +148,7 @@ LocalBlob S3BlobStore::local(const std::string& key) const {
 
 bool S3BlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
   const auto in_use = cache_.use(key);
-  const Fetching fetching(*this, key, stop);
+  const KeyedTurns::Turn turn(fetches_, key, stop);
   if (is_there_and_intact(cache_.files(), key, stop)) return true;
   cache_.erase(key);  // a copy that the disk has corrupted
   return fetch(key, stop);

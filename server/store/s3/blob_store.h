@@ -12,8 +12,8 @@
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
-#include "server/store/files/room.h"
 #include "server/store/health_check.h"
+#include "server/store/keyed_turns.h"
 #include "server/store/s3/blob_cache.h"
 #include "server/store/s3/client.h"
 #include "server/store/unnamed_blobs.h"
@@ -46,9 +46,6 @@ class S3BlobStore : public BlobStore {
   // `folder` must outlive this object. Sends no request yet.
   S3BlobStore(const DataFolder& folder, S3Options options);
 
-  void limit_room(std::uint64_t max_bytes, MakeRoom make) override {
-    room_.limit(max_bytes, std::move(make));
-  }
   bool responds() const override;
   bool is_shared() const override { return true; }
   bool is_empty() const override;
@@ -57,8 +54,6 @@ class S3BlobStore : public BlobStore {
   std::unique_ptr<BlobWriter> begin(const std::string& owner) override;
   // About the local disk; removes copies first if it is full.
   bool has_room() const override;
-  std::uint64_t bytes() const override { return room_.used(); }
-  std::uint64_t capacity() const override;
   void adopt(const std::filesystem::path& file, const Blob& blob, const std::string& owner,
              const std::stop_token& stop) override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
@@ -79,8 +74,8 @@ class S3BlobStore : public BlobStore {
 
  private:
   class Writer;
-  class Fetching;
 
+  std::uint64_t disk_capacity() const override { return folder_.reserve().capacity(); }
   // The copy that was just made. Stays readable if another thread erases the blob.
   File open_copy(const std::string& key) const;
   // Uploads the bytes of a local copy as a blob. The copy may be erased meanwhile.
@@ -92,7 +87,6 @@ class S3BlobStore : public BlobStore {
   bool fetch_once(const std::string& key, std::uint64_t bytes, const std::stop_token& stop) const;
   bool is_held(const std::string& key, std::chrono::nanoseconds oldest) const;
   bool take_out(const std::string& key, Steady spare_since, const Names& names);
-  bool is_unnamed_since(const std::string& key, Steady since) const;
   bool is_time_to_sweep();
   // The held blobs. Removes holds that are too old.
   std::set<std::string> tidy_holds(std::chrono::nanoseconds oldest);
@@ -102,17 +96,15 @@ class S3BlobStore : public BlobStore {
   const DataFolder& folder_;
   S3Client client_;
   mutable BlobCache cache_;
-  Room room_;
   mutable HealthCheck health_;
+  UnnamedBlobs unnamed_;
+  mutable KeyedTurns fetches_;
   mutable Mutex mutex_;
-  UnnamedBlobs unnamed_ ISOMESH_GUARDED_BY(mutex_);
   // Blobs in the bucket with wrong bytes.
   mutable std::set<std::string> damaged_ ISOMESH_GUARDED_BY(mutex_);
   Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
   // As given to the last sweep; before the first one every blob counts as recent.
   Steady spare_since_ ISOMESH_GUARDED_BY(mutex_);
-  mutable Condition fetched_;
-  mutable std::set<std::string> coming_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 }  // namespace isomesh::store

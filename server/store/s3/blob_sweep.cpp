@@ -10,8 +10,6 @@
 namespace isomesh::store {
 namespace {
 
-constexpr std::size_t kSweptShareOfObjects = 10;
-constexpr std::size_t kSweptObjectsAtLeast = 16;
 constexpr std::chrono::hours kLongestObjectHold{24};
 // Times of objects have whole seconds.
 constexpr std::chrono::seconds kClockStep{1};
@@ -28,16 +26,8 @@ void S3BlobStore::erase(const std::string& key) {
 
 // A leftover hold expires.
 void S3BlobStore::mark_named(const std::string& key) {
-  const std::string hold = [&] {
-    const Lock lock(mutex_);
-    return unnamed_.remove(key);
-  }();
+  const std::string hold = unnamed_.remove(key);
   if (!hold.empty()) client_.try_to_erase(hold);
-}
-
-bool S3BlobStore::is_unnamed_since(const std::string& key, Steady since) const {
-  const Lock lock(mutex_);
-  return unnamed_.has_since(key, since);
 }
 
 bool S3BlobStore::is_held(const std::string& key, std::chrono::nanoseconds oldest) const {
@@ -52,8 +42,9 @@ std::vector<std::string> S3BlobStore::erase_unnamed(std::span<const std::string>
   std::vector<std::string> left;
   for (const std::string& key : keys) {
     if (names(key)) continue;
-    if (is_unnamed_since(key, spare_since) || !take_out(key, spare_since, names))
+    if (unnamed_.has_since(key, spare_since) || !take_out(key, spare_since, names)) {
       left.push_back(key);
+    }
   }
   return left;
 }
@@ -111,7 +102,7 @@ Swept S3BlobStore::sweep(Steady spare_since, const Names& names) {
   // Listed after the blobs, so every listed blob already had its hold.
   const std::set<std::string> held = tidy_holds(age_of(spare_since));
   tidy_going();
-  const std::size_t most = std::max(kSweptObjectsAtLeast, keys.size() / kSweptShareOfObjects);
+  const std::size_t most = most_swept(keys.size());
   Swept swept;
   for (const std::string& key : keys) {
     if (names(key)) {
@@ -119,7 +110,7 @@ Swept S3BlobStore::sweep(Steady spare_since, const Names& names) {
       continue;
     }
     if (in_quarantine.contains(key) || held.contains(key)) continue;
-    if (is_unnamed_since(key, spare_since)) continue;
+    if (unnamed_.has_since(key, spare_since)) continue;
     if (swept.quarantined == most) {
       ++swept.left;
       continue;
@@ -128,7 +119,6 @@ Swept S3BlobStore::sweep(Steady spare_since, const Names& names) {
     ++swept.quarantined;
   }
   cache_.keep_only(names);
-  const Lock lock(mutex_);
   unnamed_.forget(spare_since);
   return swept;
 }

@@ -80,6 +80,13 @@ S3Text read_s3_text(std::string_view body) {
   return text;
 }
 
+// The text of a page of a list.
+S3Text listing_in(const S3Response& response) {
+  S3Text text = read_s3_text(response.text);
+  if (response.status == kS3Ok && text.root == "ListBucketResult") return text;
+  throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
+}
+
 // Safe for a log; empty if there is none.
 std::string s3_error_code(std::string_view body) {
   const S3Text text = read_s3_text(body);
@@ -90,7 +97,6 @@ std::string s3_error_code(std::string_view body) {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kLongestPause{2};
-constexpr std::size_t kReadAtOnce = std::size_t{1} << 20;
 constexpr int kListedAtOnce = 1000;
 constexpr int kMostPages = 100'000;
 // S3 allows 10 000.
@@ -289,14 +295,9 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
                                std::uint64_t begin, std::uint64_t bytes,
                                const std::stop_token& stop) {
   Sha256 digest;
-  std::vector<std::byte> block(kReadAtOnce);
-  for (std::uint64_t done = 0; done < bytes;) {
-    const auto wanted =
-        static_cast<std::size_t>(std::min<std::uint64_t>(kReadAtOnce, bytes - done));
-    const std::size_t count = file.read_at(begin + done, std::span(block).first(wanted));
-    if (count == 0) throw Error(ErrorCode::kInternal, "a file became shorter while it was stored");
-    digest.update(std::span<const std::byte>(block).first(count));
-    done += count;
+  const auto add = [&](std::span<const std::byte> block) { digest.update(block); };
+  if (file.read(add, begin, bytes) < bytes) {
+    throw Error(ErrorCode::kInternal, "a file became shorter while it was stored");
   }
   const S3Response response = ask({.method = "PUT",
                                    .key = key,
@@ -372,10 +373,7 @@ S3Listing S3Client::list(const std::string& beginning, const std::stop_token& st
   std::string last;
   for (int page = 0; page < kMostPages; ++page) {
     const S3Response response = ask(listing(beginning, last, kListedAtOnce), stop);
-    const S3Text text = read_s3_text(response.text);
-    if (response.status != kS3Ok || text.root != "ListBucketResult") {
-      throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
-    }
+    const S3Text text = listing_in(response);
     all.now = response.now();
     for (const auto& [parent, name, value] : text.leaves) {
       if (parent != "Contents") continue;
@@ -398,12 +396,7 @@ S3Listing S3Client::list(const std::string& beginning, const std::stop_token& st
 }
 
 bool S3Client::has_any(const std::string& beginning) const {
-  const S3Response response = ask(listing(beginning, "", 1));
-  const S3Text text = read_s3_text(response.text);
-  if (response.status != kS3Ok || text.root != "ListBucketResult") {
-    throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
-  }
-  return !text.find("Key").empty();
+  return !listing_in(ask(listing(beginning, "", 1))).find("Key").empty();
 }
 
 std::string S3Client::link(const std::string& key, const LinkedAs& as) const {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/store/blob_store.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 #include "server/store/s3/request.h"
 
 namespace isomesh::store {

@@ -15,7 +15,7 @@
 #include "base/curl.h"
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 #include "server/store/s3/address.h"
 
 namespace isomesh::store {

@@ -19,8 +19,8 @@
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "proto/error.h"
+#include "server/store/file.h"
 #include "server/store/files/data_folder.h"
-#include "server/store/files/files.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/sqlite.h"
@@ -30,7 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kCopiedAtOnce = std::size_t{1} << 20;
 constexpr int kTries = 5;
 // The layout of DataFolder and FileBlobStore.
 constexpr const char* kRecords = "isomesh.sqlite";
@@ -67,17 +66,12 @@ bool copy_file(const fs::path& from, const fs::path& to, Amount& copied) {
   fs::remove(to, absent);
   File target = File::create(to);
   Sha256 digest;
-  std::vector<std::byte> block(kCopiedAtOnce);
-  std::uint64_t offset = 0;
-  while (const std::size_t count = source->read_at(offset, block)) {
-    const auto bytes = std::span<const std::byte>(block).first(count);
+  copied.bytes += source->read([&](std::span<const std::byte> bytes) {
     digest.update(bytes);
     target.write(bytes);
-    offset += count;
-  }
+  });
   target.sync();
   ++copied.blobs;
-  copied.bytes += offset;
   const std::string name = from.filename().string();
   if (to_hex(digest.finish()) != name) copied.damaged.insert(name);
   return true;

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "proto/error.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 #include "server/store/sql/fair_queue.h"
 
 namespace isomesh::store {

@@ -219,7 +219,7 @@ TEST_P(Blobs, RoomIsMadeForTheOwnerOfTheBytes) {
     blobs_->erase(kHelloKey);
   });
   put("hello");
-  const auto first = blobs_->begin("one");
+  auto first = blobs_->begin("one");
   first->write(as_span("12345"));
   first->commit();
   {
@@ -231,6 +231,9 @@ TEST_P(Blobs, RoomIsMadeForTheOwnerOfTheBytes) {
   EXPECT_EQ(asked[0].owner, "one");
   EXPECT_EQ(asked[0].bytes, 3U);
   EXPECT_EQ(asked[0].unfinished, 5U) << "another file of the same job";
+  first.reset();
+  EXPECT_EQ(code_thrown_by([&] { test::put(*blobs_, "90a", "one"); }), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(asked.back().unfinished, 0U);
 }
 
 TEST_P(Blobs, WhatIsNotNamedGoesIntoQuarantine) {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "base/clock.h"
+#include "server/store/file.h"
 #include "server/store/files/blob_store.h"
-#include "server/store/files/files.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "base/log.h"
+#include "server/store/file.h"
 #include "server/store/files/blob_store.h"
-#include "server/store/files/files.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
@@ -30,8 +30,6 @@ class FileBlobStoreTest : public testing::Test {
  protected:
   Blob put(std::string_view text) { return test::put(blobs_, text); }
   std::string get(const std::string& key) { return test::get(blobs_, key); }
-
-  std::size_t blob_files() { return test::files_below(data_.blobs()).size(); }
 
   test::TemporaryFolder folder_;
   DataFolder data_{folder_ / "data"};
@@ -132,19 +130,7 @@ class Sweeping : public FileBlobStoreTest {
   static bool nothing(const std::string& /*key*/) { return false; }
 
   static Steady in(std::chrono::seconds time) { return Steady::clock::now() + time; }
-  Swept sweep() { return blobs_.sweep(in(std::chrono::seconds(1)), nothing); }
-  std::size_t in_quarantine() { return test::files_below(data_.quarantine()).size(); }
 };
-
-TEST_F(Sweeping, WhatIsAskedForComesBack) {
-  const std::string other = put("other").key;
-  put("hello");
-  sweep();
-  EXPECT_EQ(get(kHello), "hello");
-  EXPECT_EQ(blobs_.size(other), 5U);
-  EXPECT_EQ(in_quarantine(), 0U);
-  EXPECT_EQ(blob_files(), 2U);
-}
 
 // A blob that was just stored is about to be named, however old its file looks.
 TEST_F(Sweeping, LeavesWhatWasStoredSince) {
@@ -187,12 +173,6 @@ TEST_F(SharedFolder, IsNotNeededToEraseWhatTheDataFolderHolds) {
 TEST_F(SharedFolder, IsNotMade) {
   EXPECT_EQ(code_thrown_by([&] { shared_blob_folders(folder_ / "absent"); }),
             ErrorCode::kUnavailable);
-}
-
-TEST_F(SharedFolder, DoesNotAnswerOnceItIsGone) {
-  FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
-  std::filesystem::remove_all(folder_ / "shared");
-  EXPECT_FALSE(blobs.responds());
 }
 
 // A folder that is not mounted for a while is no damage, and nothing is stored in its place.

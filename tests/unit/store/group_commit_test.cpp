@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 #include "proto/error.h"
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 #include "server/store/sqlite/sqlite.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"

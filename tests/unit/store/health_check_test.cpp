@@ -15,11 +15,11 @@ using std::chrono::milliseconds;
 TEST(HealthCheck, ACheckThatThrowsHasFailedAndEnded) {
   HealthCheck health;
   const auto throws = []() -> bool { throw Error(ErrorCode::kInternal, "it cannot be checked"); };
-  EXPECT_EQ(test::code_thrown_by([&] { health.passes(milliseconds(0), hours(1), throws); }),
+  EXPECT_EQ(test::code_thrown_by([&] { health.passes(throws, milliseconds(0), hours(1)); }),
             ErrorCode::kInternal);
   const auto is_well = [] { return true; };
-  EXPECT_FALSE(health.passes(hours(1), hours(1), is_well));
-  EXPECT_TRUE(health.passes(milliseconds(0), hours(1), is_well));
+  EXPECT_FALSE(health.passes(is_well, hours(1), hours(1)));
+  EXPECT_TRUE(health.passes(is_well, milliseconds(0), hours(1)));
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -11,6 +13,7 @@
 
 namespace isomesh::store {
 
+// An open file. Its constant methods are thread safe.
 class File {
  public:
   // Creates a file that must not exist. Throws Error kOutOfSpace or kInternal.
@@ -23,6 +26,12 @@ class File {
 
   // Reads up to bytes.size() bytes from `offset`; fewer only at the end of the file.
   std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
+
+  // Passes up to `bytes` bytes from `begin` to `take`, block by block. Returns their number; fewer
+  // only at the end of the file.
+  using Take = std::function<void(std::span<const std::byte> block)>;
+  std::uint64_t read(const Take& take, std::uint64_t begin = 0,
+                     std::uint64_t bytes = std::numeric_limits<std::uint64_t>::max()) const;
 
   std::uint64_t size() const;
 

@@ -1,13 +1,24 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 
 #include "base/mutex.h"
-#include "server/store/blob_store.h"
 
 namespace isomesh::store {
+
+// Bytes that need space, and whose they will be.
+struct Incoming {
+  std::string owner = {};
+  std::uint64_t bytes = 0;
+  // Further bytes of the owner that are being written, so no record names them yet.
+  std::uint64_t unfinished = 0;
+};
+// Frees space for the bytes, or throws Error kOutOfSpace.
+using MakeRoom = std::function<void(const Incoming& incoming)>;
 
 // Counts the bytes of all blobs, including those being written, and enforces their limit. Thread
 // safe.
@@ -33,7 +44,10 @@ class Room {
   void recount(std::uint64_t bytes);
 
   std::uint64_t used() const;
-  std::uint64_t max_bytes() const { return max_bytes_; }
+  // The limit on a disk of that size.
+  std::uint64_t capacity(std::uint64_t disk) const {
+    return max_bytes_ == 0 ? disk : std::min(disk, max_bytes_);
+  }
 
  private:
   bool try_take(std::uint64_t bytes, const std::string& owner);

@@ -1,4 +1,4 @@
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
 #include <csignal>
 #include <functional>

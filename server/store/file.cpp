@@ -1,10 +1,12 @@
-#include "server/store/files/files.h"
+#include "server/store/file.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -42,6 +44,21 @@ std::size_t File::read_at(std::uint64_t offset, std::span<std::byte> bytes) cons
     total += static_cast<std::size_t>(count);
   }
   return total;
+}
+
+std::uint64_t File::read(const Take& take, std::uint64_t begin, std::uint64_t bytes) const {
+  constexpr std::uint64_t kBlockBytes = std::uint64_t{1} << 20;
+  std::vector<std::byte> block(static_cast<std::size_t>(std::min(bytes, kBlockBytes)));
+  std::uint64_t done = 0;
+  while (done < bytes) {
+    const auto wanted = std::min<std::uint64_t>(block.size(), bytes - done);
+    const std::size_t count =
+        read_at(begin + done, std::span(block).first(static_cast<std::size_t>(wanted)));
+    if (count == 0) break;
+    take(std::span(block).first(count));
+    done += count;
+  }
+  return done;
 }
 
 std::uint64_t File::size() const {

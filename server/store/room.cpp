@@ -1,4 +1,4 @@
-#include "server/store/files/room.h"
+#include "server/store/room.h"
 
 #include <algorithm>
 #include <utility>
