@@ -62,21 +62,6 @@ TEST_F(BlobsInS3, NothingIsLostWhileTheyDoNotAnswer) {
   EXPECT_TRUE(eventually([&] { return readiness() == 200; }));
 }
 
-TEST_F(BlobsInS3, AMeshWhoseObjectIsSpoiltIsMadeAgain) {
-  start_with_peer();
-  const Job made = finished_job(daemon());
-  const std::string mesh = mesh_of(made);
-  const std::string key = made.mesh->files.at(MeshFormat::kDrc).sha256;
-  peer_->put("blobs/" + key, "spoilt");
-  kill();
-  std::filesystem::remove_all(folder_ / "data/cache");
-  start_with_peer();
-  EXPECT_EQ(daemon().get(made.mesh->files.at(MeshFormat::kDrc).href).status, 503);
-  EXPECT_TRUE(eventually(
-      [&] { return daemon().get(made.mesh->files.at(MeshFormat::kDrc).href).status == 200; }));
-  EXPECT_TRUE(mesh_of(made) == mesh);
-}
-
 TEST_F(BlobsInS3, ADownloadThatPrefersItIsSentThere) {
   start_with_peer({"--blob-redirect"});
   const Job made = finished_job(daemon());
@@ -88,15 +73,6 @@ TEST_F(BlobsInS3, ADownloadThatPrefersItIsSentThere) {
   EXPECT_THAT(answer.header("cache-control"), HasSubstr("no-store"));
   EXPECT_EQ(daemon().get(file.href).status, 200) << "who does not know that is not sent away";
   EXPECT_EQ(daemon().send("HEAD", file.href, {}, {{"Prefer", "redirect"}}).status, 200);
-}
-
-TEST_F(BlobsInS3, AnotherDatabaseIsRefused) {
-  start_with_peer();
-  finished_job(daemon());
-  kill();
-  EXPECT_THROW(Daemon(folder_ / "other", "127.0.0.1:0",
-                      {"--blobs", peer_->url(), "--blob-credentials", folder_ / "keys"}),
-               std::runtime_error);
 }
 
 class BlobsInAFolder : public FaultTest {

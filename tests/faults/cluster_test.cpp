@@ -246,19 +246,6 @@ TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
 }
 
-TEST_F(Cluster, ProgressIsToldByEveryNode) {
-  start(0, {"--workers", "0"});
-  start(1, {"--workers", "1"});
-  const Job running = endless_job(0);
-  int told = 0;
-  const Job ended = node(0).client().follow(running.id, [&](const JobEvent& event) {
-    if (event.stage != Stage::kSmooth || event.progress == 0) return;
-    if (++told == 3) node(0).client().cancel(running.id);
-  });
-  EXPECT_EQ(ended.state, JobState::kCancelled);
-  EXPECT_GE(told, 3);
-}
-
 TEST_F(Cluster, ARunOutlivesAnOutageThatIsLongerThanItsLease) {
   start(0, {"--workers", "1"});
   start(1, {"--workers", "1"});

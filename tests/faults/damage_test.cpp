@@ -17,7 +17,7 @@ class Damage : public FaultTest {
   static const MeshFile& mesh(const Job& job) { return job.mesh->files.at(MeshFormat::kDrc); }
 };
 
-TEST_F(Damage, AMeshIsNotServedAndMadeAgain) {
+TEST_F(Damage, AMeshThatIsSpoiltOrMissingIsNotServedAndMadeAgain) {
   start();
   const Job job = finished_job(daemon());
   const std::string bytes = mesh_of(job);
@@ -32,12 +32,6 @@ TEST_F(Damage, AMeshIsNotServedAndMadeAgain) {
   const auto jobs = daemon().client().jobs().jobs;
   EXPECT_EQ(std::ranges::count(jobs, false, &Job::reused), 2) << "it was made again once";
   EXPECT_EQ(this->job(job.id), job);
-}
-
-TEST_F(Damage, AMissingMeshIsMadeAgain) {
-  start();
-  const Job job = finished_job(daemon());
-  const std::string bytes = mesh_of(job);
   std::filesystem::remove(file_of(mesh(job).sha256));
   EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
   ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 200; }));
@@ -64,22 +58,6 @@ TEST_F(Damage, AMeshWithoutItsVolumeIsGone) {
   const Answer gone = daemon().get(mesh(job).href);
   EXPECT_TRUE(is_problem(gone, ErrorCode::kGone));
   EXPECT_THAT(gone.body, HasSubstr("damaged"));
-}
-
-TEST_F(Damage, AMeshThatCannotBeMadeAgainSaysWhy) {
-  start();
-  const Job job = finished_job(daemon());
-  spoil(mesh(job).sha256);
-  spoil(job.parameters.volume);
-  EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
-  ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 422; }));
-  EXPECT_THAT(daemon().get(mesh(job).href).body, HasSubstr("Upload it again"));
-  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U);
-  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U) << "it is not tried again";
-  small_volume();
-  EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
-  ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 200; }));
-  EXPECT_EQ(daemon().client().jobs().jobs.size(), 3U);
 }
 
 // Labels 1 to 300, so that their list is a file of its own.
@@ -124,6 +102,7 @@ TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
       return eventually([&] { return status(asked) == expected; });
     };
     ASSERT_TRUE(becomes(422)) << request;
+    EXPECT_THAT(daemon().get(path + request).body, HasSubstr("Upload it again"));
     upload(daemon(), many_labels());
     ASSERT_TRUE(becomes(200)) << request;
     EXPECT_EQ(daemon().get(path + request).body, whole) << request;

@@ -1,5 +1,4 @@
 // A daemon on a disk that is full, or too small.
-#include <future>
 #include <string>
 #include <vector>
 
@@ -76,25 +75,6 @@ TEST_F(Disk, AFullOneCanBeFreed) {
   EXPECT_EQ(erased.status, 204) << erased.body;
   EXPECT_TRUE(becomes_ready());
   EXPECT_EQ(finished_job(daemon(), "\"passes\": 1").state, JobState::kSucceeded);
-}
-
-TEST_F(Disk, ManyJobsCanBeCancelledAtOnceOnAFullOne) {
-  start({"--max-queue", "100", "--workers", "1"});
-  const Job running = long_job(daemon());
-  const Volume volume = upload(daemon(), sphere_upload());
-  std::vector<std::string> ids;
-  for (int n = 0; n < 48; ++n) ids.push_back(submit(daemon(), volume, 10 + 0.1 * n).id);
-  disk_.fill("foreign");
-  std::vector<std::future<Answer>> cancelled;
-  for (const std::string& id : ids) {
-    cancelled.push_back(std::async(
-        std::launch::async, [this, id] { return daemon().send("DELETE", "/v1/jobs/" + id); }));
-  }
-  for (auto& each : cancelled) {
-    const Answer answer = each.get();
-    EXPECT_EQ(answer.status, 200) << answer.body;
-  }
-  daemon().client().cancel(running.id);
 }
 
 // Right after a crash, with not a byte left but the reserve.

@@ -48,18 +48,6 @@ TEST_F(Folder, AnUploadBeyondTheRoomForAllIsRefused) {
   EXPECT_EQ(blob_count(), 0U);
 }
 
-TEST_F(Folder, TheOldestGoesWhenAllIsTooMuch) {
-  start({"--max-disk", "20000"});
-  const Volume first = small_volume();
-  const RawUpload other = raw_upload(
-      sample<std::uint8_t>(scaled(sphere({10.2, 9.7, 9.1}, 5.4), 12, 100), {21, 20, 19}));
-  const Volume second = upload(daemon(), other);
-  EXPECT_EQ(daemon().get("/v1/volumes/" + first.id).status, 410);
-  EXPECT_THAT(daemon().errors(), HasSubstr("limit=--max-disk"));
-  EXPECT_THAT(daemon().errors(), HasSubstr(first.id + " unused since "));
-  EXPECT_EQ(daemon().get("/v1/volumes/" + second.id).status, 200);
-}
-
 // The files of volumes and meshes that are there, and those that wait to be removed.
 std::uint64_t stored_bytes(const std::filesystem::path& data) {
   std::uint64_t bytes = 0;

@@ -1,5 +1,4 @@
 // Tests of jobs whose daemon dies, is suspended or shuts down while they run.
-#include <algorithm>
 #include <set>
 #include <string>
 #include <thread>
@@ -18,39 +17,6 @@ using testing::HasSubstr;
 
 class Leases : public FaultTest {};
 
-TEST_F(Leases, KilledRightAfterEachAcceptanceAllFinish) {
-  start();
-  const Volume volume = small_volume();
-  std::vector<std::string> accepted;
-  for (int round = 0; round < 6; ++round) {
-    accepted.push_back(submit(daemon(), volume, 60 + round).id);
-    kill();
-    start();
-  }
-  for (const std::string& id : accepted) EXPECT_EQ(ended(id).state, JobState::kSucceeded);
-}
-
-TEST_F(Leases, KilledInTheMiddleOfAJobItRunsAgainAndGivesOneResult) {
-  // Nobody waits for the lease's end.
-  const std::vector<std::string> options = {"--lease-seconds", "600", "--workers", "1"};
-  start(options);
-  std::string id;
-  std::optional<std::string> started;
-  {
-    const HeldWorker held(daemon());
-    id = submit(daemon(), small_volume(), 80).id;
-    ASSERT_TRUE(comes_to(id, JobState::kRunning));
-    started = job(id).started;
-    kill();
-  }
-  start(options);
-  const Job after = ended(id);
-  EXPECT_EQ(after.state, JobState::kSucceeded);
-  EXPECT_NE(after.started, started);
-  EXPECT_EQ(blob_count(), 3U);  // of the volume and two meshes
-  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U);
-}
-
 TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
   start({"--lease-seconds", "4", "--workers", "1"});
   const Job before = long_job(daemon());
@@ -66,26 +32,6 @@ TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
   daemon().client().cancel(before.id);
   EXPECT_EQ(ended(before.id).state, JobState::kCancelled);
   EXPECT_EQ(blob_count(), 1U);
-}
-
-// Nobody knows what ended it, and a job could have ended only its own process.
-TEST_F(Leases, ADaemonsDeathIsChargedToNoJob) {
-  start({"--workers", "2"});
-  const Job first = long_job(daemon());
-  const Job second = long_job(daemon(), 49);
-  for (int death = 1; death <= 5; ++death) {
-    for (const Job& job : {first, second}) {
-      ASSERT_TRUE(comes_to(job.id, JobState::kRunning)) << death;
-      EXPECT_EQ(run_sql("SELECT attempts FROM jobs WHERE id = '" + job.id + "'"), "1") << death;
-    }
-    kill();
-    start({"--workers", "2"});
-  }
-  for (const Job& job : {first, second}) {
-    ASSERT_TRUE(comes_to(job.id, JobState::kRunning));
-    daemon().client().cancel(job.id);
-    EXPECT_EQ(ended(job.id).state, JobState::kCancelled);
-  }
 }
 
 TEST_F(Leases, AJobsProcessDiesWithItsDaemon) {
@@ -168,18 +114,6 @@ TEST_F(Leases, AJobStopsInTheMiddleOfAStream) {
   EXPECT_EQ(ended(id).state, JobState::kCancelled);
   EXPECT_FALSE(job_processes().contains(*before.begin())) << "it was not interrupted";
   EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
-}
-
-// Whoever ends a daemon in an orderly way may do so as often as he likes.
-TEST_F(Leases, AnOrderlyEndCountsNoAttempt) {
-  start({"--drain-seconds", "0"});
-  const Job endless = long_job(daemon());
-  for (int end = 1; end <= 4; ++end) {
-    ASSERT_TRUE(comes_to(endless.id, JobState::kRunning)) << end;
-    EXPECT_EQ(daemon().stop(), 0);
-    start({"--drain-seconds", "0"});
-  }
-  EXPECT_TRUE(comes_to(endless.id, JobState::kRunning));
 }
 
 // Holds the database, so that the daemon can store a result but not name it.

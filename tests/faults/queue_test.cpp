@@ -1,8 +1,5 @@
 // Tests of requests: many at once, repeated or cut short, with a full queue or a full disk.
-#include <atomic>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include <sys/resource.h>
 
@@ -22,31 +19,6 @@ class Queue : public FaultTest {
   }
 };
 
-TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
-  start({"--workers", "1", "--max-queue", "2000"});
-  const Job running = long_job(daemon());
-  const Volume volume = small_volume();
-  constexpr int kRoutine = 1000;
-  std::atomic<int> next = 0;
-  std::vector<std::jthread> clients;
-  for (int client = 0; client < 8; ++client) {
-    clients.emplace_back([&] {
-      for (int n = next++; n < kRoutine; n = next++) {
-        EXPECT_EQ(post(job_body(volume.id, 10 + 0.1 * n)).status, 202);
-      }
-    });
-  }
-  clients.clear();
-  const Job stat = job_from_json(post(job_body(volume.id, 5, R"("priority": "stat")")).body);
-  daemon().client().cancel(running.id);
-  ASSERT_TRUE(eventually([&] { return job(stat.id).started.has_value(); }));
-  // One worker: whatever began before it has ended, and whatever ended has a time of its end.
-  for (const Job& other : daemon().client().jobs(JobState::kSucceeded).jobs) {
-    EXPECT_GE(other.started, job(stat.id).started);
-  }
-  EXPECT_EQ(ended(stat.id).state, JobState::kSucceeded);
-}
-
 TEST_F(Queue, AnUploadThatIsCutByTheDaemonsEndLeavesNothing) {
   start();
   const RawUpload raw = long_upload();
@@ -61,20 +33,6 @@ TEST_F(Queue, AnUploadThatIsCutByTheDaemonsEndLeavesNothing) {
   EXPECT_EQ(scratch_count(), 0U);
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_TRUE(daemon().client().volumes().empty());
-}
-
-TEST_F(Queue, SpoiltSamplesGiveNoMesh) {
-  start();
-  const Volume volume = small_volume();
-  spoil(volume.id);
-  const Job failed = ended(submit(daemon(), volume, 100).id);
-  EXPECT_EQ(failed.state, JobState::kFailed);
-  EXPECT_EQ(failed.error->status, 422);
-  EXPECT_THAT(failed.error->detail, testing::HasSubstr("damaged"));
-  EXPECT_EQ(blob_count(), 1U);
-  // Sent again it is whole again.
-  small_volume();
-  EXPECT_EQ(ended(submit(daemon(), volume, 100).id).state, JobState::kSucceeded);
 }
 
 // A limit on the size of files fails as a full disk does, and can be lifted again.

@@ -414,12 +414,6 @@ TEST_P(JobConformance, AFullQueueAcceptsNothing) {
   EXPECT_TRUE(jobs().is_full());
 }
 
-TEST_P(JobConformance, CancellingMakesRoomInTheQueue) {
-  make({.max_queued = 1});
-  jobs().cancel("", submit().id);
-  EXPECT_FALSE(jobs().is_full());
-}
-
 TEST_P(JobConformance, TheDepthIsCountedByPriority) {
   submit();
   claimed();
@@ -432,48 +426,6 @@ TEST_P(JobConformance, TheDepthIsCountedByPriority) {
   EXPECT_EQ(depth.all_queued(), 3U);
   EXPECT_EQ(jobs().depth("").all_queued(), 3U);
   EXPECT_EQ(jobs().depth("other").all_queued() + jobs().depth("other").running, 0U);
-}
-
-// --- Restarts
-
-TEST_P(JobConformance, QueuedAndFinishedJobsAreThereAfterARestart) {
-  const Job first = submit();
-  jobs().finish(claimed(), some_mesh());
-  const Job done = jobs().get("", first.id);
-  const Job queued = submit(unlike(Priority::kBulk));
-  restart();
-  EXPECT_EQ(jobs().get("", first.id), done);
-  EXPECT_EQ(jobs().get("", queued.id), queued);
-  EXPECT_EQ(claimed().id, queued.id);
-}
-
-TEST_P(JobConformance, AJobThatRanAtACrashIsClaimedAgain) {
-  const std::string id = submit().id;
-  const Lease before = claimed();
-  restart();
-  EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
-  const Lease after = claimed();
-  EXPECT_GT(after.fence, before.fence);
-  EXPECT_FALSE(jobs().finish(before, some_mesh()));
-  EXPECT_TRUE(jobs().finish(after, some_mesh()));
-}
-
-TEST_P(JobConformance, ACrashUnderSeveralJobsIsChargedToNone) {
-  const std::vector<std::string> ids = {submit().id, submit().id};
-  for (int crash = 1; crash <= 12; ++crash) {
-    EXPECT_EQ(claimed().attempt, 1);
-    EXPECT_EQ(claimed().attempt, 1);
-    restart();
-    for (const std::string& id : ids) EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
-  }
-}
-
-TEST_P(JobConformance, ACancelOutlivesACrash) {
-  const std::string id = submit().id;
-  claimed();
-  jobs().cancel("", id);
-  restart();
-  EXPECT_EQ(jobs().get("", id).state, JobState::kCancelled);
 }
 
 }  // namespace

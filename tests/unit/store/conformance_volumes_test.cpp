@@ -191,15 +191,6 @@ TEST_P(VolumeConformance, KeepsWhatAJobNeeds) {
   EXPECT_EQ(jobs().get("", id).state, JobState::kSucceeded);
 }
 
-TEST_P(VolumeConformance, AMeshIsNamedByItsJob) {
-  volumes().add("", volume_of(kVolume));
-  submit();
-  const std::string key = put_blob("mesh");
-  EXPECT_FALSE(volumes().names(key));
-  jobs().finish(claimed(), mesh_of({{key, 4}}));
-  EXPECT_TRUE(volumes().names(key));
-}
-
 TEST_P(VolumeConformance, OneOfManyThreadsAddsIt) {
   std::atomic<int> added = 0;
   std::vector<std::jthread> threads;

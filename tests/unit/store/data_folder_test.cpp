@@ -76,14 +76,6 @@ TEST(DataFolder, IsTheSameByAnyPath) {
             ErrorCode::kUnavailable);
 }
 
-// A file named lock, as a killed daemon leaves it behind, does not keep the next one out.
-TEST(DataFolder, IsFreeOnceItsHolderHasGone) {
-  const TemporaryFolder parent;
-  { const DataFolder folder(parent / "data"); }
-  ASSERT_TRUE(std::filesystem::exists(parent / "data/lock"));
-  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }), std::nullopt);
-}
-
 TEST(DataFolder, KeepsWhatIsFinishedAndEmptiesScratch) {
   const TemporaryFolder parent;
   {
