@@ -7,14 +7,15 @@ namespace isomesh::store {
 std::vector<Event> RecentEvents::events(const Viewer& viewer, const std::string& job,
                                         std::uint64_t since,
                                         std::chrono::milliseconds timeout) const {
+  using Clock = std::chrono::steady_clock;
   constexpr std::size_t kMostEvents = 500;
-  const Steady deadline = Steady::clock::now() + timeout;
+  const Clock::time_point deadline = Clock::now() + timeout;
   Lock lock(mutex_);
   while (true) {
     const std::uint64_t generation = generation_;
     const std::uint64_t end = this->end();
-    // Also if the events of one job are all here: when a job expires, the database removes its
-    // events but this list does not.
+    // Never for a single job: when it expires, the database removes its events but this list does
+    // not.
     const bool is_complete = job.empty() && since >= complete_after_;
     std::vector<Event> events;
     const auto begin = std::ranges::upper_bound(recent_, since, {}, &Entry::id);
@@ -32,7 +33,7 @@ std::vector<Event> RecentEvents::events(const Viewer& viewer, const std::string&
       lock.lock();
     }
     if (events.size() > kMostEvents) events.resize(kMostEvents);
-    if (!events.empty() || closed_ || Steady::clock::now() >= deadline) return events;
+    if (!events.empty() || closed_ || Clock::now() >= deadline) return events;
     changed_.wait_until(lock, deadline, [&]() ISOMESH_REQUIRES(mutex_) {
       return generation_ != generation || closed_;
     });
