@@ -5,11 +5,61 @@
 #include "base/ids.h"
 #include "proto/json.h"
 #include "server/store/damaged_records.h"
+#include "server/store/job_rules.h"
 #include "server/store/sql/outbox.h"
-#include "server/store/sqlite/job_rows.h"
 #include "server/store/sqlite/job_store.h"
 
 namespace isomesh::store {
+namespace {
+
+// The longest possible delay of a job. A longer one means that the clock was set back.
+constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;
+
+}  // namespace
+
+// One transaction and its events, which become visible when it ends.
+class SqliteJobStore::Change {
+ public:
+  Change(SqliteJobStore& store, Durability durability = Durability::kFull)
+      : log_(store.log_), transaction_(store.database_.writer(), durability) {}
+  // The transaction's lock is still held, so its events are the last ones.
+  ~Change() {
+    if (announced_ > 0 && transaction_.is_open()) log_.withdraw(announced_);
+  }
+  Change(const Change&) = delete;
+  Change& operator=(const Change&) = delete;
+
+  Connection* operator->() const { return &transaction_.connection(); }
+  Connection& connection() const { return transaction_.connection(); }
+
+  // Stores an event with the row's present state.
+  void announce(const Row& row, EventKind kind);
+
+  void commit() {
+    if (announced_ > 0) {
+      transaction_.at_end([&log = log_](bool is_committed) { log.end_transaction(is_committed); });
+    }
+    transaction_.commit();
+  }
+
+ private:
+  EventLog& log_;
+  std::size_t announced_ = 0;
+  Transaction transaction_;  // last: its lock is held until the events are withdrawn
+};
+
+void SqliteJobStore::Change::announce(const Row& row, EventKind kind) {
+  const std::uint64_t id = log_.reserve({.id = 0,
+                                         .owner = row.owner,
+                                         .job = row.job.id,
+                                         .kind = kind,
+                                         .state = row.job.state,
+                                         .stage = row.job.stage,
+                                         .progress = row.job.progress});
+  ++announced_;
+  transaction_->run("INSERT INTO events VALUES(?, ?, ?, ?, ?, ?, ?)", id, row.owner, row.job.id,
+                    kind, row.job.state, row.job.stage, row.job.progress);
+}
 
 std::optional<Submission> SqliteJobStore::known(Connection& connection, const JobSpec& spec) const {
   if (spec.idempotency_key.empty()) return std::nullopt;
@@ -98,73 +148,6 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   }
 }
 
-void SqliteJobStore::leave_out_damaged(const std::string& considered) {
-  if (considered.empty()) return leave_out_unreadable();
-  if (!can_change(considered)) return leave_out(considered);
-  report_damaged_table("records beside those of queued jobs");
-}
-
-bool SqliteJobStore::can_change(const std::string& id) {
-  try {
-    const Change change(*this, Durability::kProcess);  // rolled back
-    if (!find(change.connection(), std::nullopt, id)) return false;
-    change->run("UPDATE jobs SET state = {job.running} WHERE id = ?", id);
-    return true;
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kInternal) throw;
-    return false;
-  }
-}
-
-std::vector<std::string> SqliteJobStore::ids_in(JobState state) const {
-  const Reading reading(database_.reader());
-  // Indexes have all of this.
-  Rows rows = reading->query(state == JobState::kQueued
-                                 ? "SELECT id FROM jobs WHERE state = {job.queued}"
-                                 : "SELECT id FROM jobs WHERE state = {job.running}");
-  std::vector<std::string> ids;
-  while (rows.next()) ids.push_back(rows.text(0));
-  return ids;
-}
-
-bool SqliteJobStore::can_read(const std::string& id) const {
-  try {
-    const Reading reading(database_.reader());
-    return find(reading.connection(), std::nullopt, id).has_value();
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kInternal) throw;
-    return false;
-  }
-}
-
-void SqliteJobStore::leave_out_unreadable() {
-  constexpr std::chrono::minutes kBetweenSearches{1};
-  {
-    const Lock lock(live_mutex_);
-    const auto now = Steady::clock::now();
-    if (now < next_search_) return;
-    next_search_ = now + kBetweenSearches;
-  }
-  bool has_found = false;
-  for (const std::string& id : ids_in(JobState::kQueued)) {
-    if (can_read(id)) continue;
-    leave_out(id);
-    has_found = true;
-  }
-  if (!has_found) report_damaged_table("records beside those of queued jobs");
-}
-
-void SqliteJobStore::leave_out(const std::string& id) {
-  report_damaged("job", id);
-  const Lock lock(live_mutex_);
-  if (unclaimable_.find(id + '\n') == std::string::npos) unclaimable_ += id + '\n';
-}
-
-std::string SqliteJobStore::unclaimable() const {
-  const Lock lock(live_mutex_);
-  return unclaimable_;
-}
-
 std::optional<Lease> SqliteJobStore::claim_next(const std::string& worker,
                                                 std::chrono::milliseconds lease,
                                                 std::string& considered) {
@@ -215,15 +198,13 @@ std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std
         std::string(
             "WITH heads AS MATERIALIZED (SELECT q.priority, q.start_tag, (SELECT j.id FROM jobs j "
             "WHERE j.state = {job.queued} AND j.priority = q.priority AND j.owner = q.owner AND "
-            "j.not_before NOT "
-            "BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS (SELECT 1 FROM jobs r WHERE r.owner = "
-            "j.owner "
+            "j.not_before NOT BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS (SELECT 1 FROM jobs r "
+            "WHERE r.owner = j.owner "
             "AND r.result_key = j.result_key AND r.state = {job.running}) ") +
             // A separate text, because the usual one is called often.
             (left_out.empty() ? "AND ?3 = '' " : "AND instr(?3, j.id || char(10)) = 0 ") +
-            "ORDER BY j.id LIMIT 1) AS job FROM "
-            "queued_owners q) SELECT job, start_tag FROM heads WHERE job IS NOT NULL ORDER BY "
-            "priority, start_tag, job LIMIT 1",
+            "ORDER BY j.id LIMIT 1) AS job FROM queued_owners q) SELECT job, start_tag FROM heads "
+            "WHERE job IS NOT NULL ORDER BY priority, start_tag, job LIMIT 1",
         now, kLongestWaitUs, left_out);
     if (!query.next()) break;
     considered = query.text(0);
@@ -239,6 +220,29 @@ std::optional<SqliteJobStore::Row> SqliteJobStore::take_next(Change& change, std
   change->run("INSERT OR REPLACE INTO turns VALUES(?, ?, ?, ?)", priority, row->owner, start_tag,
               start_tag + row->cost_us);
   return row;
+}
+
+std::optional<std::chrono::microseconds> SqliteJobStore::until_ready() const {
+  constexpr std::chrono::seconds kLook{1};
+  const std::string left_out = unclaimable();
+  try {
+    const Reading reading(database_.reader());
+    Rows row = reading->query(
+        std::string(
+            "SELECT min(not_before) - isomesh_now() FROM jobs q WHERE state = {job.queued} AND NOT "
+            "EXISTS (SELECT 1 "
+            "FROM jobs r WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = "
+            "{job.running})") +
+            (left_out.empty() ? " AND ?1 = ''" : " AND instr(?1, q.id || char(10)) = 0"),
+        left_out);
+    row.next();
+    if (row.is_null(0)) return std::nullopt;
+    return std::chrono::microseconds(row.integer(0) > kLongestWaitUs ? 0 : row.integer(0));
+  } catch (const Error& error) {
+    // A row is damaged; claim() reports it and finds the others.
+    if (error.code() != ErrorCode::kInternal) throw;
+    return kLook;
+  }
 }
 
 Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
@@ -421,9 +425,7 @@ void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::millisec
   row.job.timing = {};
   change->run(
       "UPDATE jobs SET state = {job.queued}, attempts = ?, not_before = ?, waiting_for = ?, record "
-      "= ? WHERE "
-      "id "
-      "= ?",
+      "= ? WHERE id = ?",
       row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_record(row.job),
       row.job.id);
   change.announce(row, EventKind::kStage);

@@ -1,11 +1,9 @@
-// Queries about jobs; changes of jobs are in job_queue.cpp.
+// Queries about jobs, and their damaged rows; changes of jobs are in job_queue.cpp.
 #include "server/store/sqlite/job_store.h"
 
 #include <algorithm>
 
-#include "proto/json.h"
-#include "server/store/job_rules.h"
-#include "server/store/sqlite/job_rows.h"
+#include "server/store/damaged_records.h"
 
 namespace isomesh::store {
 
@@ -23,29 +21,6 @@ SqliteJobStore::Row SqliteJobStore::row_of(const Rows& rows) const {
   return row;
 }
 
-std::optional<std::chrono::microseconds> SqliteJobStore::until_ready() const {
-  constexpr std::chrono::seconds kLook{1};
-  const std::string left_out = unclaimable();
-  try {
-    const Reading reading(database_.reader());
-    Rows row = reading->query(
-        std::string(
-            "SELECT min(not_before) - isomesh_now() FROM jobs q WHERE state = {job.queued} AND NOT "
-            "EXISTS (SELECT 1 "
-            "FROM jobs r WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = "
-            "{job.running})") +
-            (left_out.empty() ? " AND ?1 = ''" : " AND instr(?1, q.id || char(10)) = 0"),
-        left_out);
-    row.next();
-    if (row.is_null(0)) return std::nullopt;
-    return std::chrono::microseconds(row.integer(0) > kLongestWaitUs ? 0 : row.integer(0));
-  } catch (const Error& error) {
-    // A row is damaged; claim() reports it and finds the others.
-    if (error.code() != ErrorCode::kInternal) throw;
-    return kLook;
-  }
-}
-
 std::optional<Steady> SqliteJobStore::oldest_run() const {
   const Lock lock(live_mutex_);
   std::optional<Steady> oldest;
@@ -57,17 +32,73 @@ void SqliteJobStore::forget_events(Time before) {
   database_.run(store::Change::kRepeatable, "DELETE FROM events WHERE id < ?1", to_us(before));
 }
 
-void SqliteJobStore::Change::announce(const Row& row, EventKind kind) {
-  const std::uint64_t id = log_.reserve({.id = 0,
-                                         .owner = row.owner,
-                                         .job = row.job.id,
-                                         .kind = kind,
-                                         .state = row.job.state,
-                                         .stage = row.job.stage,
-                                         .progress = row.job.progress});
-  ++announced_;
-  transaction_->run("INSERT INTO events VALUES(?, ?, ?, ?, ?, ?, ?)", id, row.owner, row.job.id,
-                    kind, row.job.state, row.job.stage, row.job.progress);
+// --- Damaged rows
+
+void SqliteJobStore::leave_out_damaged(const std::string& considered) {
+  if (considered.empty()) return leave_out_unreadable();
+  if (!can_change(considered)) return leave_out(considered);
+  report_damaged_table("records beside those of queued jobs");
+}
+
+bool SqliteJobStore::can_change(const std::string& id) {
+  try {
+    const Transaction transaction(database_.writer(), Durability::kProcess);  // rolled back
+    if (!find(transaction.connection(), std::nullopt, id)) return false;
+    transaction->run("UPDATE jobs SET state = {job.running} WHERE id = ?", id);
+    return true;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInternal) throw;
+    return false;
+  }
+}
+
+std::vector<std::string> SqliteJobStore::ids_in(JobState state) const {
+  const Reading reading(database_.reader());
+  // Indexes have all of this.
+  Rows rows = reading->query(state == JobState::kQueued
+                                 ? "SELECT id FROM jobs WHERE state = {job.queued}"
+                                 : "SELECT id FROM jobs WHERE state = {job.running}");
+  std::vector<std::string> ids;
+  while (rows.next()) ids.push_back(rows.text(0));
+  return ids;
+}
+
+bool SqliteJobStore::can_read(const std::string& id) const {
+  try {
+    const Reading reading(database_.reader());
+    return find(reading.connection(), std::nullopt, id).has_value();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInternal) throw;
+    return false;
+  }
+}
+
+void SqliteJobStore::leave_out_unreadable() {
+  constexpr std::chrono::minutes kBetweenSearches{1};
+  {
+    const Lock lock(live_mutex_);
+    const auto now = Steady::clock::now();
+    if (now < next_search_) return;
+    next_search_ = now + kBetweenSearches;
+  }
+  bool has_found = false;
+  for (const std::string& id : ids_in(JobState::kQueued)) {
+    if (can_read(id)) continue;
+    leave_out(id);
+    has_found = true;
+  }
+  if (!has_found) report_damaged_table("records beside those of queued jobs");
+}
+
+void SqliteJobStore::leave_out(const std::string& id) {
+  report_damaged("job", id);
+  const Lock lock(live_mutex_);
+  if (unclaimable_.find(id + '\n') == std::string::npos) unclaimable_ += id + '\n';
+}
+
+std::string SqliteJobStore::unclaimable() const {
+  const Lock lock(live_mutex_);
+  return unclaimable_;
 }
 
 }  // namespace isomesh::store
