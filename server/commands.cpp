@@ -208,9 +208,9 @@ struct Commands::State {
         [this] { std::cout << as_config(cli, Remarks::kYes) << std::flush; });
     CLI::App& completion =
         add(cli, "completion", "Print a script that completes arguments in a shell", [this] {
-          const auto shell_asked = command_line::shell_from(shell);
-          if (!shell_asked) throw invalid_parameter("SHELL", "must be bash, zsh or fish");
-          std::cout << command_line::completion(cli, *shell_asked) << std::flush;
+          const std::string script = command_line::completion_script(cli.get_name(), shell);
+          if (script.empty()) throw invalid_parameter("SHELL", "must be bash, zsh or fish");
+          std::cout << script << std::flush;
         });
     completion.add_option("SHELL", shell, "bash, zsh or fish")->required();
     add(cli, "manual", "Print the manual page", [this] {

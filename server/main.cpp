@@ -17,6 +17,7 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include "base/command_line/completion.h"
 #include "base/command_line/help.h"
 #include "base/descriptor.h"
 #include "base/log.h"
@@ -371,6 +372,10 @@ int main(int argc, char** argv) {
     cli.formatter(command_line::wrapped_help());
     add_options(cli, options);
     Commands commands(cli, options);
+    if (argc > 1 && std::string_view(argv[1]) == "complete") {
+      std::cout << command_line::candidates(cli, {argv + 2, argv + argc}).lines << std::flush;
+      return 0;
+    }
     try {
       cli.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {

@@ -1,10 +1,10 @@
-// Shell completion of a program's arguments, generated from its own table of options.
+// Shell completion of a program's arguments, from its own table of options.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -12,16 +12,22 @@ class App;
 
 namespace isomesh::command_line {
 
-enum class Shell { kBash, kZsh, kFish };
+// A script for the shell (bash, zsh or fish); empty for another one. It calls `PROGRAM complete
+// WORDS..` whenever it completes.
+std::string completion_script(const std::string& program, std::string_view shell);
 
-std::optional<Shell> shell_from(std::string_view name);
+struct Candidates {
+  // To be printed: candidates with their descriptions, each on a line, with a tab between them; or
+  // kFiles if files are candidates.
+  std::string lines;
+  // The name of the positional that is completed, whose values only the program may know.
+  std::string operand;
+};
 
-// Arguments by which the program prints the values of a positional, one per line, by the name of
-// the positional: {"JOB", "ids jobs"}.
-using Listings = std::map<std::string, std::string>;
+inline constexpr std::string_view kFiles = ":files\n";
 
-// Returns a script for the shell. It completes subcommands, their options, enumerated values,
-// files, and the positionals in `listings`. Options and subcommands without a group are omitted.
-std::string completion(const CLI::App& app, Shell shell, const Listings& listings = {});
+// `words` are the arguments up to the cursor; the last one, which may be empty, is completed.
+// Options and subcommands without a group are omitted.
+Candidates candidates(const CLI::App& app, const std::vector<std::string>& words);
 
 }  // namespace isomesh::command_line

@@ -1,10 +1,10 @@
-#include "client/cli/argument_names.h"
-
 #include <cctype>
 #include <string_view>
 
+#include <CLI/CLI.hpp>
+
 #include "base/command_line/closest.h"
-#include "client/cli/options.h"
+#include "client/cli/option_groups.h"
 
 namespace isomesh::cli {
 namespace {

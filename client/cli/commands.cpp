@@ -1,27 +1,30 @@
 #include "client/cli/commands.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <iostream>
 #include <utility>
 
 #include "client/cli/batch.h"
 #include "client/cli/console.h"
+#include "client/cli/downloads.h"
+#include "client/cli/exit_status.h"
 #include "client/cli/ids.h"
+#include "client/cli/job_end.h"
 #include "client/cli/local_daemon.h"
+#include "client/cli/option_groups.h"
 #include "client/cli/orders.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/report.h"
-#include "client/cli/standard_input.h"
-#include "client/cli/text.h"
+#include "client/cli/uploads.h"
 #include "client/isomesh/client.h"
 #include "proto/json.h"
 
 namespace isomesh::cli {
 namespace {
 
-int upload(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int upload(Client& client, const Options& options, const std::stop_token& stop) {
   ProgressBar bar(!options.quiet);
   UploadOptions how = options.upload;
   std::vector<std::filesystem::path> files = options.files;
@@ -52,15 +55,13 @@ JobParameters parameters_of(const Options& options, Client& client) {
   return parameters;
 }
 
-int estimate(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int estimate(Client& client, const Options& options) {
   const Estimate estimate = client.estimate(parameters_of(options, client));
   std::cout << (options.json ? to_json(estimate) + '\n' : estimate_report(estimate));
   return kDone;
 }
 
-int submit(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int submit(Client& client, const Options& options) {
   const Job job = client.submit(parameters_of(options, client), options.key);
   std::cout << (options.json ? to_json(job) : job.id) << '\n';
   return kDone;
@@ -76,8 +77,7 @@ void show(Client& client, const Job& job, bool json) {
 }
 
 // Returns 0 for every state of the job.
-int status(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int status(Client& client, const Options& options) {
   show(client, client.job(job_id(client, options.id)), options.json);
   return kDone;
 }
@@ -92,16 +92,14 @@ std::optional<SampleRange> range_of(Client& client, const Job& job) {
   }
 }
 
-int wait(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int wait(Client& client, const Options& options) {
   ProgressBar bar(!options.quiet);
   const Job job = wait(client, job_id(client, options.id), bar);
   if (!options.quiet || options.json) show(client, job, options.json);
   return status_of(job, options, {}, range_of(client, job));
 }
 
-int fetch(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int fetch(Client& client, const Options& options) {
   ProgressBar bar(!options.quiet);
   const std::string id = job_id(client, options.id);
   const std::vector<Output> outputs = filled(options.outputs, {id});
@@ -122,8 +120,7 @@ int fetch(const Options& options, const std::stop_token& stop) {
 }
 
 // Deletes as many volumes as possible and reports the others.
-int erase(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int erase(Client& client, const Options& options) {
   int status = kDone;
   for (const std::string& id : options.ids) {
     try {
@@ -136,8 +133,7 @@ int erase(const Options& options, const std::stop_token& stop) {
   return status;
 }
 
-int cancel(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int cancel(Client& client, const Options& options) {
   const Job job = client.cancel(job_id(client, options.id));
   if (options.json) {
     std::cout << to_json(job) << '\n';
@@ -157,8 +153,7 @@ VolumeNames names_of_volumes(Client& client, const std::vector<Job>& jobs) {
   return names;
 }
 
-int list(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int list(Client& client, const Options& options) {
   if (options.volumes) {
     const auto volumes = client.volumes();
     std::cout << (options.json ? to_json(volumes) + '\n' : volume_list(volumes));
@@ -173,8 +168,7 @@ int list(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
-int info(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int info(Client& client, const Options& options) {
   const Volume volume = client.volume(volume_id(client, options.id));
   if (options.json) {
     std::cout << to_json(volume) << '\n';
@@ -185,8 +179,7 @@ int info(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
-int labels(const Options& options, const std::stop_token& stop) {
-  Client client = client_of(options, stop);
+int labels(Client& client, const Options& options) {
   const VolumeLabels labels = client.labels(volume_id(client, options.id), options.background);
   std::cout << (options.json ? to_json(labels) + '\n' : label_list(labels));
   return kDone;
@@ -203,68 +196,57 @@ Volume renamed(Client& client, const std::string& id, const std::optional<std::s
   }
 }
 
-int rename(const Options& options, const std::stop_token& stop) {
+int rename(Client& client, const Options& options) {
   const auto name = options.name.empty() ? std::nullopt : std::optional(options.name);
-  Client client = client_of(options, stop);
   const std::string id = volume_id(client, options.id);
   const Volume volume = renamed(client, id, name);
   std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
   return kDone;
 }
 
+int ids(Client& client, const Options& options) {
+  for (const Candidate& each : ids_of(client, options.kind)) std::cout << each.id << '\n';
+  return kDone;
+}
+
 // For completions, which must be quick and say nothing on errors.
-int ids(const Options& options, const std::stop_token& stop) {
-  Client client({.server = options.server,
+Client quick_client(const Options& options, const std::stop_token& stop) {
+  return Client({.server = options.server,
                  .token = options.token,
                  .authorities = options.authorities,
                  .connect_timeout = std::chrono::seconds{1},
                  .silence_timeout = std::chrono::seconds{2},
                  .retry_timeout = {},
                  .stop = stop});
-  for (const Candidate& each : ids_of(client, options.kind)) std::cout << each.id << '\n';
-  return kDone;
 }
 
+struct CommandRow {
+  Command command;
+  int (*run)(Client& client, const Options& options);
+};
+
+constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
+                                  CommandRow{Command::kSubmit, submit},
+                                  CommandRow{Command::kStatus, status},
+                                  CommandRow{Command::kWait, wait},
+                                  CommandRow{Command::kFetch, fetch},
+                                  CommandRow{Command::kCancel, cancel},
+                                  CommandRow{Command::kRename, rename},
+                                  CommandRow{Command::kErase, erase},
+                                  CommandRow{Command::kList, list},
+                                  CommandRow{Command::kInfo, info},
+                                  CommandRow{Command::kLabels, labels},
+                                  CommandRow{Command::kOrder, order},
+                                  CommandRow{Command::kOrders, orders},
+                                  CommandRow{Command::kPacs, pacs},
+                                  CommandRow{Command::kIds, ids}};
+
 int dispatch(const Options& options, const std::stop_token& stop) {
-  switch (options.command) {
-    case Command::kMesh:
-      return mesh(options, stop);
-    case Command::kUpload:
-      return upload(options, stop);
-    case Command::kEstimate:
-      return estimate(options, stop);
-    case Command::kSubmit:
-      return submit(options, stop);
-    case Command::kStatus:
-      return status(options, stop);
-    case Command::kWait:
-      return wait(options, stop);
-    case Command::kFetch:
-      return fetch(options, stop);
-    case Command::kCancel:
-      return cancel(options, stop);
-    case Command::kRename:
-      return rename(options, stop);
-    case Command::kErase:
-      return erase(options, stop);
-    case Command::kList:
-      return list(options, stop);
-    case Command::kInfo:
-      return info(options, stop);
-    case Command::kLabels:
-      return labels(options, stop);
-    case Command::kIds:
-      return ids(options, stop);
-    case Command::kOrder:
-    case Command::kOrders:
-    case Command::kPacs: {
-      Client client = client_of(options, stop);
-      return options.command == Command::kOrder    ? order(client, options)
-             : options.command == Command::kOrders ? orders(client, options)
-                                                   : pacs(client, options);
-    }
-  }
-  return kWrongUsage;
+  if (options.command == Command::kMesh) return mesh(options, stop);
+  Client client =
+      options.command == Command::kIds ? quick_client(options, stop) : client_of(options, stop);
+  if (options.command == Command::kUpload) return upload(client, options, stop);
+  return std::ranges::find(kCommands, options.command, &CommandRow::command)->run(client, options);
 }
 
 // A malformed server address or token is wrong usage. The server rejects all other parameters.

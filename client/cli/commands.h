@@ -6,13 +6,9 @@
 
 namespace isomesh::cli {
 
-constexpr int kDone = 0;
-constexpr int kRefused = 1;
-constexpr int kServerUnreachable = 3;
-
-// Runs the command and returns the process's exit status. Results go to standard output; progress
-// and errors go to standard error. A stop request ends the command and cancels the job that `mesh`
-// waits for.
+// Runs the command and returns its exit status (exit_status.h). Results go to standard output;
+// progress and errors go to standard error. A stop request ends the command and cancels the job
+// that `mesh` waits for.
 int run(const Options& options, const std::stop_token& stop);
 
 // The command `mesh` or `local`: from volumes to files of their meshes. Throws Error as Client does

@@ -1,6 +1,6 @@
-#include "client/cli/examples.h"
-
 #include <array>
+
+#include "client/cli/option_groups.h"
 
 namespace isomesh::cli {
 namespace {

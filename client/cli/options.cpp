@@ -1,6 +1,8 @@
 #include "client/cli/options.h"
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -12,15 +14,12 @@
 #include "base/command_line/help.h"
 #include "base/command_line/manual.h"
 #include "base/text.h"
-#include "client/cli/argument_names.h"
 #include "client/cli/batch.h"
-#include "client/cli/examples.h"
+#include "client/cli/exit_status.h"
 #include "client/cli/ids.h"
+#include "client/cli/option_groups.h"
 #include "client/cli/option_values.h"
 #include "client/cli/orders.h"
-#include "client/cli/output_options.h"
-#include "client/cli/parameter_options.h"
-#include "client/cli/upload_options.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
 
@@ -30,18 +29,20 @@ namespace {
 constexpr const char* kDescription =
     "Turns medical volumes into surface meshes, on an isomesh server or on this computer alone.";
 
-constexpr const char* kExitStatus =
-    "0 done, 1 the job failed or was rejected, or the surface is empty, 2 wrong usage, 3 the "
-    "server "
-    "could not be reached. "
-    "Ctrl-C cancels the job and ends the command by SIGINT.";
+std::string exit_statuses() {
+  std::string text;
+  for (const auto& [status, meaning] : kExitStatuses) {
+    text += (text.empty() ? "" : ", ") + std::to_string(status) + ' ' + meaning;
+  }
+  return text + ". Ctrl-C cancels the job and ends the command by SIGINT.";
+}
 
 command_line::Manual manual() {
   return {.number = 1,
           .version = ISOMESH_VERSION,
           .name = "turn medical volumes into surface meshes on an isomesh server",
           .sections = {{"Examples", general_examples()},
-                       {"Exit status", kExitStatus},
+                       {"Exit status", exit_statuses()},
                        {"See also", "isomeshd(8)"}}};
 }
 
@@ -79,7 +80,7 @@ class Parser {
     app_.require_subcommand(1);
     app_.fallthrough();
     app_.footer("Examples:\n" + general_examples() + "\n" +
-                command_line::wrapped(std::string("Exit status: ") + kExitStatus, 0) +
+                command_line::wrapped("Exit status: " + exit_statuses(), 0) +
                 "\n\n`isomesh COMMAND --help` shows the options and examples of a command.");
     app_.add_option("--server", options_.server,
                     "Address of the server: http://HOST:PORT, https://HOST:PORT or unix:PATH")
@@ -182,6 +183,8 @@ class Parser {
   }
 
   Options parse(int argc, const char* const* argv) {
+    if (argc > 1 && std::string_view(argv[1]) == "complete")
+      return completed({argv + 2, argv + argc});
     check_names(app_, argc, argv);
     try {
       app_.parse(argc, argv);
@@ -249,11 +252,20 @@ class Parser {
   void describe_itself() const {
     if (manual_->parsed()) throw EarlyExit(0, command_line::manual_page(app_, manual()));
     if (!completion_->parsed()) return;
-    const auto shell = command_line::shell_from(shell_);
-    if (!shell) wrong_usage("SHELL must be bash, zsh or fish");
-    const command_line::Listings listings = {
-        {"VOLUME", "ids volumes"}, {"JOB", "ids jobs"}, {"ORDER", "ids orders"}};
-    throw EarlyExit(0, command_line::completion(app_, *shell, listings));
+    const std::string script = command_line::completion_script(app_.get_name(), shell_);
+    if (script.empty()) wrong_usage("SHELL must be bash, zsh or fish");
+    throw EarlyExit(0, script);
+  }
+
+  // Only the server knows ids.
+  Options completed(const std::vector<std::string>& words) {
+    const command_line::Candidates found = command_line::candidates(app_, words);
+    const std::map<std::string, const char*> kinds = {
+        {"VOLUME", "volumes"}, {"JOB", "jobs"}, {"ORDER", "orders"}};
+    const auto kind = kinds.find(found.operand);
+    if (kind == kinds.end()) throw EarlyExit(0, found.lines);
+    const std::array arguments = {"isomesh", "ids", kind->second};
+    return parse(static_cast<int>(arguments.size()), arguments.data());
   }
 
   void add_mesh(CLI::App& app, Inputs inputs) {

@@ -106,9 +106,7 @@ class EarlyExit : public std::runtime_error {
   int status_;
 };
 
-constexpr int kWrongUsage = 2;
-
-// Throws EarlyExit with that status and "isomesh: `message`".
+// Throws EarlyExit with kWrongUsage and "isomesh: `message`".
 [[noreturn]] void wrong_usage(const std::string& message);
 
 // Reads the arguments, and ISOMESH_SERVER and ISOMESH_TOKEN of the environment. Throws EarlyExit.

@@ -11,7 +11,7 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
 #include "client/cli/ids.h"
 #include "client/cli/option_values.h"
 #include "client/cli/text.h"

@@ -1,5 +1,3 @@
-#include "client/cli/output_options.h"
-
 #include <algorithm>
 #include <filesystem>
 
@@ -7,6 +5,7 @@
 
 #include "base/text.h"
 #include "client/cli/batch.h"
+#include "client/cli/option_groups.h"
 #include "client/cli/option_values.h"
 #include "proto/parameters.h"
 

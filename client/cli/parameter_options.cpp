@@ -1,5 +1,3 @@
-#include "client/cli/parameter_options.h"
-
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "base/text.h"
+#include "client/cli/option_groups.h"
 #include "client/cli/option_values.h"
 #include "client/cli/text.h"
 #include "proto/parameters.h"
@@ -19,6 +18,14 @@
 
 namespace isomesh::cli {
 namespace {
+
+// "Soft tissue" and "soft-tissue" are "soft tissue".
+std::string folded(const std::string& name) {
+  std::string text = lower(name);
+  std::ranges::replace(text, '-', ' ');
+  std::ranges::replace(text, '_', ' ');
+  return text;
+}
 
 // The default in words, or one for each kind of smoothing; empty if there is none.
 template <class T>
@@ -141,9 +148,8 @@ class ParameterOptions {
                              [this, &value, name, word, words, shown](const std::string& text) {
                                value = number_from<Number>(text);
                                preset_.clear();
-                               std::string plain = lower(text);
+                               const std::string plain = folded(text);
                                if (value || plain == word) return;
-                               std::ranges::replace(plain, '-', ' ');
                                if (std::ranges::find(words, plain) == words.end()) {
                                  refuse(name, "must be a number, " + listed(shown));
                                }
@@ -373,6 +379,20 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
     if (is_left_out("passes")) parameters.passes = standard.passes;
     if (is_left_out("smoothing")) parameters.smoothing = standard.smoothing;
   });
+}
+
+double preset_of(const Volume& volume, const std::string& name) {
+  std::vector<std::string> names;
+  for (const Preset& preset : volume.presets) {
+    if (folded(preset.name) == folded(name)) return preset.iso;
+    names.push_back('"' + preset.name + '"');
+  }
+  const std::string has = names.empty()
+                              ? "it has none. Only CTs in Hounsfield units and fractional "
+                                "segmentations have presets, and only for values that occur in them"
+                              : "it has " + listed(names);
+  throw Error(ErrorCode::kInvalidParameter,
+              "--iso: the volume has no preset \"" + name + "\"; " + has);
 }
 
 std::string in_options(const Error& error) {

@@ -1,6 +1,7 @@
 // The command's texts about jobs and volumes. Pure functions: values in, lines of text out.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -18,6 +19,11 @@ struct ClientTiming {
   std::optional<double> upload = {};
   std::optional<double> download = {};
 };
+
+inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
 
 // The stages with their times and their percentages of the total, with the transfers around them.
 std::string timing_report(const Timing& timing, const ClientTiming& client);

@@ -1,5 +1,3 @@
-#include "client/cli/upload_options.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +6,7 @@
 
 #include "base/text.h"
 #include "client/cli/ids.h"
+#include "client/cli/option_groups.h"
 #include "client/cli/option_values.h"
 #include "proto/volume_formats.h"
 

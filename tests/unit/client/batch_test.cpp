@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/cli/exit_status.h"
 #include "proto/error.h"
 #include "tests/unit/client/support.h"
 

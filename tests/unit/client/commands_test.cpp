@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "client/cli/exit_status.h"
 #include "proto/json.h"
 #include "tests/unit/client/support.h"
 

@@ -1,11 +1,17 @@
+// The command line: accepted and rejected options.
 #include "client/cli/options.h"
 
 #include <cstdlib>
-#include <sstream>
+#include <map>
+#include <string>
+#include <type_traits>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/cli/exit_status.h"
+#include "proto/json.h"
 #include "proto/parameters.h"
 #include "tests/unit/client/support.h"
 
@@ -18,14 +24,26 @@ using test::with;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
+using Words = std::vector<std::string>;
+
 class OptionsTest : public testing::Test {
  protected:
   OptionsTest() { test::write_file(folder_ / "head.nii", "x"); }
 
-  test::TemporaryFolder folder_;
-  std::string file_ = (folder_ / "head.nii").string();
-  std::string drc_ = (folder_ / "brain.drc").string();
-  std::string stl_ = (folder_ / "brain.stl").string();
+  // The words of `isomesh mesh` with an iso-value and a file of that format.
+  Words mesh(const Words& more, const std::string& suffix = ".glb") const {
+    return with({"mesh", file_, "--iso", "1", "-o", folder_ / ("head" + suffix)}, more);
+  }
+
+  static void expect_refused(const Words& words, const std::string& told = {}) {
+    const auto [status, text] = end_of(words);
+    EXPECT_EQ(status, kWrongUsage) << testing::PrintToString(words);
+    EXPECT_THAT(text, HasSubstr("isomesh: " + told));
+  }
+
+  const test::TemporaryFolder folder_;
+  const std::string file_ = (folder_ / "head.nii").string();
+  const std::string drc_ = (folder_ / "brain.drc").string();
 };
 
 TEST_F(OptionsTest, ReadsRawSamples) {
@@ -77,23 +95,32 @@ TEST_F(OptionsTest, OutputsAreFilesFoldersNamesOrStandardOutput) {
   EXPECT_EQ(outputs_of({"-o", "/dev/null", "--format", "stl"}),
             (std::vector<Output>{{"/dev/null", MeshFormat::kStl}}));
 
-  for (const std::vector<std::string>& wrong :
-       std::vector<std::vector<std::string>>{{"-o", "-"},
-                                             {"-o", "-", "--format", "stl,glb"},
-                                             {"-o", "-", "--format", "stl", "--json"},
-                                             {"-o", "-", "--format", "stl", "-o", drc_},
-                                             {"-o", file_ + "/"},
-                                             {"-o", folder + "/absent/{name}.stl"},
-                                             {"-o", "/dev/null"},
-                                             {"-o", drc_, "--format", "drc"},
-                                             {"-o", drc_, "-o", named},
-                                             {"-o", folder, "--format", "xyz"},
-                                             {"-o", drc_, "--jobs", "0"},
-                                             {"-o", drc_, "--jobs", "65"},
-                                             {}}) {
-    EXPECT_EQ(end_of(with(mesh, wrong)).first, kWrongUsage) << testing::PrintToString(wrong);
+  for (const Words& wrong : std::vector<Words>{{"-o", "-"},
+                                               {"-o", "-", "--format", "stl,glb"},
+                                               {"-o", "-", "--format", "stl", "--json"},
+                                               {"-o", "-", "--format", "stl", "-o", drc_},
+                                               {"-o", file_ + "/"},
+                                               {"-o", folder + "/absent/{name}.stl"},
+                                               {"-o", "/nowhere/brain.drc"},
+                                               {"-o", "/dev/null"},
+                                               {"-o", "brain.xyz"},
+                                               {"-o", "brain"},
+                                               {"-o", drc_, "--format", "drc"},
+                                               {"-o", drc_, "-o", named},
+                                               {"-o", folder, "--format", "xyz"},
+                                               {}}) {
+    expect_refused(with(mesh, wrong));
   }
-  EXPECT_EQ(end_of({"mesh", "-", "-", "--iso", "1", "-o", folder}).first, kWrongUsage);
+  expect_refused({"mesh", "-", "-", "--iso", "1", "-o", folder});
+}
+
+TEST_F(OptionsTest, AListOfOutputsIsRejectedWithAHint) {
+  const std::string list = (folder_ / "x.glb,y.stl").string();
+  expect_refused({"mesh", file_, "--iso", "1", "-o", list},
+                 "-o: " + list + " looks like a list; repeat the option instead: -o " +
+                     (folder_ / "x.glb").string() + " -o y.stl");
+  const std::string one = (folder_ / "a,b.stl").string();
+  EXPECT_EQ(end_of({"mesh", file_, "--iso", "1", "-o", one}).first, -1);
 }
 
 TEST_F(OptionsTest, ADryRunNeedsNoOutput) {
@@ -101,40 +128,32 @@ TEST_F(OptionsTest, ADryRunNeedsNoOutput) {
       options_from({"mesh", file_, "--iso", "1", "--dry-run", "--format", "stl,obj"});
   EXPECT_TRUE(options.dry_run);
   EXPECT_THAT(options.parameters.formats, ElementsAre(MeshFormat::kStl, MeshFormat::kObj));
-  EXPECT_EQ(end_of({"mesh", file_, "--labels", "1", "--dry-run", "--label-values", "1=2"}).first,
-            kWrongUsage);
+  expect_refused({"mesh", file_, "--labels", "1", "--dry-run", "--label-values", "1=2"});
 }
 
-// A query carries no names of labels and no callback.
-TEST_F(OptionsTest, AnEstimateHasTheOptionsThatAQueryCarries) {
-  const std::string help = end_of({"estimate", "--help"}).second;
-  JobParameters parameters;
-  parameters.callback.emplace();
-  visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter, const auto&) {
-    if (path == "volume") return;
-    const std::string option = "  --" + option_name_of(parameter) + ' ';
-    const bool is_there = (help + ' ').find(option) != std::string::npos;
-    EXPECT_EQ(is_there, parameter.in_query) << option;
-  });
-}
-
-TEST_F(OptionsTest, LocalTakesWhatMeshTakes) {
+TEST_F(OptionsTest, LocalTakesWhatMeshTakesButNoServer) {
   const Options options = options_from({"local", file_, "--iso", "1", "-o", drc_, "-q"});
   EXPECT_EQ(options.command, Command::kMesh);
   EXPECT_TRUE(options.is_local);
   EXPECT_TRUE(options.quiet);
   EXPECT_FALSE(options_from({"mesh", file_, "--iso", "1", "-o", drc_}).is_local);
+  for (const Words& words :
+       std::vector<Words>{{"--server", "http://h:1", "local", file_, "--iso", "1", "-o", drc_},
+                          {"local", file_, "--iso", "1", "-o", drc_, "--server=http://h:1"}}) {
+    expect_refused(words, "--server does not apply to `isomesh local`");
+  }
 }
 
-TEST_F(OptionsTest, DescribesItselfToShellsAndReaders) {
-  const auto [status, manual] = end_of({"manual"});
-  EXPECT_EQ(status, 0);
-  EXPECT_THAT(manual, HasSubstr(".SH NAME\nisomesh \\- "));
-  EXPECT_THAT(manual, HasSubstr("\\fB\\-\\-max\\-displacement\\fR"));
-  for (const char* shell : {"bash", "zsh", "fish"}) {
-    EXPECT_THAT(end_of({"completion", shell}).second, HasSubstr("max-displacement")) << shell;
-  }
-  EXPECT_EQ(end_of({"completion", "cmd"}).first, kWrongUsage);
+TEST_F(OptionsTest, AStoredVolumeStandsInPlaceOfAFile) {
+  EXPECT_THAT(options_from({"mesh", "3f2a91c0", "--iso", "1", "-o", drc_}).files,
+              ElementsAre("3f2a91c0"));
+  expect_refused({"mesh", "3f2", "--iso", "1", "-o", drc_});
+  expect_refused({"local", "3f2a91c0", "--iso", "1", "-o", drc_});
+  expect_refused({"upload", "3f2a91c0"});
+  expect_refused({"mesh", "3f2a91c0", "--name", "n", "--iso", "1", "-o", drc_},
+                 "--name applies to files, not to stored volumes");
+  expect_refused({"mesh", "3f2a91c0", file_, "--iso", "1", "-o", drc_},
+                 "-o: several volumes need a folder");
 }
 
 TEST_F(OptionsTest, TakesGlobalOptionsBeforeAndAfterTheCommand) {
@@ -162,89 +181,134 @@ TEST_F(OptionsTest, TakesServerAndTokenFromTheEnvironment) {
   EXPECT_EQ(options_from({"list"}).server, "http://127.0.0.1:8080");
 }
 
-TEST_F(OptionsTest, RefusesWrongUsage) {
-  const std::vector<std::vector<std::string>> wrong = {
-      {},
-      {"frobnicate"},
-      {"status"},
-      {"status", "7", "8"},
-      {"mesh", file_, "-o", drc_},
-      {"mesh", file_, "--iso", "60"},
-      {"mesh", file_, "--iso", "sixty", "-o", drc_},
-      {"mesh", file_, "--iso", "nan", "-o", drc_},
-      {"mesh", file_, "--iso", "60x", "-o", drc_},
-      {"mesh", file_, "--iso", "", "-o", drc_},
-      {"mesh", file_, "--iso", "60", "--passes", "1.5", "-o", drc_},
-      {"mesh", file_, "--iso", "60", "--passes", "99999999999", "-o", drc_},
-      {"mesh", file_, "--iso", "60", "--smoothing", "gauss", "-o", drc_},
-      {"mesh", file_, "--iso", "60", "-o", "brain.xyz"},
-      {"mesh", file_, "--iso", "60", "-o", "brain"},
-      {"mesh", file_, "--iso", "60", "-o", "/nowhere/brain.drc"},
-      {"mesh", "/nowhere/head.nii", "--iso", "60", "-o", drc_},
-      {"upload", file_, "--dims", "1,2,3"},
-      {"upload", file_, "--type", "int16"},
-      {"upload", file_, "--origin", "1,1,1"},
-      {"upload", file_, "--spacing", "0,1,1"},
-      {"upload", file_, "--dims", "1,2", "--type", "int16"},
-      {"upload", file_, "--dims", "1,2,3,4", "--type", "int16"},
-      {"upload", file_, "--dims", "1,,3", "--type", "int16"},
-      {"upload", file_, "--dims", "1,2,3,", "--type", "int16"},
-      {"upload", file_, "--dims", "1,2,3", "--type", "int12"},
-      {"upload", file_, "--dims", "1,2,3", "--type", "int16", "--byte-order", "middle"},
-      {"submit", "abc"},
-      {"submit", "abc", "--iso", "60", "--format", "drc,xyz"},
-      {"list", "--state", "melted"}};
-  for (const auto& arguments : wrong) {
-    const auto [status, text] = end_of(arguments);
-    EXPECT_EQ(status, kWrongUsage) << (arguments.empty() ? "" : arguments.back());
-    EXPECT_FALSE(text.empty());
+// A value of the parameter's option that is not its default.
+template <class Member>
+std::vector<std::string> some_value(const Parameter& parameter, const Member& standard) {
+  const std::string option = "--" + option_name_of(parameter);
+  const std::map<std::string, std::string> values = {{"iso", "7"},
+                                                     {"labels", "1,3-5"},
+                                                     {"label-name", "1=Liver"},
+                                                     {"lods", "1,0.5"},
+                                                     {"crop", "0,0,0,1,2,3"},
+                                                     {"label-color", "1=#ff0000"},
+                                                     {"scheme", "5"},
+                                                     {"keep-nearest-to", "1,2,3"},
+                                                     {"label-values", "1=2-4"},
+                                                     {"smoothing", "taubin"},
+                                                     {"max-displacement", "0.5"},
+                                                     {"callback", "https://ris.example/done"}};
+  if (const auto found = values.find(option.substr(2)); found != values.end()) {
+    return {option, found->second};
+  }
+  if constexpr (std::is_same_v<Member, bool>) {
+    return {standard ? "--no-" + option.substr(2) : option};
+  } else if constexpr (Enumeration<Member> && !std::is_same_v<Member, Scheme>) {
+    return {option, std::string(to_string(values_of<Member>().back()))};
+  } else {
+    EXPECT_TRUE(parameter.maximum) << option << " has no value here";
+    return {option, number_text(parameter.maximum.value_or(0))};
   }
 }
 
-TEST_F(OptionsTest, SaysThatAnOptionWasGivenTwice) {
-  const auto [status, text] = end_of({"submit", "abc", "--passes", "1", "--passes", "2"});
-  EXPECT_EQ(status, kWrongUsage);
-  EXPECT_THAT(text, HasSubstr("--passes can only be given once"));
+TEST_F(OptionsTest, MeshTakesEveryParameterOfTheTable) {
+  JobParameters table;
+  table.callback.emplace();
+  int parameters = 0;
+  visit_leaves(table, [&](const std::string& path, const Parameter& parameter, const auto& member) {
+    if (path == "volume" || path == "formats") return;
+    ++parameters;
+    const bool is_by_labels = parameter.jobs == JobKind::kByLabels;
+    Words words = {"mesh", file_, "-o", (folder_ / "head.glb").string()};
+    if (path != "labels" && is_by_labels) words.insert(words.end(), {"--labels", "all"});
+    if (path != "iso" && !is_by_labels) words.insert(words.end(), {"--iso", "1"});
+    const JobParameters without =
+        path == "labels" || path == "iso" ? JobParameters{} : options_from(words).parameters;
+    words = with(words, some_value(parameter, member));
+    const auto [status, text] = end_of(words);
+    EXPECT_EQ(status, -1) << path << ": " << text;
+    if (status != -1) return;
+    EXPECT_NE(to_json(options_from(words).parameters), to_json(without)) << path;
+  });
+  EXPECT_GE(parameters, 30);
+}
+
+TEST_F(OptionsTest, RefusesWrongUsageAndNamesTheOptionAndItsRange) {
+  const std::vector<std::pair<Words, std::string>> refusals = {
+      {{}, ""},
+      {{"frobnicate"}, "there is no command frobnicate\n"},
+      {{"mehs", file_}, "there is no command mehs. Did you mean mesh?\n"},
+      {mesh({"--pases", "3"}), "there is no option --pases. Did you mean --passes?\n"},
+      {mesh({"--serve", "x"}), "there is no option --serve. Did you mean --server?"},
+      {mesh({"--zzzzzz"}), "there is no option --zzzzzz\n"},
+      {{"status"}, ""},
+      {{"status", "7", "8"}, ""},
+      {{"list", "--state", "melted"}, "--state: must be "},
+      {{"completion", "cmd"}, "SHELL must be bash, zsh or fish"},
+      {{"mesh", file_, "-o", drc_}, "--iso or --labels is required"},
+      {{"mesh", file_, "--iso", "60"}, "-o is required"},
+      {{"mesh", "/nowhere/head.nii", "--iso", "60", "-o", drc_},
+       "FILE: /nowhere/head.nii does not"},
+      {{"submit", "abc", "--iso", "60", "--format", "drc,xyz"}, "--format: must be "},
+      {{"submit", "abc", "--passes", "1", "--passes", "2"}, "--passes can only be given once"},
+      {mesh({"--passes", "1.5"}), "--passes: must be a whole number from 0 to 1000\n"},
+      {mesh({"--passes", "1001"}), "--passes: must be a whole number from 0 to 1000\n"},
+      {mesh({"--passes", "99999999999"}), "--passes: must be a whole number from 0 to 1000\n"},
+      {mesh({"--lambda", "2"}), "--lambda: must be a number above 0 and at most 1"},
+      {mesh({"--scheme", "7"}), R"(--scheme: must be 5, 6, "fcc", "kuhn" or "bcc")"},
+      {mesh({"--smoothing", "gauss"}), "--smoothing: must be "},
+      {mesh({"--position-bits", "7"}), "--position-bits: must be a whole number from 8 to 30"},
+      {mesh({"--max-error", "0"}), "--max-error: must be a number from 0.001 to 1000"},
+      {mesh({"--crop", "1,1,1,0,0,0"}), "--crop: must have a first corner that is smaller"},
+      {mesh({"--lods", "1,0.5"}, ".stl"), "--lods: needs the format \"glb\"\n"},
+      {mesh({"--jobs", "x"}), "--jobs: must be a whole number from 1 to 64"},
+      {mesh({"--jobs", "0"}), "--jobs: must be a whole number from 1 to 64"},
+      {mesh({"--jobs", "65"}), "--jobs: must be a whole number from 1 to 64"},
+      {mesh({"--volume", "-1"}), "--volume: must be a whole number from 0 to 4294967295"},
+      {{"upload", file_, "--dims", "1,2,3"}, "--dims requires --type"},
+      {{"upload", file_, "--type", "int16"}, "--type requires --dims"},
+      {{"upload", file_, "--origin", "1,1,1"}, "--origin requires --dims"},
+      {{"upload", file_, "--spacing", "0,1,1"}, "--spacing: must be three numbers above 0"},
+      {{"submit", "abc", "--labels", "1", "--label-color", "1=red"}, "--label-color: must be a"},
+      {{"submit", "abc", "--labels", "1", "--label-name", "Liver"}, "--label-name: \"Liver\" must"},
+      {{"submit", "abc", "--labels", "1", "--min-triangles", "5"}, ""},
+      {{"submit", "abc", "--labels", "1", "--interpolation", "linear"}, ""},
+      {{"submit", "abc", "--labels", "1", "--iso", "3"}, ""},
+      {{"submit", "abc", "--iso", "3", "--background", "1"}, "--background requires --labels"},
+      {{"mesh", file_, "--labels", "all", "-o", drc_}, "-o: " + drc_ + " can hold only one label"}};
+  for (const auto& [words, told] : refusals) expect_refused(words, told);
+  for (const std::string iso : {"sixty", "nan", "60x", "", "bones"}) {
+    expect_refused({"submit", "abc", "--iso", iso}, "--iso: must be a number, ");
+  }
+  for (const std::string dims : {"1,2", "1,2,3,4", "1,,3", "1,2,3,", "99999999999,2,2", "0,2,2"}) {
+    expect_refused({"upload", file_, "--dims", dims, "--type", "int16"},
+                   "--dims: must be three whole numbers from 1 to 4294967295");
+  }
+  const Words raw = {"upload", file_, "--dims", "1,2,3", "--type"};
+  expect_refused(with(raw, {"int12"}), "--type: must be ");
+  expect_refused(with(raw, {"int16", "--byte-order", "middle"}), "--byte-order: must be little");
+  for (const std::string labels : {"5-1", "1-", "1-2-3", "-", "", "1,,2", "1-4294967295",
+                                   "4294967296", "9223372036854775807", "a-b", "one"}) {
+    expect_refused({"submit", "abc", "--labels", labels}, "--labels: must be ");
+  }
+}
+
+TEST_F(OptionsTest, LabelsMayBeRanges) {
+  const auto labels_of = [&](const std::string& text) {
+    return options_from({"submit", "abc", "--labels", text}).parameters.labels->values;
+  };
+  EXPECT_THAT(labels_of("1-5"), ElementsAre(1, 2, 3, 4, 5));
+  EXPECT_THAT(labels_of("1,3-5"), ElementsAre(1, 3, 4, 5));
+  EXPECT_THAT(labels_of("-3--1,7"), ElementsAre(-3, -2, -1, 7));
+  EXPECT_THAT(labels_of("4294967295"), ElementsAre(4294967295));
 }
 
 TEST_F(OptionsTest, TextsAreUtf8) {
   EXPECT_EQ(options_from({"rename", "abc", "Gr\u00f6\u00dfe \"1\""}).name, "Gr\u00f6\u00dfe \"1\"");
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"rename", "abc", "\xff"},
-        std::vector<std::string>{"upload", file_, "--name",
-                                 "Gr\xf6\xdf"
-                                 "e"}}) {
-    const auto [status, text] = end_of(arguments);
-    EXPECT_EQ(status, kWrongUsage) << arguments.front();
-    EXPECT_THAT(text, HasSubstr(arguments.front() == "rename" ? "NAME: is not UTF-8"
-                                                              : "--name: is not UTF-8"));
-  }
+  expect_refused({"rename", "abc", "\xff"}, "NAME: is not UTF-8");
+  expect_refused({"upload", file_, "--name", "Gr\xf6"}, "--name: is not UTF-8");
   const std::string latin = (folder_ / "gr\xf6.nii").string();
   test::write_file(latin, "x");
   EXPECT_EQ(options_from({"upload", latin}).files.front(), latin);
-}
-
-TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
-  const std::string help = end_of({"submit", "--help"}).second;
-  JobParameters parameters;
-  visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter, const auto&) {
-    if (path == "volume") return;
-    EXPECT_THAT(help, HasSubstr("--" + option_name_of(parameter) + ' '));
-  });
-  std::string words;  // without line breaks
-  std::istringstream stream(help);
-  for (std::string word; stream >> word;) words += (words.empty() ? "" : " ") + word;
-  for (const std::string text :
-       {"Number of tetrahedra per cell, or lattice (5, 6, fcc, kuhn or bcc; default: 6)",
-        "(laplacian, ", "default: laplacian, labels with --labels)",
-        "keeps the topology (default) --no-regularize Switch off --regularize",
-        "(from 0 to 1000; default: 5, 10 with --labels)",
-        "default: 1 for laplacian, 0.33 for taubin, ", "default: 0.1)", "position, in mm",
-        "(default: drc)"}) {
-    EXPECT_THAT(words, HasSubstr(text));
-  }
-  EXPECT_THAT(end_of({"mesh", "--help"}).second,
-              testing::Not(HasSubstr("The file formats to write")));
 }
 
 TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {
@@ -267,22 +331,6 @@ TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {
   EXPECT_EQ(options_from({"mesh", file_, "--labels", "all", "--passes", "5", "-o", glb})
                 .parameters.passes,
             5);
-}
-
-TEST_F(OptionsTest, RefusesWhatIsForLabelsWithoutThem) {
-  const auto status_with = [&](const std::vector<std::string>& more) {
-    return end_of(with({"mesh", file_, "-o", drc_}, more)).first;
-  };
-  EXPECT_EQ(status_with({"--iso", "3"}), -1);
-  EXPECT_EQ(status_with({}), 2);
-  EXPECT_EQ(status_with({"--iso", "3", "--background", "1"}), 2);
-  EXPECT_EQ(status_with({"--iso", "3", "--labels", "1"}), 2);
-  EXPECT_EQ(status_with({"--labels", "all"}), 2);  // a .drc holds one label
-  EXPECT_EQ(status_with({"--labels", "1"}), -1);
-  EXPECT_EQ(status_with({"--labels", "one"}), 2);
-  EXPECT_EQ(status_with({"--labels", "1", "--label-name", "Liver"}), 2);
-  EXPECT_EQ(status_with({"--labels", "1", "--interpolation", "linear"}), 2);
-  EXPECT_EQ(status_with({"--labels", "1", "--regularize"}), -1);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "client/cli/standard_input.h"
+#include "client/cli/uploads.h"
 
 #include <array>
 #include <cerrno>
@@ -12,6 +12,9 @@
 
 #include "base/descriptor.h"
 #include "base/error.h"
+#include "client/cli/console.h"
+#include "client/cli/text.h"
+#include "client/isomesh/package.h"
 
 namespace isomesh::cli {
 namespace {
@@ -52,6 +55,23 @@ std::unique_ptr<InputCopy> copied(const std::stop_token& stop) {
   }
 }
 
+std::string files_in_words(const std::vector<PackedFile>& files) {
+  return grouped(files.size()) + (files.size() == 1 ? " file" : " files");
+}
+
+// The folder's content may differ from its name.
+void tell_folders(const std::vector<std::filesystem::path>& files) {
+  for (const std::filesystem::path& path : files) {
+    std::error_code error;
+    if (!std::filesystem::is_directory(path, error)) continue;
+    const std::vector<PackedFile> sent = files_of_upload(path);
+    std::uint64_t bytes = 0;
+    for (const PackedFile& file : sent) bytes += std::filesystem::file_size(file.path, error);
+    complain("sending " + files_in_words(sent) + " of " + path.string() + ", " +
+             human_bytes(bytes));
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<InputCopy> standard_input_as_file(std::vector<std::filesystem::path>& files,
@@ -64,6 +84,27 @@ std::unique_ptr<InputCopy> standard_input_as_file(std::vector<std::filesystem::p
     return copy;
   }
   return nullptr;
+}
+
+std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
+                                       const std::vector<std::filesystem::path>& files,
+                                       const UploadOptions& how, ProgressBar& bar,
+                                       const std::string& subject) {
+  if (!options.quiet) tell_folders(files);
+  UploadOptions watched = how;
+  watched.progress = [&](std::uint64_t done, std::uint64_t total) {
+    bar.transfer(done < total ? "upload" : "check", done, total);
+  };
+  std::vector<UploadedVolume> volumes = client.upload_all(files, watched);
+  bar.clear();
+  if (options.quiet) return volumes;
+  for (const UploadedVolume& each : volumes) {
+    if (!each.volume) continue;
+    const bool has_both = !subject.empty() && volumes.size() > 1;
+    tell_notes(*each.volume,
+               subject + (has_both ? ": " : "") + (volumes.size() > 1 ? each.member : ""));
+  }
+  return volumes;
 }
 
 }  // namespace isomesh::cli

@@ -1,0 +1,23 @@
+// Meshes on their way to files, pipes and standard output; private to this folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/options.h"
+#include "client/cli/progress_bar.h"
+#include "client/isomesh/client.h"
+
+namespace isomesh::cli {
+
+void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
+           std::optional<std::int64_t> label = std::nullopt);
+
+// The files with their sizes, one per line.
+std::string outputs_report(const Job& job, const std::vector<Output>& outputs);
+std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs);
+
+}  // namespace isomesh::cli
