@@ -98,7 +98,7 @@ if(ISOMESH_DAEMON)
   endif()
   if(ISOMESH_WEB)
     isomesh_find_command(nodejs ISOMESH_NODE node)
-    find_program(ISOMESH_NPM npm)  # client/web/npm.cmake downloads it otherwise
+    isomesh_find_command(npm ISOMESH_NPM npm)
   endif()
 endif()
 isomesh_require("isomesh" build)
