@@ -1,16 +1,11 @@
 // A daemon that takes few uploads at once: the page and the JavaScript client wait for it.
-import { execFileSync } from 'node:child_process';
 import { once } from 'node:events';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { connect, type Socket } from 'node:net';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { fileURLToPath } from 'node:url';
-import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import { afterEach, beforeEach, describe, expect, test } from 'vitest';
 import { Client } from '../../../client/web/src/api/index';
 import { ballNrrd, Daemon, drop, openPage, setup } from './support';
 
-const at = setup();
+const { at, it } = setup();
 const crowd = 12;
 // Takes one upload of a client at a time, which is half of its places.
 let few: Daemon;
@@ -31,7 +26,7 @@ async function occupy({ url }: Daemon): Promise<Socket> {
 }
 
 describe('the page', () => {
-  it.each([
+  test.each([
     ['in one request', 64],
     ['in parts', 208],
   ])('says that the server is busy, and uploads %s when it is not', async (_, size) => {
@@ -64,13 +59,6 @@ describe('the page', () => {
 });
 
 describe('many uploads at once', () => {
-  const module = mkdtempSync(join(tmpdir(), 'isomesh-module-'));
-
-  beforeAll(() => {
-    execFileSync('node', [fileURLToPath(new URL('../../../client/javascript/build.mjs', import.meta.url)), module]);
-  });
-  afterAll(() => rmSync(module, { recursive: true }));
-
   it('all arrive from Node', async () => {
     const client = new Client({ server: few.url });
     const other = await occupy(few);
@@ -83,45 +71,5 @@ describe('many uploads at once', () => {
     const ids = (await Promise.all(uploads)).map(({ volumes }) => volumes[0]?.volume?.id);
     expect(new Set(ids).size).toBe(crowd);
     expect(waits).toBeGreaterThan(0);
-  });
-
-  it('all arrive from a page', async () => {
-    const { page, faults } = await openPage(at.browser, few.url);
-    await page.route('**/module/**', (route) => {
-      const path = new URL(route.request().url()).pathname.replace('/module/', '');
-      const start = "import * as isomesh from './src/api/index.js'; Object.assign(globalThis, { isomesh });";
-      return route.fulfill({ contentType: 'text/javascript', body: path === 'start.js' ? start : readFileSync(join(module, path), 'utf8') });
-    });
-    await page.goto(few.url);
-    await page.addScriptTag({ type: 'module', url: '/module/start.js' });
-    const head = ballNrrd(64, 20).toString('base64');
-    const other = await occupy(few);
-    await page.exposeFunction('release', () => void other.destroy());
-    const { ids, waits } = await page.evaluate(
-      async ({ head, crowd }) => {
-        const { isomesh, release } = globalThis as unknown as {
-          isomesh: typeof import('../../../client/web/src/api/index');
-          release: () => Promise<void>;
-        };
-        const client = new isomesh.Client();
-        let waits = 0;
-        const uploads = Array.from({ length: crowd }, (_, number) => {
-          const bytes = Uint8Array.from(atob(head), (letter) => letter.charCodeAt(0));
-          bytes[bytes.length - 1] = number + 1;
-          const onBusy = (): void => {
-            waits += 1;
-            void release();
-          };
-          return client.upload(bytes, { onBusy });
-        });
-        const uploaded = await Promise.all(uploads);
-        return { ids: uploaded.map(({ volumes }) => volumes[0]?.volume?.id), waits };
-      },
-      { head, crowd },
-    );
-    expect(new Set(ids).size).toBe(crowd);
-    expect(waits).toBeGreaterThan(0);
-    await page.close();
-    expect(faults).toEqual([]);
   });
 });

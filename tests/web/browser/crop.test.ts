@@ -1,10 +1,10 @@
 // Slices that are enlarged, and a box that a job is cropped to.
 import type { Page } from 'playwright-core';
-import { beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels, silhouette } from './seen';
 import { ballNrrd, ballsNrrd, boxOf, drag, madeJob, noted, settled, setup } from './support';
 
-const at = setup();
+const { at, it } = setup();
 const size = 48;
 let ball: string;
 
@@ -22,8 +22,7 @@ async function open(page: Page, query: string): Promise<{ x: number; y: number; 
 }
 
 describe('a slice', () => {
-  it('is enlarged at the pointer, moved, and clicked where it is seen', async () => {
-    const { page } = at;
+  it('is enlarged at the pointer, moved, and clicked where it is seen', async ({ page }) => {
     const box = await open(page, 'iso=100&at=24,24,24');
     const before = await contourPixels(page, 'axial');
     const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
@@ -60,8 +59,7 @@ describe('a slice', () => {
 });
 
 describe('a crop', () => {
-  it('is drawn in slices and surface, dragged, and made', async () => {
-    const { page } = at;
+  it('is drawn in slices and surface, dragged, and made', async ({ page }) => {
     const box = await open(page, 'iso=100');
     const view = page.locator('.live-picture');
     const whole = await silhouette(page, view);
@@ -89,8 +87,7 @@ describe('a crop', () => {
 });
 
 describe('a surface in parts', () => {
-  it('offers to keep the largest', async () => {
-    const { page, daemon } = at;
+  it('offers to keep the largest', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballsNrrd(40));
     const { id, mesh } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     expect(mesh?.components).toBe(2);

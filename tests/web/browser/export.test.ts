@@ -1,10 +1,10 @@
 // What a surface is saved as for a printer and for a phone.
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { ballNrrd, madeJob, openSurface, setup } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 async function saved(page: Page, name: RegExp): Promise<{ name: string; bytes: Buffer }> {
   const download = page.waitForEvent('download');
@@ -14,8 +14,7 @@ async function saved(page: Page, name: RegExp): Promise<{ name: string; bytes: B
 }
 
 describe('a surface', () => {
-  it('is made for printing, with its certificate', async () => {
-    const { page, daemon } = at;
+  it('is made for printing, with its certificate', async ({ page, daemon }) => {
     // It leaves the volume on all sides.
     const volume = await daemon.upload(ballNrrd(24, 14));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
@@ -34,8 +33,7 @@ describe('a surface', () => {
     expect(told.files['3mf']?.sha256).toBe(made.mesh?.files['3mf']?.sha256);
   });
 
-  it('is saved for a phone, and simplified first where it is large', async () => {
-    const { page, daemon } = at;
+  it('is saved for a phone, and simplified first where it is large', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(32, 10));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);

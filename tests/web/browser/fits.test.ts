@@ -1,9 +1,9 @@
 // The document is never taller or wider than the window: views scroll inside, and the header stays.
 import type { Page } from 'playwright-core';
-import { beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect } from 'vitest';
 import { ballNrrd, labelsNrrd, setup, surfaceLoaded } from './support';
 
-const at = setup();
+const { at, it } = setup();
 const sizes = {
   'a phone': { width: 390, height: 844 },
   'a desktop': { width: 1400, height: 900 },
@@ -60,8 +60,7 @@ function excess(page: Page): Promise<{ down: number; right: number; header: numb
 }
 
 describe.each(Object.entries(sizes))('on %s', (_, size) => {
-  it('no view is taller or wider than the window', async () => {
-    const { page } = at;
+  it('no view is taller or wider than the window', async ({ page }) => {
     await page.setViewportSize(size);
     for (const name of views.keys()) {
       await open(page, name);
@@ -69,8 +68,7 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
     }
   });
 
-  it('no choice of a parameter is cut off', async () => {
-    const { page } = at;
+  it('no choice of a parameter is cut off', async ({ page }) => {
     await page.setViewportSize(size);
     for (const name of ['a volume', 'a volume of labels']) {
       await open(page, name);
@@ -82,8 +80,7 @@ describe.each(Object.entries(sizes))('on %s', (_, size) => {
     }
   });
 
-  it('the list of jobs leaves nothing out, and has no column of single words', async () => {
-    const { page } = at;
+  it('the list of jobs leaves nothing out, and has no column of single words', async ({ page }) => {
     await page.setViewportSize(size);
     await open(page, 'jobs');
     const cells = await page.locator('.jobs tbody td').evaluateAll((all) =>

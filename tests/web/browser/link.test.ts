@@ -1,14 +1,13 @@
 // The address keeps how a surface is looked at; changes are taken back; notes of jobs; the list of volumes.
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { smallNrrd } from './files';
 import { silhouette } from './seen';
 import { ballNrrd, boxOf, Daemon, keepNotices, noiseNrrd, noted, openPage, openSurface, pause, settled, setup, still, surfaceLoaded } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 describe('a link to a surface', () => {
-  it('carries its camera, cut, style and measurements', async () => {
-    const { page, daemon, browser } = at;
+  it('carries its camera, cut, style and measurements', async ({ page, daemon, browser }) => {
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
@@ -54,8 +53,7 @@ describe('a link to a surface', () => {
 });
 
 describe('parameters', () => {
-  it('are taken back and done again', async () => {
-    const { page, daemon } = at;
+  it('are taken back and done again', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(32, 12));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
     const undo = page.getByRole('button', { name: 'Undo' });
@@ -84,8 +82,7 @@ describe('parameters', () => {
 });
 
 describe('a drag of the iso-value', () => {
-  it('is one step to take back, however many values it passes', async () => {
-    const { page, daemon } = at;
+  it('is one step to take back, however many values it passes', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(32, 12));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
     const line = await boxOf(page.locator('.histogram .bars'));
@@ -104,8 +101,7 @@ describe('a drag of the iso-value', () => {
 });
 
 describe('the jobs that are chosen to compare', () => {
-  it('are still chosen when a person comes back from the comparison', async () => {
-    const { page, daemon } = at;
+  it('are still chosen when a person comes back from the comparison', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(32, 12));
     const ids: string[] = [];
     for (const iso of [90, 110]) ids.push((await daemon.make({ volume, iso, formats: ['glb'] })).id);
@@ -120,8 +116,7 @@ describe('the jobs that are chosen to compare', () => {
 });
 
 describe('a job that was left', () => {
-  it('tells when it has ended, also after the page was loaded anew', async () => {
-    const { browser } = at;
+  it('tells when it has ended, also after the page was loaded anew', async ({ browser }) => {
     const own = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
     try {
       const { page } = await openPage(browser, own.url);
@@ -148,8 +143,7 @@ describe('a job that was left', () => {
 });
 
 describe('the list of volumes', () => {
-  it('is searched, sorted, and its volumes renamed', async () => {
-    const { browser } = at;
+  it('is searched, sorted, and its volumes renamed', async ({ browser }) => {
     const other = await Daemon.start();
     try {
       const { page } = await openPage(browser, other.url);
@@ -182,8 +176,7 @@ describe('the list of volumes', () => {
     }
   });
 
-  it('that is empty says what is made here, and offers a sample', async () => {
-    const { browser } = at;
+  it('that is empty says what is made here, and offers a sample', async ({ browser }) => {
     const other = await Daemon.start();
     try {
       const { page, faults } = await openPage(browser, other.url);

@@ -1,10 +1,10 @@
 // The surface beside the slices, which follows the iso-value.
 import type { Page } from 'playwright-core';
-import { beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels, silhouette } from './seen';
 import { ballNrrd, boxOf, drag, labelsNrrd, noted, settled, setup } from './support';
 
-const at = setup();
+const { at, it } = setup();
 let ball: string;
 
 beforeAll(async () => {
@@ -35,8 +35,7 @@ function pictures(page: Page): Promise<number> {
 }
 
 describe('the surface beside the slices', () => {
-  it('is there before a job is made, and follows the line in the histogram', async () => {
-    const { page } = at;
+  it('is there before a job is made, and follows the line in the histogram', async ({ page }) => {
     const asked: string[] = [];
     await open(page, 'iso=60');
     const large = await area(page);
@@ -67,8 +66,7 @@ describe('the surface beside the slices', () => {
     expect(asked.filter((path) => path.startsWith('/v1/') && path !== '/v1/estimate')).toEqual([]);
   });
 
-  it('is drawn once for all moves that come while a picture is drawn, at the last of them', async () => {
-    const { page } = at;
+  it('is drawn once for all moves that come while a picture is drawn, at the last of them', async ({ page }) => {
     await open(page, 'iso=60');
     // Drawing takes as long as the test lets it.
     await page.evaluate(() => {
@@ -113,8 +111,7 @@ describe('the surface beside the slices', () => {
     expect(values.at(-1)).toBe('90');
   });
 
-  it('is turned by keys and by the pointer, and sends the slices to where it is clicked', async () => {
-    const { page } = at;
+  it('is turned by keys and by the pointer, and sends the slices to where it is clicked', async ({ page }) => {
     await open(page, 'iso=100&at=2,3,4');
     const canvas = page.locator('.live canvas');
     const box = await boxOf(canvas);
@@ -136,8 +133,7 @@ describe('the surface beside the slices', () => {
     await expect.poll(() => noted(page, 'at')).not.toBe(byKeys);
   });
 
-  it('says why there is none', async () => {
-    const { page, daemon } = at;
+  it('says why there is none', async ({ page, daemon }) => {
     await open(page, 'iso=100');
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('9999');
     await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/not between the smallest and the largest sample/);
@@ -149,8 +145,7 @@ describe('the surface beside the slices', () => {
     await expect.poll(async () => (await page.locator('.live canvas').getAttribute('aria-label')) ?? '').toMatch(/labels/);
   });
 
-  it('comes when the daemon has it again', async () => {
-    const { page } = at;
+  it('comes when the daemon has it again', async ({ page }) => {
     await page.route('**/preview?*', (route) => route.fulfill({ status: 500, body: '' }));
     await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100`);
     await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/could not be loaded/);

@@ -1,9 +1,9 @@
 // How a surface comes: its progress, and what can be done with it meanwhile.
 import type { Page } from 'playwright-core';
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { ballNrrd, holdMeshes, keepNotices, labelsNrrd, openSurface, setup, surfaceLoaded } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 declare global {
   interface Window {
@@ -23,8 +23,7 @@ function listen(page: Page): Promise<void> {
 }
 
 describe('a surface that is loading', () => {
-  it('counts the triangles that are drawn, up to all that there are', async () => {
-    const { page, daemon } = at;
+  it('counts the triangles that are drawn, up to all that there are', async ({ page, daemon }) => {
     await listen(page);
     const volume = await daemon.upload(labelsNrrd(24));
     const { id, mesh } = await daemon.make({ volume, labels: 'all', formats: ['glb'] });
@@ -39,8 +38,7 @@ describe('a surface that is loading', () => {
     for (const [drawn, total] of counts) expect(drawn).toBeLessThanOrEqual(total);
   });
 
-  it('says so where it is measured', async () => {
-    const { page, daemon } = at;
+  it('says so where it is measured', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await keepNotices(page);

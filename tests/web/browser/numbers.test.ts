@@ -1,9 +1,9 @@
 // Numbers that are typed key by key, with a comma where a country writes one.
 import type { Locator, Page } from 'playwright-core';
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { ballNrrd, drop, noted, setup } from './support';
 
-const at = setup({ locale: 'de-DE' });
+const { at, it } = setup({ locale: 'de-DE' });
 
 async function type(field: Locator, text: string): Promise<void> {
   await field.focus();
@@ -24,8 +24,7 @@ async function openBall(): Promise<Locator> {
 }
 
 describe('a decimal comma', () => {
-  it('is one in the spacing of raw samples', async () => {
-    const { page, daemon } = at;
+  it('is one in the spacing of raw samples', async ({ page, daemon }) => {
     await page.goto(daemon.url);
     await drop(page, [{ name: 'samples.raw', bytes: ballNrrd(20, 7, 3).subarray(-8000) }]);
     const along = (what: string, axis: string): Locator => page.getByLabel(`${what} along ${axis}`);
@@ -45,8 +44,7 @@ describe('a decimal comma', () => {
     expect((await daemon.json<{ spacing: number[] }>(`/v1/volumes/${id}`)).spacing).toEqual([0.7, 0.7, 1.25]);
   });
 
-  it('is one in the iso-value, and a text that is no number stays marked', async () => {
-    const { page } = at;
+  it('is one in the iso-value, and a text that is no number stays marked', async ({ page }) => {
     const iso = await openBall();
     await type(iso, '65,5');
     await iso.press('Tab');
@@ -72,8 +70,7 @@ describe('a decimal comma', () => {
 });
 
 describe('a field for a number', () => {
-  it('is stepped by the arrow keys, and read out as one', async () => {
-    const { page } = at;
+  it('is stepped by the arrow keys, and read out as one', async ({ page }) => {
     const iso = await openBall();
     await expect.poll(() => page.getByRole('spinbutton', { name: 'Iso-value' }).inputValue()).toBe('100');
     await iso.focus();
@@ -89,8 +86,7 @@ describe('a field for a number', () => {
     expect(await page.locator('[data-parameter=lambda] .fault').innerText()).toContain('at most 1');
   });
 
-  it('of a crop keeps what is no number, and makes nothing of it', async () => {
-    const { page } = at;
+  it('of a crop keeps what is no number, and makes nothing of it', async ({ page }) => {
     await openBall();
     await page.getByLabel('Crop to a box').check();
     const last = page.getByLabel('Last sample along x');

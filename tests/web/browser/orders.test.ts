@@ -4,10 +4,10 @@ import type { AddressInfo } from 'node:net';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { afterAll, beforeAll, describe, expect } from 'vitest';
 import { Daemon, openPage, setup } from './support';
 
-const at = setup();
+const { at, it } = setup();
 let pacs: Server;
 let folder: string;
 let hospital: Daemon;
@@ -93,8 +93,7 @@ describe('orders', () => {
     expect(faults).toEqual([]);
   });
 
-  it('are not spoken of where there is no hospital', async () => {
-    const { page, daemon } = at;
+  it('are not spoken of where there is no hospital', async ({ page, daemon }) => {
     const missing: string[] = [];
     page.on('response', (response) => {
       if (response.status() >= 400) missing.push(response.url());

@@ -1,7 +1,7 @@
 // The page as a person uses it: a real volume comes in, its surface goes out.
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
-import { beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels, silhouette } from './seen';
 import {
   ballNrrd,
@@ -25,11 +25,10 @@ import {
   surfaceLoaded,
 } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 describe('a real volume', () => {
-  it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async () => {
-    const { daemon, page } = at;
+  it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     await drop(page, [{ name: 'ch2bet.nii.gz', bytes: readFileSync(brain) }]);
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
@@ -106,8 +105,7 @@ describe('a surface', () => {
     made = await at.daemon.make({ volume: ball, iso: 100, passes: 2, formats: ['glb', 'drc', 'stl'] });
   });
 
-  it('of a ball is a disc from every side', async () => {
-    const { page } = at;
+  it('of a ball is a disc from every side', async ({ page }) => {
     await openSurface(at, made.id);
     for (const key of ['a', 'l', 's']) {
       await page.keyboard.press(key);
@@ -118,8 +116,7 @@ describe('a surface', () => {
     }
   });
 
-  it('is cut in half by the plane, which shows the slice', async () => {
-    const { page } = at;
+  it('is cut in half by the plane, which shows the slice', async ({ page }) => {
     await openSurface(at, made.id);
     await page.keyboard.press('a');
     await still(page);
@@ -149,8 +146,7 @@ describe('a surface', () => {
     expect(millimetres).toBeLessThan(0.9 * 48 * 1.03);
   });
 
-  it('is measured in millimetres', async () => {
-    const { page } = at;
+  it('is measured in millimetres', async ({ page }) => {
     await keepNotices(page);
     await openSurface(at, made.id);
     await page.keyboard.press('a');
@@ -173,15 +169,13 @@ describe('a surface', () => {
     expect(millimetres).toBeLessThan(expected * 1.03);
   });
 
-  it('made as Draco alone is shown as well', async () => {
-    const { daemon, page } = at;
+  it('made as Draco alone is shown as well', async ({ daemon, page }) => {
     const draco = await daemon.make({ volume: ball, iso: 100, formats: ['drc'] });
     await openSurface(at, draco.id);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
   });
 
-  it('comes to rest where frames are too quick for its coarse copy', async () => {
-    const { page } = at;
+  it('comes to rest where frames are too quick for its coarse copy', async ({ page }) => {
     const before = page.viewportSize() ?? { width: 1280, height: 800 };
     try {
       await page.setViewportSize({ width: 360, height: 300 });
@@ -194,8 +188,7 @@ describe('a surface', () => {
     }
   });
 
-  it('is compared with others by linked cameras', async () => {
-    const { daemon, page } = at;
+  it('is compared with others by linked cameras', async ({ daemon, page }) => {
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await page.getByRole('button', { name: '0, 5 and 10 passes' }).click();
     await page.waitForURL(/#\/compare/);
@@ -222,8 +215,7 @@ describe('a surface', () => {
 });
 
 describe('a job', () => {
-  it('is cancelled while it runs', async () => {
-    const { daemon, page } = at;
+  it('is cancelled while it runs', async ({ daemon, page }) => {
     const volume = await daemon.upload(noiseNrrd(96));
     const { id } = await daemon.submit({ volume, iso: 128, passes: 1000, max_error_mm: 0.01, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
@@ -234,8 +226,7 @@ describe('a job', () => {
     expect((await openedJob(at)).state).toBe('cancelled');
   });
 
-  it('is shown as lost when nobody answers, and goes on when somebody does', async () => {
-    const { browser, faults } = at;
+  it('is shown as lost when nobody answers, and goes on when somebody does', async ({ browser, faults }) => {
     const other = await Daemon.start();
     try {
       const volume = await other.upload(ballNrrd(24, 8));
@@ -263,8 +254,7 @@ describe('a job', () => {
 });
 
 describe('the page', () => {
-  it('is small, compressed and nobody else can serve or frame it', async () => {
-    const { daemon, page } = at;
+  it('is small, compressed and nobody else can serve or frame it', async ({ daemon, page }) => {
     const answer = await fetch(daemon.url);
     const policy = answer.headers.get('content-security-policy') ?? '';
     expect(policy).toContain("default-src 'none'");
@@ -294,8 +284,7 @@ describe('the page', () => {
     expect(bytes).toBeLessThan(400_000);
   });
 
-  it('can be used by keyboard, and every control has a name', async () => {
-    const { daemon, page } = at;
+  it('can be used by keyboard, and every control has a name', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     await expect.poll(() => page.locator('.drop').count()).toBe(1);
     for (const place of ['', '#/jobs', `#/volumes/${await daemon.upload(ballNrrd(16, 5))}`]) {

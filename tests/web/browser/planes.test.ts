@@ -1,11 +1,10 @@
 // Planes at any angle: one beside the slices, and one that cuts a surface. And how panes are laid out.
 import type { Locator, Page } from 'playwright-core';
-import { beforeAll, describe, expect, it } from 'vitest';
-import { insertNrrd, whitePixels } from './bright';
+import { beforeAll, describe, expect } from 'vitest';
 import { contourPixels, silhouette } from './seen';
 import { ballNrrd, boxOf, drag, noted, openSurface, setup, still, surfaceLoaded } from './support';
 
-const at = setup();
+const { at, it } = setup();
 let ball: string;
 
 beforeAll(async () => {
@@ -34,8 +33,7 @@ function filled(picture: Locator): Promise<number> {
 const disc = (Math.PI * 24 ** 2) / 64 ** 2;
 
 describe('an oblique plane', () => {
-  it('shows the same of a ball at any angle, and is turned by its handle and by keys', async () => {
-    const { page } = at;
+  it('shows the same of a ball at any angle, and is turned by its handle and by keys', async ({ page }) => {
     const picture = await openOblique(page);
     expect(await picture.getAttribute('data-angles')).toBe('30,0');
     await expect.poll(() => filled(picture)).toBeGreaterThan(0.9 * disc);
@@ -79,16 +77,7 @@ describe('an oblique plane', () => {
     await expect.poll(() => picture.isVisible()).toBe(false);
   });
 
-  it('shows bright structures over any window', async () => {
-    const { page, daemon } = at;
-    const volume = await daemon.upload(insertNrrd(64));
-    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=-480&at=42,32,32&window=0,1000`);
-    await page.getByLabel('Oblique plane', { exact: true }).check();
-    await expect.poll(() => whitePixels(page.locator('.oblique-picture'))).toBeGreaterThan(50);
-  });
-
-  it('is enlarged and taken away, and the panes are laid out otherwise', async () => {
-    const { page } = at;
+  it('is enlarged and taken away, and the panes are laid out otherwise', async ({ page }) => {
     const picture = await openOblique(page);
     const before = await picture.boundingBox();
     await page.getByRole('button', { name: 'Enlarge the oblique plane' }).click();
@@ -111,8 +100,7 @@ describe('an oblique plane', () => {
 });
 
 describe('a free cut', () => {
-  it('is parallel to the screen, is moved, and is in the address', async () => {
-    const { page, daemon } = at;
+  it('is parallel to the screen, is moved, and is in the address', async ({ page, daemon }) => {
     const { id } = await daemon.make({ volume: ball, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
     const view = page.locator('.viewport');

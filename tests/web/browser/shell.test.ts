@@ -1,11 +1,11 @@
 // What is around the views: notes, titles, keys, contrast, the token.
 import { readFileSync } from 'node:fs';
 import type { Route } from 'playwright-core';
-import { beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect } from 'vitest';
 import { pixelsOf } from './seen';
 import { ballNrrd, boxOf, noted, openPage, openSurface, pause, settled, setup, still, withTokens } from './support';
 
-const at = setup();
+const { at, it } = setup();
 let ball: string;
 let job: string;
 
@@ -15,8 +15,7 @@ beforeAll(async () => {
 });
 
 describe('the page', () => {
-  it('tells its tabs apart, has a heading in each view, and leads on where there is nothing', async () => {
-    const { page, daemon } = at;
+  it('tells its tabs apart, has a heading in each view, and leads on where there is nothing', async ({ page, daemon }) => {
     const titles: string[] = [];
     for (const place of ['', `volumes/${ball}`, `jobs/${job}`, 'jobs', `compare?jobs=${job},${job}`]) {
       await page.goto(`${daemon.url}/#/${place}`);
@@ -34,8 +33,7 @@ describe('the page', () => {
     await page.waitForURL(/#\/jobs$/);
   });
 
-  it('keeps the view that was opened last, however late the one before is', async () => {
-    const { page, daemon } = at;
+  it('keeps the view that was opened last, however late the one before is', async ({ page, daemon }) => {
     await page.goto(`${daemon.url}/#/volumes/${ball}`);
     await page.locator('.histogram .bars').waitFor();
     const jobs = /\/v1\/jobs(\?|$)/;
@@ -53,8 +51,7 @@ describe('the page', () => {
     expect(await page.locator('.loading').count()).toBe(0);
   });
 
-  it('shows where one is also in colours that a person forces', async () => {
-    const { page, daemon } = at;
+  it('shows where one is also in colours that a person forces', async ({ page, daemon }) => {
     await page.emulateMedia({ forcedColors: 'active' });
     await page.goto(`${daemon.url}/#/volumes/${ball}`);
     await page.locator('.histogram .bars').waitFor();
@@ -68,8 +65,7 @@ describe('the page', () => {
     expect(bars).not.toBe(ground);
   });
 
-  it('covers no button with its notes, and lets nothing out of its boxes', async () => {
-    const { page, daemon } = at;
+  it('covers no button with its notes, and lets nothing out of its boxes', async ({ page, daemon }) => {
     await page.goto(`${daemon.url}/#/volumes/${ball}?iso=100&formats=glb,drc,stl,ply,obj`);
     await expect.poll(() => page.locator('.estimate dl').count()).toBe(1);
     const isIn = await page.locator('.estimate').evaluate((box) => box.scrollWidth <= box.clientWidth);
@@ -82,16 +78,14 @@ describe('the page', () => {
 });
 
 describe('a surface', () => {
-  it('has its keys also while a slider has the focus', async () => {
-    const { page } = at;
+  it('has its keys also while a slider has the focus', async ({ page }) => {
     await openSurface(at, job);
     await page.getByLabel('Opacity').and(page.locator('input')).focus();
     await page.keyboard.press('a');
     await expect.poll(async () => Math.abs(Number((await settled(page, () => noted(page, 'cam'))).split(',')[0]))).toBeLessThan(1);
   });
 
-  it('is turned when a cut would be seen edge-on', async () => {
-    const { page } = at;
+  it('is turned when a cut would be seen edge-on', async ({ page }) => {
     await openSurface(at, job);
     await page.keyboard.press('a');
     const slice = page.waitForResponse(/slice\.png/);
@@ -104,8 +98,7 @@ describe('a surface', () => {
     await expect.poll(height).toBeGreaterThan(0.4);
   });
 
-  it('has its distances in its picture', async () => {
-    const { page } = at;
+  it('has its distances in its picture', async ({ page }) => {
     await openSurface(at, job);
     await page.keyboard.press('a');
     await still(page);
@@ -131,8 +124,7 @@ describe('a surface', () => {
 });
 
 describe('the token', () => {
-  it('is asked for again after its dialog was closed', async () => {
-    const { browser } = at;
+  it('is asked for again after its dialog was closed', async ({ browser }) => {
     await withTokens(async (guarded, token) => {
       const { page } = await openPage(browser, guarded.url);
       await page.goto(guarded.url);

@@ -1,9 +1,9 @@
 // The page never waits for its shaders: a program is asked for only after a fence behind its linking has passed. A page that
 // asks sooner stands still until it is made, 0.2 s and more where software draws.
-import { expect, it } from 'vitest';
+import { expect } from 'vitest';
 import { ballNrrd, openSurface, setup, still } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 interface Watched {
   linked: number;
@@ -11,8 +11,7 @@ interface Watched {
   tooSoon: number;
 }
 
-it('the page does not wait for shaders while a surface comes and is looked at', async () => {
-  const { page, daemon } = at;
+it('the page does not wait for shaders while a surface comes and is looked at', async ({ page, daemon }) => {
   const volume = await daemon.upload(ballNrrd(48, 18));
   const job = await daemon.make({ volume, iso: 100, formats: ['glb'] });
   await page.addInitScript(() => {

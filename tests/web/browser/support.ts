@@ -5,7 +5,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, beforeEach, expect } from 'vitest';
+import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 
 // A head in magnetic resonance and its brain alone, of Debian's mricron-data. The brain's hull has a
 // million triangles, which software draws in bearable time.
@@ -165,9 +165,11 @@ export interface Setup extends OpenPage {
   daemon: Daemon;
 }
 
+type It = (name: string, run: (at: Setup) => Promise<void>) => void;
+
 // A browser and a daemon for the tests of a file, with a fresh page for each of them, that may have no
-// faults. To be taken apart inside of a test.
-export function setup(options: Parameters<Browser['newPage']>[0] = {}): Setup {
+// faults. `it` gives them to a test; `at` is to be taken apart inside of one.
+export function setup(options: Parameters<Browser['newPage']>[0] = {}): { at: Setup; it: It } {
   const made = {} as Setup;
   beforeAll(async () => {
     made.browser = await startBrowser();
@@ -184,7 +186,7 @@ export function setup(options: Parameters<Browser['newPage']>[0] = {}): Setup {
     await made.page.close();
     expect(made.faults).toEqual([]);
   });
-  return made;
+  return { at: made, it: (name, run) => test(name, () => run(made)) };
 }
 
 // The job whose page is open.

@@ -3,10 +3,10 @@
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { CDPSession, Page } from 'playwright-core';
-import { expect, it } from 'vitest';
+import { expect } from 'vitest';
 import { ballNrrd, head, setup, still, surfaceLoaded } from './support';
 
-const at = setup({ viewport: { width: 1280, height: 800 } });
+const { at, it } = setup({ viewport: { width: 1280, height: 800 } });
 const folder = process.env.ISOMESH_TIMES ?? '';
 
 interface Times {
@@ -67,8 +67,7 @@ async function heapOf(session: CDPSession): Promise<number> {
   return usedSize / (1 << 20);
 }
 
-it('a surface of millions of triangles', async () => {
-  const { daemon, browser } = at;
+it('a surface of millions of triangles', async ({ daemon, browser }) => {
   const volume = await uploadHead();
   const job = await daemon.make({ volume, iso: 60, regularize: false, formats: ['glb'] });
   const seen: Times[] = [];
@@ -114,8 +113,7 @@ async function framesTurning(page: Page, seconds: number): Promise<number> {
   return drawn / seconds;
 }
 
-it('a surface of millions of triangles that is turned', async () => {
-  const { page, daemon } = at;
+it('a surface of millions of triangles that is turned', async ({ page, daemon }) => {
   const volume = await uploadHead();
   const { id, mesh } = await daemon.make({ volume, iso: 60, regularize: false, formats: ['glb'] });
   await page.goto(`${daemon.url}/#/jobs/${id}`);
@@ -129,8 +127,7 @@ it('a surface of millions of triangles that is turned', async () => {
   }
 });
 
-it('twenty surfaces, one after the other', async () => {
-  const { page, daemon } = at;
+it('twenty surfaces, one after the other', async ({ page, daemon }) => {
   const volume = await daemon.upload(ballNrrd(96, 40));
   const session = await page.context().newCDPSession(page);
   const heap: number[] = [];
@@ -144,8 +141,7 @@ it('twenty surfaces, one after the other', async () => {
   expect(heap).toHaveLength(2);
 });
 
-it('a drag of the iso-value', async () => {
-  const { page, daemon } = at;
+it('a drag of the iso-value', async ({ page, daemon }) => {
   const volume = await uploadHead();
   await page.goto(`${daemon.url}/#/volumes/${volume}?iso=60`);
   const live = page.locator('.live');

@@ -1,13 +1,12 @@
 // Several surfaces in one scene.
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { hues, silhouette } from './seen';
 import { ballNrrd, labelsNrrd, noted, settled, setup, surfaceLoaded } from './support';
 
-const at = setup();
+const { it } = setup();
 
 describe('surfaces in one scene', () => {
-  it('have colours and opacities of their own, are hidden, and come back by the address', async () => {
-    const { page, daemon } = at;
+  it('have colours and opacities of their own, are hidden, and come back by the address', async ({ page, daemon }) => {
     const volume = await daemon.upload(ballNrrd(48, 18));
     const jobs = [];
     for (const iso of [70, 200]) jobs.push(await daemon.make({ volume, iso, formats: ['glb'] }));
@@ -44,8 +43,7 @@ describe('surfaces in one scene', () => {
     await page.waitForURL(new RegExp(`#/jobs/${jobs[0]?.id ?? ''}`));
   });
 
-  it('show each label of a job in its own colour until they get one together', async () => {
-    const { page, daemon } = at;
+  it('show each label of a job in its own colour until they get one together', async ({ page, daemon }) => {
     const volume = await daemon.upload(labelsNrrd(32));
     const job = await daemon.make({ volume, labels: 'all', label_colors: { 1: '#d02020', 2: '#2040e0' }, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/together?jobs=${job.id}`);
@@ -62,8 +60,7 @@ describe('surfaces in one scene', () => {
     await expect.poll(async () => (await hues(page, view)).red).toBeGreaterThan(1000);
   });
 
-  it('have to be some', async () => {
-    const { page, daemon } = at;
+  it('have to be some', async ({ page, daemon }) => {
     await page.goto(`${daemon.url}/#/together`);
     await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/No surfaces to show/);
   });

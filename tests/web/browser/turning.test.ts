@@ -1,10 +1,10 @@
 // A surface while it is turned by the pointer, and afterwards.
 import { readFileSync } from 'node:fs';
 import type { Locator, Page } from 'playwright-core';
-import { describe, expect, it } from 'vitest';
+import { describe, expect } from 'vitest';
 import { boxOf, brain, brainHull, openSurface, setup, still } from './support';
 
-const at = setup();
+const { at, it } = setup();
 
 declare global {
   interface Window {
@@ -39,8 +39,7 @@ function pixelsOf(canvas: Locator): Promise<number> {
 }
 
 describe('a large surface', () => {
-  it('is turned by a coarse copy with fewer pixels where frames take long, and rests whole', async () => {
-    const { daemon, page } = at;
+  it('is turned by a coarse copy with fewer pixels where frames take long, and rests whole', async ({ daemon, page }) => {
     await countTriangles(page);
     const volume = await daemon.upload(readFileSync(brain));
     const { id, mesh } = await daemon.make({ volume, iso: brainHull, formats: ['glb'] });

@@ -1,14 +1,12 @@
 // What comes in: several files, refused ones, and those of people with a token.
 import { readFileSync } from 'node:fs';
-import { describe, expect, it } from 'vitest';
-import { contourPixels } from './seen';
+import { describe, expect } from 'vitest';
 import { ballNrrd, brain, setup, drop, openPage, surfaceLoaded, withTokens } from './support';
 
-const at = setup();
+const { it } = setup();
 
 describe('several files', () => {
-  it('are packed in the browser and come as one volume', async () => {
-    const { daemon, page } = at;
+  it('are packed in the browser and come as one volume', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     const header = [
       'ObjectType = Image',
@@ -27,8 +25,7 @@ describe('several files', () => {
     await expect.poll(() => page.locator('.facts').innerText()).toMatch(/MetaImage.*20 \u00d7 20 \u00d7 20.*1 \u00d7 1 \u00d7 2 mm/);
   });
 
-  it('of more than one series let a person choose', async () => {
-    const { daemon, page } = at;
+  it('of more than one series let a person choose', async ({ daemon, page }) => {
     // The daemon's own tests hold real series; here it matters what the page does with the refusal.
     const asked: string[] = [];
     const choices = {
@@ -86,8 +83,7 @@ describe('several files', () => {
 });
 
 describe('a server with tokens', () => {
-  it('is entered with one, and with none but one', async () => {
-    const { browser } = at;
+  it('is entered with one, and with none but one', async ({ browser }) => {
     await withTokens(async (guarded, token) => {
       const { page: mine, faults: none } = await openPage(browser, guarded.url);
       await mine.goto(guarded.url);
@@ -119,8 +115,7 @@ describe('a server with tokens', () => {
 });
 
 describe('a refused file', () => {
-  it('says why, and what to do next', async () => {
-    const { daemon, page } = at;
+  it('says why, and what to do next', async ({ daemon, page }) => {
     await page.goto(daemon.url);
     const whole = readFileSync(brain);
     await drop(page, [{ name: 'half.nii.gz', bytes: whole.subarray(0, whole.length / 2) }]);
@@ -128,19 +123,5 @@ describe('a refused file', () => {
     expect(await page.locator('.refusal .advice').innerText()).not.toBe('');
     await page.getByRole('button', { name: 'Choose another file' }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
-  });
-
-  it('that holds raw samples is taken with a description', async () => {
-    const { daemon, page } = at;
-    await page.goto(daemon.url);
-    await drop(page, [{ name: 'samples.raw', bytes: ballNrrd(20, 7).subarray(-8000) }]);
-    const submit = page.getByRole('button', { name: 'Upload as raw samples' });
-    await expect.poll(() => submit.count()).toBe(1);
-    await expect.poll(() => submit.isDisabled()).toBe(true);
-    for (const axis of ['x', 'y', 'z']) await page.getByLabel(`Samples along ${axis}`).fill('20');
-    await page.getByLabel('Type').selectOption('uint8');
-    await submit.click();
-    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-    await expect.poll(() => contourPixels(page, 'coronal')).toBeGreaterThan(50);
   });
 });
