@@ -23,8 +23,7 @@ std::string name_of_database(Database& database, const std::string& proposed) {
     Transaction transaction(connection);
     transaction->query("LOCK TABLE identity IN SHARE ROW EXCLUSIVE MODE");
     transaction->query(
-        "INSERT INTO identity SELECT ?1, isomesh_now() WHERE NOT EXISTS (SELECT 1 FROM "
-        "identity)",
+        "INSERT INTO identity SELECT ?1, isomesh_now() WHERE NOT EXISTS (SELECT 1 FROM identity)",
         proposed);
     Rows row = transaction->query("SELECT id FROM identity");
     row.next();

@@ -306,8 +306,7 @@ std::size_t PostgresJobStore::reap() {
   const bool judges_leases = has_responded_for_long();
   Rows rows = database_.query(select_ +
                                   "WHERE (?3 <> 0 AND r.lease_until < isomesh_now()) OR r.node IN "
-                                  "(SELECT id FROM nodes WHERE "
-                                  "name = ?1 AND id <> ?2::uuid)",
+                                  "(SELECT id FROM nodes WHERE name = ?1 AND id <> ?2::uuid)",
                               database_.node_name(), database_.node(), judges_leases);
   note_response();
   std::size_t reaped = 0;

@@ -12,8 +12,7 @@ void note(SqlConnection& connection, const Expirable& record, const std::vector<
           Expired& expired) {
   connection.run(
       "INSERT INTO expired(id, owner, at) VALUES(?1, ?2, isomesh_kept(isomesh_now())) ON "
-      "CONFLICT(id, "
-      "owner) DO UPDATE SET at = excluded.at",
+      "CONFLICT(id, owner) DO UPDATE SET at = excluded.at",
       record.id, record.owner);
   expired.records.push_back(record);
   for (const Blob& blob : blobs) {

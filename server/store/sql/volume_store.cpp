@@ -232,8 +232,7 @@ std::vector<Expirable> SqlVolumeStore::unused(const ExpiryFilter& filter, std::s
       database_.query(
           "SELECT owner, id, used FROM volumes v WHERE used < ?1 AND NOT EXISTS (SELECT 1 FROM "
           "jobs j WHERE j.volume = v.id AND j.owner = v.owner AND j.state < {job.final}) AND (?3 "
-          "IS NULL OR "
-          "owner = ?3) ORDER BY used LIMIT ?2",
+          "IS NULL OR owner = ?3) ORDER BY used LIMIT ?2",
           database_.to_us(filter.before), limit, filter.owner));
 }
 

@@ -84,10 +84,8 @@ TEST_F(ClusterTest, ProgressIsWrittenTwiceASecondAtMost) {
   submit();
   const Lease lease = two().claimed();
   ask("CREATE TABLE writes(n int); CREATE FUNCTION count_write() RETURNS trigger LANGUAGE plpgsql "
-      "AS "
-      "'BEGIN INSERT INTO writes VALUES(1); RETURN NULL; END'; CREATE TRIGGER counts AFTER UPDATE "
-      "ON "
-      "runs FOR EACH ROW EXECUTE FUNCTION count_write()");
+      "AS 'BEGIN INSERT INTO writes VALUES(1); RETURN NULL; END'; CREATE TRIGGER counts AFTER "
+      "UPDATE ON runs FOR EACH ROW EXECUTE FUNCTION count_write()");
   double share = 0;
   const auto writes_of_ten_seconds = [&](double step) {
     ask("DELETE FROM writes");

@@ -128,8 +128,7 @@ TEST_F(GroupCommit, WhatAFullDiskTakesBackIsAcknowledgedToNobody) {
       if (thread % 4 == 3) {
         transaction->run(
             "WITH RECURSIVE many(n) AS (SELECT 1000 UNION ALL SELECT n + 1 FROM many WHERE n < "
-            "99999)"
-            " INSERT INTO numbers SELECT n FROM many");
+            "99999) INSERT INTO numbers SELECT n FROM many");
       }
       transaction.commit();
     });
