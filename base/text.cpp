@@ -148,8 +148,4 @@ std::string percent_encode(std::string_view text) {
   return encoded;
 }
 
-std::string axis_name(std::size_t axis) {
-  return axis < 3 ? std::string(1, "ijk"[axis]) : std::to_string(axis + 1);
-}
-
 }  // namespace isomesh

@@ -57,7 +57,4 @@ std::string in_quotes(std::string_view text);
 // Encodes every byte that is not unreserved in RFC 3986 as %XX.
 std::string percent_encode(std::string_view text);
 
-// "i", "j" or "k", or "4", "5", ... beyond.
-std::string axis_name(std::size_t axis);
-
 }  // namespace isomesh

@@ -107,6 +107,10 @@ void check_dims(const RawDescription& description) {
 
 }  // namespace
 
+std::string axis_name(std::size_t axis) {
+  return axis < 3 ? std::string(1, "ijk"[axis]) : std::to_string(axis + 1);
+}
+
 Geometry geometry_of(const Vector3& origin, const std::array<Vector3, 3>& steps) {
   Geometry geometry;
   geometry.origin = origin;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "proto/error.h"
 #include "proto/types.h"
@@ -12,6 +14,9 @@
 namespace isomesh::volume {
 
 using Vector3 = std::array<double, 3>;
+
+// "i", "j" or "k", or "4", "5", ... beyond.
+std::string axis_name(std::size_t axis);
 
 // The geometry with sample (0,0,0) at `origin` and the given steps between neighbouring samples
 // along i, j and k, all in LPS millimetres. find_fault rejects the result for steps that are zero

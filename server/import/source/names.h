@@ -13,6 +13,7 @@ using isomesh::bytes_per_sample;
 using process::ImportOptions;
 using process::ImportTask;
 
+using volume::axis_name;
 using volume::CanonicalWriter;
 using volume::check_limits;
 using volume::check_raw;
