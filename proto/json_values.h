@@ -181,8 +181,7 @@ template <class T>
 void read_members(const Json& json, T& value) {
   check_object(json);
   visit(value, [&](const auto& name, auto& member) {
-    // RFC 9457 requires no member of a problem. Other lists are newer than the first version, or
-    // are omitted if empty.
+    // RFC 9457 requires no member of a problem. Other lists are omitted if empty.
     using Member = std::remove_reference_t<decltype(member)>;
     constexpr bool kMayHaveNoList = std::is_same_v<T, Volume> || std::is_same_v<T, MeshSummary> ||
                                     std::is_same_v<T, Estimate> || std::is_same_v<T, DicomIdentity>;
@@ -194,8 +193,6 @@ void read_members(const Json& json, T& value) {
       read_field(*found, member);
     } else if (!kMayBeMissing && !may_be_absent(name)) {
       throw Error(ErrorCode::kInternal, std::string("lacks ") + key);
-    } else if constexpr (std::is_same_v<Member, bool>) {
-      member = false;  // what an older version had no switch for, it did not do
     }
   });
 }

@@ -47,14 +47,6 @@ TEST(AnswerJson, VolumesComeBackTheSame) {
   EXPECT_EQ(volumes_from_json(to_json(several)), several);
 }
 
-TEST(AnswerJson, JobsOfBeforeASwitchDidNotHaveItOn) {
-  json job = json::parse(to_json(succeeded_job()));
-  job["parameters"]["regularize"] = true;
-  EXPECT_TRUE(job_from_json(job.dump()).parameters.regularize);
-  job["parameters"].erase("regularize");
-  EXPECT_FALSE(job_from_json(job.dump()).parameters.regularize);
-}
-
 TEST(AnswerJson, PagesHaveTheCursorOfTheNext) {
   EXPECT_EQ(next_from_json(R"({"jobs": [], "next": "abc"})"), "abc");
   EXPECT_EQ(next_from_json(R"({"jobs": [], "next": null})"), "");
@@ -136,36 +128,7 @@ TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
   EXPECT_EQ(read.detail.find('\xff'), std::string::npos);
 }
 
-// --- From other versions, and from nobody
-
-TEST(AnswerJson, VolumesOfTheFirstVersionAreRead) {
-  json volume = json::parse(to_json(dicom_volume()));
-  for (const char* name : {"name", "modality", "presets", "ignored", "notes", "dicom"}) {
-    volume.erase(name);
-  }
-  Volume expected = some_volume();
-  expected.format = "dicom";
-  EXPECT_EQ(volume_from_json(volume.dump()), expected);
-}
-
-// Identities told less once.
-TEST(AnswerJson, RecordsOfIdentitiesThatToldLessAreRead) {
-  Volume expected = dicom_volume();
-  json record = json::parse(to_record(expected));
-  for (const char* name :
-       {"issuer_of_patient_id", "patient_identity_removed", "deidentification_method",
-        "acquisition_datetime", "position_reference_indicator", "equipment", "segments"}) {
-    record["dicom"].erase(name);
-  }
-  expected.dicom->issuer_of_patient_id.clear();
-  expected.dicom->patient_identity_removed.clear();
-  expected.dicom->deidentification_method.clear();
-  expected.dicom->acquisition_datetime.clear();
-  expected.dicom->position_reference_indicator.clear();
-  expected.dicom->equipment = {};
-  expected.dicom->segments.clear();
-  EXPECT_EQ(volume_from_record(record.dump()), expected);
-}
+// --- From later versions, and from nobody
 
 TEST(AnswerJson, UnknownMembersAreIgnored) {
   json volume = json::parse(to_json(some_volume()));
@@ -206,48 +169,47 @@ struct Fault {
   const char* value;
 };
 
-TEST(AnswerJson, MembersOfTheWrongKindAreRefused) {
-  const json good = json::parse(to_json(some_volume()));
-  for (const Fault& fault : std::vector<Fault>{{"/id", "7"},
-                                               {"/dims", "[1]"},
-                                               {"/dims", "7"},
-                                               {"/dims/0", "\"x\""},
-                                               {"/type", "\"int3\""},
-                                               {"/type", "3"},
-                                               {"/spacing", "null"},
-                                               {"/spacing/1", "null"},
-                                               {"/range", "{}"},
-                                               {"/bytes", "\"many\""}}) {
-    json bad = good;
+template <class Read>
+void expect_refused(const std::string& answer, const std::vector<Fault>& faults, const Read& read) {
+  for (const Fault& fault : faults) {
+    json bad = json::parse(answer);
     bad[json::json_pointer(fault.pointer)] = json::parse(fault.value);
-    EXPECT_EQ(code_thrown_by([&] { volume_from_json(bad.dump()); }), ErrorCode::kInternal)
+    EXPECT_EQ(code_thrown_by([&] { read(bad.dump()); }), ErrorCode::kInternal)
         << fault.pointer << ": " << fault.value;
   }
 }
 
-TEST(AnswerJson, MembersOfAJobOfTheWrongKindAreRefused) {
-  const json good = json::parse(to_json(succeeded_job()));
-  for (const Fault& fault : std::vector<Fault>{{"/state", "\"melted\""},
-                                               {"/state", "null"},
-                                               {"/stage", "\"frying\""},
-                                               {"/progress", "\"1\""},
-                                               {"/parameters", "[]"},
-                                               {"/parameters", "7"},
-                                               {"/parameters/formats", "\"drc\""},
-                                               {"/parameters/draco", "3"},
-                                               {"/timing", "[]"},
-                                               {"/timing", "1"},
-                                               {"/mesh", "[]"},
-                                               {"/mesh/files", "[]"},
-                                               {"/mesh/files/drc", "3"},
-                                               {"/mesh/bounds", "[]"},
-                                               {"/error", "\"broken\""},
-                                               {"/started", "3"}}) {
-    json bad = good;
-    bad[json::json_pointer(fault.pointer)] = json::parse(fault.value);
-    EXPECT_EQ(code_thrown_by([&] { job_from_json(bad.dump()); }), ErrorCode::kInternal)
-        << fault.pointer << ": " << fault.value;
-  }
+TEST(AnswerJson, MembersOfTheWrongKindAreRefused) {
+  expect_refused(to_json(some_volume()),
+                 {{"/id", "7"},
+                  {"/dims", "[1]"},
+                  {"/dims", "7"},
+                  {"/dims/0", "\"x\""},
+                  {"/type", "\"int3\""},
+                  {"/type", "3"},
+                  {"/spacing", "null"},
+                  {"/spacing/1", "null"},
+                  {"/range", "{}"},
+                  {"/bytes", "\"many\""}},
+                 volume_from_json);
+  expect_refused(to_json(succeeded_job()),
+                 {{"/state", "\"melted\""},
+                  {"/state", "null"},
+                  {"/stage", "\"frying\""},
+                  {"/progress", "\"1\""},
+                  {"/parameters", "[]"},
+                  {"/parameters", "7"},
+                  {"/parameters/formats", "\"drc\""},
+                  {"/parameters/draco", "3"},
+                  {"/timing", "[]"},
+                  {"/timing", "1"},
+                  {"/mesh", "[]"},
+                  {"/mesh/files", "[]"},
+                  {"/mesh/files/drc", "3"},
+                  {"/mesh/bounds", "[]"},
+                  {"/error", "\"broken\""},
+                  {"/started", "3"}},
+                 job_from_json);
 }
 
 TEST(AnswerJson, ListsThatAreNotListsAreRefused) {
