@@ -20,6 +20,8 @@ constexpr bool is_letter_or_digit(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
+bool is_digits(std::string_view text);
+
 // A letter, a digit, a dot, a dash or an underscore: a path and a file name take them as they are.
 constexpr bool is_plain(char c) {
   return is_letter_or_digit(c) || c == '.' || c == '-' || c == '_';

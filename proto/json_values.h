@@ -68,9 +68,9 @@ void write_field(Json& object, const Parameter& parameter, const std::optional<T
 
 template <class T>
 void write(Json& place, const T& value) {
-  if constexpr (std::is_same_v<T, Scheme>) {
-    is_number(value) ? assign(place, static_cast<std::int64_t>(value))
-                     : assign(place, to_string(value));
+  if constexpr (std::is_same_v<T, SchemeName>) {
+    const std::string_view name = to_string(value);
+    is_digits(name) ? assign(place, static_cast<std::int64_t>(value)) : assign(place, name);
   } else if constexpr (Numbered<T>) {
     assign(place, static_cast<std::int64_t>(value));
   } else if constexpr (Enumeration<T>) {
@@ -199,9 +199,9 @@ void read_members(const Json& json, T& value) {
 
 template <class T>
 void read(const Json& json, T& value) {
-  if constexpr (std::is_same_v<T, Scheme>) {
+  if constexpr (std::is_same_v<T, SchemeName>) {
     const auto known =
-        from_string<Scheme>(is_string(json) ? text(json) : std::to_string(whole(json, 9)));
+        from_string<SchemeName>(is_string(json) ? text(json) : std::to_string(whole(json, 9)));
     if (!known) throw Error(ErrorCode::kInternal, "has an unknown value");
     value = *known;
   } else if constexpr (Numbered<T>) {

@@ -3,10 +3,13 @@
 
 #include <array>
 #include <concepts>
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <type_traits>
 
-#include "proto/types.h"
+#include "proto/mesh_summary.h"
+#include "proto/smoothing.h"
 
 namespace isomesh {
 
@@ -30,6 +33,7 @@ inline constexpr std::size_t kMostValues = 8;
 using Meanings = std::array<const char*, kMostValues>;
 
 enum class JobKind { kAny, kAtIso, kByLabels };
+enum class TextKind { kAny, kName, kColor };  // of a text: one line, or "#rrggbb"
 
 struct Parameter {
   const char* name;
@@ -44,10 +48,12 @@ struct Parameter {
   Meanings values = {};              // of an enumeration's values, in order
   SmoothingCases cases = {};
   bool is_required = false;
-  const char* unless = nullptr;  // a required parameter may be missing if this one is given
+  const char* unless = nullptr;  // the parameter that takes the place of a required one
   JobKind jobs = JobKind::kAny;
-  const char* by_labels = nullptr;  // the default for jobs by labels, if it differs
-  bool may_be_absent = false;       // omitted for jobs that it does not concern
+  const char* by_labels = nullptr;       // why a job by labels takes only the default
+  std::optional<MeshFormat> needs = {};  // the format without which it takes only the default
+  TextKind text = TextKind::kAny;
+  bool may_be_absent = false;  // omitted for jobs that it does not concern
   bool in_query = true;
   const char* query = nullptr;   // its name in a query, if it is not `name`
   const char* option = nullptr;  // its name on the command line, if it is not the query's

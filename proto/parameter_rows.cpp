@@ -131,9 +131,8 @@ constinit const Parameter kLabels = {
         "Each label gets a surface of its own. Neighbouring labels share the wall "
         "between them. Values that are not listed are background. Vertices lie "
         "half-way between two samples. Some defaults differ from those of jobs with an "
-        "iso-value: `smoothing` is `labels`. With another kind of smoothing there are 10 "
-        "passes, a lambda of 0.33, and no vertex moves farther than half the smallest "
-        "spacing.",
+        "iso-value. With another smoothing than `labels` no vertex moves farther than half the "
+        "smallest spacing.",
     .minimum = kLeastLabel,
     .maximum = kMostLabel,
     .jobs = JobKind::kByLabels,
@@ -147,12 +146,16 @@ constinit const Parameter kBackground = {.name = "background",
                                          .jobs = JobKind::kByLabels,
                                          .may_be_absent = true};
 
+constinit const Parameter kLabelName = {
+    .name = "label", .minimum = kLeastLabel, .maximum = kMostLabel};
+
 constinit const Parameter kLabelNames = {
     .name = "label_names",
     .title = "Label names",
     .help = "Names of the labels, by value.",
     .more = "Labels that are not listed keep the name from the volume's file.",
     .jobs = JobKind::kByLabels,
+    .text = TextKind::kName,
     .may_be_absent = true,
     .in_query = false,
     .option = "label-name"};
@@ -165,6 +168,7 @@ constinit const Parameter kLabelColors = {
         "Labels that are not listed keep the colour from the volume's "
         "file, or get one of a fixed series.",
     .jobs = JobKind::kByLabels,
+    .text = TextKind::kColor,
     .may_be_absent = true,
     .in_query = false,
     .option = "label-color"};
@@ -207,6 +211,7 @@ constinit const Parameter kInterpolation = {
     .values = {"Where the iso-value lies between the two samples",
                "Half-way between the two samples"},
     .jobs = JobKind::kAtIso,
+    .by_labels = "must be \"midpoint\" for labels: there are no values between two labels",
     .may_be_absent = true};
 
 constinit const Parameter kRegularize = {
@@ -227,20 +232,21 @@ constinit const Parameter kPasses = {
     .title = "Passes",
     .help = "Number of smoothing passes.",
     .more =
-        "Vertices on the surface's boundary stay where they are. For labels "
-        "the default is 10. `labels` smoothes once, whatever their number, and moves "
+        "Vertices on the surface's boundary stay where they are. `labels` smoothes once, whatever "
+        "their number, and moves "
         "the boundary within the volume's border; 0 leaves the surface as it is "
         "extracted.",
     .minimum = 0,
     .maximum = 1000,
-    .by_labels = "10"};
+};
 
-constinit const Parameter kSmoothing = {.name = "smoothing",
-                                        .title = "Smoothing",
-                                        .help = "The smoothing method.",
-                                        .more = kMethods.data(),
-                                        .values = kMethodMeanings,
-                                        .by_labels = "labels"};
+constinit const Parameter kSmoothing = {
+    .name = "smoothing",
+    .title = "Smoothing",
+    .help = "The smoothing method.",
+    .more = kMethods.data(),
+    .values = kMethodMeanings,
+};
 
 constinit const Parameter kLambda = {
     .name = "lambda",
@@ -249,7 +255,7 @@ constinit const Parameter kLambda = {
     .above = 0,
     .maximum = 1,
     .cases = kLambdaCases,
-    .by_labels = "0.33"};
+};
 
 constinit const Parameter kPassBand = {
     .name = "pass_band",
@@ -287,7 +293,10 @@ constinit const Parameter kComponents = {
         "and "
         "`keep` chooses among the rest. Components are ranked by their number of triangles, equal "
         "ones by "
-        "their first vertex. Without members all are kept. Labels do not allow it."};
+        "their first vertex. Without members all are kept. Labels do not allow it.",
+    .by_labels =
+        "cannot be combined with labels: a dropped component would leave a hole in its "
+        "neighbours"};
 
 constinit const Parameter kFillCavities = {
     .name = "fill_cavities",
@@ -295,6 +304,7 @@ constinit const Parameter kFillCavities = {
     .help = "Remove enclosed cavities: their walls and all connected components inside them.",
     .more = "A cavity is enclosed if no opening leads to it.",
     .jobs = JobKind::kAtIso,
+    .by_labels = "cannot be combined with labels: other labels may lie in their cavities",
     .may_be_absent = true};
 
 constinit const Parameter kCrop = {
@@ -365,6 +375,7 @@ constinit const Parameter kDistances = {
         "The vertex attribute is `_DISTANCE_MM`; every level of detail has it. Values "
         "are rounded to a four thousandth of the largest. The page shows them as "
         "colours. The formats must include `glb`.",
+    .needs = MeshFormat::kGlb,
     .may_be_absent = true};
 
 constinit const Parameter kLods = {
@@ -378,6 +389,7 @@ constinit const Parameter kLods = {
         "ignore them. The formats must include `glb`.",
     .above = 0,
     .maximum = 1,
+    .needs = MeshFormat::kGlb,
     .may_be_absent = true};
 
 constinit const Parameter kMerge = {

@@ -3,9 +3,70 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <string_view>
 
+#include "proto/json.h"
+#include "proto/json_tree.h"
+
 namespace isomesh {
+namespace {
+
+const FormatRow& row_of(MeshFormat format) {
+  return *std::ranges::find(kFormatRows, format, &FormatRow::format);
+}
+
+// As a request that leaves everything out is completed.
+JsonTree completed(JobParameters parameters) {
+  parameters.lambda = default_lambda(parameters);
+  return JsonTree(to_json(parameters));
+}
+
+}  // namespace
+
+double default_lambda(const MeshParameters& parameters) {
+  const SmoothingRow& row = row_of(parameters.smoothing);
+  const double usual = row.lambda.value_or(1);
+  return parameters.labels ? row.lambda_by_labels.value_or(usual) : usual;
+}
+
+Space space_of(MeshFormat format, const MeshParameters& parameters) {
+  return row_of(format).own_space.value_or(parameters.space);
+}
+
+bool holds_all_labels(MeshFormat format) { return row_of(format).holds_all_labels; }
+
+std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
+  if (!parameters.labels) return parameters.formats;
+  std::vector<MeshFormat> files;
+  std::ranges::copy_if(parameters.formats, std::back_inserter(files), holds_all_labels);
+  if (!zipped_formats(parameters).empty()) files.push_back(MeshFormat::kZip);
+  return files;
+}
+
+std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters) {
+  std::vector<MeshFormat> zipped;
+  for (const MeshFormat format : parameters.formats) {
+    if (row_of(format).is_zipped) zipped.push_back(format);
+  }
+  const bool is_asked =
+      std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
+  if (zipped.empty() && is_asked) zipped.push_back(MeshFormat::kStl);
+  return zipped;
+}
+
+std::string default_by_labels(const Parameter& parameter) {
+  static const JsonTree at_iso = completed({});
+  static const JsonTree by_labels = completed(label_parameters({}));
+  if (parameter.jobs != JobKind::kAny) return "";
+  const Json* const usual = json_values::find(at_iso.root(), parameter.name);
+  const Json* const other = json_values::find(by_labels.root(), parameter.name);
+  if (usual == nullptr || other == nullptr) return "";
+  std::string text = dump(*other);
+  if (text == dump(*usual)) return "";
+  std::erase(text, '"');
+  return text;
+}
 
 std::string query_name_of(const Parameter& parameter) {
   return parameter.query == nullptr ? parameter.name : parameter.query;

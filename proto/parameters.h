@@ -1,19 +1,148 @@
-// The table of a job's parameters: each has one row in parameter_rows.cpp, and the functions
-// `visit` below say which member has which row. The member has the type, the default and the names
-// of the values. The rows generate: requests, queries and their errors (requests.cpp), the
-// command's options and help (client/cli/parameter_options.cpp), and openapi.yaml
-// (openapi/describe.cpp), from which the page's form is generated.
+// The parameters of a job. Each has one member with its default in the structures below, and one
+// row, with everything else that is said of it, in parameter_rows.cpp; the functions `visit` join
+// the two. The rows generate: requests, queries and their errors (requests.cpp), the command's
+// options and help (client/cli/parameter_options.cpp), and openapi.yaml (openapi/describe.cpp),
+// from which the page's form is generated.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "proto/labels.h"
+#include "proto/mesh_summary.h"
 #include "proto/parameter.h"
-#include "proto/types.h"
+#include "proto/smoothing.h"
 
 namespace isomesh {
+
+// The division of cells into tetrahedra: so many for each, or those of the body-centred lattice of
+// the samples and the centres of the cells.
+enum class Scheme { kFive = 5, kSix, kBcc };
+
+// The spelling of a scheme in a request, which responses repeat: kFcc and kKuhn are the lattices of
+// five and six.
+enum class SchemeName { kFive = 5, kSix, kBcc, kFcc, kKuhn };
+
+constexpr Scheme scheme_of(SchemeName name) {
+  if (name == SchemeName::kFcc) return Scheme::kFive;
+  return name == SchemeName::kKuhn ? Scheme::kSix : Scheme{static_cast<int>(name)};
+}
+
+enum class Interpolation { kLinear, kMidpoint };
+enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
+enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
+
+struct DracoParameters {
+  int position_bits = 14;  // per coordinate
+  int speed = 7;           // 0 smallest .. 10 fastest
+
+  bool operator==(const DracoParameters&) const = default;
+};
+
+// Selects connected components; keeps all if empty. Several members apply in this order:
+// `nearest_to`, `min_triangles`, `keep`.
+struct ComponentFilter {
+  std::optional<std::uint32_t> keep;              // number of the largest components to keep; at
+                                                  // least 1
+  std::optional<std::uint32_t> min_triangles;     // drops smaller components; at least 1
+  std::vector<std::array<double, 3>> nearest_to;  // the components nearest to these points, in mm,
+                                                  // LPS
+  static constexpr std::size_t kMostPlaces = 1000;
+
+  bool keeps_all() const { return !keep && !min_triangles && nearest_to.empty(); }
+  bool operator==(const ComponentFilter&) const = default;
+};
+
+// A box along the axes of LPS: smallest and largest corner, in millimetres.
+using Box = std::array<std::array<double, 3>, 2>;
+
+// The URL to notify when a job has ended.
+struct Callback {
+  std::string url;
+
+  bool operator==(const Callback&) const = default;
+};
+
+// Everything beside the volume that determines a mesh's bytes, and nothing else. Files carry it,
+// and jobs with equal parameters share their result. parameters.h has the meanings and ranges.
+struct MeshParameters {
+  std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
+  SchemeName scheme = SchemeName::kSix;
+  Interpolation interpolation = Interpolation::kLinear;
+  bool regularize = true;
+  int passes = 5;
+  Smoothing smoothing = Smoothing::kLaplacian;
+  std::optional<double> lambda;               // empty: default_lambda()
+  double pass_band = 0.1;                     // of Taubin smoothing
+  std::optional<double> max_displacement_mm;  // empty: no limit
+  bool close = false;
+  ComponentFilter components;
+  std::vector<MeshFormat> formats = {MeshFormat::kDrc};
+  DracoParameters draco;
+  bool normals = true;     // in glb
+  bool distances = false;  // in glb: of each vertex to the surface as extracted
+  // Largest allowed deviation of the files from the surface as extracted; empty: no limit.
+  std::optional<double> max_error_mm = {};
+  std::optional<std::uint32_t> triangles = {};  // at most this many; empty: all
+  std::vector<double> lods = {};  // in glb: levels of detail, as fractions of the triangles
+  static constexpr std::size_t kMostLods = 8;
+  bool merge = false;  // in glb: one primitive per surface and level
+  GlbCodec glb_codec = GlbCodec::kDraco;
+  Space space = Space::kLps;     // of files whose format does not define it
+  std::optional<Box> crop = {};  // empty: the whole volume
+  bool fill_cavities = false;
+  // For a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
+  std::optional<LabelChoice> labels = {};
+  std::int64_t background = 0;  // the value outside of all labels
+  LabelTexts label_names = {};
+  LabelTexts label_colors = {};   // "#rrggbb"
+  LabelValues label_values = {};  // of labels with more values than their own number
+
+  bool operator==(const MeshParameters&) const = default;
+};
+
+// A job request: the mesh's parameters, the volume, the priority and the callback.
+struct JobParameters : MeshParameters {
+  std::string volume;
+  Priority priority = Priority::kRoutine;
+  std::optional<Callback> callback = {};
+  bool certify = false;  // measures the deviation of the files from the surface as extracted
+
+  bool operator==(const JobParameters&) const = default;
+};
+
+// The defaults of a job by labels; the members' own are those of a job at an iso-value.
+inline JobParameters label_parameters(LabelChoice labels) {
+  JobParameters parameters;
+  parameters.labels = std::move(labels);
+  parameters.interpolation = Interpolation::kMidpoint;
+  parameters.passes = 10;
+  parameters.smoothing = Smoothing::kLabels;
+  return parameters;
+}
+
+// The space of a file's coordinates: GIFTI is RAS, GLB has a node of its own for it, other formats
+// follow the parameter.
+Space space_of(MeshFormat format, const MeshParameters& parameters);
+
+// True if one file of the format holds all labels.
+bool holds_all_labels(MeshFormat format);
+
+// The files of a job, in order: its formats. For a job by labels: the formats that hold all labels,
+// and a ZIP of the others.
+std::vector<MeshFormat> files_of(const MeshParameters& parameters);
+
+// The formats of the files in a ZIP of labels, in order.
+std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
+
+// The default relaxation factor (smoothing.h).
+double default_lambda(const MeshParameters& parameters);
 
 namespace rows {
 extern const Parameter kKeep, kMinTriangles, kNearestTo;
@@ -23,6 +152,7 @@ extern const Parameter kIso, kLabels, kBackground, kLabelNames, kLabelColors, kL
     kClose, kComponents, kFillCavities, kCrop, kMaxErrorMm, kTriangles, kFormats, kDraco, kNormals,
     kDistances, kLods, kMerge, kGlbCodec, kSpace;
 extern const Parameter kVolume, kPriority, kCertify, kCallback;
+extern const Parameter kLabelName;  // of a member that a label names
 }  // namespace rows
 
 // True if the member is visited: readers visit every member, writers only those with a value.
@@ -105,6 +235,10 @@ void visit_leaves(Self& self, const Leaf& leaf, const std::string& prefix = {}) 
     }
   });
 }
+
+// The default for jobs by labels if it is another one than that for jobs at an iso-value, as JSON
+// without quotes; otherwise empty.
+std::string default_by_labels(const Parameter& parameter);
 
 std::string query_name_of(const Parameter& parameter);
 

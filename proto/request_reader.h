@@ -113,14 +113,15 @@ class RequestReader {
     read_member(json, path, parameter, value.emplace());
   }
 
+  // Numbers are names without quotes; one with a point is the same number.
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   Scheme& value) {
+                   SchemeName& value) {
     std::string name = json.is_string() ? json.get<std::string>() : json.dump();
-    // A number with a point is the same number.
     if (json.is_number() && name.ends_with(".0")) name.resize(name.size() - 2);
-    const auto known = from_string<Scheme>(name);
-    if (!known || is_number(*known) == json.is_string())
-      return add(path, "must be " + names_of<Scheme>());
+    const auto known = from_string<SchemeName>(name);
+    if (!known || is_digits(name) == json.is_string()) {
+      return add(path, "must be " + names_of<SchemeName>());
+    }
     value = *known;
   }
 
@@ -240,7 +241,7 @@ class RequestReader {
       std::int64_t key = 0;
       const std::size_t before = errors_.size();
       const std::string place = path + '.' + name;
-      read_member(label ? Json(*label) : Json(), place, label_range(), key);
+      read_member(label ? Json(*label) : Json(), place, rows::kLabelName, key);
       if (errors_.size() == before && value.contains(key)) {
         add(place, "names a label that another member names, too");
       }
@@ -258,26 +259,13 @@ class RequestReader {
                      std::string& value) {
     if (!json.is_string()) return add(path, "must be a string");
     read_member(json, path, parameter, value);
-    if (std::string_view(parameter.name) == "label_colors") {
+    if (parameter.text == TextKind::kColor) {
       std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::tolower(c); });
       if (!is_color(value)) add(path, "must be a colour such as \"#d8654f\"");
     } else if (trimmed(value).empty() || value.size() > LabelEntry::kMostNameBytes ||
                has_control_characters(value)) {
       add(path, "must be a text of 1 to 255 bytes on one line");
     }
-  }
-
-  static const Parameter& label_range() {
-    static const Parameter range = [] {
-      MeshParameters parameters;  // not constant, so that `visit` reaches members that may be
-                                  // absent
-      Parameter found;
-      visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
-        if (std::string_view(parameter.name) == "background") found = parameter;
-      });
-      return found;
-    }();
-    return range;
   }
 
   template <class T>

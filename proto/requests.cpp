@@ -185,38 +185,54 @@ void check_case(const std::string& path, const Parameter& parameter, Smoothing s
   }
 }
 
-// Rejects members that do not apply to jobs with labels, or to jobs without them.
-void check_labels(const Json& json, const JobParameters& parameters, RequestReader& reader) {
+// Calls each(parameter, member, usual) with the members of both in turn.
+template <class Each>
+void visit_beside(JobParameters& parameters, JobParameters& usual, const Each& each) {
+  std::vector<void*> others;
+  visit(usual, [&](const Parameter& /*parameter*/, auto& member) { others.push_back(&member); });
+  auto other = others.begin();
+  visit(parameters, [&](const Parameter& parameter, auto& member) {
+    each(parameter, member, *static_cast<decltype(&member)>(*other++));
+  });
+}
+
+bool has(const JobParameters& parameters, MeshFormat format) {
+  return std::ranges::find(parameters.formats, format) != parameters.formats.end();
+}
+
+// Checks the conditions of the table.
+void check_conditions(const Json& json, JobParameters& parameters, JobParameters usual,
+                      RequestReader& reader) {
+  visit_beside(parameters, usual, [&](const Parameter& row, const auto& member, const auto& same) {
+    if (!json.contains(row.name)) return;
+    if (row.jobs == JobKind::kByLabels && !parameters.labels) {
+      reader.add(row.name, "is only for jobs with labels");
+    }
+    if (row.unless != nullptr && json.contains(row.unless)) {
+      reader.add(row.name, std::string("cannot be combined with ") + row.unless);
+    }
+    if (member == same) return;
+    if (row.by_labels != nullptr && parameters.labels) reader.add(row.name, row.by_labels);
+    if (row.needs && !has(parameters, *row.needs)) {
+      reader.add(row.name, "needs the format \"" + std::string(to_string(*row.needs)) + '"');
+    }
+  });
+}
+
+// Rejects values that do not apply to jobs with labels, or to jobs without them.
+void check_labels(const JobParameters& parameters, RequestReader& reader) {
   const auto refuse_if = [&](bool is_wrong, const char* name, const std::string& message) {
     if (is_wrong) reader.add(name, message);
   };
-  const auto has = [&](MeshFormat format) {
-    return std::ranges::find(parameters.formats, format) != parameters.formats.end();
-  };
   if (!parameters.labels) {
-    JobParameters all;  // not constant, so that `visit` reaches members that may be absent
-    visit(all, [&](const Parameter& parameter, const auto& /*member*/) {
-      const bool is_wrong = parameter.jobs == JobKind::kByLabels;
-      refuse_if(is_wrong && json.contains(parameter.name), parameter.name,
-                "is only for jobs with labels");
-    });
     refuse_if(
         row_of(parameters.smoothing).is_for_labels_only, "smoothing",
         '"' + std::string(to_string(parameters.smoothing)) + "\" is only for jobs with labels");
-    return refuse_if(has(MeshFormat::kZip), "formats",
+    return refuse_if(has(parameters, MeshFormat::kZip), "formats",
                      "\"zip\" holds one file per label, so it needs labels");
   }
-  refuse_if(json.contains("iso"), "iso", "cannot be combined with labels");
-  refuse_if(parameters.scheme == Scheme::kBcc, "scheme",
+  refuse_if(scheme_of(parameters.scheme) == Scheme::kBcc, "scheme",
             "cannot be \"bcc\" with labels: there are no values between two labels");
-  refuse_if(parameters.fill_cavities, "fill_cavities",
-            "cannot be combined with labels: other labels may lie in their cavities");
-  refuse_if(json.contains("interpolation") && parameters.interpolation == Interpolation::kLinear,
-            "interpolation",
-            "must be \"midpoint\" for labels: there are no values between two labels");
-  refuse_if(!parameters.components.keeps_all(), "components",
-            "cannot be combined with labels: a dropped component would leave a hole in its "
-            "neighbours");
   const std::string names_background =
       "must not include the background, " + std::to_string(parameters.background);
   refuse_if(std::ranges::binary_search(parameters.labels->values, parameters.background), "labels",
@@ -244,10 +260,6 @@ void complete(const Json& json, JobParameters& parameters, RequestReader& reader
   if (!lods.empty() && (lods.front() != 1 || !is_falling)) {
     reader.add("lods", "must start at 1 and then decrease");
   }
-  if (std::ranges::find(parameters.formats, MeshFormat::kGlb) != parameters.formats.end()) return;
-  constexpr const char* kNeedsGlb = "needs the format \"glb\"";
-  if (!lods.empty()) reader.add("lods", kNeedsGlb);
-  if (parameters.distances) reader.add("distances", kNeedsGlb);
 }
 
 JobParameters defaults_of(const Json& json) {
@@ -269,7 +281,8 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
       check_case(path, parameter, parameters.smoothing, member, reader);
     }
   });
-  check_labels(json, parameters, reader);
+  check_conditions(json, parameters, defaults_of(json), reader);
+  check_labels(parameters, reader);
   complete(json, parameters, reader);
   reader.throw_if_any();
   if (!parameters.lambda) parameters.lambda = default_lambda(parameters);

@@ -1,14 +1,28 @@
-// The stages of a job, in the order in which they run: a new one is a row here, its enumerator and
-// its time in types.h.
+// The stages of a job, in the order in which they run: a new one is an enumerator, a time and a row
+// here, and its time in server/jobs/making/stage_times.cpp.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 
-#include "proto/types.h"
-
 namespace isomesh {
+
+enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
+
+// Wall-clock milliseconds of each stage; 0 for a stage that has not run.
+struct Timing {
+  double queue = 0;
+  double load = 0;
+  double extract = 0;
+  double smooth = 0;
+  double simplify = 0;
+  double encode = 0;
+  double certify = 0;
+  double total = 0;  // from acceptance to the end
+
+  bool operator==(const Timing&) const = default;
+};
 
 struct StageRow {
   Stage stage;

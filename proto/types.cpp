@@ -1,15 +1,13 @@
 #include "proto/types.h"
 
-#include <algorithm>
 #include <array>
-#include <iterator>
 #include <optional>
 #include <string_view>
 #include <utility>
 
+#include "base/text.h"
 #include "proto/orders.h"
 #include "proto/samples.h"
-#include "proto/stages.h"
 
 namespace isomesh {
 namespace {
@@ -41,10 +39,11 @@ struct Names<NiftiForm> {
 };
 
 template <>
-struct Names<Scheme> {
+struct Names<SchemeName> {
   static constexpr std::array kTable = {
-      std::pair{Scheme::kFive, "5"}, std::pair{Scheme::kSix, "6"}, std::pair{Scheme::kFcc, "fcc"},
-      std::pair{Scheme::kKuhn, "kuhn"}, std::pair{Scheme::kBcc, "bcc"}};
+      std::pair{SchemeName::kFive, "5"}, std::pair{SchemeName::kSix, "6"},
+      std::pair{SchemeName::kFcc, "fcc"}, std::pair{SchemeName::kKuhn, "kuhn"},
+      std::pair{SchemeName::kBcc, "bcc"}};
 };
 
 template <>
@@ -57,10 +56,6 @@ template <>
 struct Names<Smoothing> {
   static constexpr auto kTable = names_from(kSmoothings, &SmoothingRow::smoothing);
 };
-
-const FormatRow& row_of(MeshFormat format) {
-  return *std::ranges::find(kFormatRows, format, &FormatRow::format);
-}
 
 template <>
 struct Names<MeshFormat> {
@@ -148,78 +143,11 @@ bool is_final(JobState state) {
          state == JobState::kCancelled;
 }
 
-Scheme numbered(Scheme scheme) {
-  switch (scheme) {
-    case Scheme::kFcc:
-      return Scheme::kFive;
-    case Scheme::kKuhn:
-      return Scheme::kSix;
-    default:
-      return scheme;
-  }
-}
-
-double default_lambda(const MeshParameters& parameters) {
-  const SmoothingRow& row = row_of(parameters.smoothing);
-  const double usual = row.lambda.value_or(1);
-  return parameters.labels ? row.lambda_by_labels.value_or(usual) : usual;
-}
-
-JobParameters label_parameters(LabelChoice labels) {
-  constexpr int kPasses = 10;
-  JobParameters parameters;
-  parameters.labels = std::move(labels);
-  parameters.interpolation = Interpolation::kMidpoint;
-  parameters.passes = kPasses;
-  parameters.smoothing = Smoothing::kLabels;
-  return parameters;
-}
-
-Space space_of(MeshFormat format, const MeshParameters& parameters) {
-  return row_of(format).own_space.value_or(parameters.space);
-}
-
-bool holds_all_labels(MeshFormat format) { return row_of(format).holds_all_labels; }
-
-std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
-  if (!parameters.labels) return parameters.formats;
-  std::vector<MeshFormat> files;
-  std::ranges::copy_if(parameters.formats, std::back_inserter(files), holds_all_labels);
-  if (!zipped_formats(parameters).empty()) files.push_back(MeshFormat::kZip);
-  return files;
-}
-
-std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters) {
-  std::vector<MeshFormat> zipped;
-  for (const MeshFormat format : parameters.formats) {
-    if (row_of(format).is_zipped) zipped.push_back(format);
-  }
-  const bool is_asked =
-      std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
-  if (zipped.empty() && is_asked) zipped.push_back(MeshFormat::kStl);
-  return zipped;
-}
-
 std::string mesh_path(const std::string& job, MeshFormat format,
                       std::optional<std::int64_t> label) {
   return "/v1/jobs/" + job + "/mesh." + std::string(to_string(format)) +
          (label ? "?label=" + std::to_string(*label) : "");
 }
-
-std::string_view to_string(SampleType value) { return name_of(value); }
-std::string_view to_string(NiftiForm value) { return name_of(value); }
-std::string_view to_string(Scheme value) { return name_of(value); }
-std::string_view to_string(Interpolation value) { return name_of(value); }
-std::string_view to_string(Smoothing value) { return name_of(value); }
-std::string_view to_string(MeshFormat value) { return name_of(value); }
-std::string_view to_string(GlbCodec value) { return name_of(value); }
-std::string_view to_string(Space value) { return name_of(value); }
-std::string_view to_string(Priority value) { return name_of(value); }
-std::string_view to_string(JobState value) { return name_of(value); }
-std::string_view to_string(OrderState value) { return name_of(value); }
-std::string_view to_string(Stage value) { return name_of(value); }
-std::string_view to_string(WaitingFor value) { return name_of(value); }
-std::string_view to_string(Simplification::Bound value) { return name_of(value); }
 
 template <class Enum>
 std::optional<Enum> from_string(std::string_view name) {
@@ -229,41 +157,12 @@ std::optional<Enum> from_string(std::string_view name) {
   return std::nullopt;
 }
 
-template std::optional<SampleType> from_string(std::string_view);
-template std::optional<NiftiForm> from_string(std::string_view);
-template std::optional<Scheme> from_string(std::string_view);
-template std::optional<Interpolation> from_string(std::string_view);
-template std::optional<Smoothing> from_string(std::string_view);
-template std::optional<MeshFormat> from_string(std::string_view);
-template std::optional<GlbCodec> from_string(std::string_view);
-template std::optional<Space> from_string(std::string_view);
-template std::optional<Priority> from_string(std::string_view);
-template std::optional<JobState> from_string(std::string_view);
-template std::optional<OrderState> from_string(std::string_view);
-template std::optional<Stage> from_string(std::string_view);
-template std::optional<WaitingFor> from_string(std::string_view);
-template std::optional<Simplification::Bound> from_string(std::string_view);
-
 template <class Enum>
 std::vector<Enum> values_of() {
   std::vector<Enum> values;
   for (const auto& [value, unused] : Names<Enum>::kTable) values.push_back(value);
   return values;
 }
-
-template std::vector<NiftiForm> values_of();
-template std::vector<Scheme> values_of();
-template std::vector<Interpolation> values_of();
-template std::vector<Smoothing> values_of();
-template std::vector<MeshFormat> values_of();
-template std::vector<GlbCodec> values_of();
-template std::vector<Space> values_of();
-template std::vector<Priority> values_of();
-template std::vector<JobState> values_of();
-template std::vector<SampleType> values_of();
-
-// Written as a number in JSON.
-bool is_number(std::string_view name) { return name.find_first_not_of("0123456789") == name.npos; }
 
 template <class Enum>
 std::string names_of() {
@@ -272,21 +171,32 @@ std::string names_of() {
   for (std::size_t row = 0; row < table.size(); ++row) {
     if (row > 0) text += row + 1 == table.size() ? " or " : ", ";
     const std::string name(table[row].second);
-    text += is_number(name) ? name : '"' + name + '"';
+    text += is_digits(name) ? name : '"' + name + '"';
   }
   return text;
 }
 
-template std::string names_of<SampleType>();
-template std::string names_of<NiftiForm>();
-template std::string names_of<Scheme>();
-template std::string names_of<Interpolation>();
-template std::string names_of<Smoothing>();
-template std::string names_of<MeshFormat>();
-template std::string names_of<GlbCodec>();
-template std::string names_of<Space>();
-template std::string names_of<Priority>();
-template std::string names_of<JobState>();
-template std::string names_of<WaitingFor>();
+#define ISOMESH_NAMED(Enum)                                         \
+  std::string_view to_string(Enum value) { return name_of(value); } \
+  template std::optional<Enum> from_string<Enum>(std::string_view); \
+  template std::vector<Enum> values_of<Enum>();                     \
+  template std::string names_of<Enum>();
+
+ISOMESH_NAMED(SampleType)
+ISOMESH_NAMED(NiftiForm)
+ISOMESH_NAMED(SchemeName)
+ISOMESH_NAMED(Interpolation)
+ISOMESH_NAMED(Smoothing)
+ISOMESH_NAMED(MeshFormat)
+ISOMESH_NAMED(GlbCodec)
+ISOMESH_NAMED(Space)
+ISOMESH_NAMED(Priority)
+ISOMESH_NAMED(JobState)
+ISOMESH_NAMED(OrderState)
+ISOMESH_NAMED(Stage)
+ISOMESH_NAMED(WaitingFor)
+ISOMESH_NAMED(Simplification::Bound)
+
+#undef ISOMESH_NAMED
 
 }  // namespace isomesh

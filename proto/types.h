@@ -14,7 +14,8 @@
 #include "proto/labels.h"
 #include "proto/mesh_summary.h"
 #include "proto/notes.h"
-#include "proto/smoothing.h"
+#include "proto/parameters.h"
+#include "proto/stages.h"
 
 namespace isomesh {
 
@@ -176,121 +177,8 @@ struct UploadedVolume {
   bool operator==(const UploadedVolume&) const = default;
 };
 
-// The division of cells into tetrahedra: by their number, or by the lattice whose edges these have.
-// kBcc is the body-centred one, of the samples and the centres of the cells.
-enum class Scheme { kFive = 5, kSix = 6, kFcc, kKuhn, kBcc };
-
-// The number that a lattice's name stands for, if there is one; others stand for themselves.
-Scheme numbered(Scheme scheme);
-// False where it is a name, although it may stand for a number.
-constexpr bool is_number(Scheme scheme) { return scheme <= Scheme::kSix; }
-enum class Interpolation { kLinear, kMidpoint };
-enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
-enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
-
-struct DracoParameters {
-  int position_bits = 14;  // per coordinate
-  int speed = 7;           // 0 smallest .. 10 fastest
-
-  bool operator==(const DracoParameters&) const = default;
-};
-
-// Selects connected components; keeps all if empty. Several members apply in this order:
-// `nearest_to`, `min_triangles`, `keep`.
-struct ComponentFilter {
-  std::optional<std::uint32_t> keep;              // number of the largest components to keep; at
-                                                  // least 1
-  std::optional<std::uint32_t> min_triangles;     // drops smaller components; at least 1
-  std::vector<std::array<double, 3>> nearest_to;  // the components nearest to these points, in mm,
-                                                  // LPS
-  static constexpr std::size_t kMostPlaces = 1000;
-
-  bool keeps_all() const { return !keep && !min_triangles && nearest_to.empty(); }
-  bool operator==(const ComponentFilter&) const = default;
-};
-
-// A box along the axes of LPS: smallest and largest corner, in millimetres.
-using Box = std::array<std::array<double, 3>, 2>;
-
-// The URL to notify when a job has ended.
-struct Callback {
-  std::string url;
-
-  bool operator==(const Callback&) const = default;
-};
-
-// Everything beside the volume that determines a mesh's bytes, and nothing else. Files carry it,
-// and jobs with equal parameters share their result. parameters.h has the meanings and ranges.
-struct MeshParameters {
-  std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
-  Scheme scheme = Scheme::kSix;
-  Interpolation interpolation = Interpolation::kLinear;
-  bool regularize = true;
-  int passes = 5;
-  Smoothing smoothing = Smoothing::kLaplacian;
-  std::optional<double> lambda;               // empty: default_lambda(smoothing)
-  double pass_band = 0.1;                     // of Taubin smoothing
-  std::optional<double> max_displacement_mm;  // empty: no limit
-  bool close = false;
-  ComponentFilter components;
-  std::vector<MeshFormat> formats = {MeshFormat::kDrc};
-  DracoParameters draco;
-  bool normals = true;     // in glb
-  bool distances = false;  // in glb: of each vertex to the surface as extracted
-  // Largest allowed deviation of the files from the surface as extracted; empty: no limit.
-  std::optional<double> max_error_mm = {};
-  std::optional<std::uint32_t> triangles = {};  // at most this many; empty: all
-  std::vector<double> lods = {};  // in glb: levels of detail, as fractions of the triangles
-  static constexpr std::size_t kMostLods = 8;
-  bool merge = false;  // in glb: one primitive per surface and level
-  GlbCodec glb_codec = GlbCodec::kDraco;
-  Space space = Space::kLps;     // of files whose format does not define it
-  std::optional<Box> crop = {};  // empty: the whole volume
-  bool fill_cavities = false;
-  // For a job by labels. It has no iso-value and no interpolation: its vertices lie half-way.
-  // label_parameters() has its defaults.
-  std::optional<LabelChoice> labels = {};
-  std::int64_t background = 0;  // the value outside of all labels
-  LabelTexts label_names = {};
-  LabelTexts label_colors = {};   // "#rrggbb"
-  LabelValues label_values = {};  // of labels with more values than their own number
-
-  bool operator==(const MeshParameters&) const = default;
-};
-
-// A job request: the mesh's parameters, the volume, the priority and the callback.
-struct JobParameters : MeshParameters {
-  std::string volume;
-  Priority priority = Priority::kRoutine;
-  std::optional<Callback> callback = {};
-  bool certify = false;  // measures the deviation of the files from the surface as extracted
-
-  bool operator==(const JobParameters&) const = default;
-};
-
-// With the defaults of a job by labels; the structure's own are those of a job at an iso-value.
-JobParameters label_parameters(LabelChoice labels);
-
-// The space of a file's coordinates: GIFTI is RAS, GLB has a node of its own for it, other formats
-// follow the parameter.
-Space space_of(MeshFormat format, const MeshParameters& parameters);
-
-// True if one file of the format holds all labels.
-bool holds_all_labels(MeshFormat format);
-
-// The files of a job, in order: its formats. For a job by labels: the formats that hold all labels,
-// and a ZIP of the others.
-std::vector<MeshFormat> files_of(const MeshParameters& parameters);
-
-// The formats of the files in a ZIP of labels, in order.
-std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
-
-// The default relaxation factor (smoothing.h).
-double default_lambda(const MeshParameters& parameters);
-
-// Databases contain the numbers of both, so a new one comes last.
+// Databases contain the numbers, so a new one comes last.
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
-enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
 
 // The reason, beside busy workers, that a job is still queued.
 enum class WaitingFor { kDisk };  // space for its files
@@ -301,20 +189,6 @@ bool is_final(JobState state);
 // The path of a job's mesh, or of one label's file, on its server.
 std::string mesh_path(const std::string& job, MeshFormat format,
                       std::optional<std::int64_t> label = std::nullopt);
-
-// Wall-clock milliseconds of each stage; 0 for a stage that has not run.
-struct Timing {
-  double queue = 0;
-  double load = 0;
-  double extract = 0;
-  double smooth = 0;
-  double simplify = 0;
-  double encode = 0;
-  double certify = 0;
-  double total = 0;  // from acceptance to the end
-
-  bool operator==(const Timing&) const = default;
-};
 
 struct Job {
   std::string id;
@@ -362,7 +236,7 @@ struct Estimate {
 
   std::string volume;
   std::optional<double> iso = {};  // also if it is Otsu's threshold; none by labels
-  Scheme scheme = Scheme::kSix;
+  SchemeName scheme = SchemeName::kSix;
   std::uint64_t triangles = 0;  // exact, like `vertices`, for the surface as extracted
   std::uint64_t vertices = 0;
   // The approximate number after simplification, if the job asks for it.
@@ -391,7 +265,7 @@ struct JobEvent {
 // The API's names of the values.
 std::string_view to_string(SampleType value);
 std::string_view to_string(NiftiForm value);
-std::string_view to_string(Scheme value);
+std::string_view to_string(SchemeName value);
 std::string_view to_string(Interpolation value);
 std::string_view to_string(Smoothing value);
 std::string_view to_string(MeshFormat value);

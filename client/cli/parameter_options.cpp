@@ -72,8 +72,8 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   if (help.ends_with('.')) help.pop_back();
   const std::string unit = parameter.unit;
   std::string defaults = default_of(parameter, standard);
-  if (parameter.by_labels != nullptr) {
-    defaults += std::string(defaults.empty() ? "" : ", ") + parameter.by_labels + " with --labels";
+  if (const std::string by_labels = default_by_labels(parameter); !by_labels.empty()) {
+    defaults += (defaults.empty() ? "" : ", ") + by_labels + " with --labels";
   }
   std::string more = words_of<T>() + limits_of(parameter);  // a number has limits, others words
   if (!defaults.empty()) more += (more.empty() ? "default: " : "; default: ") + defaults;

@@ -6,9 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "base/text.h"
 #include "proto/openapi/schemas.h"
 #include "proto/openapi/yaml.h"
 #include "proto/parameters.h"
+#include "proto/types.h"
 
 namespace isomesh {
 namespace {
@@ -50,7 +52,7 @@ std::string type_of() {
     return "boolean";
   } else if constexpr (std::is_same_v<T, double>) {
     return "number";
-  } else if constexpr (std::is_same_v<T, Scheme>) {
+  } else if constexpr (std::is_same_v<T, SchemeName>) {
     return "[integer, string]";
   } else if constexpr (std::is_integral_v<T>) {
     return "integer";
@@ -107,7 +109,12 @@ std::string cases_in_words(const Parameter& parameter) {
 
 std::string description_of(const Parameter& parameter) {
   const std::string more = parameter.more;
-  return parameter.help + (more.empty() ? "" : ' ' + more) + cases_in_words(parameter);
+  std::string by_labels = default_by_labels(parameter);
+  if (!by_labels.empty()) {
+    if (!parse_double(by_labels)) by_labels = '`' + by_labels + '`';
+    by_labels = " For labels the default is " + by_labels + '.';
+  }
+  return parameter.help + (more.empty() ? "" : ' ' + more) + cases_in_words(parameter) + by_labels;
 }
 
 void write_bounds(Yaml& yaml, const Parameter& parameter) {
@@ -135,7 +142,7 @@ void write_choice(Yaml& yaml, const Parameter& parameter) {
   if (parameter.values.front() == nullptr) return;
   yaml.under("x-enumDescriptions", [&] {
     for (std::size_t n = 0; n < names.size(); ++n) {
-      const std::string key = std::is_same_v<Enum, Scheme> ? '\'' + names[n] + '\'' : names[n];
+      const std::string key = std::is_same_v<Enum, SchemeName> ? '\'' + names[n] + '\'' : names[n];
       yaml.text(key, parameter.values.at(n));
     }
   });
@@ -144,8 +151,8 @@ void write_choice(Yaml& yaml, const Parameter& parameter) {
 void write_jobs(Yaml& yaml, const Parameter& parameter) {
   if (parameter.jobs == JobKind::kAtIso) yaml.line("x-jobs: iso");
   if (parameter.jobs == JobKind::kByLabels) yaml.line("x-jobs: labels");
-  if (parameter.by_labels != nullptr) {
-    yaml.line(std::string("x-default-by-labels: ") + parameter.by_labels);
+  if (const std::string standard = default_by_labels(parameter); !standard.empty()) {
+    yaml.line("x-default-by-labels: " + standard);
   }
 }
 
@@ -188,7 +195,7 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
     yaml.line("type: object");
     yaml.line("propertyNames: { pattern: '^-?[0-9]+$' }");
     const bool is_list = std::is_same_v<T, LabelValues>;
-    const bool is_color = std::string_view(parameter.name) == "label_colors";
+    const bool is_color = parameter.text == TextKind::kColor;
     const std::string text = is_color ? "{ type: string, pattern: '^#[0-9a-fA-F]{6}$' }"
                                       : "{ type: string, minLength: 1, maxLength: " +
                                             std::to_string(LabelEntry::kMostNameBytes) + " }";
@@ -369,31 +376,6 @@ std::string query_references() {
   return yaml.str();
 }
 
-std::string formats() {
-  Yaml yaml(2);
-  yaml.under("MeshFormat", [&] {
-    yaml.text(
-        "description",
-        "The format and suffix of a mesh file. STL, PLY and VTK are binary. `vtk` is VTK's legacy "
-        "format, `vtp` its XML format, `gii` GIFTI, `usda` USD's text, and `usdz` that text in a "
-        "package. `zip` is for labels. It holds one file per label in each other requested format "
-        "except `glb`, `3mf`, `usda` and `usdz`. If there is none, the files are STL.");
-    yaml.line("type: string");
-    yaml.line("enum: " + in_brackets(name_list<MeshFormat>()));
-    std::vector<std::string> whole;
-    for (const MeshFormat format : values_of<MeshFormat>()) {
-      if (holds_all_labels(format)) whole.push_back(name_of(format));
-    }
-    yaml.line("x-hold-all-labels: " + in_brackets(whole));
-    yaml.under("x-titles", [&] {
-      for (const FormatRow& row : kFormatRows) {
-        yaml.line("'" + std::string(row.name) + "': " + std::string(row.title));
-      }
-    });
-  });
-  return yaml.str();
-}
-
 // The start of the line that holds `text`, and of the next line.
 std::pair<std::size_t, std::size_t> line_with(const std::string& description,
                                               const std::string& text, std::size_t from) {
@@ -412,7 +394,7 @@ std::string with_parameters(const std::string& description) {
   };
   const std::vector<Part> parts = {
       {"parameters.h", "schemas of parameters", schemas()},
-      {"parameters.h", "formats", formats()},
+      {"parameters.h", "formats", schema_of_mesh_formats()},
       {"parameters.h", "parameters of a query", query()},
       {"parameters.h", "query of an estimate", query_references()},
       {"parameters.h", "query of a mesh", query_references()},

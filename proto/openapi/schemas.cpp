@@ -5,9 +5,25 @@
 #include "proto/notes.h"
 #include "proto/openapi/yaml.h"
 #include "proto/stages.h"
+#include "proto/types.h"
 #include "proto/volume_formats.h"
 
 namespace isomesh {
+namespace {
+
+// "`glb`, `3mf` and `usdz`": the formats that are in no ZIP of labels, beside that itself.
+std::string unzipped_formats() {
+  std::string text;
+  std::string last;
+  for (const FormatRow& row : kFormatRows) {
+    if (row.is_zipped || row.format == MeshFormat::kZip) continue;
+    if (!last.empty()) text += (text.empty() ? "" : ", ") + last;
+    last = '`' + std::string(row.name) + '`';
+  }
+  return text + " and " + last;
+}
+
+}  // namespace
 
 std::string schemas_of_notes() {
   std::vector<std::string> all;
@@ -59,6 +75,32 @@ std::string schema_of_volume_formats() {
     yaml.under("x-suffixes", [&] {
       for (const VolumeFormat& format : volume_formats()) {
         yaml.line(std::string(format.name) + ": '" + std::string(format.suffixes) + "'");
+      }
+    });
+  });
+  return yaml.str();
+}
+
+std::string schema_of_mesh_formats() {
+  Yaml yaml(2);
+  yaml.under("MeshFormat", [&] {
+    yaml.text(
+        "description",
+        "The format and suffix of a mesh file. STL, PLY and VTK are binary. `vtk` is VTK's legacy "
+        "format, `vtp` its XML format, `gii` GIFTI, `usda` USD's text, and `usdz` that text in a "
+        "package. `zip` is for labels. It holds one file per label in each other requested format "
+        "except " +
+            unzipped_formats() + ". If there is none, the files are STL.");
+    yaml.line("type: string");
+    yaml.line("enum: " + in_brackets(name_list<MeshFormat>()));
+    std::vector<std::string> whole;
+    for (const MeshFormat format : values_of<MeshFormat>()) {
+      if (holds_all_labels(format)) whole.emplace_back(to_string(format));
+    }
+    yaml.line("x-hold-all-labels: " + in_brackets(whole));
+    yaml.under("x-titles", [&] {
+      for (const FormatRow& row : kFormatRows) {
+        yaml.line("'" + std::string(row.name) + "': " + std::string(row.title));
       }
     });
   });

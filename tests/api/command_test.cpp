@@ -113,7 +113,7 @@ TEST_F(CommandTest, MeshPassesEveryOptionOn) {
   const Job job = job_from_json(result.output);
   EXPECT_EQ(job.state, JobState::kSucceeded);
   EXPECT_EQ(job.parameters.iso, 120);
-  EXPECT_EQ(job.parameters.scheme, Scheme::kFive);
+  EXPECT_EQ(job.parameters.scheme, SchemeName::kFive);
   EXPECT_EQ(job.parameters.interpolation, Interpolation::kMidpoint);
   EXPECT_EQ(job.parameters.passes, 2);
   EXPECT_EQ(job.parameters.lambda, 0.5);

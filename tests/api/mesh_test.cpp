@@ -211,7 +211,7 @@ TEST_F(MeshInOne, TakesEveryParameter) {
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "model/stl");
   const Job job = job_from_json(daemon_.get(answer.header("location")).body);
-  EXPECT_EQ(job.parameters.scheme, Scheme::kFive);
+  EXPECT_EQ(job.parameters.scheme, SchemeName::kFive);
   EXPECT_EQ(job.parameters.interpolation, Interpolation::kMidpoint);
   EXPECT_EQ(job.parameters.passes, 2);
   EXPECT_EQ(job.parameters.smoothing, Smoothing::kTaubin);

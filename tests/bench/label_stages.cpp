@@ -60,7 +60,7 @@ LabelStages::LabelStages(const Samples& samples, const MeshParameters& parameter
   with_lattice(samples, [&](const auto& lattice) {
     const auto present = mesh::count_labels(lattice, {});
     options_.labels = mesh::select_labels(present, 0);
-    options_.scheme = numbered(parameters.scheme);
+    options_.scheme = scheme_of(parameters.scheme);
     options_.close = parameters.close;
     options_.regularize = parameters.regularize;
     for (const mesh::LabelVoxels& one : present) {

@@ -129,7 +129,7 @@ JobFigures run_job(const Samples& samples, const MeshParameters& parameters, dou
 
 JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
   MeshParameters parameters = asked;
-  parameters.scheme = surface_.scheme;
+  parameters.scheme = SchemeName{static_cast<int>(surface_.scheme)};
   parameters.interpolation = surface_.interpolation;
   parameters.close = surface_.close;
   parameters.regularize = surface_.regularize;

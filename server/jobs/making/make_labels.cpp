@@ -37,7 +37,7 @@ auto with_label(SampleType type, const Use& use) {
 mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& labels,
                                        const MeshParameters& parameters) {
   mesh::SeparateOptions options = {.labels = {},
-                                   .scheme = numbered(parameters.scheme),
+                                   .scheme = scheme_of(parameters.scheme),
                                    .close = parameters.close,
                                    .regularize = parameters.regularize};
   for (const mesh::LabelVoxels& label : labels) {

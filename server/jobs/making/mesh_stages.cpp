@@ -149,7 +149,7 @@ void smooth_stage(const Smooth& smooth, Progress& progress, const mesh::Mesh& me
 
 mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
   return {.iso = iso,
-          .scheme = numbered(parameters.scheme),
+          .scheme = scheme_of(parameters.scheme),
           .interpolation = parameters.interpolation,
           .close = parameters.close,
           .regularize = is_regularized(parameters)};

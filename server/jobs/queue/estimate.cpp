@@ -163,8 +163,8 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
       return process_.count(order, stop);
     });
   };
-  return *counts_.get({viewer, volume.id, iso, key_of_part(parameters), numbered(parameters.scheme),
-                       parameters.close},
+  return *counts_.get({viewer, volume.id, iso, key_of_part(parameters),
+                       scheme_of(parameters.scheme), parameters.close},
                       find);
 }
 

@@ -274,7 +274,7 @@ TEST(Extremes, OfSpacingsChangeNoDigit) {
       parameters.formats = {MeshFormat::kStl};
       meshes.emplace_back(name, made(ball, 0, parameters).mesh);
       parameters.passes = 0;
-      parameters.scheme = Scheme::kFive;
+      parameters.scheme = SchemeName::kFive;
       meshes.emplace_back(name + " as it is", made(ball, 0, parameters).mesh);
     }
     return meshes;

@@ -127,7 +127,8 @@ TEST_F(ErrorJobsTest, SayWhyTheirErrorIsNotProven) {
     EXPECT_LE(certificate.found_mm, parameters.max_error_mm.value_or(1));
     return certificate.why_unproven.value_or("");
   };
-  EXPECT_EQ(why([](auto& job) { job.scheme = Scheme::kBcc; }), "The proof is for schemes 5 and 6.");
+  EXPECT_EQ(why([](auto& job) { job.scheme = SchemeName::kBcc; }),
+            "The proof is for schemes 5 and 6.");
   EXPECT_EQ(why([](auto& job) { job.components.keep = 1; }),
             "The proof is for all components together.");
   EXPECT_EQ(why([](auto& job) { job.max_error_mm.reset(); }), "A proof needs max_error_mm.");

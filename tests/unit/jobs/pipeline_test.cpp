@@ -60,19 +60,13 @@ TEST_F(PipelineTest, JoinsVerticesAndKeepsTheTopology) {
     parameters.regularize = false;
     const MeshSummary plain = run(volume, parameters).mesh;
     parameters.regularize = true;
-    const PipelineResult joined = run(volume, parameters);
-    EXPECT_LT(joined.mesh.triangles, plain.triangles);
-    EXPECT_EQ(joined.mesh.components, plain.components);
-    EXPECT_EQ(joined.mesh.euler, plain.euler);
-    EXPECT_EQ(joined.mesh.boundary_edges, plain.boundary_edges);
-    EXPECT_TRUE(joined.mesh.quality.manifold);
-    EXPECT_TRUE(joined.mesh.quality.oriented);
-    std::set<std::string> files = {mesh_bytes(joined)};
-    for (const int threads : {1, 3, 8}) {
-      JobProcess process(job_program(ISOMESH_JOB, threads));
-      files.insert(mesh_bytes(run_pipeline(volume, parameters, {}, blobs_, process, {}, kQuiet)));
-    }
-    EXPECT_EQ(files.size(), 1U);
+    const MeshSummary joined = run(volume, parameters).mesh;
+    EXPECT_LT(joined.triangles, plain.triangles);
+    EXPECT_EQ(joined.components, plain.components);
+    EXPECT_EQ(joined.euler, plain.euler);
+    EXPECT_EQ(joined.boundary_edges, plain.boundary_edges);
+    EXPECT_TRUE(joined.quality.manifold);
+    EXPECT_TRUE(joined.quality.oriented);
   }
 }
 
@@ -146,19 +140,17 @@ TEST_F(PipelineTest, TakesEverySampleType) {
 TEST_F(PipelineTest, EveryWayGivesTheSameBytesOnAnyNumberOfThreads) {
   const Volume volume =
       add(test::noise<std::uint8_t>({0, 1, 2}, {19, 17, 40}, 9), SampleType::kUint8);
-  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
-    for (const Interpolation interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
-      JobParameters parameters = parameters_of(volume, 1);
-      parameters.scheme = scheme;
-      parameters.interpolation = interpolation;
-      std::set<std::string> results;
-      for (const int threads : {1, 2, 3, 8}) {
-        JobProcess process(job_program(ISOMESH_JOB, threads));
-        results.insert(
-            mesh_bytes(run_pipeline(volume, parameters, {}, blobs_, process, {}, kQuiet)));
-      }
-      EXPECT_EQ(results.size(), 1U);
+  for (int way = 0; way < 8; ++way) {
+    JobParameters parameters = parameters_of(volume, 1);
+    parameters.scheme = way % 2 == 0 ? SchemeName::kFive : SchemeName::kSix;
+    parameters.interpolation = way / 2 % 2 == 0 ? Interpolation::kLinear : Interpolation::kMidpoint;
+    parameters.regularize = way / 4 == 0;
+    std::set<std::string> results;
+    for (const int threads : {1, 2, 3, 8}) {
+      JobProcess process(job_program(ISOMESH_JOB, threads));
+      results.insert(mesh_bytes(run_pipeline(volume, parameters, {}, blobs_, process, {}, kQuiet)));
     }
+    EXPECT_EQ(results.size(), 1U) << way;
   }
 }
 

@@ -98,7 +98,7 @@ Volume dicom_volume() {
 
 JobParameters some_parameters() {
   return {{.iso = -0.1,
-           .scheme = Scheme::kFive,
+           .scheme = SchemeName::kFive,
            .interpolation = Interpolation::kMidpoint,
            .passes = 1000,
            .smoothing = Smoothing::kTaubin,

@@ -78,7 +78,7 @@ TEST(Volume, CountsSamplesBeyond32Bits) {
 // The contract's table.
 TEST(JobParameters, HaveTheContractsDefaults) {
   const JobParameters parameters;
-  EXPECT_EQ(parameters.scheme, Scheme::kSix);
+  EXPECT_EQ(parameters.scheme, SchemeName::kSix);
   EXPECT_EQ(parameters.interpolation, Interpolation::kLinear);
   EXPECT_EQ(parameters.passes, 5);
   EXPECT_EQ(parameters.smoothing, Smoothing::kLaplacian);

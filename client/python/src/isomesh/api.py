@@ -364,9 +364,8 @@ class JobOptions(_Parameters, total=False):
         Labels of a segmentation to mesh instead of an iso-value: their values, or all. Each
         label gets a surface of its own. Neighbouring labels share the wall between them. Values
         that are not listed are background. Vertices lie half-way between two samples. Some
-        defaults differ from those of jobs with an iso-value: smoothing is labels. With another
-        kind of smoothing there are 10 passes, a lambda of 0.33, and no vertex moves farther
-        than half the smallest spacing.
+        defaults differ from those of jobs with an iso-value. With another smoothing than labels
+        no vertex moves farther than half the smallest spacing.
 
     background
         The value of samples without a label.
@@ -405,9 +404,9 @@ class JobOptions(_Parameters, total=False):
         is measured from that surface.
 
     passes
-        Number of smoothing passes. Vertices on the surface's boundary stay where they are. For
-        labels the default is 10. labels smoothes once, whatever their number, and moves the
-        boundary within the volume's border; 0 leaves the surface as it is extracted.
+        Number of smoothing passes. Vertices on the surface's boundary stay where they are.
+        labels smoothes once, whatever their number, and moves the boundary within the volume's
+        border; 0 leaves the surface as it is extracted. For labels the default is 10.
 
     smoothing
         The smoothing method. laplacian: each pass moves every vertex towards the mean of its
@@ -420,11 +419,12 @@ class JobOptions(_Parameters, total=False):
         towards the mean of its neighbours in the first half of the passes, and then to wherever
         the smallest angle becomes larger. labels is for labels alone: it takes the steps of the
         voxels away, keeps flat faces, and gives each label the volume of its voxels, to a few
-        tenths of a percent; of a few voxels, to some percent.
+        tenths of a percent; of a few voxels, to some percent. For labels the default is labels.
 
     lambda_
         Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours. Null: 1
-        for laplacian, 0.33 for taubin, which takes at most 0.66.
+        for laplacian, 0.33 for taubin, which takes at most 0.66. For labels the default is
+        0.33.
 
     pass_band
         For taubin: keep surface frequencies below this, and smooth higher ones. They range from
