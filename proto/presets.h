@@ -1,17 +1,23 @@
-// Names of iso-value presets: the server finds their values, the command takes their names.
+// The iso-values that have a name: the importer gives them to the volumes that have them, the
+// command takes their names.
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 
 namespace isomesh {
 
-inline constexpr std::string_view kSkinPreset = "skin";
-inline constexpr std::string_view kSoftTissuePreset = "soft tissue";
-inline constexpr std::string_view kBonePreset = "bone";
-inline constexpr std::string_view kSegmentPreset = "segment";  // of a fractional segmentation
+struct PresetRow {
+  std::string_view name;
+  // Of a CT; empty: half of the largest value of a fractional segmentation.
+  std::optional<double> hounsfield;
+};
 
-inline constexpr std::array kPresetNames = {kSkinPreset, kSoftTissuePreset, kBonePreset,
-                                            kSegmentPreset};
+// Air is -1000 and water 0. Skin is the border of air. Soft tissue is midway between fat (about
+// -100) and muscle and organs (about 50), so fat is excluded. Bone begins above the usual values of
+// contrast agent and calcified tissue.
+inline constexpr std::array kPresets = {PresetRow{"skin", -300}, PresetRow{"soft tissue", -25},
+                                        PresetRow{"bone", 250}, PresetRow{"segment", {}}};
 
 }  // namespace isomesh

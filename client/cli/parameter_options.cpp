@@ -134,7 +134,9 @@ class ParameterOptions {
     const std::string word = parameter.when_empty;
     const bool is_iso = std::string_view(parameter) == "iso";
     std::vector<std::string> words = {word};
-    if (is_iso) words.insert(words.end(), kPresetNames.begin(), kPresetNames.end());
+    for (const PresetRow& row : kPresets) {
+      if (is_iso) words.emplace_back(row.name);
+    }
     std::vector<std::string> shown = words;
     std::string type = "N";
     for (std::string& each : shown) {

@@ -131,38 +131,21 @@ Volume describe_volume(const Stack& stack) {
   return volume;
 }
 
-struct PresetRow {
-  std::string_view name;
-  double hounsfield;
-};
-
-// Air is -1000 and water 0. Skin is the border of air. Soft tissue is midway between fat (about
-// -100) and muscle and organs (about 50), so fat is excluded. Bone begins above the usual values of
-// contrast agent and calcified tissue.
-constexpr PresetRow kPresets[] = {
-    {kSkinPreset, -300}, {kSoftTissuePreset, -25}, {kBonePreset, 250}};
-
-// The presets of a CT in Hounsfield units that are within the range of the samples. Empty for other
-// modalities, and for a CT with another rescale type (0028,1054).
-std::vector<Preset> presets_for(std::string_view modality, std::string_view rescale_type,
-                                const std::array<double, 2>& range) {
-  std::vector<Preset> presets;
-  if (modality != "CT" || (!rescale_type.empty() && rescale_type != "HU")) return presets;
-  for (const PresetRow& row : kPresets) {
-    if (row.hounsfield <= range[0] || row.hounsfield > range[1]) continue;
-    presets.push_back({std::string(row.name), row.hounsfield});
-  }
-  return presets;
+bool is_in_hounsfield_units(const Image& image) {
+  return image.modality == "CT" && (image.rescale_type.empty() || image.rescale_type == "HU");
 }
 
-// Preset iso-values for the volume, which may be better than one derived from its samples.
+// Adds the presets whose values occur. They may be better than a value derived from the samples.
 void suggest(const Stack& stack, Volume& volume) {
-  const Image& image = *stack.slices.front().image;
-  volume.presets = presets_for(image.modality, image.rescale_type, volume.range);
-  if (!are_labels(stack) || !are_shares(stack)) return;
-  volume.suggested_iso = half_of(stack);
-  if (half_of(stack) <= volume.range[1])
-    volume.presets.push_back({std::string(kSegmentPreset), half_of(stack)});
+  const bool is_ct = is_in_hounsfield_units(*stack.slices.front().image);
+  const bool is_fractional = are_labels(stack) && are_shares(stack);
+  if (is_fractional) volume.suggested_iso = half_of(stack);
+  for (const PresetRow& row : kPresets) {
+    if (row.hounsfield ? !is_ct : !is_fractional) continue;
+    const double iso = row.hounsfield ? *row.hounsfield : half_of(stack);
+    if (iso <= volume.range[0] || iso > volume.range[1]) continue;
+    volume.presets.push_back({std::string(row.name), iso});
+  }
 }
 
 DicomIdentity identify(const Stack& stack, std::span<const Source> sources, const DataSet& data) {
