@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/command_line/completion.h"
+#include "base/command_line/exit_status.h"
 #include "base/command_line/manual.h"
 #include "base/log.h"
 #include "proto/json_tree.h"
@@ -60,7 +61,7 @@ struct Commands::State {
   std::uint64_t after = 0;  // for the audit trail
   bool verify = false;      // the audit trail
   std::function<void()> chosen = {};
-  int status = 0;
+  int status = exit_status::kDone;
 
   // Options of the program itself may follow a subcommand.
   CLI::App& add(CLI::App& parent, const std::string& name, const std::string& help,
@@ -179,7 +180,7 @@ struct Commands::State {
       std::cerr << "isomeshd: entry " << *check.misfit
                 << " of the audit trail does not fit: it or one before it was changed, removed or "
                    "inserted\n";
-      status = 1;
+      status = exit_status::kRefused;
       return;
     }
     std::cout << check.entries << " entries fit";
@@ -200,7 +201,7 @@ struct Commands::State {
       log_warning("{} is damaged: its bytes have changed", lost);
     }
     for (const std::string& lost : copied.missing) log_warning("{} is missing", lost);
-    if (!copied.damaged.empty() || !copied.missing.empty()) status = 1;
+    if (!copied.damaged.empty() || !copied.missing.empty()) status = exit_status::kRefused;
   }
 
   void add_description_commands() {

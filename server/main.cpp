@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "base/command_line/completion.h"
+#include "base/command_line/exit_status.h"
 #include "base/command_line/help.h"
 #include "base/descriptor.h"
 #include "base/log.h"
@@ -357,7 +358,6 @@ std::string usage_message(const CLI::App* cli, const CLI::Error& error) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  constexpr int kWrongUsage = 2;
   hold_standard_descriptors();
   LogFormat log_format = LogFormat::kText;
   try {
@@ -380,9 +380,9 @@ int main(int argc, char** argv) {
       cli.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {
       tell_failure(log_format, std::string("the file of --config: ") + error.what());
-      return kWrongUsage;
+      return exit_status::kWrongUsage;
     } catch (const CLI::ParseError& error) {
-      return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
+      return cli.exit(error) == 0 ? 0 : exit_status::kWrongUsage;  // 0 for --help and --version
     }
     if (commands.asked()) {
       const int status = commands.run();
@@ -398,6 +398,6 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     const std::string_view reason = shortage(error);
     tell_failure(log_format, reason.empty() ? error.what() : std::string(reason));
-    return 1;
+    return exit_status::kRefused;
   }
 }

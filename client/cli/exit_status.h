@@ -3,12 +3,11 @@
 
 #include <array>
 
+#include "base/command_line/exit_status.h"
+
 namespace isomesh::cli {
 
-inline constexpr int kDone = 0;
-inline constexpr int kRefused = 1;
-inline constexpr int kWrongUsage = 2;
-inline constexpr int kServerUnreachable = 3;
+using namespace exit_status;
 
 struct ExitStatus {
   int status;
