@@ -30,7 +30,10 @@ class Check {
   std::vector<FieldError> faults_;
 };
 
-void check_files_of(const Options& options, Check& check) {
+}  // namespace
+
+void check_configured_files(const Options& options, const ConfiguredFiles& others) {
+  Check check;
   check.file("tls-cert", options.tls_certificate);
   check.file("tls-key", options.tls_key);
   check.file("tokens", options.tokens);
@@ -38,19 +41,6 @@ void check_files_of(const Options& options, Check& check) {
   check.file("blob-credentials", options.blobs.credentials);
   check.file("callback-ca", options.callback_authorities);
   check.file("blob-ca", options.blobs.authorities);
-}
-
-}  // namespace
-
-void check_option_files(const Options& options) {
-  Check check;
-  check_files_of(options, check);
-  check.finish();
-}
-
-void check_configured_files(const Options& options, const ConfiguredFiles& others) {
-  Check check;
-  check_files_of(options, check);
   if (!options.store.empty()) {
     for (const auto& [keyword, file] : store::postgresql::files_of_url(options.store)) {
       check.file("store: " + keyword, file);

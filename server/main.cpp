@@ -233,7 +233,7 @@ int run(const Options& options, const sigset_t& signals) {
   const std::size_t descriptors = net::raise_descriptor_limit();
   std::jthread starting = end_start_on_signal(signals);
   const net::Address address = net::parse_address(options.listen);
-  check_option_files(options);
+  check_configured_files(options);
   const Files files = open_files(options, address, http::ReadBy::kService);
   check_reach(options, address, files);
   const callbacks::CallbackTargets targets(options.callback_targets);

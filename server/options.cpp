@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -103,80 +107,171 @@ std::string wrong_host(const std::string& text) {
   return is_name ? "" : '"' + text + "\" is not a host name";
 }
 
-void add_log_options(CLI::App& cli, Options& options) {
-  cli.add_option("--log-level", options.log_level,
-                 "Least severe messages to log: debug, info, warn, error or off")
-      ->envname("ISOMESH_LOG_LEVEL")
-      ->transform(one_of(kLogLevels))
-      ->default_str("info");
-  cli.add_option("--log-format", options.log_format,
-                 "Format of the log lines on standard error: text or json")
-      ->envname("ISOMESH_LOG_FORMAT")
-      ->transform(one_of(kLogFormats))
-      ->default_str("text");
+// Restricts the values of an option.
+using Limits = std::function<void(CLI::Option&)>;
+
+template <class Number>
+Limits between(Number least, Number most) {
+  if constexpr (std::is_floating_point_v<Number>) {
+    return [=](CLI::Option& option) { option.check(number_between(least, most)); };
+  } else {
+    return [=](CLI::Option& option) { option.check(CLI::Range(least, most)); };
+  }
 }
 
-void add_security_options(CLI::App& cli, Options& options) {
-  cli.add_option("--tokens", options.tokens,
-                 "File of the tokens that requests need; `isomeshd token add` creates them. SIGHUP "
-                 "reloads it")
-      ->envname("ISOMESH_TOKENS");
-  auto* certificate =
-      cli.add_option("--tls-cert", options.tls_certificate,
-                     "Certificate file (PEM), to listen with https. SIGHUP reloads it and the key")
-          ->envname("ISOMESH_TLS_CERT");
-  cli.add_option("--tls-key", options.tls_key, "File of the certificate's private key (PEM)")
-      ->envname("ISOMESH_TLS_KEY")
-      ->needs(certificate);
+Limits bytes(std::uint64_t least = 0) {
+  return [=](CLI::Option& option) { option.transform(size_of_bytes(least)); };
 }
 
-void add_callback_options(CLI::App& cli, Options& options) {
-  cli.add_option(
-         "--callback-allow", options.callback_targets,
-         "Allow callbacks to URLs that begin with this, such as https://ris.example.org/hooks. May "
-         "be repeated. Prefix `private:` to allow private addresses")
-      ->envname("ISOMESH_CALLBACK_ALLOW")
-      ->type_name("URL")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  cli.add_option("--callback-secret-file", options.callback_secrets,
-                 "File of the keys that sign callbacks, one per line. SIGHUP reloads it")
-      ->envname("ISOMESH_CALLBACK_SECRET_FILE");
-  cli.add_option(
-         "--callback-ca", options.callback_authorities,
-         "File of the certificate authorities to trust for callbacks, instead of the system's")
-      ->envname("ISOMESH_CALLBACK_CA");
-  cli.add_option("--callback-retry-seconds", options.callback_retry_seconds,
-                 "Seconds before a failed callback is retried; each further failure doubles them, "
-                 "up to an hour")
-      ->envname("ISOMESH_CALLBACK_RETRY_SECONDS")
-      ->check(number_between(0.01, 3600.0))
-      ->capture_default_str();
+Limits bytes_between(std::uint64_t least, std::uint64_t most) {
+  return [=](CLI::Option& option) {
+    option.transform(size_of_bytes())->check(CLI::Range(least, most));
+  };
 }
 
-void add_blob_options(CLI::App& cli, Options& options) {
-  cli.add_option("--blobs", options.blobs.place,
-                 "Where to store the files of volumes and meshes, if not in the folder of --data: "
-                 "s3://BUCKET[/PREFIX]?endpoint=URL&region=NAME, or a folder that several daemons "
-                 "may share")
-      ->envname("ISOMESH_BLOBS")
-      ->type_name("URL|DIR");
-  cli.add_option("--blob-cache", options.blobs.cache,
-                 "Size of the cache for files from S3, in bytes; it is in the folder of --data")
-      ->envname("ISOMESH_BLOB_CACHE")
-      ->transform(size_of_bytes())
-      ->capture_default_str();
-  cli.add_option("--blob-credentials", options.blobs.credentials,
-                 "File of the keys for S3, in the format of AWS' tools. Each S3 request reads it "
-                 "again. Without it, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY are used")
-      ->envname("ISOMESH_BLOB_CREDENTIALS");
-  cli.add_option("--blob-ca", options.blobs.authorities,
-                 "File of the certificate authorities to trust for S3, instead of the system's")
-      ->envname("ISOMESH_BLOB_CA");
-  cli.add_flag("--blob-redirect", options.http.blob_redirect,
-               "Redirect mesh downloads that say `Prefer: redirect` to a link into S3, valid for "
-               "one minute")
-      ->envname("ISOMESH_BLOB_REDIRECT");
+template <class Enum>
+Limits one_name_of(const std::map<std::string, Enum>& names, const char* standard) {
+  return [&names, standard](CLI::Option& option) {
+    option.transform(one_of(names))->default_str(standard);
+  };
+}
+
+// Separated by commas.
+Limits many(std::string (*fault_of)(const std::string&)) {
+  return [=](CLI::Option& option) { option.check(CLI::Validator(fault_of, ""))->delimiter(','); };
+}
+
+Limits typed(const char* type) {
+  return [=](CLI::Option& option) { option.type_name(type); };
+}
+
+// Each time that the option is given, it has values separated by commas.
+Limits repeated(const char* type) {
+  return
+      [=](CLI::Option& option) { option.type_name(type)->delimiter(',')->allow_extra_args(false); };
+}
+
+void no_limits(CLI::Option& /*option*/) {}
+
+// An option without its hyphens, which is also the key in the file of --config. Its variable in the
+// environment is ISOMESH_MAX_QUEUE for max-queue. Its default is the member's.
+struct Row {
+  template <class T>
+  Row(const char* option, T& member, Limits bounds, const char* meaning)
+      : name(option), help(meaning), limits(std::move(bounds)) {
+    add = [&member](CLI::App& cli, const std::string& flag, const char* text) -> CLI::Option& {
+      if constexpr (std::is_same_v<T, bool>) {
+        return *cli.add_flag(flag, member, text);
+      } else {
+        CLI::Option& added = *cli.add_option(flag, member, text);
+        constexpr bool kHasDefault = !std::is_same_v<T, std::vector<std::string>> &&
+                                     !std::is_same_v<T, std::optional<std::uint64_t>>;
+        if constexpr (kHasDefault && !std::is_enum_v<T>) added.capture_default_str();
+        return added;
+      }
+    };
+  }
+
+  const char* name;
+  const char* help;
+  Limits limits;
+  std::function<CLI::Option&(CLI::App&, const std::string&, const char*)> add;
+};
+
+std::string variable_of(std::string name) {
+  std::ranges::replace(name, '-', '_');
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
+  return "ISOMESH_" + name;
+}
+
+std::vector<Row> rows_of(Options& options) {
+  return {
+      {"listen", options.listen, no_limits,
+       "Address to listen on: HOST:PORT, HOST:0 for a free port, or unix:PATH"},
+      {"data", options.data, no_limits, "Folder for volumes and meshes; created if missing"},
+      {"store", options.store, no_limits,
+       "PostgreSQL database that several daemons share, as postgresql://USER@HOST/NAME. "
+       "Without it, records are in SQLite in the folder of --data"},
+      {"workers", options.workers, between(0, 64),
+       "Jobs to run at the same time. 0: this daemon runs no jobs and only answers requests"},
+      {"threads", options.threads, between(0, 1024), "Threads per job. 0: one per processor"},
+      {"max-queue", options.jobs.max_queued, between(1, 1000000),
+       "Jobs that may wait in the queue; further jobs are rejected with 503"},
+      {"keep-days", options.keep_days, between(0.0, 100000.0),
+       "Days to keep finished jobs with their meshes, and volumes after their last use"},
+      {"max-disk", options.max_disk, bytes(),
+       "Space for all volumes and meshes, in bytes. When it is full, isomeshd deletes "
+       "the oldest data of the largest user first. 0: the whole disk"},
+      {"disk-reserve", options.disk_reserve, bytes(),
+       "Bytes to reserve so that a full disk can be cleaned up. Default: 1/32 of the "
+       "disk, at most 64 MiB"},
+      {"lease-seconds", options.lease_seconds, between(1, 3600),
+       "Seconds without a sign of life after which a worker loses its job"},
+      {"max-job-minutes", options.longest_job_minutes, between(1, 10000),
+       "Minutes that a job may run; a longer job fails"},
+      {"max-upload", options.http.upload.max_bytes, bytes(1),
+       "Largest size of one upload, in bytes"},
+      {"upload-places", options.http.upload_places, between(1, 24),
+       "Uploads to receive at the same time; one user or address may use at most half"},
+      {"cors-origin", options.http.cors_origins, many(wrong_origin),
+       "Origins whose pages may use this service, such as https://viewer.example; * allows all"},
+      {"allow-host", options.http.hosts, many(wrong_host),
+       "Host names that requests without tokens may use, besides loopback names"},
+      {"max-volume", options.import.max_sample_bytes, bytes(1),
+       "Largest size of one volume's uncompressed samples, in bytes"},
+      {"imports", options.runner.at_once, between(1, 64),
+       "Uploads to read at the same time; others wait"},
+      {"import-memory", options.runner.bounds.memory_bytes,
+       bytes_between(std::uint64_t{64} << 20, std::uint64_t{1} << 50),
+       "Memory for reading one upload, in bytes, besides the volume itself"},
+      {"import-seconds", options.import_seconds, between(1, 86400),
+       "Seconds that reading one upload may take"},
+      {"job-memory", options.job_memory, bytes_between(std::uint64_t{0}, std::uint64_t{1} << 50),
+       "Memory for one job, in bytes. 0: three quarters of the memory of the machine or "
+       "control group, divided by --workers"},
+      {"drain-seconds", options.drain_seconds, no_limits,
+       "Seconds that running jobs have to finish after SIGTERM. Less than what stops the "
+       "daemon waits: TimeoutStopSec= of systemd, --stop-timeout of Docker"},
+      {"open-network", options.open_network, no_limits,
+       "Listen beyond loopback although requests are not authenticated"},
+      {"hospital", options.hospital, no_limits,
+       "File of PACS and rules (TOML): orders fetch images from these PACS and send "
+       "meshes to them"},
+      {"log-level", options.log_level, one_name_of(kLogLevels, "info"),
+       "Least severe messages to log: debug, info, warn, error or off"},
+      {"log-format", options.log_format, one_name_of(kLogFormats, "text"),
+       "Format of the log lines on standard error: text or json"},
+      {"tokens", options.tokens, no_limits,
+       "File of the tokens that requests need; `isomeshd token add` creates them. SIGHUP "
+       "reloads it"},
+      {"tls-cert", options.tls_certificate, no_limits,
+       "Certificate file (PEM), to listen with https. SIGHUP reloads it and the key"},
+      {"tls-key", options.tls_key, no_limits, "File of the certificate's private key (PEM)"},
+      {"callback-allow", options.callback_targets, repeated("URL"),
+       "Allow callbacks to URLs that begin with this, such as https://ris.example.org/hooks. May "
+       "be repeated. Prefix `private:` to allow private addresses"},
+      {"callback-secret-file", options.callback_secrets, no_limits,
+       "File of the keys that sign callbacks, one per line. SIGHUP reloads it"},
+      {"callback-ca", options.callback_authorities, no_limits,
+       "File of the certificate authorities to trust for callbacks, instead of the system's"},
+      {"callback-retry-seconds", options.callback_retry_seconds, between(0.01, 3600.0),
+       "Seconds before a failed callback is retried; each further failure doubles them, "
+       "up to an hour"},
+      {"blobs", options.blobs.place, typed("URL|DIR"),
+       "Where to store the files of volumes and meshes, if not in the folder of --data: "
+       "s3://BUCKET[/PREFIX]?endpoint=URL&region=NAME, or a folder that several daemons "
+       "may share"},
+      {"blob-cache", options.blobs.cache, bytes(),
+       "Size of the cache for files from S3, in bytes; it is in the folder of --data"},
+      {"blob-credentials", options.blobs.credentials, no_limits,
+       "File of the keys for S3, in the format of AWS' tools. Each S3 request reads it "
+       "again. Without it, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY are used"},
+      {"blob-ca", options.blobs.authorities, no_limits,
+       "File of the certificate authorities to trust for S3, instead of the system's"},
+      {"blob-redirect", options.http.blob_redirect, no_limits,
+       "Redirect mesh downloads that say `Prefer: redirect` to a link into S3, valid for "
+       "one minute"},
+  };
 }
 
 void add_check(CLI::App& cli, Options& options) {
@@ -208,123 +303,12 @@ void add_options(CLI::App& cli, Options& options) {
   cli.set_config("--config", config == nullptr ? "" : config,
                  "Read options from this file (TOML); also ISOMESH_CONFIG", config != nullptr);
   cli.config_formatter(config_file(cli));
-  cli.add_option("--listen", options.listen,
-                 "Address to listen on: HOST:PORT, HOST:0 for a free port, or unix:PATH")
-      ->envname("ISOMESH_LISTEN")
-      ->capture_default_str();
-  cli.add_option("--data", options.data, "Folder for volumes and meshes; created if missing")
-      ->envname("ISOMESH_DATA")
-      ->capture_default_str();
-  cli.add_option("--store", options.store,
-                 "PostgreSQL database that several daemons share, as postgresql://USER@HOST/NAME. "
-                 "Without it, records are in SQLite in the folder of --data")
-      ->envname("ISOMESH_STORE");
-  cli.add_option(
-         "--workers", options.workers,
-         "Jobs to run at the same time. 0: this daemon runs no jobs and only answers requests")
-      ->envname("ISOMESH_WORKERS")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str();
-  cli.add_option("--threads", options.threads, "Threads per job. 0: one per processor")
-      ->envname("ISOMESH_THREADS")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  cli.add_option("--max-queue", options.jobs.max_queued,
-                 "Jobs that may wait in the queue; further jobs are rejected with 503")
-      ->envname("ISOMESH_MAX_QUEUE")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  cli.add_option("--keep-days", options.keep_days,
-                 "Days to keep finished jobs with their meshes, and volumes after their last use")
-      ->envname("ISOMESH_KEEP_DAYS")
-      ->check(number_between(0.0, 100000.0))
-      ->capture_default_str();
-  cli.add_option("--max-disk", options.max_disk,
-                 "Space for all volumes and meshes, in bytes. When it is full, isomeshd deletes "
-                 "the oldest data of the largest user first. 0: the whole disk")
-      ->envname("ISOMESH_MAX_DISK")
-      ->transform(size_of_bytes())
-      ->capture_default_str();
-  cli.add_option("--disk-reserve", options.disk_reserve,
-                 "Bytes to reserve so that a full disk can be cleaned up. Default: 1/32 of the "
-                 "disk, at most 64 MiB")
-      ->envname("ISOMESH_DISK_RESERVE")
-      ->transform(size_of_bytes());
-  cli.add_option("--lease-seconds", options.lease_seconds,
-                 "Seconds without a sign of life after which a worker loses its job")
-      ->envname("ISOMESH_LEASE_SECONDS")
-      ->check(CLI::Range(1, 3600))
-      ->capture_default_str();
-  cli.add_option("--max-job-minutes", options.longest_job_minutes,
-                 "Minutes that a job may run; a longer job fails")
-      ->envname("ISOMESH_MAX_JOB_MINUTES")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  cli.add_option("--max-upload", options.http.upload.max_bytes,
-                 "Largest size of one upload, in bytes")
-      ->envname("ISOMESH_MAX_UPLOAD")
-      ->transform(size_of_bytes(1))
-      ->capture_default_str();
-  cli.add_option("--upload-places", options.http.upload_places,
-                 "Uploads to receive at the same time; one user or address may use at most half")
-      ->envname("ISOMESH_UPLOAD_PLACES")
-      ->check(CLI::Range(1, 24))
-      ->capture_default_str();
-  cli.add_option(
-         "--cors-origin", options.http.cors_origins,
-         "Origins whose pages may use this service, such as https://viewer.example; * allows all")
-      ->envname("ISOMESH_CORS_ORIGIN")
-      ->check(CLI::Validator(wrong_origin, ""))
-      ->delimiter(',');
-  cli.add_option("--allow-host", options.http.hosts,
-                 "Host names that requests without tokens may use, besides loopback names")
-      ->envname("ISOMESH_ALLOW_HOST")
-      ->check(CLI::Validator(wrong_host, ""))
-      ->delimiter(',');
-  cli.add_option("--max-volume", options.import.max_sample_bytes,
-                 "Largest size of one volume's uncompressed samples, in bytes")
-      ->envname("ISOMESH_MAX_VOLUME")
-      ->transform(size_of_bytes(1))
-      ->capture_default_str();
-  cli.add_option("--imports", options.runner.at_once,
-                 "Uploads to read at the same time; others wait")
-      ->envname("ISOMESH_IMPORTS")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  cli.add_option("--import-memory", options.runner.bounds.memory_bytes,
-                 "Memory for reading one upload, in bytes, besides the volume itself")
-      ->envname("ISOMESH_IMPORT_MEMORY")
-      ->transform(size_of_bytes())
-      ->check(CLI::Range(std::uint64_t{64} << 20, std::uint64_t{1} << 50))
-      ->capture_default_str();
-  cli.add_option("--import-seconds", options.import_seconds,
-                 "Seconds that reading one upload may take")
-      ->envname("ISOMESH_IMPORT_SECONDS")
-      ->check(CLI::Range(1, 86400))
-      ->capture_default_str();
-  cli.add_option("--job-memory", options.job_memory,
-                 "Memory for one job, in bytes. 0: three quarters of the memory of the machine or "
-                 "control group, divided by --workers")
-      ->envname("ISOMESH_JOB_MEMORY")
-      ->transform(size_of_bytes())
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 50))
-      ->capture_default_str();
-  cli.add_option("--drain-seconds", options.drain_seconds,
-                 "Seconds that running jobs have to finish after SIGTERM. Less than what stops the "
-                 "daemon waits: TimeoutStopSec= of systemd, --stop-timeout of Docker")
-      ->envname("ISOMESH_DRAIN_SECONDS")
-      ->capture_default_str();
-  cli.add_flag("--open-network", options.open_network,
-               "Listen beyond loopback although requests are not authenticated")
-      ->envname("ISOMESH_OPEN_NETWORK");
-  cli.add_option("--hospital", options.hospital,
-                 "File of PACS and rules (TOML): orders fetch images from these PACS and send "
-                 "meshes to them")
-      ->envname("ISOMESH_HOSPITAL");
-  add_log_options(cli, options);
-  add_security_options(cli, options);
-  add_callback_options(cli, options);
-  add_blob_options(cli, options);
+  for (const Row& row : rows_of(options)) {
+    CLI::Option& added = row.add(cli, std::string("--") + row.name, row.help);
+    added.envname(variable_of(row.name));
+    row.limits(added);
+  }
+  cli.get_option("--tls-key")->needs("--tls-cert");
   add_operator_overrides(cli, options);
   add_check(cli, options);
 }
