@@ -12,7 +12,6 @@
 #include "server/blobs.h"
 #include "server/http/server.h"
 #include "server/jobs/library/import_runner.h"
-#include "server/process/import_message.h"
 #include "server/store/job_store.h"
 #include "server/store/operator_overrides.h"
 

@@ -17,10 +17,10 @@
 #include "server/import/archives/archive.h"
 #include "server/import/dicom/elements/text.h"
 #include "server/import/import.h"
+#include "server/import/message/import_message.h"
 #include "server/import/peers/response.h"
 #include "server/process/child.h"
 #include "server/process/fork_server.h"
-#include "server/process/import_message.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
 

@@ -338,7 +338,7 @@ Volume read_stack(const Stack& stack, const Contents& contents, const Input& inp
 [[noreturn]] void offer_members(const Contents& contents, const std::string& asked) {
   std::vector<Choice> choices;
   if (!contents.slices.empty()) {
-    choices.push_back({"member", std::string(process::kDicomMember),
+    choices.push_back({"member", std::string(kDicomMember),
                        std::to_string(contents.slices.size()) + " DICOM files"});
   }
   for (const auto& [member, reader, doubles] : contents.volumes) {
@@ -375,8 +375,7 @@ Volume read_members(Members& members, const Input& input) {
   const std::size_t count =
       contents.volumes.size() + contents.stacks.size() + (contents.slices.empty() ? 0 : 1);
   if (count == 0) throw_no_volume(members.all());
-  if (!contents.slices.empty() &&
-      (asked == process::kDicomMember || (asked.empty() && count == 1))) {
+  if (!contents.slices.empty() && (asked == kDicomMember || (asked.empty() && count == 1))) {
     return read_slices(contents, input);
   }
   const auto stack = std::ranges::find_if(contents.stacks, [&](const Stack& each) {

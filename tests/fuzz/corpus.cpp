@@ -1,7 +1,7 @@
 #include <cstring>
 
 #include "proto/json.h"
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 #include "server/volume/canonical.h"
 #include "tests/fuzz/dicom_corpus.h"
 #include "tests/fuzz/draco_target.h"
@@ -238,11 +238,11 @@ std::vector<std::string> dicom_files() {
 std::vector<std::string> canonical_files() { return {import_bytes(nifti({}, kSamples)).canonical}; }
 
 std::vector<std::string> report_texts() {
-  process::ImportOrder order;
+  auto order = import::ImportOrder();
   order.task.options.raw = RawDescription{};
   const Error error(ErrorCode::kUnusableVolume, "why", {{"field", "message"}});
-  return {process::reading_message("nifti") + process::volume_message(Volume{}),
-          process::error_message(error), process::to_message(order)};
+  return {import::reading_message("nifti") + import::volume_message(Volume{}),
+          import::error_message(error), import::to_message(order)};
 }
 
 std::vector<std::string> json_texts() {

@@ -13,8 +13,8 @@
 #include "server/import/import.h"
 #include "server/import/labels/label_table.h"
 #include "server/import/labels/label_text.h"
+#include "server/import/message/import_message.h"
 #include "server/import/readers.h"
-#include "server/process/import_message.h"
 #include "server/volume/canonical.h"
 #include "server/volume/labels.h"
 #include "tests/fuzz/draco_target.h"
@@ -51,16 +51,16 @@ void expect_volume(const Volume& found, const fs::path& canonical) {
   if (!volume::is_label_table(found.labels)) fail("the volume's labels are no table");
 }
 
-void import_bytes(Bytes bytes, const process::ImportOptions& options) {
+void import_bytes(Bytes bytes, const import::ImportOptions& options) {
   const fs::path source = folder() / "upload";
   test::write_file(source, text_of(bytes));
   const fs::path scratch = folder() / "scratch";
   fs::create_directory(scratch);
-  const process::ImportTask task = {.source = source,
-                                    .scratch = scratch,
-                                    .target = scratch / "canonical",
-                                    .options = options,
-                                    .limits = {.max_sample_bytes = std::uint64_t{1} << 20}};
+  const import::ImportTask task = {.source = source,
+                                   .scratch = scratch,
+                                   .target = scratch / "canonical",
+                                   .options = options,
+                                   .limits = {.max_sample_bytes = std::uint64_t{1} << 20}};
   try {
     expect_volume(import::import_volume(task), task.target);
   } catch (const Error& error) {
@@ -162,8 +162,8 @@ void read_labels(Bytes bytes) {
 }
 
 void read_report(Bytes bytes) {
-  read_text(bytes, [](std::string_view text) { process::report_from(text); });
-  read_text(bytes, [](std::string_view text) { process::order_from(text); });
+  read_text(bytes, [](std::string_view text) { import::report_from(text); });
+  read_text(bytes, [](std::string_view text) { import::order_from(text); });
 }
 
 void read_json(Bytes bytes) {

@@ -14,7 +14,6 @@ namespace {
 using orders::FoundSeries;
 using orders::PacsFailure;
 using orders::PacsFault;
-using process::PeersObject;
 
 constexpr std::uint64_t kMostResponseBytes = std::uint64_t{64} << 20;
 constexpr const char* kDicomJson = "application/dicom+json";
@@ -234,7 +233,7 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
                                            stop);
   constexpr int kConflict = 409;  // the body has the reason
   if (head.status != kConflict) check_status(head);
-  const process::PeersResponse said = read_response_(response.path());
+  const PeersResponse said = read_response_(response.path());
   const std::string& instance = object.place.instance;
   if (names(said.stored, instance)) return;
   const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);

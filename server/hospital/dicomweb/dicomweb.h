@@ -6,12 +6,15 @@
 
 #include "server/hospital/dicomweb/http_peer.h"
 #include "server/hospital/orders/pacs.h"
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 
 namespace isomesh::dicomweb {
 
+using import::PeersObject;
+using import::PeersResponse;
+
 // Parses a PACS response in a confined process: see jobs::ImportRunner::read_response.
-using ResponseReader = std::function<process::PeersResponse(const std::filesystem::path& file)>;
+using ResponseReader = std::function<PeersResponse(const std::filesystem::path& file)>;
 
 class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
  public:
@@ -37,11 +40,10 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
 
  private:
   // Returns one page of results.
-  std::vector<process::PeersObject> search(const std::string& target, const std::stop_token& stop);
+  std::vector<PeersObject> search(const std::string& target, const std::stop_token& stop);
   // Returns the objects of all pages, each once; `name` is the member that identifies an object.
-  std::vector<process::PeersObject> search_all(const std::string& target,
-                                               std::string process::PeersObject::*name,
-                                               const std::stop_token& stop);
+  std::vector<PeersObject> search_all(const std::string& target, std::string PeersObject::*name,
+                                      const std::stop_token& stop);
 
   const orders::PacsSettings settings_;
   const HttpPeer peer_;

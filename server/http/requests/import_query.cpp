@@ -127,8 +127,8 @@ const std::set<std::string>& import_parameters() {
   return names;
 }
 
-process::ImportOptions import_options_of(const Request& request) {
-  process::ImportOptions options{.raw = raw_description_of(request)};
+ImportOptions import_options_of(const Request& request) {
+  ImportOptions options{.raw = raw_description_of(request)};
   if (options.raw) {
     refuse_choice_in_raw(request);
     return options;

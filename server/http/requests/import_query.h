@@ -9,16 +9,18 @@
 
 #include "proto/types.h"
 #include "server/http/requests/request.h"
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 
 namespace isomesh::http {
+
+using import::ImportOptions;
 
 // The description of raw samples from `dims`, `type` and others; empty without `dims`.
 std::optional<RawDescription> raw_description_of(const Request& request);
 
 // The description of raw samples, the selection among several series, members or volumes, and
 // accepted ambiguities.
-process::ImportOptions import_options_of(const Request& request);
+ImportOptions import_options_of(const Request& request);
 
 // The names of the parameters that import_options_of reads.
 const std::set<std::string>& import_parameters();

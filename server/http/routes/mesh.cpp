@@ -70,7 +70,7 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
         "format",
         "must hold all labels, such as glb, ply, obj or zip, because the response is one file");
   }
-  const process::ImportOptions options = import_options_of(request);
+  const ImportOptions options = import_options_of(request);
   const std::string key = idempotency_key_of(request);
   const auto place = place_for_upload(app, request);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);

@@ -54,7 +54,7 @@ void keep(App& app, const Request& request, Response& response, const KeptBody& 
 
 std::vector<UploadedVolume> imported(App& app, const Request& request, Response& response,
                                      const KeptBody& body) {
-  const process::ImportOptions options = import_options_of(request);
+  const ImportOptions options = import_options_of(request);
   const bool is_kept = is_to_be_kept(request);
   const PartialUpload::Reading reading(body.partial);
   const jobs::ImportControl control = {

@@ -15,8 +15,6 @@ namespace isomesh::import {
 namespace {
 
 namespace json = json_values;
-using process::PeersObject;
-using process::PeersResponse;
 
 constexpr const char* kModality = "00080060";
 constexpr const char* kSeriesDescription = "0008103E";

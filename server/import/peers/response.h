@@ -3,12 +3,12 @@
 
 #include <filesystem>
 
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 
 namespace isomesh::import {
 
 // Reads a response of QIDO-RS (a list of objects) or STOW-RS (one object with stored and failed
 // instances). An empty file is an empty list. Throws Error kPacsUnreachable for anything else.
-process::PeersResponse read_response(const std::filesystem::path& file);
+PeersResponse read_response(const std::filesystem::path& file);
 
 }  // namespace isomesh::import

@@ -63,7 +63,7 @@ dicom::DicomFile opened(const std::filesystem::path& part, std::size_t number,
 // The files of the series' instances, without duplicates. Rejects missing instances, because half a
 // head is also a valid volume, and instances of several patients.
 std::vector<NamedFile> checked(const std::vector<std::filesystem::path>& parts,
-                               const process::PeersSeries& asked, const ImportTask& task) {
+                               const PeersSeries& asked, const ImportTask& task) {
   std::vector<NamedFile> files;
   std::set<std::string> instances;
   PatientCheck patients;
@@ -90,7 +90,7 @@ std::vector<NamedFile> checked(const std::vector<std::filesystem::path>& parts,
 }  // namespace
 
 Volume read_peers_series(const ImportTask& task, const FormatListener& listener) {
-  const process::PeersSeries& asked = *task.options.peers;
+  const PeersSeries& asked = *task.options.peers;
   const TemporaryFolder folder(task.scratch, "parts-");
   const MultipartLimits limits = {.max_bytes = task.limits.max_sample_bytes + kHeadroomBytes,
                                   .max_parts = kMostInstances};

@@ -1,7 +1,7 @@
 // Names of lower layers that this folder uses without qualification.
 #pragma once
 
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 #include "server/volume/canonical.h"
 #include "server/volume/geometry.h"
 #include "server/volume/unusable.h"
@@ -9,9 +9,6 @@
 namespace isomesh::import {
 
 using isomesh::bytes_per_sample;
-
-using process::ImportOptions;
-using process::ImportTask;
 
 using volume::axis_name;
 using volume::CanonicalWriter;

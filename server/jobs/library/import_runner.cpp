@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "proto/error.h"
+#include "server/jobs/limits.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
 #include "server/volume/labels.h"
@@ -17,18 +18,14 @@ namespace isomesh::jobs {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
 
-constexpr milliseconds kEnd{2000};  // for a process to exit after it closed its socket
-constexpr std::size_t kMostResponseBytes = std::size_t{16} << 20;
-
-std::string while_reading(const process::ImportReport& report) {
+std::string while_reading(const ImportReport& report) {
   return report.reading.empty() ? "" : " while reading " + report.reading;
 }
 
 // `limit` as in "20 seconds of processor time"; `advice` is a sentence.
 [[noreturn]] void refuse_slow(const std::string& limit, const std::string& advice,
-                              const process::ImportReport& report) {
+                              const ImportReport& report) {
   const std::string what =
       "The import took too long: it ended after " + limit + while_reading(report);
   log_error("{}", what);
@@ -37,7 +34,7 @@ std::string while_reading(const process::ImportReport& report) {
 
 // A small upload has less time than others.
 [[noreturn]] void refuse_busy(std::chrono::seconds time, std::chrono::seconds most,
-                              const process::ImportReport& report) {
+                              const ImportReport& report) {
   const std::string advice =
       time < most
           ? "That is the limit for an upload of this size. If the file is compressed, send it "
@@ -46,7 +43,7 @@ std::string while_reading(const process::ImportReport& report) {
   refuse_slow(std::to_string(time.count()) + " seconds of processor time", advice, report);
 }
 
-[[noreturn]] void refuse_dead(const std::string& how, const process::ImportReport& report) {
+[[noreturn]] void refuse_dead(const std::string& how, const ImportReport& report) {
   const std::string what = "The import ended " + how + while_reading(report);
   log_error("{}", what);
   volume::throw_unusable(what + "; the file is damaged or malicious.");
@@ -58,7 +55,7 @@ std::string while_reading(const process::ImportReport& report) {
 
 // A malicious file may have taken over the process, so its response is compared with the canonical
 // file.
-void check(const Volume& volume, const process::ImportTask& task) {
+void check(const Volume& volume, const ImportTask& task) {
   if (!std::filesystem::exists(task.target)) throw_lying();
   for (const Note& note : volume.notes) {
     if (find_note(note.code) == nullptr) throw_lying();
@@ -75,7 +72,7 @@ void check(const Volume& volume, const process::ImportTask& task) {
   }
 }
 
-Volume volume_of(process::ImportReport report, const process::ImportTask& task) {
+Volume volume_of(ImportReport report, const ImportTask& task) {
   if (report.error) {
     log_info("an import was rejected{}: {}", while_reading(report),
              describe(report.error->code()).name);
@@ -97,13 +94,11 @@ std::uint64_t size_of(const std::filesystem::path& upload) {
 
 }  // namespace
 
-process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most) {
-  constexpr std::uint64_t kBytesPerSecond = 64 * 1024;
-  constexpr std::uint64_t kSecondsAtLeast = 20;
-  process::ImportBounds bounds = most;
-  const std::uint64_t seconds = kSecondsAtLeast + upload_bytes / kBytesPerSecond;
-  bounds.time = std::chrono::seconds(std::min<std::uint64_t>(
-      seconds, static_cast<std::uint64_t>(std::max<std::int64_t>(most.time.count(), 0))));
+ImportBounds bounds_for(std::uint64_t upload_bytes, const ImportBounds& most) {
+  const std::chrono::seconds usual =
+      limits::kLeastImportTime + std::chrono::seconds(upload_bytes / limits::kImportBytesPerSecond);
+  ImportBounds bounds = most;
+  bounds.time = std::min(usual, std::max(most.time, std::chrono::seconds(0)));
   return bounds;
 }
 
@@ -118,23 +113,22 @@ void throw_cancelled() { throw Error(ErrorCode::kCancelled, "the upload was canc
 
 void throw_ending() { throw Error(ErrorCode::kUnavailable, "the service is shutting down"); }
 
-Volume ImportRunner::run(const process::ImportTask& task, const std::string& party,
+Volume ImportRunner::run(const ImportTask& task, const std::string& party,
                          const std::stop_token& cancelled) {
   // Checked here because a JSON message cannot carry non-finite numbers.
   if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
-  const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
-  const std::string message = process::to_message(process::ImportOrder{task, bounds});
+  const ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
+  const std::string message = import::to_message(import::ImportOrder{task, bounds});
   return until_stopped(cancelled, [&](const std::stop_token& stop) {
     return volume_of(report_of(message, bounds, party, stop), task);
   });
 }
 
-process::PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
-  const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
+PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
+  const ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
   try {
-    process::ImportReport report = until_stopped({}, [&](const std::stop_token& stop) {
-      return report_of(process::to_message(process::ResponseOrder{{file}, bounds}), bounds, "",
-                       stop);
+    ImportReport report = until_stopped({}, [&](const std::stop_token& stop) {
+      return report_of(import::to_message(import::ResponseOrder{{file}, bounds}), bounds, "", stop);
     });
     if (report.error) throw *report.error;
     if (!report.response) throw_lying();
@@ -147,15 +141,12 @@ process::PeersResponse ImportRunner::read_response(const std::filesystem::path& 
   }
 }
 
-process::ImportReport ImportRunner::report_of(const std::string& message,
-                                              const process::ImportBounds& bounds,
-                                              const std::string& party,
-                                              const std::stop_token& stop) {
+ImportReport ImportRunner::report_of(const std::string& message, const ImportBounds& bounds,
+                                     const std::string& party, const std::stop_token& stop) {
   const ImportPlaces::Place place = places_.take(party, stop);
   const auto deadline = Clock::now() + options_.bounds.time;
   // A process that died while idle has not touched the file. Several in a row are a defect.
-  constexpr int kMostIdleDeaths = 3;
-  for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
+  for (int tries = 0; tries < limits::kMostIdleDeaths; ++tries) {
     if (auto report = run_in(prepared_.take(deadline, stop), message, bounds, stop))
       return *std::move(report);
     log_warning("a prepared import process ended before its import began; another one takes over");
@@ -163,16 +154,15 @@ process::ImportReport ImportRunner::report_of(const std::string& message,
   throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");
 }
 
-std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
-                                                          const std::string& message,
-                                                          const process::ImportBounds& bounds,
-                                                          const std::stop_token& stop) {
+std::optional<ImportReport> ImportRunner::run_in(process::Child child, const std::string& message,
+                                                 const ImportBounds& bounds,
+                                                 const std::stop_token& stop) {
   using Ending = process::Output::Ending;
   child.send_last(message);
   const auto deadline = Clock::now() + options_.bounds.time;
-  const process::Output output = child.receive(kMostResponseBytes, deadline, stop);
+  const process::Output output = child.receive(limits::kMostImportMessages, deadline, stop);
   if (output.ending == Ending::kStopped) throw_ending();
-  process::ImportReport report = process::report_from(output.text);
+  ImportReport report = import::report_from(output.text);
   if (output.ending == Ending::kTooLong) {
     refuse_slow(std::to_string(options_.bounds.time.count()) + " seconds",
                 "Send it again when the server has less to do, or have the server allow more time "
@@ -181,7 +171,7 @@ std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
   }
   const bool is_answered = report.volume || report.response || report.error;
   if (output.ending == Ending::kTooMuch || !is_answered) {
-    const auto status = child.ended_within(kEnd);
+    const auto status = child.ended_within(limits::kExit);
     if (output.ending == Ending::kClosed && !report.begun) return std::nullopt;
     prepared_.renew();
     if (process::is_out_of_time(status)) refuse_busy(bounds.time, options_.bounds.time, report);

@@ -7,14 +7,21 @@
 #include <stop_token>
 #include <string>
 
+#include "server/import/message/import_message.h"
 #include "server/jobs/library/import_places.h"
-#include "server/process/import_message.h"
 #include "server/process/prepared.h"
 
 namespace isomesh::jobs {
 
+using import::ImportBounds;
+using import::ImportOptions;
+using import::ImportReport;
+using import::ImportTask;
+using import::PeersResponse;
+using import::PeersSeries;
+
 struct RunnerOptions {
-  process::ImportBounds bounds;
+  ImportBounds bounds;
   // Further imports wait; also the number of idle processes kept ready.
   std::size_t at_once = 2;
   process::Program program;  // isomesh-import
@@ -22,7 +29,7 @@ struct RunnerOptions {
 
 // The bounds of one import: at most `most`, and less time for a small upload, which takes long only
 // if it is malicious. Honest uploads are read at many megabytes per second.
-process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
+ImportBounds bounds_for(std::uint64_t upload_bytes, const ImportBounds& most);
 
 // The process was ended because it took too long. The text says after how long, and what to do.
 class ImportTookTooLong : public Error {
@@ -44,12 +51,12 @@ class ImportRunner {
   // has been compared with the canonical file. Throws what import_volume throws; Error
   // kUnusableVolume if the process crashes or exceeds its bounds, as ImportTookTooLong if it took
   // too long; kUnavailable after stop(); kCancelled after a stop request to `cancelled`.
-  Volume run(const process::ImportTask& task, const std::string& party = {},
+  Volume run(const ImportTask& task, const std::string& party = {},
              const std::stop_token& cancelled = {});
 
   // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
   // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
-  process::PeersResponse read_response(const std::filesystem::path& file);
+  PeersResponse read_response(const std::filesystem::path& file);
 
   // Calls `run` with a token that stop() and `cancelled` stop, and returns its result. If it throws
   // an Error after that, throws as run() does.
@@ -74,12 +81,11 @@ class ImportRunner {
  private:
   // Sends `message` to a process and returns its report. The process has ended when this returns.
   // Throws as run() does if the report has neither a result nor an error.
-  process::ImportReport report_of(const std::string& message, const process::ImportBounds& bounds,
-                                  const std::string& party, const std::stop_token& stop);
+  ImportReport report_of(const std::string& message, const ImportBounds& bounds,
+                         const std::string& party, const std::stop_token& stop);
   // Returns nothing if the process ended before it began its work.
-  std::optional<process::ImportReport> run_in(process::Child child, const std::string& message,
-                                              const process::ImportBounds& bounds,
-                                              const std::stop_token& stop);
+  std::optional<ImportReport> run_in(process::Child child, const std::string& message,
+                                     const ImportBounds& bounds, const std::stop_token& stop);
 
   const RunnerOptions options_;
   std::stop_source stop_;

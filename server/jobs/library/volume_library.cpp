@@ -7,7 +7,7 @@ namespace isomesh::jobs {
 namespace {
 
 // True if the upload was rejected only because it has several volumes.
-bool leaves_members_open(const Error& error, const process::ImportOptions& options) {
+bool leaves_members_open(const Error& error, const ImportOptions& options) {
   const std::vector<Choice>& choices = error.remedy().choices;
   return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
 }
@@ -20,9 +20,8 @@ std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
 
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const std::filesystem::path& upload,
-                                           const process::ImportOptions& options,
-                                           const std::string& name, const std::string& party,
-                                           const ImportControl& control) {
+                                           const ImportOptions& options, const std::string& name,
+                                           const std::string& party, const ImportControl& control) {
   const store::ScratchFolder scratch(folder_.scratch());
   Volume volume = import_file(upload, options, party, scratch, control.cancelled);
   if (!volume.name && !name.empty()) volume.name = name;
@@ -31,7 +30,7 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
 
 std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& owner,
                                                           const std::filesystem::path& response,
-                                                          const process::PeersSeries& series,
+                                                          const PeersSeries& series,
                                                           const ImportControl& control) {
   const store::ScratchFolder scratch(folder_.scratch());
   Volume volume = import_file(response, {.peers = series}, owner, scratch, control.cancelled);
@@ -40,9 +39,8 @@ std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& own
   return {keep(owner, std::move(volume), scratch, control).first, std::move(identity)};
 }
 
-Volume VolumeLibrary::import_file(const std::filesystem::path& upload,
-                                  const process::ImportOptions& options, const std::string& party,
-                                  const store::ScratchFolder& scratch,
+Volume VolumeLibrary::import_file(const std::filesystem::path& upload, const ImportOptions& options,
+                                  const std::string& party, const store::ScratchFolder& scratch,
                                   const std::stop_token& cancelled) {
   try {
     return runner_.run({.source = upload,
@@ -89,13 +87,10 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   return {std::move(stored), is_new};
 }
 
-std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
-                                                   const std::filesystem::path& upload,
-                                                   const process::ImportOptions& options,
-                                                   const std::string& name,
-                                                   const std::string& party,
-                                                   const ImportControl& control) {
-  const auto add_one = [&](const process::ImportOptions& how) {
+std::vector<UploadedVolume> VolumeLibrary::add_all(
+    const std::string& owner, const std::filesystem::path& upload, const ImportOptions& options,
+    const std::string& name, const std::string& party, const ImportControl& control) {
+  const auto add_one = [&](const ImportOptions& how) {
     auto [volume, is_new] = add(owner, upload, how, name, party, control);
     return UploadedVolume{.member = how.member, .status = is_new ? 201 : 200, .volume = volume};
   };
@@ -108,7 +103,7 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
   }
   std::vector<UploadedVolume> volumes;
   for (const Choice& member : members) {
-    process::ImportOptions how = options;
+    ImportOptions how = options;
     how.member = member.value;
     try {
       volumes.push_back(add_one(how));

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "proto/types.h"
+#include "server/import/message/import_message.h"
 #include "server/jobs/library/blob_eraser.h"
 #include "server/jobs/library/import_runner.h"
-#include "server/process/import_message.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
@@ -48,16 +48,15 @@ class VolumeLibrary {
   // ImportRunner::run throws, also while the bytes are stored, and kOutOfSpace. It stores nothing
   // if it throws kCancelled.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
-                              const process::ImportOptions& options = {},
-                              const std::string& name = {}, const std::string& party = {},
-                              const ImportControl& control = {});
+                              const ImportOptions& options = {}, const std::string& name = {},
+                              const std::string& party = {}, const ImportControl& control = {});
 
   // Imports a series from a PACS response. Second: the patient, study and series according to the
   // images themselves; the record may be of an earlier upload of the same samples. The returned
   // volume has the labels of this series, as with add(). It stores nothing if it throws kCancelled.
   std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
                                              const std::filesystem::path& response,
-                                             const process::PeersSeries& series,
+                                             const PeersSeries& series,
                                              const ImportControl& control = {});
 
   // Imports all volumes of an upload, each in a process of its own, one after the other. Each
@@ -65,9 +64,8 @@ class VolumeLibrary {
   // options choose a member or the upload has only one volume, there is one element with the chosen
   // member, and its error is thrown. A cancellation is thrown, too.
   std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
-                                      const process::ImportOptions& options,
-                                      const std::string& name, const std::string& party,
-                                      const ImportControl& control = {});
+                                      const ImportOptions& options, const std::string& name,
+                                      const std::string& party, const ImportControl& control = {});
 
   // Renames the owner's volume; an empty name removes it. Throws Error kNotFound, kGone.
   Volume rename(const std::string& owner, const std::string& id,
@@ -88,7 +86,7 @@ class VolumeLibrary {
 
  private:
   // Writes the canonical file of the upload into the scratch folder.
-  Volume import_file(const std::filesystem::path& upload, const process::ImportOptions& options,
+  Volume import_file(const std::filesystem::path& upload, const ImportOptions& options,
                      const std::string& party, const store::ScratchFolder& scratch,
                      const std::stop_token& cancelled);
   // Makes that file a blob, and adds the volume to the owner's records.

@@ -87,7 +87,7 @@ TEST(Boundary, IsThatOfTheContentType) {
   }
 }
 
-process::PeersResponse answer_of(const std::string& text) {
+PeersResponse answer_of(const std::string& text) {
   const test::TemporaryFolder folder;
   test::write_file(folder / "answer", text);
   return read_response(folder / "answer");
@@ -101,16 +101,16 @@ TEST(Answer, OfASearchIsAListOfObjects) {
      "00201209": {"vr": "IS", "Value": [54]}},
     {"00201209": {"vr": "IS", "Value": ["54"]}}, {"00201209": {"vr": "IS"}}, {}])");
   ASSERT_EQ(answer.objects.size(), 4U);
-  EXPECT_EQ(answer.objects[0], (process::PeersObject{.study = "1.2",
-                                                     .series = "1.3",
-                                                     .instance = "1.4",
-                                                     .patient_id = "P",
-                                                     .modality = "CT",
-                                                     .series_description = "head",
-                                                     .instances = 54}));
+  EXPECT_EQ(answer.objects[0], (PeersObject{.study = "1.2",
+                                            .series = "1.3",
+                                            .instance = "1.4",
+                                            .patient_id = "P",
+                                            .modality = "CT",
+                                            .series_description = "head",
+                                            .instances = 54}));
   EXPECT_EQ(answer.objects[1].instances, 54U);
   EXPECT_FALSE(answer.objects[2].instances);
-  EXPECT_EQ(answer.objects[3], process::PeersObject());
+  EXPECT_EQ(answer.objects[3], PeersObject());
   EXPECT_THAT(answer_of("").objects, IsEmpty());
   EXPECT_THAT(answer_of("[]").objects, IsEmpty());
 }
@@ -129,9 +129,8 @@ TEST(Answer, OfStoringTellsWhatWasStored) {
     "00081199": {"vr": "SQ", "Value": [{"00081155": {"vr": "UI", "Value": ["1.5"]}}]},
     "00081198": {"vr": "SQ", "Value": [{"00081155": {"vr": "UI", "Value": ["1.6"]},
                                         "00081197": {"vr": "US", "Value": [42752]}}]}})");
-  EXPECT_THAT(answer.stored, ElementsAre(process::PeersObject{.instance = "1.5"}));
-  EXPECT_THAT(answer.failed,
-              ElementsAre(process::PeersObject{.instance = "1.6", .failure = 0xA700}));
+  EXPECT_THAT(answer.stored, ElementsAre(PeersObject{.instance = "1.5"}));
+  EXPECT_THAT(answer.failed, ElementsAre(PeersObject{.instance = "1.6", .failure = 0xA700}));
 }
 
 TEST(Answer, ThatIsNoneIsRefused) {
@@ -153,7 +152,7 @@ TEST(Answer, OfStrangeKindsTellsNothing) {
       R"([{"0020000D": 1, "0020000E": {"Value": 1}, "00080018": {"Value": []},
            "00100020": {"Value": [7]}, "00201209": {"Value": [-1]}},
           {"00201209": {"Value": [1e99]}}])");
-  EXPECT_THAT(answer.objects, ElementsAre(process::PeersObject(), process::PeersObject()));
+  EXPECT_THAT(answer.objects, ElementsAre(PeersObject(), PeersObject()));
 }
 
 }  // namespace

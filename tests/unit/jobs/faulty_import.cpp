@@ -16,14 +16,15 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "server/import/message/import_message.h"
 #include "server/process/fork_server.h"
-#include "server/process/import_message.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
 
 namespace {
 
 using namespace isomesh;
+using namespace isomesh::import;
 using namespace isomesh::process;
 
 std::string read_order() {
@@ -91,26 +92,16 @@ std::string escapes(const ImportOrder& order) {
   return found;
 }
 
-void write_beyond_limit(const ImportOrder& order) {
-  std::ofstream file(order.task.scratch / "large", std::ios::binary);
-  const std::string piece(std::size_t{1} << 20, 'x');
-  for (int at = 0; at < 3; ++at) file << piece << std::flush;
-  say(error_message({ErrorCode::kOutOfSpace, file ? "it was written" : "it was not written"}));
-}
-
-void lie() {
+Volume small_volume() {
   Volume volume;
   volume.format = "nifti";
   volume.dims = {2, 2, 2};
   volume.bytes = 8;
-  say(volume_message(volume));
+  return volume;
 }
 
 void lie_about_labels(const ImportOrder& order) {
-  Volume volume;
-  volume.format = "nifti";
-  volume.dims = {2, 2, 2};
-  volume.bytes = 8;
+  Volume volume = small_volume();
   volume.labels = {{.label = 2, .name = "liver"}, {.label = 1, .name = "kidney"}};
   const volume::CanonicalWriter writer(order.task.target,
                                        {volume.dims, volume.type, volume.geometry});
@@ -136,12 +127,10 @@ void misbehave(const std::string& what, const ImportOrder& order) {
   }
   if (what == "babble") say("{\"reading\": 7}\n");
   if (what == "forge") say("{\"reading\": \"nifti\\u000a[error] forged\"}\n");
-  if (what == "lie") lie();
+  if (what == "lie") say(volume_message(small_volume()));
   if (what == "lie about labels") lie_about_labels(order);
   confine_as(order);
   if (what == "memory") eat_memory();
-  if (what == "file") write_beyond_limit(order);
-  if (what == "who") say(error_message({ErrorCode::kUnusableVolume, std::to_string(::getpid())}));
   if (what == "escape")
     say(error_message({ErrorCode::kUnusableVolume, "[" + escapes(order) + "]"}));
 }

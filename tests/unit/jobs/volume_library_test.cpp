@@ -24,7 +24,7 @@ class VolumeLibraryTest : public test::JobsFixture {
  protected:
   static constexpr std::array<std::uint32_t, 3> kDims = {2, 3, 4};
 
-  static process::ImportOptions raw(const Geometry& geometry = {}) {
+  static ImportOptions raw(const Geometry& geometry = {}) {
     return {
         .raw = RawDescription{
             .dims = kDims, .type = SampleType::kUint8, .geometry = geometry, .big_endian = false}};

@@ -1,10 +1,10 @@
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
 
-namespace isomesh::process {
+namespace isomesh::import {
 namespace {
 
 using std::chrono::seconds;
@@ -127,4 +127,4 @@ TEST(ImportMessage, AReportOfAnotherFormIsRefused) {
 }
 
 }  // namespace
-}  // namespace isomesh::process
+}  // namespace isomesh::import

@@ -1,11 +1,11 @@
-#include "server/process/import_message.h"
+#include "server/import/message/import_message.h"
 
 #include <algorithm>
 
 #include "proto/orders.h"
 #include "server/process/message.h"
 
-namespace isomesh::process {
+namespace isomesh::import {
 
 void visit(Is<PeersSeries> auto& self, auto&& field) {
   field("content_type", self.content_type);
@@ -66,6 +66,10 @@ void visit(Is<PeersResponse> auto& self, auto&& field) {
 }
 
 namespace {
+
+using process::line_of;
+using process::ReadLine;
+using process::throw_malformed;
 
 constexpr const char* kImport = "import";
 constexpr const char* kBegun = "begun";
@@ -145,4 +149,4 @@ ImportReport report_from(std::string_view messages) {
   }
 }
 
-}  // namespace isomesh::process
+}  // namespace isomesh::import

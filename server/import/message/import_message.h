@@ -17,7 +17,7 @@
 #include "proto/types.h"
 #include "server/volume/geometry.h"
 
-namespace isomesh::process {
+namespace isomesh::import {
 
 // The expected content of a file from a PACS: the response to a request for one series.
 struct PeersSeries {
@@ -125,4 +125,4 @@ struct ImportReport {
 // malformed.
 ImportReport report_from(std::string_view messages);
 
-}  // namespace isomesh::process
+}  // namespace isomesh::import
