@@ -26,7 +26,7 @@ namespace {
 
 store::JobStoreOptions job_options(const Options& options) {
   store::JobStoreOptions result = options.jobs;
-  result.mesher_version = jobs::mesher_version();
+  result.mesher_version = jobs::kMesherVersion;
   result.job_version = jobs::kJobVersion;
   result.expected_ms = jobs::expected_ms;
   return result;

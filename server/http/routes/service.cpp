@@ -53,7 +53,7 @@ void add_service_routes(App& app) {
     const bool takes_orders = app.services.hospital != nullptr && app.services.hospital->is_open();
     JsonTree version;
     json_values::write_field(version.root(), "version", std::string(ISOMESH_VERSION));
-    json_values::write_field(version.root(), "mesher", jobs::mesher_version());
+    json_values::write_field(version.root(), "mesher", std::string(jobs::kMesherVersion));
     json_values::write_field(version.root(), "orders", takes_orders);
     response.set_body(dump(version.root()), "application/json");
   });

@@ -10,7 +10,6 @@ constexpr JobOrder::Work last_of(JobOrder::Work /*value*/) { return JobOrder::Wo
 
 void visit(Is<JobSetup> auto& self, auto&& field) {
   field("threads", self.threads);
-  field("backend", self.backend);
   field("memory_bytes", self.memory_bytes);
 }
 

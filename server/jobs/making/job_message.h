@@ -22,7 +22,6 @@ namespace isomesh::jobs {
 // Holds for all orders of a process.
 struct JobSetup {
   int threads = 1;                                      // of the kernels
-  std::string backend{kDefaultBackend};                 // by its name
   std::uint64_t memory_bytes = std::uint64_t{1} << 60;  // the most of an order
 };
 

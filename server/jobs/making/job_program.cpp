@@ -99,14 +99,13 @@ struct Task {
   Descriptor file;
 };
 
-MeshRequest request_of(const JobOrder& order, const JobSetup& setup) {
+MeshRequest request_of(const JobOrder& order) {
   return {.volume = order.volume,
           .parameters = order.parameters,
           .iso = order.iso,
           .certify = order.certify,
           .memory_bytes = order.memory_bytes,
-          .disk_bytes = order.disk_bytes,
-          .backend = backend_of(setup.backend)};
+          .disk_bytes = order.disk_bytes};
 }
 
 // Passes orders from the reading thread to the working thread. Thread safe.
@@ -179,8 +178,7 @@ void send_many_labels(Speaker& speaker, std::size_t file, MeshSummary& summary) 
   summary.labels.clear();
 }
 
-MadeMesh make(Task task, const JobSetup& setup, const std::stop_token& stop, Speaker& speaker,
-              Workspace& workspace) {
+MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
   const JobOrder& order = task.order;
   Reporter reporter(speaker);
   const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
@@ -197,7 +195,7 @@ MadeMesh make(Task task, const JobSetup& setup, const std::stop_token& stop, Spe
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
   MadeMesh made;
-  const MeshRequest request = request_of(order, setup);
+  const MeshRequest request = request_of(order);
   const CroppedSamples cropped(array_of(canonical), order.parameters);
   const SampleArray& samples = cropped.array();
   made.summary = order.parameters.labels
@@ -209,15 +207,14 @@ MadeMesh make(Task task, const JobSetup& setup, const std::stop_token& stop, Spe
   return made;
 }
 
-CountedSurface count(Task task, const JobSetup& setup, const std::stop_token& stop,
-                     Speaker& speaker) {
+CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
   speaker.say(JobProgress{});  // it has begun
   const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
   const MeshParameters& parameters = task.order.parameters;
   const CroppedSamples cropped(array_of(canonical), parameters);
   const SampleArray& samples = cropped.array();
   if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
-  return count_surface(samples, request_of(task.order, setup), {stop, nullptr});
+  return count_surface(samples, request_of(task.order), {stop, nullptr});
 }
 
 struct Ending {
@@ -226,13 +223,12 @@ struct Ending {
 };
 
 // Every exception becomes a message here, because nothing else leaves this process.
-Ending work(Task task, const JobSetup& setup, const std::stop_token& stop, Speaker& speaker,
-            Workspace& workspace) {
+Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
   const std::uint64_t memory_bytes = task.order.memory_bytes;
   try {
     const bool is_count = task.order.work == JobOrder::Work::kCount;
-    if (is_count) return {count(std::move(task), setup, stop, speaker)};
-    return {make(std::move(task), setup, stop, speaker, workspace)};
+    if (is_count) return {count(std::move(task), stop, speaker)};
+    return {make(std::move(task), stop, speaker, workspace)};
   } catch (const Error& error) {
     return {error};
   } catch (const std::bad_alloc&) {
@@ -286,7 +282,7 @@ int main() {
     auto [task, stop] = desk.take();
     const std::uint64_t memory_bytes = task.order.memory_bytes;
     memory.set(memory_bytes + headroom);
-    const Ending ending = work(std::move(task), setup, stop, speaker, workspace);
+    const Ending ending = work(std::move(task), stop, speaker, workspace);
     if (!ending.is_last) workspace.trim(kept_bytes(memory_bytes));
     speaker.say(ending.answer);
     if (ending.is_last) std::_Exit(EXIT_SUCCESS);

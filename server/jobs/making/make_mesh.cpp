@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "proto/samples.h"
 #include "proto/stages.h"
 #include "server/codec/formats.h"
 #include "server/jobs/making/certify_stage.h"
@@ -23,13 +24,16 @@ using Clock = std::chrono::steady_clock;
 
 void extract(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
              mesh::Mesh& mesh) {
-  const auto& [x, y, z] = samples.dims;
-  const std::uint64_t count = mesh::Dims{x, y, z}.samples();
-  const Backend::Admit check = [&](const mesh::SurfaceSize& size) {
-    check_memory(size, count, request);
-  };
-  request.backend.extract(samples, extract_options(request.parameters, request.iso), check,
-                          progress.context(), mesh);
+  constexpr double kCounting = 0.2;  // of the whole
+  const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
+  const mesh::Context context = progress.context();
+  with_sample(samples.type, [&](auto sample) {
+    const auto lattice = lattice_of<decltype(sample)>(samples);
+    const mesh::SurfaceCount count =
+        mesh::count_surface(lattice, options, context.part(0, kCounting));
+    check_memory(size_of(count), lattice.dims.samples(), request);
+    extract_surface(lattice, options, count, context.part(kCounting, 1), mesh);
+  });
 }
 
 void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
@@ -112,8 +116,10 @@ void Progress::end_stage() {
 
 CountedSurface count_surface(const SampleArray& samples, const MeshRequest& request,
                              const mesh::Context& context) {
-  return {
-      request.backend.count(samples, extract_options(request.parameters, request.iso), context)};
+  const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
+  return {with_sample(samples.type, [&](auto sample) {
+    return size_of(mesh::count_surface(lattice_of<decltype(sample)>(samples), options, context));
+  })};
 }
 
 void Workspace::trim(std::size_t budget_bytes) {

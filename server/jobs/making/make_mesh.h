@@ -14,7 +14,6 @@
 
 #include "proto/types.h"
 #include "server/codec/encode.h"
-#include "server/jobs/making/backend.h"
 #include "server/jobs/making/sample_array.h"
 #include "server/mesh/extract/extract.h"
 #include "server/mesh/labels/separate.h"
@@ -77,11 +76,10 @@ struct MeshRequest {
   std::uint64_t memory_bytes;
   // For all files together, if the disk held nothing else.
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
-  const Backend& backend = backend_of(kDefaultBackend);
 
   // The same with other parameters, which must outlive it.
   MeshRequest with(const MeshParameters& others) const {
-    return {volume, others, iso, certify, memory_bytes, disk_bytes, backend};
+    return {volume, others, iso, certify, memory_bytes, disk_bytes};
   }
 };
 

@@ -128,7 +128,7 @@ void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progre
   mesh::SmoothOptions options = smooth_options(request.parameters);
   options.within = sides_of_caps(samples, request.parameters, options);
   const auto smooth = [&](const mesh::Context& context) {
-    return request.backend.smooth(options, context, mesh);
+    return mesh::smooth(options, context, mesh);
   };
   smooth_stage(smooth, progress, mesh, summary);
 }

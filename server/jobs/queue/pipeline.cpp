@@ -26,12 +26,6 @@ std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume
 
 }  // namespace
 
-std::string mesher_version(std::string_view backend) {
-  std::string version = kMesherVersion;
-  if (backend != kDefaultBackend) version.append("-").append(backend);
-  return version;
-}
-
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, store::BlobStore& blobs,
                             JobProcess& process, std::stop_token stop, const Report& report,

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <stop_token>
 #include <string>
-#include <string_view>
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
@@ -23,16 +22,13 @@ struct PipelineLimits {
   std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job
 };
 
-// Increment whenever the same volume and parameters would give different bytes than before.
+// A part of the key of a result. Increment whenever the same volume and parameters would give
+// different bytes than before.
 inline constexpr const char* kMesherVersion = "1";
 
 // Increment with kMesherVersion, and whenever jobs can ask for something new: in an upgrade, the
 // older daemons that share the queue leave newer jobs to newer daemons.
 inline constexpr int kJobVersion = 1;
-
-// What stands for the mesher in the key of a result: its version, and the name of the back end
-// unless that is the default.
-std::string mesher_version(std::string_view backend = kDefaultBackend);
 
 // Lets `process` load the samples, extract, smooth and encode in every format, and stores the
 // results as data of `owner`. The same volume and parameters give the same bytes. Throws Error

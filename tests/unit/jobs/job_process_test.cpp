@@ -361,15 +361,5 @@ TEST_F(JobProcessTest, AProgramThatIsHeldOutlivesItsFile) {
   EXPECT_EQ(started().size(), 1U) << "it shows its name";
 }
 
-TEST_F(JobProcessTest, ABackEndThatIsNotThereEndsTheOrder) {
-  JobProgram program = job_program();
-  program.setup.backend = "abacus";
-  JobProcess process(program);
-  const auto error = refusal(process, order_of(add_sphere(), 0));
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kInternal);
-  EXPECT_THAT(error->what(), HasSubstr("abacus"));
-}
-
 }  // namespace
 }  // namespace isomesh::jobs
