@@ -1,6 +1,7 @@
 // The daemon's options.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 
 #include "base/log.h"
 #include "server/blobs.h"
+#include "server/callbacks/limits.h"
 #include "server/http/server.h"
 #include "server/jobs/library/import_runner.h"
 #include "server/store/job_store.h"
@@ -40,7 +42,8 @@ struct Options {
   std::vector<std::string> callback_targets;
   std::filesystem::path callback_secrets;
   std::filesystem::path callback_authorities;
-  double callback_retry_seconds = 5;
+  double callback_retry_seconds =
+      std::chrono::duration<double>(callbacks::limits::kFirstDelay).count();
   store::JobStoreOptions jobs;
   double keep_days = 30;
   std::uint64_t max_disk = 0;

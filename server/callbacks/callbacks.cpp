@@ -20,12 +20,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::size_t kAtOnce = 64;
-constexpr std::size_t kAtOncePerReceiver = 4;
-constexpr milliseconds kLongestSleep{5'000};
-// Pause after the database could not be read or written.
-constexpr milliseconds kPause{1'000};
-
 using curl::append;
 using curl::Easy;
 using curl::Headers;
@@ -93,14 +87,14 @@ class Callbacks::Sender {
  private:
   void run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
-      milliseconds sleep = kLongestSleep;
+      milliseconds sleep = limits::kLongestSleep;
       try {
         const auto now = std::chrono::system_clock::now();
         begin_due(now);
         sleep = advance(now);
       } catch (const std::exception& error) {
         log_error("callbacks could not be sent and are retried: {}", error.what());
-        sleep = kPause;
+        sleep = limits::kPause;
       }
       if (stop.stop_requested()) return;
       curl_multi_poll(multi_.get(), nullptr, 0, static_cast<int>(sleep.count()), nullptr);
@@ -108,11 +102,11 @@ class Callbacks::Sender {
   }
 
   void begin_due(store::Time now) {
-    if (attempts_.size() >= kAtOnce) return;
+    if (attempts_.size() >= limits::kAtOnce) return;
     // Attempts in progress are still due and come first, so they count against their receiver's
     // limit.
-    for (store::Delivery& delivery : outbox_.due(now, kAtOncePerReceiver)) {
-      if (attempts_.size() >= kAtOnce) return;
+    for (store::Delivery& delivery : outbox_.due(now, limits::kAtOncePerReceiver)) {
+      if (attempts_.size() >= limits::kAtOnce) return;
       if (!attempts_.contains(delivery.job)) begin(std::move(delivery));
     }
   }
@@ -178,9 +172,9 @@ class Callbacks::Sender {
     }
     if (ended) return milliseconds(0);
     const auto next = outbox_.next_after(now);
-    if (!next) return kLongestSleep;
+    if (!next) return limits::kLongestSleep;
     const auto wait = std::chrono::ceil<milliseconds>(*next - std::chrono::system_clock::now());
-    return std::clamp(wait, milliseconds(0), kLongestSleep);
+    return std::clamp(wait, milliseconds(0), limits::kLongestSleep);
   }
 
   void end(CURL* easy, CURLcode result) {

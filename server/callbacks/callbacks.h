@@ -8,19 +8,19 @@
 #include <string>
 #include <vector>
 
+#include "server/callbacks/limits.h"
 #include "server/callbacks/targets.h"
 #include "server/store/outbox.h"
 
 namespace isomesh::callbacks {
 
 struct CallbackOptions {
-  std::vector<std::string> secrets;           // see signature.h
-  std::string authorities;                    // a file of trusted certificates; empty: the system's
-  std::chrono::milliseconds timeout{10'000};  // of one attempt, from resolving the name to the
-                                              // response
-  std::chrono::milliseconds first_delay{5'000};  // after the first failed attempt; doubles
-  std::chrono::milliseconds longest_delay{std::chrono::hours(1)};
-  std::chrono::milliseconds give_up_after{std::chrono::hours(24)};
+  std::vector<std::string> secrets;  // see signature.h
+  std::string authorities;           // a file of trusted certificates; empty: the system's
+  std::chrono::milliseconds timeout = limits::kTimeout;
+  std::chrono::milliseconds first_delay = limits::kFirstDelay;
+  std::chrono::milliseconds longest_delay = limits::kLongestDelay;
+  std::chrono::milliseconds give_up_after = limits::kGiveUpAfter;
 };
 
 enum class CallbackOutcome { kDelivered, kRetried, kGivenUp };

@@ -13,11 +13,10 @@
 
 #include "base/hex.h"
 #include "base/text.h"
+#include "server/callbacks/limits.h"
 
 namespace isomesh::callbacks {
 namespace {
-
-constexpr std::size_t kLongestUrl = 2000;
 
 using CurlUrl = std::unique_ptr<CURLU, decltype(&curl_url_cleanup)>;
 
@@ -144,7 +143,7 @@ bool is_within_v6(Reach reach, const in6_addr& address) {
 std::optional<CallbackTargets::Url> CallbackTargets::parse(const std::string& text) {
   const bool printable =
       std::ranges::all_of(text, [](unsigned char c) { return c > ' ' && c < 0x7F; });
-  if (text.empty() || text.size() > kLongestUrl || !printable) return std::nullopt;
+  if (text.empty() || text.size() > limits::kLongestUrl || !printable) return std::nullopt;
   const CurlUrl url(curl_url(), &curl_url_cleanup);
   if (!url || curl_url_set(url.get(), CURLUPART_URL, text.c_str(), 0) != CURLUE_OK) {
     return std::nullopt;

@@ -8,15 +8,12 @@
 
 #include "base/log.h"
 #include "server/http/app/outcomes.h"
+#include "server/http/limits.h"
 #include "server/http/routes/routes.h"
 #include "server/net/listener.h"
 
 namespace isomesh::http {
 namespace {
-
-constexpr std::chrono::seconds kLongestWatch{1};
-// Time limit for sending the last responses on shutdown.
-constexpr std::chrono::seconds kLastResponses{5};
 
 // Distributes events of jobs to waiting requests, streams, the log and the metrics, until the
 // service stops and all have been distributed.
@@ -25,7 +22,8 @@ void watch_jobs(App& app) {
   while (true) {
     const bool is_ending = app.stopping;
     try {
-      const auto events = app.services.jobs.events(std::nullopt, "", last, kLongestWatch);
+      const auto events =
+          app.services.jobs.events(std::nullopt, "", last, limits::kBetweenEventReads);
       bool is_heard = false;
       for (const store::Event& event : events) {
         last = event.id;
@@ -40,7 +38,7 @@ void watch_jobs(App& app) {
     } catch (const std::exception& error) {
       if (is_ending) return log_error("the last job events cannot be read: {}", error.what());
       log_error("job events cannot be read and are retried: {}", error.what());
-      std::this_thread::sleep_for(kLongestWatch);
+      std::this_thread::sleep_for(limits::kBetweenEventReads);
     }
   }
 }
@@ -109,7 +107,7 @@ void Server::stop() {
   app.services.library.stop_imports();
   app.services.jobs.close();
   if (state_->watching.joinable()) state_->watching.join();
-  app.connections.close(kLastResponses);
+  app.connections.close(limits::kLastResponses);
 }
 
 }  // namespace isomesh::http

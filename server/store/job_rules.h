@@ -13,9 +13,6 @@
 
 namespace isomesh::store {
 
-// Retry-After of rejected submissions.
-inline constexpr std::chrono::seconds kRetryAfter{1};
-
 // Equal for all jobs whose results have the same bytes and properties. `notes` are the volume's; a
 // mesh carries some of them.
 std::string result_key(const std::string& volume, const std::vector<Note>& notes,

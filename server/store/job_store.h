@@ -42,8 +42,7 @@ struct Submission {
   };
 
   Kind kind = Kind::kNew;
-  Job job;                              // for kNew and kExisting
-  std::chrono::seconds retry_after{0};  // for kBusy and kOwnersShare
+  Job job;  // for kNew and kExisting
 };
 
 // Returns the submission's job. Throws Error kKeyReused for kConflict, kUnavailable for kBusy and

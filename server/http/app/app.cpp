@@ -7,13 +7,11 @@
 
 #include "base/log.h"
 #include "proto/error.h"
+#include "server/http/limits.h"
 #include "server/http/observe/metrics.h"
 
 namespace isomesh::http {
 namespace {
-
-constexpr std::size_t kLongestPath = 256;
-constexpr std::size_t kLongestTarget = 4096;
 
 ConnectionOptions connection_options(const ServerOptions& options) {
   ConnectionOptions connections;
@@ -69,7 +67,8 @@ std::string unready_reason(const Services& services) {
 // Rejects requests that are malformed for every route. The HTTP library would wait for a body of
 // unknown length.
 void check_request(const Request& request) {
-  if (request.path.size() > kLongestPath || request.target.size() > kLongestTarget) {
+  if (request.path.size() > limits::kLongestPath ||
+      request.target.size() > limits::kLongestTarget) {
     throw Error(ErrorCode::kUriTooLong, "the request's path or query is too long");
   }
   const bool needs_body =

@@ -10,6 +10,7 @@
 #include <httplib.h>
 
 #include "base/clock.h"
+#include "server/http/limits.h"
 #include "server/http/requests/request_values.h"
 
 namespace isomesh::http {
@@ -34,10 +35,6 @@ std::string with_one_question_mark(const std::string& target) {
 constexpr std::string_view kFormEnd = "\r\n";
 
 constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
-
-// The library keeps what is no file of a form in memory: heads of fields, and what follows a
-// boundary.
-constexpr std::size_t kMostBytesBesideFiles = std::size_t{1} << 20;
 
 constexpr const char* kAcceptEncoding = "Accept-Encoding";
 
@@ -82,7 +79,7 @@ class HttplibStream : public httplib::Stream {
   // Buffers the body: the library reads in pieces too small for system calls.
   bool read_ahead() {
     beside_files_ += ahead_.size();
-    if (beside_files_ > kMostBytesBesideFiles) return false;
+    if (beside_files_ > limits::kMostBytesBesideFiles) return false;
     ahead_read_ = 0;
     ahead_.resize(kPieceBytes);
     const auto count = body_.read(ahead_);

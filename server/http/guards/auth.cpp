@@ -13,17 +13,18 @@
 #include "base/ids.h"
 #include "base/sha256.h"
 #include "base/text.h"
+#include "server/http/limits.h"
 
 namespace isomesh::http {
 namespace {
 
 constexpr std::size_t kTokenBytes = 32;
-constexpr std::size_t kLongestName = 64;
 constexpr std::string_view kTokenPrefix =
     "isomesh_";  // lets secret scanners recognise leaked tokens
 
 bool is_name(std::string_view text) {
-  return !text.empty() && text.size() <= kLongestName && std::ranges::all_of(text, is_plain);
+  return !text.empty() && text.size() <= limits::kLongestUserName &&
+         std::ranges::all_of(text, is_plain);
 }
 
 bool is_hash(std::string_view hex) {
@@ -122,13 +123,12 @@ Tokens::Entries Tokens::read() const {
 
 std::optional<std::string> bearer_of(std::string_view authorization) {
   constexpr std::string_view kScheme = "bearer ";
-  constexpr std::size_t kLongestToken = 512;
   if (lower(authorization.substr(0, kScheme.size())) != kScheme) return std::nullopt;
   const std::size_t begin = authorization.find_first_not_of(' ', kScheme.size());
   if (begin == std::string_view::npos) return std::nullopt;
   const std::string_view token =
       authorization.substr(begin, authorization.find_last_not_of(' ') + 1 - begin);
-  if (token.size() > kLongestToken) return std::nullopt;
+  if (token.size() > limits::kLongestToken) return std::nullopt;
   return std::string(token);
 }
 

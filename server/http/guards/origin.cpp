@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/http/limits.h"
 #include "server/net/address.h"
 
 namespace isomesh::http {
@@ -90,10 +91,10 @@ void RefusedOrigins::tell(std::string_view origin) {
   constexpr std::size_t kLongest = 200;
   const std::string shown(origin.substr(0, kLongest));
   const Lock lock(mutex_);
-  if (told_.size() >= kMost || !told_.insert(shown).second) return;
+  if (told_.size() >= limits::kMostOriginsLogged || !told_.insert(shown).second) return;
   LogLine("origin_refused", LogLevel::kWarn)
       .add("origin", shown)
-      .add("reason", told_.size() < kMost
+      .add("reason", told_.size() < limits::kMostOriginsLogged
                          ? "pages of this origin may not use the service; --cors-origin allows them"
                          : "pages of this origin may not use the service; no further origins are "
                            "logged");

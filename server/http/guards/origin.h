@@ -37,8 +37,6 @@ std::string host_of(std::string_view authority);
 // Logs each origin once, up to a number of them: pages that the rules do not allow. Thread safe.
 class RefusedOrigins {
  public:
-  static constexpr std::size_t kMost = 64;
-
   void tell(std::string_view origin) ISOMESH_EXCLUDES(mutex_);
 
  private:

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/text.h"
+#include "server/http/limits.h"
 #include "server/http/requests/request_values.h"
 
 namespace isomesh::http {
@@ -45,8 +46,7 @@ std::array<std::uint32_t, 3> dims_of(std::string_view text) {
 }
 
 std::string series_of(std::string_view text) {
-  constexpr std::size_t kLongestUid = 64;
-  if (text.empty() || text.size() > kLongestUid ||
+  if (text.empty() || text.size() > limits::kLongestUid ||
       text.find_first_not_of("0123456789.") != std::string_view::npos) {
     throw invalid_parameter("series",
                             "must be a UID: numbers separated by dots, at most 64 characters");
@@ -55,8 +55,7 @@ std::string series_of(std::string_view text) {
 }
 
 std::string member_of(std::string_view text) {
-  constexpr std::size_t kLongest = 1024;
-  if (text.empty() || text.size() > kLongest || has_control_characters(text)) {
+  if (text.empty() || text.size() > limits::kLongestMemberName || has_control_characters(text)) {
     throw invalid_parameter("member", "must be the name of a file in the archive");
   }
   return std::string(text);
@@ -181,12 +180,11 @@ std::optional<RawDescription> raw_description_of(const Request& request) {
 }
 
 std::string plain_file_name(std::string_view name) {
-  constexpr std::size_t kLongest = 255;
   const std::size_t folder = name.find_last_of("/\\");
   std::string plain(trimmed(folder == std::string_view::npos ? name : name.substr(folder + 1)));
   std::erase_if(plain, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-  if (plain.size() <= kLongest) return plain;
-  std::size_t end = kLongest;
+  if (plain.size() <= limits::kLongestFileName) return plain;
+  std::size_t end = limits::kLongestFileName;
   while (end > 0 && (static_cast<unsigned char>(plain[end]) & 0xC0) == 0x80) --end;
   return plain.substr(0, end);
 }

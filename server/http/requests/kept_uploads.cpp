@@ -10,12 +10,12 @@
 #include "base/log.h"
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/http/limits.h"
 
 namespace isomesh::http {
 namespace {
 
 constexpr std::size_t kNameBytes = 16;
-constexpr std::size_t kMostCancelled = 1000;
 
 Error gone() { return {ErrorCode::kGone, "this upload is no longer kept: send it again"}; }
 
@@ -165,7 +165,7 @@ std::vector<std::string> KeptUploads::cancel(const std::string& owner, const std
   if (!partial) throw gone();
   erase(entry);
   cancelled_.emplace_back(owner, name);
-  if (cancelled_.size() > kMostCancelled) cancelled_.pop_front();
+  if (cancelled_.size() > limits::kMostCancelledUploads) cancelled_.pop_front();
   lock.unlock();
   std::vector<std::string> stored = partial->cancel();
   const std::string volume = partial->note().volume;

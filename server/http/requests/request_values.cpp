@@ -10,12 +10,11 @@
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "base/text.h"
+#include "server/http/limits.h"
 #include "server/net/request_head.h"
 
 namespace isomesh::http {
 namespace {
-
-constexpr int kLongestWaitSeconds = 30;
 
 // Numbers in headers and queries have no sign "+", which base/text allows.
 std::optional<double> number_of(std::string_view text) {
@@ -145,16 +144,16 @@ std::chrono::milliseconds wait_of(const Request& request) {
                                      : "wait must be a number of seconds, at least 0");
   }
   return std::chrono::milliseconds(
-      static_cast<std::int64_t>(std::min<double>(*seconds, kLongestWaitSeconds) * 1000));
+      static_cast<std::int64_t>(std::min<double>(*seconds, limits::kLongestWait.count()) * 1000));
 }
 
 std::string idempotency_key_of(const Request& request) {
   constexpr const char* kHeader = "Idempotency-Key";
-  constexpr std::size_t kLongest = 255;
   if (!request.has_header(kHeader)) return {};
   std::string key(request.header(kHeader));
   const bool is_printable = std::ranges::all_of(key, [](char c) { return c > 0x20 && c < 0x7F; });
-  if (request.count_headers(kHeader) > 1 || key.empty() || key.size() > kLongest || !is_printable) {
+  if (request.count_headers(kHeader) > 1 || key.empty() ||
+      key.size() > limits::kLongestIdempotencyKey || !is_printable) {
     throw invalid_parameter(kHeader, "must be one key of 1 to 255 printable characters");
   }
   return key;
@@ -273,9 +272,8 @@ std::string cursor_after(std::string_view kind, std::string_view id) {
 std::string id_after(const Request& request, std::string_view kind) {
   if (!request.has_parameter("cursor")) return {};
   const std::string text = from_hex(request.parameter("cursor")).value_or("");
-  constexpr std::size_t kLongest = 128;
   const std::string prefix = std::string(kind) + ':';
-  const bool is_ours = text.size() > prefix.size() && text.size() <= kLongest &&
+  const bool is_ours = text.size() > prefix.size() && text.size() <= limits::kLongestCursor &&
                        text.starts_with(prefix) &&
                        std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; });
   if (!is_ours) throw wrong_cursor();

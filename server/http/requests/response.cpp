@@ -4,16 +4,18 @@
 
 #include "base/clock.h"
 #include "proto/json.h"
+#include "server/http/limits.h"
 
 namespace isomesh::http {
 namespace {
 
-constexpr const char* kRetryAfterSeconds = "1";
 constexpr const char* kProblemType = "application/problem+json";
 
 bool may_come_again(const Problem& problem) {
   return problem.status == 429 || problem.status == 503;
 }
+
+std::string retry_after() { return std::to_string(limits::kRetryAfter.count()); }
 
 }  // namespace
 
@@ -44,7 +46,7 @@ void answer_problem(const Request& request, Response& response, Problem problem)
   response.status = problem.status;
   response.set_header("Cache-Control", "no-store");
   if (may_come_again(problem) && !response.has_header("Retry-After")) {
-    response.set_header("Retry-After", kRetryAfterSeconds);
+    response.set_header("Retry-After", retry_after());
   }
   response.stream.reset();
   response.set_body(to_json(problem), kProblemType);
@@ -61,7 +63,7 @@ std::string refusal(const Error& error) {
       "\r\nContent-Length: " +
       std::to_string(body.size()) + "\r\n";
   if (may_come_again(problem)) {
-    bytes.append("Retry-After: ").append(kRetryAfterSeconds).append("\r\n");
+    bytes.append("Retry-After: ").append(retry_after()).append("\r\n");
   }
   return bytes + "\r\n" + body;
 }

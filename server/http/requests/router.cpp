@@ -3,11 +3,10 @@
 #include <algorithm>
 
 #include "base/text.h"
+#include "server/http/limits.h"
 
 namespace isomesh::http {
 namespace {
-
-constexpr std::size_t kLongestParameter = 100;
 
 // Not trimmed, unlike base/text's split: white space is part of a path.
 std::vector<std::string_view> segments_of(std::string_view path) {
@@ -21,7 +20,8 @@ std::vector<std::string_view> segments_of(std::string_view path) {
 }
 
 bool is_parameter(std::string_view text) {
-  return !text.empty() && text.size() <= kLongestParameter && std::ranges::all_of(text, is_plain);
+  return !text.empty() && text.size() <= limits::kLongestPathParameter &&
+         std::ranges::all_of(text, is_plain);
 }
 
 }  // namespace

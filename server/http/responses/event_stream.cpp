@@ -4,13 +4,10 @@
 #include <utility>
 
 #include "proto/json.h"
+#include "server/http/limits.h"
 
 namespace isomesh::http {
 namespace {
-
-constexpr std::chrono::seconds kPing{15};
-// Browsers reconnect after this many milliseconds.
-constexpr const char* kRetry = "retry: 2000\n\n";
 
 std::string_view name_of(store::EventKind kind) {
   switch (kind) {
@@ -36,13 +33,15 @@ class TalkingSource : public net::Source {
  protected:
   // Call before writing the first event.
   void begin(std::string& bytes) {
-    if (!std::exchange(has_begun_, true)) bytes += kRetry;
+    if (!std::exchange(has_begun_, true)) {
+      bytes += "retry: " + std::to_string(limits::kReconnectAfter.count()) + "\n\n";
+    }
   }
 
   // Call after writing the available events.
   More sent(std::string& bytes) {
     const auto now = std::chrono::steady_clock::now();
-    if (bytes.empty() && now - last_told_ >= kPing) bytes += ": ping\n\n";
+    if (bytes.empty() && now - last_told_ >= limits::kBetweenPings) bytes += ": ping\n\n";
     if (bytes.empty()) return More::kLater;
     last_told_ = now;
     return More::kBytes;
@@ -139,7 +138,7 @@ void Broadcaster::Mailbox::put(const store::Event& event) {
   const bool replaces = event.kind == store::EventKind::kProgress && before != events_.rend() &&
                         before->kind == store::EventKind::kProgress;
   if (replaces) events_.erase(std::next(before).base());
-  if (events_.size() >= kMostUnread) {
+  if (events_.size() >= limits::kMostUnreadEvents) {
     events_.clear();
     has_lost_some_ = true;
   }

@@ -25,9 +25,6 @@ class Broadcaster {
   // short while it is read.
   class Mailbox {
    public:
-    // Limit of unread events; further ones are lost.
-    static constexpr std::size_t kMostUnread = 4096;
-
     void put(const store::Event& event) ISOMESH_EXCLUDES(mutex_);
     std::optional<store::Event> take() ISOMESH_EXCLUDES(mutex_);
     bool has_lost_some() ISOMESH_EXCLUDES(mutex_);

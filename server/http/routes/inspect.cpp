@@ -4,6 +4,7 @@
 
 #include "base/text.h"
 #include "proto/json.h"
+#include "server/http/limits.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/library/intact_volume.h"
@@ -13,9 +14,7 @@
 namespace isomesh::http {
 namespace {
 
-constexpr std::uint64_t kMostBins = 65536;
 constexpr std::uint64_t kUsualBins = 256;
-constexpr std::uint64_t kMostPreviewSize = 256;
 constexpr std::uint64_t kUsualPreviewSize = 128;
 
 // A volume's id determines its content, so derived data never changes.
@@ -24,7 +23,7 @@ constexpr const char* kForever = "private, max-age=31536000, immutable";
 void histogram(App& app, const Request& request, Response& response) {
   check_known(request, {"bins"});
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
-  const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
+  const std::uint64_t bins = whole_number_of(request, "bins", {1, limits::kMostBins}, kUsualBins);
   const std::string etag = '"' + volume.id + ".bins" + std::to_string(bins) + '"';
   if (is_known(request, response, etag, kForever)) return;
   response.status = 200;
@@ -67,7 +66,7 @@ void preview(App& app, const Request& request, Response& response) {
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
   const volume::PreviewChoice choice = {
       .most = static_cast<std::uint32_t>(
-          whole_number_of(request, "size", {1, kMostPreviewSize}, kUsualPreviewSize)),
+          whole_number_of(request, "size", {1, limits::kMostPreviewSize}, kUsualPreviewSize)),
       .window = interval_of(request, "window").value_or(volume.range)};
   const std::string etag = '"' + volume.id + ".preview" + std::to_string(choice.most) + '.' +
                            to_text(choice.window[0]) + '.' + to_text(choice.window[1]) + '"';

@@ -39,7 +39,7 @@ std::optional<Continuation> submit(App& app, const Request& request, Response& r
         spec.parameters.labels ? place_for_upload(app, request) : net::FairPlaces::Place();
     spec.parameters = complete_parameters(app, request, spec.parameters);
   }
-  const Job job = submitted(app, spec, response);
+  const Job job = submitted(app, spec);
   const bool waits = wait.count() > 0;
   return answer_at_end(app, request, response, job, wait,
                        [waits](const Request& /*request*/, Response& out, const Job& now) {

@@ -13,6 +13,7 @@
 #include "proto/json.h"
 #include "server/codec/formats.h"
 #include "server/http/app/outcomes.h"
+#include "server/http/limits.h"
 #include "server/http/requests/import_query.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/responses/sources.h"
@@ -21,8 +22,6 @@
 
 namespace isomesh::http {
 namespace {
-
-constexpr std::chrono::hours kLongestJob{24};
 
 std::string server_timing(const Timing& timing) {
   std::string text;
@@ -50,7 +49,7 @@ std::optional<ByteRange> part_of(const Request& request, Response& response,
   }
 }
 
-Job submit_with_volume(App& app, const Request& request, Response& response) {
+Job submit_with_volume(App& app, const Request& request) {
   std::vector<std::pair<std::string, std::string>> job_query;
   std::set<std::string> names;  // all names: this only checks for duplicates
   for (const auto& parameter : request.query) {
@@ -83,8 +82,7 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   // ("mesh").
   const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
   return submitted(app,
-                   {owner_of(request), complete_parameters(app, request, parameters), key, digest},
-                   response);
+                   {owner_of(request), complete_parameters(app, request, parameters), key, digest});
 }
 
 // The request's body is the volume, the response the mesh.
@@ -96,8 +94,9 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
     }
     answer_mesh(app, asked, out, job, {job.parameters.formats.front(), std::nullopt});
   };
-  const Job job = submit_with_volume(app, request, response);
-  auto continuation = answer_at_end(app, request, response, job, kLongestJob, answer);
+  const Job job = submit_with_volume(app, request);
+  auto continuation =
+      answer_at_end(app, request, response, job, limits::kLongestSynchronousJob, answer);
   // Without an idempotency key the client cannot return for the job.
   if (continuation && idempotency_key_of(request).empty()) {
     continuation->abandoned = [&app, id = job.id](const Request& asked) {

@@ -8,6 +8,7 @@
 #include "base/sha256.h"
 #include "base/text.h"
 #include "proto/json.h"
+#include "server/http/limits.h"
 #include "server/http/requests/upload.h"
 #include "server/jobs/library/complete_labels.h"
 #include "server/jobs/making/crop.h"
@@ -80,11 +81,10 @@ net::FairPlaces::Place place_for_upload(App& app, const Request& request) {
 }
 
 std::string json_body(App& app, const Request& request) {
-  constexpr std::size_t kMostBodyBytes = 64 * 1024;
   check_is_json(request);
   const auto place =
       request.body->is_whole() ? net::FairPlaces::Place() : app.uploads.take(party_of(request));
-  return read_text(request, kMostBodyBytes);
+  return read_text(request, limits::kMostJsonBytes);
 }
 
 JobParameters complete_parameters(const App& app, const Request& request,
@@ -101,13 +101,10 @@ JobParameters complete_parameters(const App& app, const Request& request,
   return jobs::complete_labels(std::move(parameters), viewer, volume, app.services.labels);
 }
 
-Job submitted(App& app, const store::JobSpec& spec, Response& response) {
+Job submitted(App& app, const store::JobSpec& spec) {
   const store::Submission submission = app.services.jobs.submit(spec);
   if (submission.kind == store::Submission::Kind::kBusy && app.draining) {
     throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-  }
-  if (submission.retry_after.count() > 0) {
-    response.set_header("Retry-After", std::to_string(submission.retry_after.count()));
   }
   return store::job_of(submission);
 }

@@ -11,6 +11,7 @@
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/http/app/app.h"
+#include "server/http/limits.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/responses/list_page.h"
 #include "server/http/responses/sources.h"
@@ -71,7 +72,7 @@ bool is_known(const Request& request, Response& response, const std::string& eta
 // Answers 200, or 304 if the client has the content already. Throws Error kPreconditionFailed.
 void answer_tagged_json(const Request& request, Response& response, const std::string& json);
 // The allowed numbers of entries in one response, and the default.
-inline constexpr WholeNumbers kListLengths = {1, 1000};
+inline constexpr WholeNumbers kListLengths = {1, limits::kMostListed};
 inline constexpr std::uint64_t kUsualListLength = 100;
 
 // Throws Error kUnavailable if all places are taken or the service stops, and kTooManyRequests if
@@ -86,8 +87,8 @@ std::string json_body(App& app, const Request& request);
 // Error kNotFound without the volume.
 JobParameters complete_parameters(const App& app, const Request& request, JobParameters parameters);
 
-// Submits a job. Throws as store::job_of does, with a Retry-After in `response`.
-Job submitted(App& app, const store::JobSpec& spec, Response& response);
+// Submits a job. Throws as store::job_of does.
+Job submitted(App& app, const store::JobSpec& spec);
 
 using JobResponder = std::function<void(const Request&, Response&, const Job&)>;
 

@@ -18,17 +18,13 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/import/limits.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {
 
 constexpr std::size_t kTarBlock = 512;
-
-// Deflate compresses at most a thousandfold, and empty volumes come close to that. So archives that
-// unpack to less than a gigabyte are never rejected as bombs.
-constexpr std::uint64_t kMostUnpackedPerByte = 200;
-constexpr std::uint64_t kNeverABomb = std::uint64_t{1} << 30;
 
 [[noreturn]] void throw_archive_error(archive* source) {
   const char* reason = ::archive_error_string(source);
@@ -282,7 +278,8 @@ class Unpacker {
       throw_unusable("The archive is truncated: its members have more bytes than it has.");
     }
     if (total_ + further > most_unpacked_bytes(file_.size())) {
-      throw_unusable("The archive unpacks to more than " + std::to_string(kMostUnpackedPerByte) +
+      throw_unusable("The archive unpacks to more than " +
+                     std::to_string(limits::kMostUnpackedPerByte) +
                      " times its size. Only decompression bombs do that.");
     }
   }
@@ -317,7 +314,7 @@ bool is_tar(std::string_view head) {
 }
 
 std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes) {
-  return std::max(kNeverABomb, archive_bytes * kMostUnpackedPerByte);
+  return std::max(limits::kNeverABomb, archive_bytes * limits::kMostUnpackedPerByte);
 }
 
 std::string_view folder_of(std::string_view name) {

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "base/files.h"
+#include "server/import/limits.h"
 
 namespace isomesh::import {
 
-// The longest header of lines that name a field and its value.
-inline constexpr std::uint64_t kMostTextHeaderBytes = std::uint64_t{1} << 20;
-inline constexpr std::uint64_t kMostTextHeaderLines = 100'000;
+using limits::kMostTextHeaderBytes;
+using limits::kMostTextHeaderLines;
 
 struct LineLimits {
   std::string_view header;  // its name at the beginning of a sentence: "The NRRD header"

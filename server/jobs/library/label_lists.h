@@ -11,6 +11,7 @@
 
 #include "proto/types.h"
 #include "server/jobs/library/cache.h"
+#include "server/jobs/limits.h"
 #include "server/mesh/labels/labels.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -21,14 +22,10 @@ namespace isomesh::jobs {
 LabelValues values_of(const Volume& volume);
 
 // Lists the labels in stored volumes. The first list of a volume reads all samples. The results of
-// the last kVolumes volumes are cached for each viewer, for the reason given at Histograms. Thread
+// the last volumes are cached for each viewer, for the reason given at Histograms. Thread
 // safe; `blobs` must outlive it.
 class LabelLists {
  public:
-  static constexpr std::size_t kVolumes = 16;  // at most 3 MB each
-  static constexpr std::size_t kLists = 4;     // at most about 10 MB each
-  static constexpr std::size_t kMostWaiting = 12;
-
   explicit LabelLists(const store::BlobStore& blobs) : blobs_(blobs) {}
 
   // Samples of the value `background` belong to no label. Labels without voxels are omitted. Throws
@@ -50,11 +47,12 @@ class LabelLists {
   using Counts = std::vector<mesh::LabelVoxels>;
 
   const store::BlobStore& blobs_;
-  Cache<std::pair<store::Viewer, std::string>, Counts> counts_{kVolumes, kMostWaiting};
+  Cache<std::pair<store::Viewer, std::string>, Counts> counts_{limits::kLabelCounts,
+                                                               limits::kMostWaitingForAnswers};
   // The key has the record's creation time, because the same samples may be uploaded again with
   // other names.
   Cache<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
-      kLists, kMostWaiting};
+      limits::kLabelLists, limits::kMostWaitingForAnswers};
 };
 
 }  // namespace isomesh::jobs

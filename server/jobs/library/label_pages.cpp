@@ -6,6 +6,7 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/jobs/limits.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -13,8 +14,6 @@ namespace {
 constexpr std::size_t kPerPage = MeshSummary::kMostListedLabels;
 constexpr std::size_t kNumberBytes = 8;
 constexpr std::size_t kEntryBytes = 2 * kNumberBytes;
-// Far more than a page with long names and files in every format needs.
-constexpr std::uint64_t kMostPageBytes = std::uint64_t{64} << 20;
 
 [[noreturn]] void throw_damaged() {
   throw Error(ErrorCode::kInternal, "the stored list of a job's labels is damaged");
@@ -105,7 +104,7 @@ void JobLabels::read_index(const LabelListFile& file) {
 std::vector<LabelSummary> JobLabels::page(std::size_t n) const {
   const std::uint64_t begin = pages_[n].offset;
   const std::uint64_t end = n + 1 < pages_.size() ? pages_[n + 1].offset : end_of_pages_;
-  if (end - begin > kMostPageBytes) throw_damaged();
+  if (end - begin > limits::kMostLabelPageBytes) throw_damaged();
   std::string text(end - begin, '\0');
   read(*file_, begin, std::as_writable_bytes(std::span(text)));
   std::vector<LabelSummary> labels = labels_in(text);

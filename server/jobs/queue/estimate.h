@@ -12,6 +12,7 @@
 #include "proto/stages.h"
 #include "proto/types.h"
 #include "server/jobs/library/cache.h"
+#include "server/jobs/limits.h"
 #include "server/jobs/making/stage_times.h"
 #include "server/jobs/queue/pipeline.h"
 #include "server/store/blob_store.h"
@@ -85,9 +86,6 @@ class Estimator {
   // closed.
   using Surface = std::tuple<store::Viewer, std::string, double, std::string, Scheme, bool>;
 
-  static constexpr std::size_t kSurfaces = 1024;
-  static constexpr std::size_t kMostWaiting = 12;
-
   CountedSurface count(const store::Viewer& viewer, const Volume& volume,
                        const MeshParameters& parameters, double iso);
   CostModel model(const store::Viewer& viewer) const;
@@ -99,7 +97,7 @@ class Estimator {
   std::stop_source stop_;
   Mutex process_mutex_;
   JobProcess process_ ISOMESH_GUARDED_BY(process_mutex_);  // counts one surface at a time
-  Cache<Surface, CountedSurface> counts_{kSurfaces, kMostWaiting};
+  Cache<Surface, CountedSurface> counts_{limits::kSurfaceCounts, limits::kMostWaitingForAnswers};
 };
 
 }  // namespace isomesh::jobs

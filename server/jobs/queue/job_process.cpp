@@ -10,24 +10,15 @@
 #include "base/files.h"
 #include "base/log.h"
 #include "proto/error.h"
+#include "server/jobs/limits.h"
 
 namespace isomesh::jobs {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
 
-// Wait this long for a process to exit after it closed its socket.
-constexpr milliseconds kGone{2000};
-// Kill a process that does not stop within this time. Kernels check for cancellation once per slab,
-// but libdraco encodes a whole stream without checking.
-constexpr milliseconds kPatience{300};
 // Longer than most lines, and large enough for efficient reading of files.
 constexpr std::size_t kReceivedBytes = std::size_t{256} << 10;
-// The triangles of 65 535 labels take about 3 MB.
-constexpr std::size_t kLongestLine = std::size_t{16} << 20;
-// A process may die while idle; several in a row are a defect.
-constexpr int kMostEarlyEnds = 3;
 
 }  // namespace
 
@@ -62,7 +53,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
     begin_ = end_ = 0;
   }
   const InputFile file(order.file);
-  for (int tries = 0; tries < kMostEarlyEnds; ++tries) {
+  for (int tries = 0; tries < limits::kMostIdleDeaths; ++tries) {
     start();
     Talk talk = {order, sinks, stop, report};
     try {
@@ -159,7 +150,7 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
       return line;
     }
     const std::size_t known = end_ - begin_;
-    if (known >= kLongestLine) {
+    if (known >= limits::kLongestJobMessage) {
       throw Error(ErrorCode::kInternal, "A job process sent too much text.");
     }
     if (known == received_.size()) received_.resize(2 * received_.size());
@@ -193,14 +184,14 @@ void JobProcess::look_at_stop(Talk& talk) {
     child_->send(kCancelMessage);
     talk.asked = Clock::now();
   }
-  if (Clock::now() - *talk.asked < kPatience) return;
+  if (Clock::now() - *talk.asked < limits::kStop) return;
   child_.reset();
   if (talk.failure) std::rethrow_exception(talk.failure);
   throw Error(ErrorCode::kCancelled, "cancelled");
 }
 
 void JobProcess::throw_ended(const Talk& talk) {
-  const std::string how = process::how_it_ended(child_->ended_within(kGone));
+  const std::string how = process::how_it_ended(child_->ended_within(limits::kExit));
   child_.reset();
   const std::string stage(to_string(talk.stage.value_or(Stage::kLoad)));
   if (talk.failure) std::rethrow_exception(talk.failure);

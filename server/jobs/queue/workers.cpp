@@ -10,25 +10,13 @@
 
 #include "base/ids.h"
 #include "base/log.h"
+#include "server/jobs/limits.h"
 
 namespace isomesh::jobs {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
-
-// Interval at which a running job reports its progress and checks whether it should stop.
-constexpr milliseconds kBetweenRenewals{100};
-constexpr milliseconds kBetweenReaps{1000};
-constexpr milliseconds kLongestIdle{1000};
-// Initial and maximum delay before a job that found the disk full runs again. The delay doubles
-// each time.
-constexpr milliseconds kFullDiskDelay{5000};
-constexpr milliseconds kLongestFullDiskDelay{60'000};
-// Delay before a job that lacked descriptors or memory runs again.
-constexpr milliseconds kExhaustedDelay{5000};
-// Interval between attempts to record a job's end.
-constexpr milliseconds kEndRetry{500};
 
 // Why a run was asked to stop.
 enum class Reason { kNone, kCancelled, kLost, kTooLong, kEnding };
@@ -143,16 +131,16 @@ void Workers::work(const std::stop_token& stop, const std::string& name) {
   while (!stop.stop_requested()) {
     try {
       if (!blobs_.has_room() || (may_have_work && !responds(blobs_))) {
-        pause(stop, kLongestIdle);
+        pause(stop, limits::kLongestIdle);
       } else if (const auto lease = jobs_.claim(name, options_.lease)) {
         may_have_work = true;
         run(*lease, process);
       } else {
-        may_have_work = jobs_.wait_for_work(stop, kLongestIdle);
+        may_have_work = jobs_.wait_for_work(stop, limits::kLongestIdle);
       }
     } catch (const std::exception& error) {
       log_error("the queue cannot be read and is retried: {}", error.what());
-      pause(stop, kLongestIdle);
+      pause(stop, limits::kLongestIdle);
     }
   }
   const Lock lock(alive_mutex_);
@@ -237,7 +225,8 @@ void Workers::conclude(const Run& run, Fault fault, store::Outcome outcome) {
       log_warning("job {} waits {} s for disk space", lease.id, delay.count() / 1000);
       return jobs_.put_back(lease, delay, WaitingFor::kDisk);
     }
-    if (!was_stopped && fault == Fault::kOther) return jobs_.put_back(lease, kExhaustedDelay);
+    if (!was_stopped && fault == Fault::kOther)
+      return jobs_.put_back(lease, limits::kExhaustedDelay);
     return jobs_.finish(lease, outcome);
   };
   while (true) {
@@ -251,16 +240,16 @@ void Workers::conclude(const Run& run, Fault fault, store::Outcome outcome) {
       log_error("the end of job {} could not be recorded and is retried: {}", lease.id,
                 error.what());
     }
-    pause(running_.get_token(), kEndRetry);
+    pause(running_.get_token(), limits::kEndRetry);
   }
 }
 
 // Kept in memory only: after a restart the job is retried soon.
 milliseconds Workers::full_disk_delay(const std::string& job) {
   const Lock lock(runs_mutex_);
-  milliseconds& next = full_disk_delays_.try_emplace(job, kFullDiskDelay).first->second;
+  milliseconds& next = full_disk_delays_.try_emplace(job, limits::kFullDiskDelay).first->second;
   const milliseconds delay = next;
-  next = std::min(2 * next, kLongestFullDiskDelay);
+  next = std::min(2 * next, limits::kLongestFullDiskDelay);
   return delay;
 }
 
@@ -284,11 +273,11 @@ void Workers::look_after_leases(const std::stop_token& stop) {
       if (run->age() > options_.longest_job) run->stop(Reason::kTooLong);
       renew(*run);
     }
-    if (Clock::now() - last_reap > kBetweenReaps) {
+    if (Clock::now() - last_reap > limits::kBetweenReaps) {
       last_reap = Clock::now();
       reap();
     }
-    pause(stop, kBetweenRenewals);
+    pause(stop, limits::kBetweenRenewals);
   }
 }
 

@@ -121,21 +121,21 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec) {
   const std::string outcome = row.text(0);
   if (outcome == "new") {
     wake_workers();
-    return Submission{Submission::Kind::kNew, job, {}};
+    return Submission{Submission::Kind::kNew, job};
   }
   if (outcome == "known") {
-    return Submission{Submission::Kind::kExisting, get(spec.owner, row.text(1)), {}};
+    return Submission{Submission::Kind::kExisting, get(spec.owner, row.text(1))};
   }
-  if (outcome == "conflict") return Submission{Submission::Kind::kConflict, {}, {}};
+  if (outcome == "conflict") return Submission{Submission::Kind::kConflict, {}};
   if (outcome == "no volume") {
     database_.read([&](SqlConnection& connection) { throw_no_volume_of(connection, spec); });
   }
-  if (outcome == "no share") return Submission{Submission::Kind::kOwnersShare, {}, kRetryAfter};
+  if (outcome == "no share") return Submission{Submission::Kind::kOwnersShare, {}};
   if (outcome == "look again") return std::nullopt;
   if (!has_room) {
     throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
   }
-  return Submission{Submission::Kind::kBusy, {}, kRetryAfter};
+  return Submission{Submission::Kind::kBusy, {}};
 }
 
 std::optional<Lease> PostgresJobStore::claim(const std::string& worker,

@@ -70,12 +70,12 @@ std::optional<Submission> SqliteJobStore::known(Connection& connection, const Jo
         spec.idempotency_key);
     if (!earlier.next()) return std::nullopt;
     if (earlier.text(1) != spec.request_digest) {
-      return Submission{Submission::Kind::kConflict, {}, {}};
+      return Submission{Submission::Kind::kConflict, {}};
     }
     id = earlier.text(0);
   }
-  return Submission{
-      Submission::Kind::kExisting, with_progress(found(connection, std::nullopt, id)), {}};
+  return Submission{Submission::Kind::kExisting,
+                    with_progress(found(connection, std::nullopt, id))};
 }
 
 std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
@@ -100,10 +100,10 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
     if (latest != (made ? made->job : "")) return std::nullopt;
     const auto mesh = made ? made->mesh : std::nullopt;
     if (refusing_ || (!mesh && is_full(change.connection()))) {
-      return Submission{Submission::Kind::kBusy, {}, kRetryAfter};
+      return Submission{Submission::Kind::kBusy, {}};
     }
     if (!mesh && !has_share(change.connection(), spec)) {
-      return Submission{Submission::Kind::kOwnersShare, {}, kRetryAfter};
+      return Submission{Submission::Kind::kOwnersShare, {}};
     }
     if (!mesh && !blobs_.has_room()) {
       throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
@@ -125,7 +125,7 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
     change.commit();
   }
   if (!is_final(row.job.state)) wake_a_worker();
-  return Submission{Submission::Kind::kNew, row.job, {}};
+  return Submission{Submission::Kind::kNew, row.job};
 }
 
 std::string SqliteJobStore::latest_like(Connection& connection, const Row& row) {

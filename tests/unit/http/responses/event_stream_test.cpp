@@ -142,7 +142,7 @@ TEST_F(EventStreamTest, ToAllJobsTellsOfEachThatItsViewerSees) {
 
 TEST_F(EventStreamTest, ToAllJobsEndsForWhoDoesNotRead) {
   const auto stream = event_source(broadcaster_.listen_to_all(std::nullopt), places_.take(""));
-  for (std::uint64_t id = 1; id <= Broadcaster::Mailbox::kMostUnread + 1; ++id) {
+  for (std::uint64_t id = 1; id <= limits::kMostUnreadEvents + 1; ++id) {
     broadcaster_.publish(event(id, EventKind::kStage, std::to_string(id)));
   }
   std::string bytes;
