@@ -31,7 +31,7 @@ Event event_of(const Rows& row, const std::string& node) {
           .job = row.text(3),
           .kind = row.choice(4, EventKind::kDone),
           .state = row.choice(5, JobState::kCancelled),
-          .stage = row.choice(6, Stage::kDone),
+          .stage = row.stage(6),
           .progress = row.real(7),
           .is_elsewhere = row.text(8) != node};
 }
@@ -101,7 +101,7 @@ void EventFeed::look_at_runs() {
       run = before->second;
     }
     if (!rows.is_null(3)) {
-      const auto stage = rows.choice(3, Stage::kDone);
+      const auto stage = rows.stage(3);
       const double share = rows.real(4);
       const bool is_other_stage = stage != run.stage;
       if (is_other_stage || share != run.share) {

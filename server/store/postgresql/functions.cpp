@@ -13,7 +13,7 @@ CREATE OR REPLACE FUNCTION alike_lock(p_owner text, p_key text) RETURNS bigint L
   $$ SELECT hashtextextended(p_owner || chr(10) || p_key, 18) $$;
 
 -- Ends a job. The caller has locked or inserted its row. p_blobs: the blobs of its mesh, objects of `blob` and `bytes`.
-CREATE OR REPLACE FUNCTION end_job(p_job text, p_state int, p_record text, p_stage int, p_ended_by bigint, p_node uuid,
+CREATE OR REPLACE FUNCTION end_job(p_job text, p_state int, p_record text, p_stage text, p_ended_by bigint, p_node uuid,
                                    p_blobs jsonb) RETURNS void LANGUAGE plpgsql AS $$
 DECLARE j record; now_us bigint := isomesh_now();
 BEGIN
@@ -149,7 +149,7 @@ END $$;
 
 -- Renews a lease. Returns null if it is lost, otherwise whether the run should stop. A lease that expired during an outage
 -- of the database is renewed too: while its row exists, nobody else has the job.
-CREATE OR REPLACE FUNCTION renew_run(p_job text, p_fence bigint, p_lease bigint, p_stage int, p_progress float8,
+CREATE OR REPLACE FUNCTION renew_run(p_job text, p_fence bigint, p_lease bigint, p_stage text, p_progress float8,
                                      p_timings text) RETURNS boolean LANGUAGE plpgsql AS $$
 DECLARE stops boolean; now_us bigint := isomesh_now();
 BEGIN

@@ -245,8 +245,8 @@ Standing PostgresJobStore::renew(const Lease& lease, const Progress& progress,
     is_fresh = is_same_stage && run->lease_until > asked + length - slack;
   }
   if (!is_fresh) {
-    Rows row = database_.query("SELECT renew_run(?1, ?2, ?3, ?4::int, ?5, ?6)", lease.id,
-                               lease.fence, microseconds(length), progress.stage, progress.share,
+    Rows row = database_.query("SELECT renew_run(?1, ?2, ?3, ?4, ?5, ?6)", lease.id, lease.fence,
+                               microseconds(length), progress.stage, progress.share,
                                to_json(progress.timing));
     row.next();
     if (row.is_null(0)) {

@@ -94,7 +94,7 @@ PostgresJobStore::Row PostgresJobStore::row_of(const Rows& rows) const {
   if (row.job.state != JobState::kRunning || rows.is_null(8)) return row;
   start_run(row.job, row.accepted, rows.integer(8));
   if (!rows.is_null(9)) {
-    row.job.stage = rows.choice(9, Stage::kDone);
+    row.job.stage = rows.stage(9);
     row.job.progress = rows.real(10);
     give_timing(row.job, readable_timing(rows.text(11)));
   }

@@ -102,7 +102,7 @@ CREATE TABLE runs(                     -- a row is a lease: its holder's until s
   claimed bigint NOT NULL,
   lease_until bigint NOT NULL,
   cancelling boolean NOT NULL DEFAULT false,
-  stage int,                           -- these three as of the last renewal
+  stage text,                          -- these three as of the last renewal
   progress float8,
   timings text,                        -- of the stages that have ended, as JSON
   CONSTRAINT runs_one_of_those_alike UNIQUE(owner, result_key)
@@ -124,7 +124,7 @@ CREATE TABLE events(                   -- ordered by transaction and place in it
   job text COLLATE "C" NOT NULL,
   kind int NOT NULL,
   state int NOT NULL,
-  stage int NOT NULL,
+  stage text NOT NULL,
   progress float8 NOT NULL,
   at bigint NOT NULL DEFAULT isomesh_now(),
   PRIMARY KEY(tx, place)

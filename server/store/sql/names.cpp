@@ -14,9 +14,11 @@ namespace {
 struct Name {
   template <class T>
   constexpr Name(std::string_view text, T value) : name(text), number(static_cast<int>(value)) {}
+  constexpr Name(std::string_view text, Stage value) : name(text), stage(row_of(value).name) {}
 
   std::string_view name;
-  int number;
+  int number = 0;
+  std::string_view stage = {};  // tables contain the names of stages, so a new one fits in anywhere
 };
 
 constexpr std::array kNames = {
@@ -42,13 +44,15 @@ static_assert(static_cast<int>(JobState::kCancelled) == 4);
 static_assert(static_cast<int>(OrderState::kSucceeded) == 4);
 static_assert(static_cast<int>(OrderState::kCancelled) == 6);
 static_assert(static_cast<int>(EventKind::kDone) == 2);
-static_assert(static_cast<int>(Stage::kDone) == 7);
 static_assert(static_cast<int>(Priority::kBulk) == 2);
 
-int number_of(std::string_view name) {
+std::string value_of(std::string_view name) {
   const auto* const found = std::ranges::find(kNames, name, &Name::name);
-  if (found != kNames.end()) return found->number;
-  throw Error(ErrorCode::kInternal, "SQL has no name " + std::string(name));
+  if (found == kNames.end()) {
+    throw Error(ErrorCode::kInternal, "SQL has no name " + std::string(name));
+  }
+  if (found->stage.empty()) return std::to_string(found->number);
+  return '\'' + std::string(found->stage) + '\'';
 }
 
 }  // namespace
@@ -66,7 +70,7 @@ std::string with_numbers(std::string_view sql) {
     if (sql.starts_with(kEmptyObject)) {
       text += kEmptyObject;
     } else {
-      text += std::to_string(number_of(sql.substr(1, end - 1)));
+      text += value_of(sql.substr(1, end - 1));
     }
     sql.remove_prefix(end + 1);
   }

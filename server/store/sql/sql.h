@@ -19,6 +19,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "proto/types.h"
 #include "server/store/expiry.h"
 
 namespace isomesh::store {
@@ -35,6 +36,7 @@ struct Parameter {
   template <class T>
   requires std::is_integral_v<T> || std::is_enum_v<T>
   explicit Parameter(T value) : integer(static_cast<std::int64_t>(value)) {}
+  explicit Parameter(Stage value) : Parameter(to_string(value)) {}
   explicit Parameter(double value) : type(Type::kReal), real(value) {}
   explicit Parameter(std::string_view value, Type as = Type::kText) : type(as), text(value) {}
   explicit Parameter(const std::string& value) : Parameter(std::string_view(value)) {}
@@ -89,6 +91,11 @@ class Rows {
     const std::int64_t number = integer(column);
     const bool is_known = number >= 0 && number < static_cast<std::int64_t>(last);
     return is_known ? static_cast<Enum>(number) : last;
+  }
+
+  // By its name; a damaged one is taken for the last.
+  Stage stage(int column) const {
+    return from_string<Stage>(source_->text(column)).value_or(Stage::kDone);
   }
 
  private:

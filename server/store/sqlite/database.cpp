@@ -80,7 +80,7 @@ CREATE TABLE events(
   job TEXT NOT NULL,
   kind INTEGER NOT NULL,
   state INTEGER NOT NULL,
-  stage INTEGER NOT NULL,
+  stage TEXT NOT NULL,
   progress REAL NOT NULL
 );
 CREATE INDEX events_by_job ON events(job, id);

@@ -74,7 +74,7 @@ std::vector<Event> EventLog::kept(const Viewer& viewer, const std::string& job, 
                       .job = row.text(2),
                       .kind = row.choice(3, EventKind::kDone),
                       .state = row.choice(4, JobState::kCancelled),
-                      .stage = row.choice(5, Stage::kDone),
+                      .stage = row.stage(5),
                       .progress = row.real(6)});
   }
   return events;
