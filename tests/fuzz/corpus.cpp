@@ -124,21 +124,21 @@ std::vector<std::string> numpy_files() {
 }
 
 std::vector<std::string> tiff_files() {
-  return {
-      tiff({kSamples.substr(0, 12), kSamples.substr(12)}),
-      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
-           "ImageJ=1\nimages=2\nslices=2\nunit=mm\nspacing=2\n"),
-      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
-           "<OME><Pixels DimensionOrder='XYZCT' SizeZ='2' PhysicalSizeX='1'/></OME>"),
-      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
+  const std::vector<std::string> pages = {kSamples.substr(0, 12), kSamples.substr(12)};
+  std::vector<std::string> files = {
+      tiff(pages), tiff({kSamples}, "ImageJ=1\nimages=2\nslices=2\n"),
+      tiff(pages,
            "<OME UUID='u'><Pixels DimensionOrder='XYZCT' SizeZ='2' SizeC='2'><TiffData IFD='1'/>"
            "<TiffData FirstZ='1' PlaneCount='1'><UUID>u</UUID></TiffData></Pixels></OME>",
-           3),
-      tiff({kSamples}, "ImageJ=1\nimages=2\nslices=2\n"),
-      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
-           R"({"shape": [2, 1, 3, 4], "axes": "ZCYX"})"),
-      tiff({kSamples.substr(0, 12), kSamples.substr(12)},
-           "SCIFIO=0.41.0\naxes=X,Y,Z\nlengths=4,3,2\nscales=1,1,1\nunits=mm,mm,mm\n")};
+           3)};
+  for (const char* const description :
+       {"ImageJ=1\nimages=2\nslices=2\nunit=mm\nspacing=2\n",
+        "<OME><Pixels DimensionOrder='XYZCT' SizeZ='2' PhysicalSizeX='1'/></OME>",
+        R"({"shape": [2, 1, 3, 4], "axes": "ZCYX"})",
+        "SCIFIO=0.41.0\naxes=X,Y,Z\nlengths=4,3,2\nscales=1,1,1\nunits=mm,mm,mm\n"}) {
+    files.push_back(tiff(pages, description));
+  }
+  return files;
 }
 
 std::vector<std::string> afni_files() {
@@ -183,58 +183,6 @@ std::vector<std::string> raw_files() {
   return {file + bytes_of(geometry) + kSamples};
 }
 
-// An element of Explicit VR Little Endian.
-std::string element(unsigned group, unsigned number, const std::string& vr, std::string value) {
-  if (value.size() % 2 != 0) value += vr == "UI" ? '\0' : ' ';
-  const auto little = [](unsigned n) {
-    return bytes_of(std::vector{static_cast<std::uint16_t>(n)});
-  };
-  const bool is_long = vr == "OW" || vr == "OB" || vr == "SQ";
-  const std::string length =
-      is_long
-          ? std::string(2, '\0') + bytes_of(std::vector{static_cast<std::uint32_t>(value.size())})
-          : little(static_cast<unsigned>(value.size()));
-  return little(group) + little(number) + vr + length + value;
-}
-
-std::string dicom_meta(const std::string& syntax) {
-  const std::string meta = element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-                           element(2, 3, "UI", "1.2.3.4") + element(2, 0x10, "UI", syntax);
-  return element(2, 0, "UL", bytes_of(std::vector{static_cast<std::uint32_t>(meta.size())})) + meta;
-}
-
-std::string dicom_data() {
-  const auto number = [](std::uint16_t n) { return bytes_of(std::vector{n}); };
-  return element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + element(8, 0x18, "UI", "1.2.3.4") +
-         element(8, 0x60, "CS", "CT") + element(0x10, 0x10, "PN", "A^B") +
-         element(0x20, 0xd, "UI", "1.2") + element(0x20, 0xe, "UI", "1.3") +
-         element(0x20, 0x32, "DS", "0\\0\\0") + element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
-         element(0x28, 2, "US", number(1)) + element(0x28, 4, "CS", "MONOCHROME2") +
-         element(0x28, 0x10, "US", number(3)) + element(0x28, 0x11, "US", number(4)) +
-         element(0x28, 0x30, "DS", "1\\1") + element(0x28, 0x100, "US", number(16)) +
-         element(0x28, 0x101, "US", number(16)) + element(0x28, 0x102, "US", number(15)) +
-         element(0x28, 0x103, "US", number(1)) + element(0x28, 0x1052, "DS", "-1024") +
-         element(0x28, 0x1053, "DS", "1") + element(0x7fe0, 0x10, "OW", kSamples);
-}
-
-std::string dicom_file(const std::string& syntax) {
-  return std::string(128, '\0') + "DICM" + dicom_meta(syntax) + dicom_data();
-}
-
-std::vector<std::string> dicom_files() {
-  std::vector<std::string> files = dicom_objects();
-  const std::vector<std::string> slices = {dicom_file("1.2.840.10008.1.2.1"),
-                                           dicom_meta("1.2.840.10008.1.2.1") + dicom_data(),
-                                           dicom_data(),
-                                           gzip(dicom_file("1.2.840.10008.1.2.1")),
-                                           dicom_file("1.2.840.10008.1.2.5"),
-                                           dicom_file("1.2.840.10008.1.2.4.70"),
-                                           dicom_file("1.2.840.10008.1.2.4.80"),
-                                           dicom_file("1.2.840.10008.1.2.4.90")};
-  files.insert(files.end(), slices.begin(), slices.end());
-  return files;
-}
-
 std::vector<std::string> canonical_files() { return {import_bytes(nifti({}, kSamples)).canonical}; }
 
 std::vector<std::string> report_texts() {
@@ -263,7 +211,7 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "metaimage") return metaimage_files();
   if (name == "vti") return vti_files();
   if (auto files = other_files(name); !files.empty()) return files;
-  if (name == "dicom") return dicom_files();
+  if (name == "dicom") return dicom_objects();
   if (name == "structures") return structure_sets();
   if (name == "ascconv") return siemens_protocols();
   if (name == "csa") return csa_headers();

@@ -4,10 +4,13 @@
 #include "tests/unit/import/dicom/mosaics.h"
 #include "tests/unit/import/dicom/segments.h"
 #include "tests/unit/import/dicom/structures.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::fuzz {
 
 using namespace import::test;
+
+constexpr std::size_t kPreambleBytes = 132;  // with "DICM"
 
 std::vector<std::string> dicom_objects() {
   std::vector<std::string> files;
@@ -28,6 +31,16 @@ std::vector<std::string> dicom_objects() {
     for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
       files.push_back(object.file(syntax));
     }
+  }
+  DicomObject slice = DicomSeries{}.slice(0);
+  slice.text(import::dicom::kRescaleIntercept, "DS", "-1024")
+      .text(import::dicom::kRescaleSlope, "DS", "1");
+  // Without their beginnings, and with samples that are not what the syntax says.
+  files.insert(files.end(), {slice.file(), slice.file().substr(kPreambleBytes), slice.bare(),
+                             gzip(slice.file())});
+  for (const std::string_view syntax : {"1.2.840.10008.1.2.5", "1.2.840.10008.1.2.4.70",
+                                        "1.2.840.10008.1.2.4.80", "1.2.840.10008.1.2.4.90"}) {
+    files.push_back(slice.file(syntax));
   }
   return files;
 }

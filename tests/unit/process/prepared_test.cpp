@@ -23,6 +23,7 @@
 #include "base/niceness.h"
 #include "proto/error.h"
 #include "server/process/fork_server.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
 
@@ -168,12 +169,7 @@ TEST(PreparedProcesses, AProgramThatEndsThreeTimesBeforeItAnswersIsStartedAFourt
 TEST(PreparedProcesses, NoneIsGivenOnceStopped) {
   PreparedProcesses prepared(COPIED_PROGRAM, 1);
   prepared.stop();
-  try {
-    prepared.take(soon());
-    FAIL() << "nothing was thrown";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kUnavailable);
-  }
+  EXPECT_EQ(test::code_thrown_by([&] { prepared.take(soon()); }), ErrorCode::kUnavailable);
   EXPECT_TRUE(eventually([] { return children_of(::getpid()).empty(); }));
 }
 
@@ -184,12 +180,11 @@ TEST(PreparedProcesses, WaitingForOneCanBeCancelled) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));  // likely after the wait has begun
     stop.request_stop();
   });
-  try {
-    prepared.take(std::chrono::steady_clock::now() + std::chrono::hours(1), stop.get_token());
-    FAIL() << "nothing was thrown";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
-  }
+  EXPECT_EQ(test::code_thrown_by([&] {
+              prepared.take(std::chrono::steady_clock::now() + std::chrono::hours(1),
+                            stop.get_token());
+            }),
+            ErrorCode::kCancelled);
 }
 
 TEST(PreparedProcesses, GoWithTheirOwner) {

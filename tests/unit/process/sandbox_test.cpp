@@ -46,11 +46,16 @@ class Sandbox : public testing::Test {
   bool confined(const std::function<bool()>& holds) const { return confined(confinement(), holds); }
 
   static bool confined(const Confinement& confinement, const std::function<bool()>& holds) {
-    const int status = status_of([&] {
+    return ends_well([&] {
       confine_ahead();
       confine_to(confinement);
       return holds();
     });
+  }
+
+  // True if `holds` returns true in a process of its own.
+  static bool ends_well(const std::function<bool()>& holds) {
+    const int status = status_of(holds);
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
   }
 
@@ -100,19 +105,17 @@ TEST_F(Sandbox, TakesTheWayBack) {
 }
 
 TEST_F(Sandbox, TakesSocketsAndProcessesAhead) {
-  const int status = status_of([] {
+  EXPECT_TRUE(ends_well([] {
     confine_ahead();
     return fails(::socket(AF_UNIX, SOCK_STREAM, 0), EPERM) && fails(::fork(), EPERM) &&
            fails(::kill(::getppid(), 0), EPERM) && fails(::prctl(PR_SET_DUMPABLE, 1), EPERM) &&
            fails(::execl("/bin/true", "true", nullptr), EPERM);
-  });
-  EXPECT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  }));
 }
 
 TEST_F(Sandbox, LeavesATalkToTheSocketsThatAreThere) {
   const SocketPair sockets = make_socket_pair();
-  const int status = status_of([&] {
+  EXPECT_TRUE(ends_well([&] {
     confine_ahead_to_talk();
     confine_to(confinement());
     const int on = 1;
@@ -124,8 +127,7 @@ TEST_F(Sandbox, LeavesATalkToTheSocketsThatAreThere) {
            fails(::connect(sockets.ours.number(), nullptr, 0), EPERM) &&
            fails(::accept(sockets.ours.number(), nullptr, nullptr), EPERM) &&
            fails(::fork(), EPERM);
-  });
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  }));
 }
 
 TEST_F(Sandbox, CannotBeConfinedTwice) {
@@ -207,11 +209,10 @@ TEST_F(Sandbox, SaysWhenAFolderCannotBeAllowed) {
 class JobSandbox : public Sandbox {
  protected:
   bool confined(const std::function<bool()>& holds) const {
-    const int status = status_of([&] {
+    return ends_well([&] {
       confine_job();
       return holds();
     });
-    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
   }
 };
 
@@ -288,7 +289,7 @@ TEST_F(JobSandbox, LimitsMemoryAgainAndAgain) {
     return true;
   };
   constexpr std::size_t kMebibyte = 1 << 20;
-  const int status = status_of([&] {
+  EXPECT_TRUE(ends_well([&] {
     const MemoryLimit limit(300 * kMebibyte);
     confine_job();
     limit.set(64 * kMebibyte);
@@ -299,20 +300,17 @@ TEST_F(JobSandbox, LimitsMemoryAgainAndAgain) {
     if (!can_have(280 * kMebibyte) || can_have(320 * kMebibyte)) return false;
     limit.set(64 * kMebibyte);
     return !can_have(80 * kMebibyte);
-  });
-  EXPECT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  }));
 }
 
 // Root may raise limits, unless it has no capabilities.
 TEST_F(JobSandbox, CannotRaiseTheMostMemory) {
-  const int status = status_of([&] {
+  EXPECT_TRUE(ends_well([&] {
     const MemoryLimit limit(std::uint64_t{64} << 20);
     confine_job();
     const rlimit more = {.rlim_cur = RLIM_INFINITY, .rlim_max = RLIM_INFINITY};
     return fails(::setrlimit(RLIMIT_DATA, &more), EPERM);
-  });
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  }));
 }
 
 #endif
