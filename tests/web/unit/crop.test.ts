@@ -36,7 +36,7 @@ describe('a crop', () => {
 describe('the edges of a crop in a slice', () => {
   it('are caught near them and moved, but not past each other', () => {
     let box: Box = [[2, 3, 4], [10, 20, 39]];
-    const crop = new SliceCrop({ box: () => box, setBox: (next) => (box = next) }, [0, 2]);
+    const { grip: crop } = new SliceCrop({ box: () => box, setBox: (next) => (box = next) }, [0, 2]);
     const at = (column: number, row: number, isTouch = false): Spot => ({ place: [column, row], pixels: [4, 4], isTouch });
     expect(crop.isAt(at(2.5, 20))).toBe(true);
     expect(crop.isAt(at(6, 20))).toBe(false);

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { blockSize, blocksOf, firstCrossing, inPreview, previewOf, valueAt } from '@/volume/preview';
+import { blockSize, blocksOf, firstCrossing, inPreview, previewOf } from '@/volume/preview';
 import type { Vec3 } from '@/api/types';
 
 function file(dims: Vec3, samples: ArrayLike<number>, extra = ''): ArrayBuffer {
@@ -49,13 +49,6 @@ describe('a preview', () => {
     const { blocks, blockDims } = blocksOf(samples, [20, 1, 1]);
     expect(blockDims).toEqual([3, 1, 1]);
     expect([...blocks]).toEqual([0, 9, 0, 9, 0, 4]);
-  });
-
-  it('has values between its samples', () => {
-    const preview = { dims: [2, 2, 1] as Vec3, samples: Uint8Array.from([0, 255, 0, 255]) };
-    expect(valueAt(preview, [0.25, 0.5, 0])).toBeCloseTo(0.25);
-    expect(valueAt(preview, [-3, 9, 5])).toBe(0);
-    expect(valueAt(preview, [7, 0, 0])).toBe(1);
   });
 
   it('says where a ray meets the surface', () => {

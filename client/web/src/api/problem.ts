@@ -109,33 +109,22 @@ export function asApiError(error: unknown, server = ''): ApiError {
   return new ApiError(-1, 'An unexpected error occurred', String(error));
 }
 
+const advice: readonly [statuses: number[], text: string][] = [
+  [[0], 'Try again when the server responds.'],
+  [[401, 403], 'Enter an access token that has this permission.'],
+  [[404, 410], 'It may have been erased. Choose another one from the list.'],
+  [[413], 'Crop or resample the volume, or ask the administrator to raise the limit.'],
+  [[415], 'Send the volume in a format that the server reads. Raw samples need a description.'],
+  [[422], 'Export the volume again from its source, or choose another one.'],
+  [[429, 503], 'The server is busy. Try again in a moment.'],
+  [[507], 'Erase volumes that you no longer need, then try again.'],
+];
+
 /** Says in one sentence what a person can do. Empty if the error's detail already does. */
 export function adviceFor(error: ApiError): string {
-  if (error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
-  switch (error.status) {
-    case 0:
-      return 'Try again when the server responds.';
-    case 401:
-    case 403:
-      return 'Enter an access token that has this permission.';
-    case 404:
-    case 410:
-      return 'It may have been erased. Choose another one from the list.';
-    case 413:
-      return 'Crop or resample the volume, or ask the administrator to raise the limit.';
-    case 415:
-      return 'Send the volume in a format that the server reads. Raw samples need a description.';
-    case 422:
-      if (/\. (Add|Choose|Give|Send|Upload) /.test(error.detail)) return '';
-      return 'Export the volume again from its source, or choose another one.';
-    case 429:
-    case 503:
-      return 'The server is busy. Try again in a moment.';
-    case 507:
-      return 'Erase volumes that you no longer need, then try again.';
-    default:
-      return '';
-  }
+  const isSaid = error.status === 422 && /\. (Add|Choose|Give|Send|Upload) /.test(error.detail);
+  if (isSaid || error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
+  return advice.find(([statuses]) => statuses.includes(error.status))?.[1] ?? '';
 }
 
 // Returns whether a client should repeat the request: the server cannot be reached, is busy or shuts down, or a proxy before

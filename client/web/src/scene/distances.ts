@@ -1,5 +1,6 @@
 // Distances of a surface's vertices as colour: how far they reach, and the shader that shows them.
-import { ClampToEdgeWrapping, DataTexture, LinearFilter, SRGBColorSpace, type MeshPhongMaterial } from 'three';
+import { ClampToEdgeWrapping, DataTexture, LinearFilter, SRGBColorSpace, Triangle, Vector3, type MeshPhongMaterial } from 'three';
+import type { Vec3 } from '../api/types';
 import { colourTable } from './colour_map';
 
 const bins = 4096;
@@ -34,22 +35,11 @@ export function reachOf(parts: readonly Float32Array[]): Reach | null {
 }
 
 // The value within a triangle at that point of its plane, of its corners' three.
-export function valueWithin(
-  values: ArrayLike<number>,
-  positions: ArrayLike<number>,
-  corners: readonly [number, number, number],
-  point: readonly [number, number, number],
-): number {
-  const [a, b, c] = corners.map((vertex) =>
-    [0, 1, 2].map((axis) => (positions[3 * vertex + axis] as number) - (point[axis as 0] ?? 0)),
-  ) as [number[], number[], number[]];
-  // Each corner weighs as the area across from it.
-  const area = ([px = 0, py = 0, pz = 0]: number[], [qx = 0, qy = 0, qz = 0]: number[]): number =>
-    Math.hypot(py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx);
-  const weights = [area(b, c), area(c, a), area(a, b)];
-  const sum = weights.reduce((all, weight) => all + weight, 0);
-  if (sum === 0) return values[corners[0]] as number;
-  return corners.reduce((value, vertex, i) => value + ((weights[i] ?? 0) / sum) * (values[vertex] as number), 0);
+export function valueWithin(values: ArrayLike<number>, positions: ArrayLike<number>, corners: readonly [number, number, number], point: Vec3): number {
+  const [a, b, c] = corners.map((vertex) => new Vector3().fromArray(positions, 3 * vertex)) as [Vector3, Vector3, Vector3];
+  // Null where the triangle is a line.
+  const weights = Triangle.getBarycoord(new Vector3(...point), a, b, c, new Vector3())?.toArray() ?? [1, 0, 0];
+  return corners.reduce((sum, vertex, i) => sum + (weights[i] ?? 0) * (values[vertex] as number), 0);
 }
 
 // What every material that shows distances shares; one change of the scale is seen in all.

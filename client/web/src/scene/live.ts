@@ -1,6 +1,6 @@
 // The surface that a volume has at an iso-value, drawn anew for each value and from any side: nothing is extracted.
 // Takes as many pixels as there is time for while something moves, and all of them when it rests.
-import { Matrix4, PerspectiveCamera, Vector2, Vector3 } from 'three';
+import { Box3, Matrix4, PerspectiveCamera, Vector2, Vector3 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import { firstCrossing, firstLabel, inPreview, type Preview } from '../volume/preview';
@@ -10,7 +10,7 @@ import { GpuPainter } from './live_gpu';
 import { placeOfSamples, type LivePainter, type LivePicture, type LiveScene } from './live_painter';
 import type { Look } from '../volume/looks';
 import { onTap } from './tap';
-import { firstOffset, fitted } from './views';
+import { firstOffset, fitted, turned } from './views';
 
 // How long a frame may take while something moves, and at rest, in milliseconds. A change in the middle of a frame is
 // drawn after it, so that half a frame's time comes on top.
@@ -162,28 +162,23 @@ export class LiveSurface {
 
   fit(offset: Vec3): void {
     if (!this.best) return;
-    const corners = this.corners(this.best);
-    const low = corners[0].clone().min(corners[1]);
-    const high = corners[0].clone().max(corners[1]);
+    const last = new Vector3(...this.best.dims).subScalar(1);
+    const { min, max } = new Box3(new Vector3(), last).applyMatrix4(placeOfSamples(this.best));
     const { clientWidth: width, clientHeight: height } = this.host;
     const angle = (verticalAngle * Math.PI) / 180;
-    const place = fitted([low.toArray(), high.toArray()], offset, angle, width / Math.max(1, height));
+    const place = fitted([min.toArray(), max.toArray()], offset, angle, width / Math.max(1, height));
     this.controls.target.set(...place.target);
-    this.camera.position.copy(this.controls.target).add(new Vector3(...place.offset));
-    this.controls.update();
-    this.moved();
+    this.stand(place.offset);
   }
 
   // Around the patient's axis and up, in radians; and nearer by a factor below 1.
   turn(azimuth: number, elevation: number, factor = 1): void {
     const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
-    const up = new Vector3(0, 0, 1);
-    offset.applyAxisAngle(up, azimuth);
-    const side = offset.clone().cross(up).normalize();
-    const limit = 0.02;
-    const wanted = Math.max(limit, Math.min(Math.PI - limit, offset.angleTo(up) - elevation));
-    offset.applyAxisAngle(side, offset.angleTo(up) - wanted);
-    this.camera.position.copy(this.controls.target).add(offset);
+    this.stand(turned(offset.toArray(), azimuth, elevation));
+  }
+
+  private stand(offset: Vec3): void {
+    this.camera.position.copy(this.controls.target).add(new Vector3(...offset));
     this.controls.update();
     this.moved();
   }
@@ -194,21 +189,6 @@ export class LiveSurface {
     this.resizing.disconnect();
     this.controls.dispose();
     this.painter.dispose();
-  }
-
-  // Two opposite corners of the box around the whole volume.
-  private corners(preview: Preview): [Vector3, Vector3] {
-    const [x, y, z] = preview.dims;
-    const matrix = placeOfSamples(preview);
-    const low = new Vector3(Infinity, Infinity, Infinity);
-    const high = low.clone().negate();
-    for (let corner = 0; corner < 8; corner += 1) {
-      const place = new Vector3(corner & 1 ? x - 1 : 0, corner & 2 ? y - 1 : 0, corner & 4 ? z - 1 : 0);
-      place.applyMatrix4(matrix);
-      low.min(place);
-      high.max(place);
-    }
-    return [low, high];
   }
 
   private moved(): void {

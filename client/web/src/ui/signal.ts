@@ -51,7 +51,8 @@ export class Scope {
     handler: (event: WindowEventMap[K]) => void,
     options: AddEventListenerOptions = {},
   ): void {
-    target.addEventListener(name, handler as EventListener, { ...options, signal: this.signal });
+    // A wheel's listener stops the page from scrolling.
+    target.addEventListener(name, handler as EventListener, { passive: false, ...options, signal: this.signal });
   }
 
   // Calls it so often while the page is seen, but not before it has ended: it may wait for a busy server. A lost connection

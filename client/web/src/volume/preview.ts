@@ -105,17 +105,29 @@ export function inPreview({ window: [low, high] }: Pick<Preview, 'window'>, iso:
   return (iso - low) / (high - low || 1);
 }
 
-// The value between samples, by trilinear interpolation, 0 to 1; the place counts samples.
-export function valueAt({ dims, samples }: Pick<Preview, 'dims' | 'samples'>, place: Vec3): number {
-  const [x, y, z] = place.map((value, axis) => Math.max(0, Math.min(dims[axis as 0] - 1, value))) as Vec3;
-  const [i, j, k] = [x, y, z].map((value, axis) => Math.max(0, Math.min(dims[axis as 0] - 2, Math.floor(value)))) as Vec3;
-  const step = (axis: 0 | 1 | 2): number => (dims[axis] > 1 ? 1 : 0);
-  const at = (dx: number, dy: number, dz: number): number =>
-    samples[((k + dz * step(2)) * dims[1] + j + dy * step(1)) * dims[0] + i + dx * step(0)] as number;
-  const mix = (a: number, b: number, part: number): number => a + (b - a) * part;
-  const line = (dy: number, dz: number): number => mix(at(0, dy, dz), at(1, dy, dz), x - i);
-  const plane = (dz: number): number => mix(line(0, dz), line(1, dz), y - j);
-  return mix(plane(0), plane(1), z - k) / 255;
+// The value between samples, trilinear; 0 farther than half a sample outside.
+export function sampler({ dims, samples }: Pick<Preview, 'dims' | 'samples'>): (x: number, y: number, z: number) => number {
+  const [wide, high, deep] = dims;
+  const [right, down, back] = [wide > 1 ? 1 : 0, high > 1 ? wide : 0, deep > 1 ? wide * high : 0];
+  const inside = (value: number, count: number): number => Math.max(0, Math.min(count - 1, value));
+  return (px, py, pz) => {
+    if (px < -0.5 || py < -0.5 || pz < -0.5 || px > wide - 0.5 || py > high - 0.5 || pz > deep - 0.5) return 0;
+    const [x, y, z] = [inside(px, wide), inside(py, high), inside(pz, deep)];
+    const i = Math.max(0, Math.min(wide - 2, Math.floor(x)));
+    const j = Math.max(0, Math.min(high - 2, Math.floor(y)));
+    const k = Math.max(0, Math.min(deep - 2, Math.floor(z)));
+    const from = (k * high + j) * wide + i;
+    const line = (at: number): number => {
+      const value = samples[at] as number;
+      return value + ((samples[at + right] as number) - value) * (x - i);
+    };
+    const plane = (at: number): number => {
+      const value = line(at);
+      return value + (line(at + down) - value) * (y - j);
+    };
+    const value = plane(from);
+    return value + (plane(from + back) - value) * (z - k);
+  };
 }
 
 // The first sample that the ray comes to of which something is seen, by the opacities of the numbers; null for none.
@@ -143,7 +155,8 @@ export function firstCrossing(preview: Preview, iso: number, from: Vec3, directi
   }
   const step = 1 / Math.max(...direction.map(Math.abs));
   const at = (part: number): Vec3 => from.map((value, axis) => value + part * direction[axis as 0]) as Vec3;
-  const isInside = (part: number): boolean => valueAt(preview, at(part)) >= iso;
+  const sample = sampler(preview);
+  const isInside = (part: number): boolean => sample(...at(part)) >= 255 * iso;
   if (!(near < far)) return null;
   const began = isInside(near);
   for (let part = near; part < far; part += step) {

@@ -1,7 +1,7 @@
 // A volume's values where the samples of another one's slice lie in the patient, and through a slab around that slice.
 import type { Axis, Vec3, Volume } from '../api/types';
 import { axisDirection, axisIndex, cross, dot, pictureAxes, toPatient, toSamples } from './geometry';
-import type { Preview } from './preview';
+import { sampler, type Preview } from './preview';
 
 export type Projection = 'maximum' | 'mean';
 
@@ -25,31 +25,6 @@ function inSamplesOf({ dims, origin, steps }: Preview): { at: (point: Vec3) => V
   const at = (point: Vec3): Vec3 => toSamples(geometry, point);
   const zero = at([0, 0, 0]);
   return { at, step: (vector) => at(vector).map((value, axis) => value - zero[axis as 0]) as Vec3 };
-}
-
-// Trilinear; 0 farther than half a sample outside.
-function sampler({ dims, samples }: Preview): (x: number, y: number, z: number) => number {
-  const [wide, high, deep] = dims;
-  const [right, down, back] = [wide > 1 ? 1 : 0, high > 1 ? wide : 0, deep > 1 ? wide * high : 0];
-  const inside = (value: number, count: number): number => Math.max(0, Math.min(count - 1, value));
-  return (px, py, pz) => {
-    if (px < -0.5 || py < -0.5 || pz < -0.5 || px > wide - 0.5 || py > high - 0.5 || pz > deep - 0.5) return 0;
-    const [x, y, z] = [inside(px, wide), inside(py, high), inside(pz, deep)];
-    const i = Math.max(0, Math.min(wide - 2, Math.floor(x)));
-    const j = Math.max(0, Math.min(high - 2, Math.floor(y)));
-    const k = Math.max(0, Math.min(deep - 2, Math.floor(z)));
-    const from = (k * high + j) * wide + i;
-    const line = (at: number): number => {
-      const value = samples[at] as number;
-      return value + ((samples[at + right] as number) - value) * (x - i);
-    };
-    const plane = (at: number): number => {
-      const value = line(at);
-      return value + (line(at + down) - value) * (y - j);
-    };
-    const value = plane(from);
-    return value + (plane(from + back) - value) * (z - k);
-  };
 }
 
 // 0 farther than half a sample outside.

@@ -1,14 +1,15 @@
 // One plane at any angle through the point where the slices meet: a pane of its own, and a line with a handle in the slices.
 import type { Axis, Vec3, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
+import { imageOf, paintImage } from '../../ui/pixels';
 import { Signal, type Scope } from '../../ui/signal';
 import { axisDirection, cross, opposite, pictureAxes, sampleAt, sideOf, toPatient, toSamples } from '../../volume/geometry';
 import { lineIn, obliqueFrame, through, type Angles } from '../../volume/oblique';
 import type { Preview } from '../../volume/preview';
 import { sampledSquare } from '../../volume/reslice';
-import { greyTable, type Window } from '../../volume/slices';
-import type { SliceGrip, Spot } from './slice_grip';
-import { paintLetters, pixelsOf, sliceColours } from './slice_looks';
+import type { Window } from '../../volume/slices';
+import { SliceGrip } from './slice_grip';
+import { paintLetters, pixelsIn, sliceColours } from './slice_looks';
 import { anglesOfText, anglesToText } from './slice_texts';
 
 const colour = '#c792ea';
@@ -101,28 +102,12 @@ export class ObliqueView {
   }
 
   // Its handle in slices across that axis.
-  gripIn(axis: Axis): SliceGrip {
-    let holding = NaN;
-    const isAt = ({ place: [x, y], pixels: [wide, high], isTouch }: Spot): boolean => {
+  gripIn(axis: Axis): SliceGrip<Axis> {
+    return new SliceGrip(({ place: [x, y], pixels: [wide, high], isTouch }) => {
       const handle = this.preview && this.endsIn(axis)?.[1];
-      return handle ? Math.hypot((x - handle[0]) * wide, (y - handle[1]) * high) < (isTouch ? reach.touch : reach.mouse) : false;
-    };
-    return {
-      isAt,
-      hold: (pointer, spot) => {
-        if (isAt(spot)) holding = pointer;
-        return holding === pointer;
-      },
-      move: (pointer, { place }) => {
-        if (holding === pointer) this.turnTo(axis, place);
-        return holding === pointer;
-      },
-      letGo: (pointer) => {
-        const wasHeld = holding === pointer;
-        if (wasHeld) holding = NaN;
-        return wasHeld;
-      },
-    };
+      const isNear = handle && Math.hypot((x - handle[0]) * wide, (y - handle[1]) * high) < (isTouch ? reach.touch : reach.mouse);
+      return isNear ? axis : null;
+    }, (_, place) => this.turnTo(axis, place));
   }
 
   private turnTo(axis: Axis, place: readonly [number, number]): void {
@@ -197,14 +182,10 @@ export class ObliqueView {
   private render(preview: Preview): void {
     const { volume, cursor, window: shown } = this.host;
     const { right, down } = obliqueFrame(this.angles);
-    const { values } = sampledSquare(preview, { middle: toPatient(volume, cursor()), right, down, size: this.size, pixels });
+    const square = sampledSquare(preview, { middle: toPatient(volume, cursor()), right, down, size: this.size, pixels });
+    paintImage(this.canvas, imageOf(square, pixelsIn(preview, shown())));
     const context = this.canvas.getContext('2d', { willReadFrequently: true });
     if (!context) return;
-    const picture = context.createImageData(pixels, pixels);
-    const colours = pixelsOf(sliceColours.value);
-    const table = greyTable({ window: preview.window }, shown());
-    new Uint32Array(picture.data.buffer).set(Uint32Array.from(values, (value) => colours[table[value] ?? 0] ?? 0));
-    context.putImageData(picture, 0, 0);
     context.fillStyle = colour;
     context.fillRect(pixels / 2 - 8, pixels / 2 - 0.5, 16, 1);
     context.fillRect(pixels / 2 - 0.5, pixels / 2 - 8, 1, 16);
@@ -233,15 +214,10 @@ export class ObliqueView {
       press = null;
     });
     scope.listen(canvas, 'pointercancel', () => (press = null));
-    scope.listen(
-      canvas,
-      'wheel',
-      (event: WheelEvent) => {
-        event.preventDefault();
-        this.step(-Math.sign(event.deltaY));
-      },
-      { passive: false },
-    );
+    scope.listen(canvas, 'wheel', (event: WheelEvent) => {
+      event.preventDefault();
+      this.step(-Math.sign(event.deltaY));
+    });
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
       const step = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 }[event.key];
       if (step === undefined || event.ctrlKey || event.metaKey || event.altKey) return;

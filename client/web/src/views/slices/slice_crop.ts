@@ -1,7 +1,7 @@
 // The box of a crop in a slice: seen, and moved by its edges.
 import type { Vec3 } from '../../api/types';
 import type { Box } from '../../volume/crop';
-import type { SliceGrip, Spot } from './slice_grip';
+import { SliceGrip, type Spot } from './slice_grip';
 
 export interface CropHost {
   // Null while nothing is cropped.
@@ -11,17 +11,14 @@ export interface CropHost {
 
 type AxisNumber = 0 | 1 | 2;
 
-interface Grabbed {
-  pointer: number;
-  // Along the picture's columns and rows, which end of the box; null for neither.
-  ends: [0 | 1 | null, 0 | 1 | null];
-}
+// Along the picture's columns and rows, which end of the box; null for neither.
+type Ends = [0 | 1 | null, 0 | 1 | null];
 
 const reachOfMouse = 7;
 const reachOfTouch = 18;
 
-export class SliceCrop implements SliceGrip {
-  private grabbed: Grabbed | null = null;
+export class SliceCrop {
+  readonly grip = new SliceGrip<Ends>((spot) => this.endsAt(spot), (ends, place) => this.drag(ends, place));
 
   constructor(
     private readonly host: CropHost,
@@ -40,12 +37,8 @@ export class SliceCrop implements SliceGrip {
     return true;
   }
 
-  isAt(spot: Spot): boolean {
-    return this.endsAt(spot) !== null;
-  }
-
   // Which edges are at that place.
-  private endsAt({ place, pixels, isTouch }: Spot): Grabbed['ends'] | null {
+  private endsAt({ place, pixels, isTouch }: Spot): Ends | null {
     const box = this.host.box();
     if (!box) return null;
     const reach = isTouch ? reachOfTouch : reachOfMouse;
@@ -57,22 +50,16 @@ export class SliceCrop implements SliceGrip {
       return isBeside && Math.abs(place[along] - box[end][axis]) * pixels[along] < reach;
     };
     const endOf = (along: 0 | 1): 0 | 1 | null => (near(along, 0) ? 0 : near(along, 1) ? 1 : null);
-    const ends: Grabbed['ends'] = [endOf(0), endOf(1)];
+    const ends: Ends = [endOf(0), endOf(1)];
     return ends.every((end) => end === null) ? null : ends;
   }
 
-  hold(pointer: number, spot: Spot): boolean {
-    const ends = this.endsAt(spot);
-    if (ends) this.grabbed = { pointer, ends };
-    return ends !== null;
-  }
-
-  move(pointer: number, { place }: Spot): boolean {
+  private drag(ends: Ends, place: Spot['place']): void {
     const box = this.host.box();
-    if (this.grabbed?.pointer !== pointer || !box) return false;
+    if (!box) return;
     const next: Box = [[...box[0]], [...box[1]]];
     ([0, 1] as const).forEach((along) => {
-      const end = this.grabbed?.ends[along] ?? null;
+      const end = ends[along];
       if (end === null) return;
       const axis = this.axes[along];
       const value = Math.round(place[along]);
@@ -80,12 +67,5 @@ export class SliceCrop implements SliceGrip {
       next[end][axis] = end === 0 ? Math.min(value, other[axis] - 1) : Math.max(value, other[axis] + 1);
     });
     this.host.setBox(next);
-    return true;
-  }
-
-  letGo(pointer: number): boolean {
-    if (this.grabbed?.pointer !== pointer) return false;
-    this.grabbed = null;
-    return true;
   }
 }

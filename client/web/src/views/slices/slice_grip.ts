@@ -7,11 +7,36 @@ export interface Spot {
   isTouch: boolean;
 }
 
-export interface SliceGrip {
-  isAt: (spot: Spot) => boolean;
+export class SliceGrip<T> {
+  private held: { pointer: number; what: T } | null = null;
+
+  constructor(
+    // Null where nothing is.
+    private readonly find: (spot: Spot) => T | null,
+    private readonly drag: (what: T, place: Spot['place']) => void,
+  ) {}
+
+  isAt(spot: Spot): boolean {
+    return this.find(spot) !== null;
+  }
+
   // True if something was there, which this pointer moves until it lets go.
-  hold: (pointer: number, spot: Spot) => boolean;
+  hold(pointer: number, spot: Spot): boolean {
+    const what = this.find(spot);
+    if (what !== null) this.held = { pointer, what };
+    return what !== null;
+  }
+
   // True if this pointer moves it.
-  move: (pointer: number, spot: Spot) => boolean;
-  letGo: (pointer: number) => boolean;
+  move(pointer: number, { place }: Spot): boolean {
+    if (this.held?.pointer !== pointer) return false;
+    this.drag(this.held.what, place);
+    return true;
+  }
+
+  letGo(pointer: number): boolean {
+    if (this.held?.pointer !== pointer) return false;
+    this.held = null;
+    return true;
+  }
 }

@@ -4,6 +4,7 @@ import type { Axis, Volume } from '../../api/types';
 import { checkbox, field, h, select } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { tellError } from '../../ui/notices';
+import { imageOf, paintImage } from '../../ui/pixels';
 import { Signal, type Scope } from '../../ui/signal';
 import { defaultWindow } from '../../volume/histogram';
 import { volumeName } from '../../volume/names';
@@ -24,6 +25,10 @@ const perPage = 1000;
 const fading = 48;
 // Up to yellow: what is white could be either volume.
 const hottest = 2 / 3;
+const hot = pixelsOf('hot').map((_, value, colours) => {
+  const alpha = Math.round(255 * Math.min(1, value / fading));
+  return (((colours[Math.round(hottest * value)] ?? 0) & 0xff_ffff) | (alpha << 24)) >>> 0;
+});
 
 interface Layer {
   volume: Volume;
@@ -136,16 +141,8 @@ export class SliceLayers {
     const before = context.globalAlpha;
     context.globalAlpha *= this.opacity.valueAsNumber;
     const picture = this.overlays.get(axis, [other.volume.id, index].join(), () => {
-      const { width, height, values } = resliced(other.preview, volume, axis, index);
-      const canvas = h('canvas', { width, height });
-      const picture = new ImageData(width, height);
-      const pixels = new Uint32Array(picture.data.buffer);
-      const colours = pixelsOf('hot');
-      values.forEach((value, at) => {
-        const alpha = Math.round(255 * Math.min(1, value / fading));
-        pixels[at] = (((colours[Math.round(hottest * value)] ?? 0) & 0xff_ffff) | (alpha << 24)) >>> 0;
-      });
-      canvas.getContext('2d', { willReadFrequently: true })?.putImageData(picture, 0, 0);
+      const canvas = h('canvas');
+      paintImage(canvas, imageOf(resliced(other.preview, volume, axis, index), hot));
       return canvas;
     });
     context.drawImage(picture, 0, 0);

@@ -5,7 +5,7 @@ import { field, h, segmented, select } from '../../ui/dom';
 import { formatNumber } from '../../ui/format';
 import { Signal, type Scope } from '../../ui/signal';
 import type { MeasureKind } from '../../volume/measure';
-import { textOfWindow, type Window } from '../../volume/slices';
+import { greyTable, textOfWindow, type Slice, type Window } from '../../volume/slices';
 import { layoutNames, paneLayout } from './pane_area';
 import type { SliceMeasures } from './slice_measure';
 
@@ -63,6 +63,12 @@ export function pixelsOf(name: ColourName): Uint32Array {
     const [red, green, blue] = colourAt(grey);
     return (0xff00_0000 | (blue << 16) | (green << 8) | red) >>> 0;
   });
+}
+
+// The same for each value of a slice, as it is seen in that window.
+export function pixelsIn(slice: Pick<Slice, 'window'>, shown: Window): Uint32Array {
+  const colours = pixelsOf(sliceColours.value);
+  return Uint32Array.from(greyTable(slice, shown), (grey) => colours[grey] ?? 0);
 }
 
 // The letters of the patient's sides, so far from the edges of the canvas.

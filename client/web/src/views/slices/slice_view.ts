@@ -1,12 +1,13 @@
 // One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
 import type { Axis, Vec3, Volume } from '../../api/types';
 import { h, uniqueId } from '../../ui/dom';
+import { imageOf, paintImage } from '../../ui/pixels';
 import type { Scope } from '../../ui/signal';
 import { contour } from '../../volume/contour';
-import { coloursOf, paintLabels, type LabelLook } from '../../volume/label_map';
-import { labelOpacity } from '../labels/label_opacity';
+import type { LabelLook } from '../../volume/label_map';
+import { labelImage, labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
-import { paintLetters, pixelsOf, sliceColours, sliceSpace } from './slice_looks';
+import { paintLetters, pixelsIn, sliceColours, sliceSpace } from './slice_looks';
 import type { ObliqueView } from './oblique_view';
 import type { SliceGrip, Spot } from './slice_grip';
 import type { SliceLayers } from './slice_layers';
@@ -24,7 +25,7 @@ import {
   type SlicePlane,
 } from '../../volume/geometry';
 import { SliceLoader } from '../../volume/slice_loader';
-import { draggedWindow, greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
+import { draggedWindow, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
 
 export interface SliceState {
   iso: number | null; // of the contour
@@ -82,7 +83,7 @@ export class SliceView {
   private readonly readout: SliceReadout;
   private readonly zoom: SliceZoom;
   private readonly crop: SliceCrop | null;
-  private readonly grips: SliceGrip[];
+  private readonly grips: Pick<SliceGrip<unknown>, 'isAt' | 'hold' | 'move' | 'letGo'>[];
   private scheduled = false;
 
   constructor(
@@ -103,7 +104,7 @@ export class SliceView {
     this.slider.disabled = this.count(this.layout.normal) === 1;
     this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
     this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
-    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop].filter((grip) => grip != null);
+    this.grips = [host.oblique?.gripIn(this.layout.normal), this.crop?.grip].filter((grip) => grip != null);
     this.readout = new SliceReadout({
       volume: host.volume,
       isInteger: host.isInteger,
@@ -213,11 +214,12 @@ export class SliceView {
   }
 
   private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
-    const { iso, labels, cursor } = this.host.state();
+    const { iso, labels, cursor, window } = this.host.state();
     const { layers } = this.host;
     const projected = layers?.projected(slice.axis, slice.index) ?? null;
-    if (slice.labels && labels && !projected) this.fillLabels(slice, slice.labels, labels);
-    else this.fillBuffer(projected ?? slice);
+    const { width, height, labels: numbers } = slice;
+    const isOfLabels = numbers && labels && !projected;
+    paintImage(this.buffer, isOfLabels ? labelImage({ width, height, labels: numbers }, labels) : imageOf(projected ?? slice, pixelsIn(projected ?? slice, window)));
     context.save();
     context.setTransform(...this.placement());
     context.imageSmoothingEnabled = labels === null;
@@ -244,28 +246,6 @@ export class SliceView {
     if (this.crop?.paint(context)) strokePixels(context, 1.5 * ratio, cropColour);
     this.host.measures?.paint(context, ratio, this.measured(cursor[axisIndex(this.layout.normal)]) ?? []);
     context.restore();
-  }
-
-  private fillLabels({ width, height }: Slice, numbers: Uint16Array, look: LabelLook): void {
-    this.buffer.width = width;
-    this.buffer.height = height;
-    const pixels = paintLabels({ width, height, labels: numbers }, coloursOf(look), labelOpacity.value);
-    this.buffer.getContext('2d', { willReadFrequently: true })?.putImageData(new ImageData(pixels, width, height), 0, 0);
-  }
-
-  private fillBuffer(slice: Slice): void {
-    this.buffer.width = slice.width;
-    this.buffer.height = slice.height;
-    const context = this.buffer.getContext('2d', { willReadFrequently: true });
-    if (!context) return;
-    const picture = context.createImageData(slice.width, slice.height);
-    const table = greyTable(slice, this.host.state().window);
-    const pixels = new Uint32Array(picture.data.buffer);
-    const colours = pixelsOf(sliceColours.value);
-    slice.values.forEach((value, i) => {
-      pixels[i] = colours[table[value] ?? 0] ?? 0;
-    });
-    context.putImageData(picture, 0, 0);
   }
 
   // The column and row of the picture under a point of the screen.
@@ -380,27 +360,20 @@ export class SliceView {
 
   private listenToSteps(): void {
     const { canvas, scope } = this;
-    scope.listen(
-      canvas,
-      'wheel',
-      (event: WheelEvent) => {
-        event.preventDefault();
-        if (event.ctrlKey || event.metaKey) this.zoom.wheel(event);
-        else if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
-      },
-      { passive: false },
-    );
+    scope.listen(canvas, 'wheel', (event: WheelEvent) => {
+      event.preventDefault();
+      if (event.ctrlKey || event.metaKey) this.zoom.wheel(event);
+      else if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
+    });
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
       const key = event.key;
+      const step = { ArrowUp: 1, ArrowRight: 1, PageUp: 10, ArrowDown: -1, ArrowLeft: -1, PageDown: -10 }[key];
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.shiftKey && key.startsWith('Arrow')) {
         const dx = key === 'ArrowLeft' ? -8 : key === 'ArrowRight' ? 8 : 0;
         const dy = key === 'ArrowUp' ? -8 : key === 'ArrowDown' ? 8 : 0;
         this.host.setWindow(draggedWindow(this.host.state().window, dx, dy));
-      } else if (key === 'ArrowUp' || key === 'ArrowRight') this.step(1);
-      else if (key === 'ArrowDown' || key === 'ArrowLeft') this.step(-1);
-      else if (key === 'PageUp') this.step(10);
-      else if (key === 'PageDown') this.step(-10);
+      } else if (step !== undefined) this.step(step);
       else return;
       event.preventDefault();
     });

@@ -6,32 +6,27 @@ import type { Surface } from '../../scene/surface';
 import { button, checkbox, h, select } from '../../ui/dom';
 import { formatSize } from '../../ui/format';
 import { tellError } from '../../ui/notices';
+import { greys, imageOf } from '../../ui/pixels';
 import type { Scope } from '../../ui/signal';
 import { axisIndex, patientAxes } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
-import { coloursOf, paintLabels, type LabelLook, type NumberedSlice } from '../../volume/label_map';
-import type { Resliced } from '../../volume/reslice';
+import type { LabelLook, NumberedSlice } from '../../volume/label_map';
 import { SliceSource, type Window } from '../../volume/slices';
-import { labelOpacity } from '../labels/label_opacity';
+import { labelImage, labelOpacity } from '../labels/label_opacity';
 import { FreeCut } from './free_cut';
 
 const bins = 512;
 
 // Over black.
 function paintedLabels(slice: NumberedSlice, look: LabelLook): Promise<ImageBitmap> {
-  const pixels = paintLabels(slice, coloursOf(look), labelOpacity.value);
+  const image = labelImage(slice, look);
+  const pixels = image.data;
   for (let at = 0; at < pixels.length; at += 4) {
     const opacity = (pixels[at + 3] as number) / 255;
     for (let channel = 0; channel < 3; channel += 1) pixels[at + channel] = (pixels[at + channel] as number) * opacity;
     pixels[at + 3] = 255;
   }
-  return createImageBitmap(new ImageData(pixels, slice.width, slice.height));
-}
-
-function greyBitmap({ width, height, values }: Resliced): Promise<ImageBitmap> {
-  const pixels = new Uint8ClampedArray(4 * width * height).fill(255);
-  values.forEach((value, at) => pixels.fill(value, 4 * at, 4 * at + 3));
-  return createImageBitmap(new ImageData(pixels, width, height));
+  return createImageBitmap(image);
 }
 
 export class CutTool {
@@ -208,7 +203,7 @@ export class CutTool {
       const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
       this.window = defaultWindow(await client.histogramOf(volume.id, bins, this.scope.signal), iso);
     }
-    if (this.isFree) return greyBitmap(await this.free.picture(this.window, null));
+    if (this.isFree) return createImageBitmap(imageOf(await this.free.picture(this.window, null), greys));
     return createImageBitmap(await client.slicePicture(volume.id, axis, index, this.window, this.scope.signal));
   }
 

@@ -1,17 +1,13 @@
 // The volumes of a file of several, on a slider with a picture of each, before one is chosen.
 import type { Choice } from '../../api/types';
 import { button, h, uniqueId } from '../../ui/dom';
+import { greys, imageOf, paintImage } from '../../ui/pixels';
 import type { Picture } from '../../volume/dicom_peek';
 import { readTimePoints } from '../../volume/time_points';
 
 // Draws it with its own pixels.
 export function paintPicture({ width, height, grey }: Picture, canvas: HTMLCanvasElement): void {
-  const context = canvas.getContext('2d');
-  if (!context) return;
-  [canvas.width, canvas.height] = [width, height];
-  const image = context.createImageData(width, height);
-  grey.forEach((value, i) => image.data.set([value, value, value, 255], 4 * i));
-  context.putImageData(image, 0, 0);
+  paintImage(canvas, imageOf({ width, height, values: grey }, greys));
 }
 
 // Stays hidden where the page cannot read the file.
