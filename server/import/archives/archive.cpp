@@ -64,8 +64,8 @@ std::string plain_name(std::string_view name) {
 
 // Null if the machine lacks it.
 locale_t utf8_locale() {
-  static const locale_t kLocale = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
-  return kLocale;
+  static const locale_t locale = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+  return locale;
 }
 
 // The library drops names that a ZIP declares as UTF-8 if the locale cannot represent them. It

@@ -89,9 +89,9 @@ std::array<StarPoints, 2> find_points(Scheme scheme) {
 }  // namespace
 
 const std::array<StarPoints, 2>& star_points(Scheme scheme) {
-  static const std::array<StarPoints, 2> kSix = find_points(Scheme::kSix);
-  static const std::array<StarPoints, 2> kFive = find_points(Scheme::kFive);
-  return scheme == Scheme::kSix ? kSix : kFive;
+  static const std::array<StarPoints, 2> six = find_points(Scheme::kSix);
+  static const std::array<StarPoints, 2> five = find_points(Scheme::kFive);
+  return scheme == Scheme::kSix ? six : five;
 }
 
 }  // namespace isomesh::mesh
