@@ -52,14 +52,6 @@ TEST_F(InspectTest, AHistogramCountsEverySample) {
   }
 }
 
-TEST_F(InspectTest, AHistogramIsRefusedByName) {
-  for (const std::string bins : {"0", "65537", "-1", "1.5", "ten", "", "99999999999999999999"}) {
-    EXPECT_TRUE(blames(daemon_.get(path_ + "/histogram?bins=" + bins), "bins")) << bins;
-  }
-  EXPECT_TRUE(blames(daemon_.get(path_ + "/histogram?bin=2"), "bin"));
-  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/histogram"), ErrorCode::kNotFound));
-}
-
 TEST_F(InspectTest, LabelsAreCountedAndKeptByTheClient) {
   std::string samples(24, '\0');
   samples[1] = samples[2] = 3;
@@ -105,13 +97,7 @@ TEST_F(InspectTest, LabelsHaveTheNamesOfTheUpload) {
   EXPECT_EQ(list.labels[1].voxels, 2U);
 }
 
-TEST_F(InspectTest, LabelsAreRefusedByName) {
-  for (const std::string background : {"", "x", "1.5", "+1", "%2B1", "99999999999999999999"}) {
-    EXPECT_TRUE(blames(daemon_.get(path_ + "/labels?background=" + background), "background"))
-        << background;
-  }
-  EXPECT_TRUE(blames(daemon_.get(path_ + "/labels?bins=1"), "bins"));
-  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/labels"), ErrorCode::kNotFound));
+TEST_F(InspectTest, FractionsHaveNoLabels) {
   const Volume fractions = volume_from_json(
       daemon_.send("POST", "/v1/volumes?dims=2,2,2&type=float32", std::string(32, '\0')).body);
   EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/" + fractions.id + "/labels"),
@@ -125,7 +111,7 @@ TEST_F(InspectTest, ASliceIsTheSamplesOfTheUpload) {
   for (std::size_t at = 0; at < z.pixels.size(); ++at) {
     ASSERT_EQ(z.pixels[at], static_cast<unsigned char>(sphere_.bytes[3 * 21 * 20 + at])) << at;
   }
-  EXPECT_EQ(picture("axis=x").height, 19U);
+  EXPECT_EQ(picture("axis=x&index=20").height, 19U);
   EXPECT_EQ(picture("axis=y").width, 21U);
 }
 
@@ -135,21 +121,6 @@ TEST_F(InspectTest, TheMiddleInTheVolumesRangeIsTheDefault) {
       std::to_string(volume_.range[0]) + ',' + std::to_string(volume_.range[1]);
   EXPECT_EQ(usual.pixels, picture("axis=z&index=9&window=" + range).pixels);
   EXPECT_THAT(usual.pixels, testing::Contains(255));
-}
-
-TEST_F(InspectTest, ASliceIsRefusedByName) {
-  for (const std::string axis : {"w", "", "xy", "X"}) {
-    EXPECT_TRUE(blames(slice("axis=" + axis), "axis")) << axis;
-  }
-  for (const std::string index : {"19", "-1", "", "1.5", "99999999999999999999"}) {
-    EXPECT_TRUE(blames(slice("axis=z&index=" + index), "index")) << index;
-  }
-  EXPECT_EQ(slice("axis=x&index=20").status, 200);
-  for (const std::string window : {"1", "1,1", "2,1", "nan,1", "0,inf", "0,1,2", ",", ""}) {
-    EXPECT_TRUE(blames(slice("window=" + window), "window")) << window;
-  }
-  EXPECT_TRUE(blames(slice("zoom=2"), "zoom"));
-  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/slice.png"), ErrorCode::kNotFound));
 }
 
 TEST_F(InspectTest, APreviewIsTheVolumeReduced) {
@@ -165,15 +136,6 @@ TEST_F(InspectTest, APreviewIsTheVolumeReduced) {
   // No larger than asked for, it is what was uploaded.
   const Answer whole = daemon_.get(path_ + "/preview?window=0,255");
   EXPECT_TRUE(whole.body.ends_with(sphere_.bytes));
-}
-
-TEST_F(InspectTest, APreviewIsRefusedByName) {
-  for (const std::string size : {"0", "257", "-1", "1.5", ""}) {
-    EXPECT_TRUE(blames(daemon_.get(path_ + "/preview?size=" + size), "size")) << size;
-  }
-  EXPECT_TRUE(blames(daemon_.get(path_ + "/preview?window=2,1"), "window"));
-  EXPECT_TRUE(blames(daemon_.get(path_ + "/preview?axis=x"), "axis"));
-  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/preview"), ErrorCode::kNotFound));
 }
 
 TEST_F(InspectTest, WhatNeverChangesIsNotSentTwice) {
@@ -202,20 +164,6 @@ TEST_F(InspectTest, AnEstimateCountsWhatTheJobMakes) {
   EXPECT_EQ(estimate.bytes.at(MeshFormat::kStl), job.mesh->files.at(MeshFormat::kStl).bytes);
   EXPECT_TRUE(estimate.fits);
   EXPECT_EQ(estimate.queue, Estimate::Queue{});
-}
-
-TEST_F(InspectTest, AnEstimateIsRefusedByName) {
-  const auto with = [&](const std::string& query) {
-    return daemon_.get("/v1/estimate?volume=" + volume_.id + query);
-  };
-  EXPECT_TRUE(blames(with(""), "iso"));
-  EXPECT_TRUE(blames(with("&iso=x"), "iso"));
-  EXPECT_TRUE(blames(with("&iso=1&scheme=7"), "scheme"));
-  EXPECT_TRUE(blames(with("&iso=1&format=doc"), "format"));
-  EXPECT_TRUE(blames(with("&iso=1&iso=2"), "iso"));
-  EXPECT_TRUE(blames(with("&iso=1&flavour=sweet"), "flavour"));
-  EXPECT_TRUE(blames(daemon_.get("/v1/estimate?iso=1"), "volume"));
-  EXPECT_TRUE(is_problem(daemon_.get("/v1/estimate?iso=1&volume=0123"), ErrorCode::kNotFound));
 }
 
 }  // namespace

@@ -238,19 +238,6 @@ TEST_F(MeshInOne, IgnoresConditionsAndRanges) {
   EXPECT_GT(answer.body.size(), 10U);
 }
 
-TEST_F(MeshInOne, RefusesBeforeItTakesTheVolume) {
-  EXPECT_TRUE(blames(post("passes=3"), "iso"));
-  EXPECT_TRUE(blames(post("iso=1&passes=1001"), "passes"));
-  EXPECT_TRUE(blames(post("iso=1&formats=drc"), "formats"));
-  EXPECT_TRUE(blames(post("iso=1&volume=abc"), "volume"));
-  EXPECT_TRUE(blames(post("iso=1&format=drc,stl"), "format"));
-  EXPECT_TRUE(blames(post("iso=1&format=exe"), "format"));
-  EXPECT_TRUE(blames(post("iso=1&position_bits=31"), "position_bits"));
-  EXPECT_TRUE(blames(post("iso=1&iso=2"), "iso"));
-  EXPECT_TRUE(blames(post("iso=1&dims=1,2,3"), "dims"));
-  EXPECT_TRUE(daemon_.client().volumes().empty());
-}
-
 TEST_F(MeshInOne, RefusesWhatIsNoVolume) {
   EXPECT_TRUE(is_problem(post("iso=1", "garbage"), ErrorCode::kUnsupportedMedia));
   EXPECT_TRUE(is_problem(post("iso=1", ""), ErrorCode::kInvalidParameter));

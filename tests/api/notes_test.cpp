@@ -406,17 +406,6 @@ TEST_F(NotesTest, AVolumeKeepsItsFilesNameUntilItIsRenamed) {
   EXPECT_THAT(daemon_.errors(), Not(HasSubstr("skull")));
 }
 
-TEST_F(NotesTest, AFormTellsItsFilesName) {
-  const std::string body =
-      "--x\r\nContent-Disposition: form-data; name=\"file\"; "
-      "filename=\"ct.nrrd\"\r\n\r\n" +
-      nrrd("") + "\r\n--x--\r\n";
-  const Answer answer = daemon_.send("POST", "/v1/volumes", body,
-                                     {{"Content-Type", "multipart/form-data; boundary=x"}});
-  ASSERT_EQ(answer.status, 201) << answer.body;
-  EXPECT_EQ(volume_from_json(answer.body).name, "ct.nrrd");
-}
-
 // The same samples and geometry are one volume, whose record is that of the first upload. Each
 // upload's answer says how its own file was read.
 TEST_F(NotesTest, AreInTheAnswerOfTheirUploadAndInTheRecordOfTheFirst) {
