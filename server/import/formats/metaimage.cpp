@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -143,8 +142,8 @@ std::optional<Rescale> rescale_of(const HeaderTexts& fields) {
   const auto number = [&](std::string_view name, double otherwise) {
     const std::string_view text = value_of(fields, name);
     if (text.empty()) return otherwise;
-    const auto value = parse_double(text);
-    if (!value || !std::isfinite(*value)) {
+    const auto value = finite_number(text);
+    if (!value) {
       throw_unusable("The MetaImage header's " + in_quotes(name) + " is not a finite number.");
     }
     return *value;

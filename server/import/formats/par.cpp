@@ -70,8 +70,8 @@ Key key_of(const ImageRow& row) {
 ImageRow image_row(std::string_view line) {
   ImageRow row;
   for (const std::string_view word : words(line)) {
-    const auto number = parse_double(word);
-    if (!number || !std::isfinite(*number)) {
+    const auto number = finite_number(word);
+    if (!number) {
       throw_unusable("The PAR header has a row of an image with " + in_quotes(word) +
                      ", which is not a number.");
     }

@@ -336,8 +336,8 @@ std::optional<double> described_length(std::string_view unit) {
 }
 
 std::optional<double> described_positive(std::string_view text) {
-  const auto number = parse_double(text);
-  return number && std::isfinite(*number) && *number > 0 ? number : std::nullopt;
+  const auto number = finite_number(text);
+  return number.value_or(0) > 0 ? number : std::nullopt;
 }
 
 std::uint64_t described_count(std::string_view text, std::uint64_t otherwise) {

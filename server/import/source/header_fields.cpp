@@ -7,15 +7,12 @@
 
 namespace isomesh::import {
 
-std::vector<double> finite_numbers(std::string_view text) {
-  std::vector<double> numbers;
-  for (const std::string_view word : words(text)) {
-    const auto number = parse_double(word);
-    if (!number || !std::isfinite(*number)) return {};
-    numbers.push_back(*number);
-  }
-  return numbers;
+std::optional<double> finite_number(std::string_view text) {
+  const auto number = parse_double(text);
+  return number && std::isfinite(*number) ? number : std::nullopt;
 }
+
+std::vector<double> finite_numbers(std::string_view text) { return finite_numbers_of(words(text)); }
 
 std::uint64_t plausible_whole(double number, const std::string& what) {
   constexpr double kMost = 1e9;

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,7 +23,18 @@ inline std::string_view value_of(const HeaderTexts& texts, std::string_view name
   return found == texts.end() ? std::string_view{} : std::string_view(found->second);
 }
 
-// The numbers of a text, separated by white space. Empty unless all are finite.
+// Empty unless the text is a finite number, or all are: parts, or those between white space.
+std::optional<double> finite_number(std::string_view text);
+template <class Texts>
+std::vector<double> finite_numbers_of(const Texts& parts) {
+  std::vector<double> numbers;
+  for (const std::string_view part : parts) {
+    const auto number = finite_number(part);
+    if (!number) return {};
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
 std::vector<double> finite_numbers(std::string_view text);
 
 // The same number if it is whole and from 0 to 1e9. Throws Error kUnusableVolume, with `what`

@@ -14,6 +14,7 @@
 #include "server/import/dicom/geometry/attributes.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/vectors.h"
+#include "server/import/source/header_fields.h"
 
 namespace isomesh::import::dicom {
 namespace {
@@ -30,11 +31,6 @@ std::string phase_of(const Slice& slice, std::size_t attribute) {
     if (found != phases->end()) return found->value;
   }
   return {};
-}
-
-std::optional<double> finite_number(const std::string& text) {
-  const auto number = parse_double(text);
-  return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
 // Orders numbers by value, before texts in alphabetical order.

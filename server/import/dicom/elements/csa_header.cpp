@@ -93,9 +93,7 @@ Values values_of(std::string_view protocol) {
 // Empty if the number is not finite. A missing one is 0.
 std::optional<double> number(const Values& values, const std::string& name) {
   const auto found = values.find(name);
-  if (found == values.end()) return 0;
-  const auto parsed = parse_double(found->second);
-  return parsed && std::isfinite(*parsed) ? parsed : std::nullopt;
+  return found == values.end() ? 0.0 : finite_number(found->second);
 }
 
 std::optional<Vector3> vector(const Values& values, const std::string& name) {
@@ -129,14 +127,7 @@ CsaHeader parse_csa_header(std::string_view bytes) {
 
 std::vector<double> csa_numbers(const CsaHeader& header, std::string_view field) {
   const auto found = header.find(field);
-  if (found == header.end()) return {};
-  std::vector<double> numbers;
-  for (const std::string& value : found->second) {
-    const auto number = parse_double(value);
-    if (!number || !std::isfinite(*number)) return {};
-    numbers.push_back(*number);
-  }
-  return numbers;
+  return found == header.end() ? std::vector<double>{} : finite_numbers_of(found->second);
 }
 
 std::optional<ProtocolSlices> protocol_slices(std::string_view header) {

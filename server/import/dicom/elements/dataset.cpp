@@ -1,7 +1,6 @@
 #include "server/import/dicom/elements/dataset.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <string_view>
 
@@ -150,15 +149,7 @@ std::vector<std::string_view> DataSet::texts(Tag tag) const {
   }
 }
 
-std::vector<double> DataSet::numbers(Tag tag) const {
-  std::vector<double> result;
-  for (const std::string_view part : texts(tag)) {
-    const auto number = parse_double(part);
-    if (!number || !std::isfinite(*number)) return {};
-    result.push_back(*number);
-  }
-  return result;
-}
+std::vector<double> DataSet::numbers(Tag tag) const { return finite_numbers_of(texts(tag)); }
 
 std::optional<std::int64_t> DataSet::integer(Tag tag) const {
   const auto parts = texts(tag);
