@@ -34,8 +34,7 @@ std::vector<std::string> forms(const std::vector<Member>& members) {
 
 void expect_read(const std::vector<Member>& members, const std::string& format) {
   for (const std::string& file : forms(members)) {
-    const Outcome outcome = import_bytes(file);
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(file));
     if (!outcome.imported()) continue;
     EXPECT_EQ(outcome.sample_bytes(), kSmallSamples);
     EXPECT_EQ(outcome.volume.format, format);
@@ -73,8 +72,7 @@ TEST(Archive, NamesMayBeDeclaredAsUtf8) {
   const std::vector<Member> members = {{"K\xc3\xb6pfe/R\xc3\xbcmpf.mhd", mhd("R\xc3\xbcmpf.raw")},
                                        {"K\xc3\xb6pfe/R\xc3\xbcmpf.raw", kSamples}};
   for (const Utf8Names names : {Utf8Names::kFlag, Utf8Names::kField}) {
-    const Outcome outcome = import_bytes(zip_in_utf8(members, names));
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(zip_in_utf8(members, names)));
     EXPECT_EQ(outcome.volume.name, "R\xc3\xbcmpf.mhd");
   }
 }
@@ -211,9 +209,8 @@ TEST(Archive, LinksDevicesAndHiddenFilesArePassedOver) {
   const Member volume{"head.nii", nifti({}, kSamples)};
   expect_read({volume, {"__MACOSX/head.nii", "junk"}, {".DS_Store", "junk"}}, "nifti");
   expect_read({{"link.nii", "/etc/passwd", Kind::kLink}, volume}, "nifti");
-  const Outcome tarred = import_bytes(
-      tar({volume, {"again.nii", "head.nii", Kind::kHardLink}, {"null", "", Kind::kDevice}}));
-  EXPECT_EQ(tarred.error, "");
+  const Outcome tarred = imported(import_bytes(
+      tar({volume, {"again.nii", "head.nii", Kind::kHardLink}, {"null", "", Kind::kDevice}})));
 }
 
 // Clients send all files of a folder.
@@ -242,8 +239,7 @@ TEST(Archive, FilesThatAreNoPartOfAVolumeAreIgnored) {
   single.push_back({"./head.nii", nifti({}, kSamples)});
   for (const std::vector<Member>& members : {series, single}) {
     for (const std::string& file : forms(members)) {
-      const Outcome outcome = import_bytes(file);
-      EXPECT_EQ(outcome.error, "");
+      const Outcome outcome = imported(import_bytes(file));
       EXPECT_THAT(names(outcome.volume), named);
     }
   }
@@ -275,8 +271,7 @@ TEST(Archive, OneFileTwiceIsTakenOnce) {
   const std::string volume = nifti({}, kSamples);
   const std::string file = zip({{"a.nii", volume}, {"old/a.nii", volume}, {"c.nii", volume}});
   for (const char* asked : {"", "a.nii", "c.nii"}) {
-    const Outcome outcome = import_bytes(file, {}, {.member = asked});
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(file, {}, {.member = asked}));
     EXPECT_EQ(outcome.volume.name, "a.nii");
     EXPECT_THAT(codes_of(outcome), testing::ElementsAre("duplicate-file"));
     ASSERT_EQ(outcome.volume.ignored.size(), 2U);

@@ -4,25 +4,6 @@
 #include <stdexcept>
 
 namespace isomesh::import::test {
-namespace {
-
-// Runs an import that is given a target; keeps what came of it.
-template <class Import>
-Outcome outcome_of(const Folder& folder, const Import& import) {
-  Outcome outcome;
-  const std::filesystem::path target = folder.path("target");
-  try {
-    outcome.volume = import(target);
-    outcome.canonical = read_file(target);
-  } catch (const Error& error) {
-    outcome.code = error.code();
-    outcome.error = error.what();
-    outcome.remedy = error.remedy();
-  }
-  return outcome;
-}
-
-}  // namespace
 
 std::filesystem::path Folder::write(std::string_view name, std::string_view bytes) const {
   isomesh::test::write_file(path(name), bytes);
@@ -34,12 +15,26 @@ std::size_t Folder::entries() const {
   return static_cast<std::size_t>(std::distance(begin(all), end(all)));
 }
 
+Outcome outcome_of(const std::filesystem::path& target,
+                   const std::function<Volume(const std::filesystem::path& target)>& import) {
+  Outcome outcome;
+  try {
+    outcome.volume = import(target);
+    outcome.canonical = read_file(target);
+  } catch (const Error& error) {
+    outcome.code = error.code();
+    outcome.error = error.what();
+    outcome.remedy = error.remedy();
+  }
+  return outcome;
+}
+
 Outcome import_bytes(std::string_view bytes, const SizeLimits& limits,
                      const ImportOptions& options) {
   const Folder folder;
   const Folder scratch;
   const auto source = folder.write("upload", bytes);
-  Outcome outcome = outcome_of(folder, [&](const std::filesystem::path& target) {
+  Outcome outcome = outcome_of(folder.path("target"), [&](const auto& target) {
     return import_volume({.source = source,
                           .scratch = scratch.path(""),
                           .target = target,
@@ -50,23 +45,15 @@ Outcome import_bytes(std::string_view bytes, const SizeLimits& limits,
   return outcome;
 }
 
+Outcome imported(Outcome outcome) {
+  if (!outcome.imported()) throw std::runtime_error(outcome.error);
+  return outcome;
+}
+
 std::vector<std::string> codes_of(const Outcome& outcome) {
   std::vector<std::string> codes;
   for (const Note& note : outcome.volume.notes) codes.push_back(note.code);
   return codes;
-}
-
-Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
-                         const SizeLimits& limits) {
-  const Folder folder;
-  const auto source = folder.write("upload", bytes);
-  return outcome_of(folder, [&](const std::filesystem::path& target) {
-    return import_volume({.source = source,
-                          .scratch = folder.path(""),
-                          .target = target,
-                          .options = {.raw = description, .series = {}},
-                          .limits = limits});
-  });
 }
 
 }  // namespace isomesh::import::test

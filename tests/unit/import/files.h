@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -45,12 +46,20 @@ struct Outcome {
   std::string_view sample_bytes() const { return std::string_view(canonical).substr(kHeaderBytes); }
 };
 
+// Runs an import that is given a target; keeps what came of it.
+Outcome outcome_of(const std::filesystem::path& target,
+                   const std::function<Volume(const std::filesystem::path& target)>& import);
+
 Outcome import_bytes(std::string_view bytes, const SizeLimits& limits = {},
                      const ImportOptions& options = {});
+// The same of an import that must succeed. Throws std::runtime_error with its error.
+Outcome imported(Outcome outcome);
 // The codes of the volume's notes, in their order.
 std::vector<std::string> codes_of(const Outcome& outcome);
-Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
-                         const SizeLimits& limits = {});
+inline Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
+                                const SizeLimits& limits = {}) {
+  return import_bytes(bytes, limits, {.raw = description});
+}
 
 // The samples of an outcome as their type.
 template <class Sample>

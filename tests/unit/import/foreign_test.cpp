@@ -1,6 +1,5 @@
 // Tests of files by other programs that extend or violate the formats' descriptions.
 
-#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -53,15 +52,6 @@ TEST(ForeignNrrd, SpacingFollowsFromMinsAndMaxs) {
   EXPECT_FALSE(import_bytes(nrrd(with(lines, "axis maxs", "0 19 30"), kSamples)).imported());
 }
 
-TEST(ForeignNrrd, RefusesDirectionsBeyondMeasure) {
-  for (const std::string step : {"1e155", "1e100", "1e-170"}) {
-    const std::string directions = "(" + step + ",0,0) (0," + step + ",0) (0,0," + step + ")";
-    EXPECT_FALSE(
-        import_bytes(nrrd(with(small_nrrd(), "space directions", directions), kSamples)).imported())
-        << step;
-  }
-}
-
 TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfSlicer) {
   Lines lines = without_space(small_nrrd());
   lines = with(with(lines, "dimension", "4"), "sizes", "4 3 2 1");
@@ -69,8 +59,7 @@ TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfSlicer) {
   lines.emplace_back("space directions", "(-2,0,0,0) (0,-2,0,0) (0,0,3,0) (0,0,0,1)");
   lines.emplace_back("space origin", "(10,20,30,0)");
   const std::string file = nrrd(lines, kSamples);
-  const Outcome bare = import_bytes(file);
-  ASSERT_EQ(bare.error, "");
+  const Outcome bare = imported(import_bytes(file));
   EXPECT_THAT(codes_of(bare), ElementsAre("space-assumed"));
   EXPECT_EQ(bare.volume.geometry.origin, (Vector{-10, -20, 30}));
   EXPECT_EQ(bare.volume.geometry.direction, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
@@ -84,8 +73,6 @@ TEST(ForeignNrrd, AUnitThatCountsSamplesIsNoLength) {
   lines.emplace_back("space units", "\"pixel\" \"pixel\" \"pixel\"");
   const Outcome outcome = import_bytes(nrrd(lines, kSamples));
   EXPECT_THAT(codes_of(outcome), ElementsAre("unit-unknown"));
-  lines.back().second = "\"furlong\" \"furlong\" \"furlong\"";
-  EXPECT_THAT(import_bytes(nrrd(lines, kSamples)).error, HasSubstr("furlong"));
 }
 
 // Sample by sample, as diffusion series are stored, and one behind the other.
@@ -152,26 +139,19 @@ TEST(ForeignMetaImage, SlopeAndOffsetAreApplied) {
   EXPECT_THAT(codes_of(outcome), ElementsAre("values-rescaled"));
 }
 
-TEST(ForeignMetaImage, OneOfSeveralVolumesIsChosen) {
-  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "2 3 2 2");
-  for (const char* name : {"TransformMatrix", "Offset", "ElementSpacing"})
-    lines = with(lines, name, "");
-  const std::string file = metaimage(lines, kSamples);
-  EXPECT_EQ(import_bytes(file).remedy.choices.size(), 2);
-  EXPECT_EQ(import_bytes(file, {}, {.volume = 1}).sample_bytes(), kSamples.substr(12));
-}
-
 TEST(ForeignPairs, AreReadWithTheirImage) {
   using std::string_literals::operator""s;
   const std::string header = nifti({.magic = "ni1\0"s, .vox_offset = 0}, "").substr(0, 348);
   for (const std::string& image : {kSamples, gzip(kSamples)}) {
     const std::string name = image == kSamples ? "v/a.img" : "v/a.img.gz";
-    const Outcome outcome = import_bytes(zip({{"v/a.hdr", header}, {name, image}}));
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(zip({{"v/a.hdr", header}, {name, image}})));
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
     EXPECT_THAT(codes_of(outcome), IsEmpty());
   }
-  EXPECT_THAT(import_bytes(header).error, HasSubstr("in an .img file, which is missing"));
+  const std::string version_2 = nifti({.version = 2, .magic = "ni2\0\r\n\032\n"s}, kSamples);
+  for (const std::string& alone : {header, version_2}) {
+    EXPECT_THAT(import_bytes(alone).error, HasSubstr("in an .img file, which is missing"));
+  }
   EXPECT_THAT(import_bytes(zip({{"a.hdr", header}, {"b.img", kSamples}})).error,
               HasSubstr("in an .img file, which is missing"));
 }
@@ -184,8 +164,7 @@ TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
                              "")
                            .substr(0, 348);
   header[38] = 'r';
-  const Outcome outcome = import_bytes(zip({{"a.hdr", header}, {"a.img", kSamples}}));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(zip({{"a.hdr", header}, {"a.img", kSamples}})));
   EXPECT_EQ(outcome.volume.format, "nifti");
   EXPECT_EQ(outcome.sample_bytes(), kSamples);
   EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
@@ -204,8 +183,8 @@ TEST(ForeignPairs, AnalyzeIsKnownWithoutRegular) {
   NiftiFields fields = {.magic = std::string(4, '\0'), .vox_offset = 0, .sform_code = 0};
   for (const bool big_endian : {false, true}) {
     fields.big_endian = big_endian;
-    const Outcome outcome = import_bytes(zip({{"a.hdr", header(fields)}, {"a.img", kSamples}}));
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome =
+        imported(import_bytes(zip({{"a.hdr", header(fields)}, {"a.img", kSamples}})));
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
     EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
   }

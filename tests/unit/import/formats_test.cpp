@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/import/files.h"
+#include "tests/unit/import/other_writers.h"
+#include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
@@ -53,14 +55,12 @@ struct SameVolume {
 
 TEST(Formats, GiveOneCanonicalFile) {
   const SameVolume same;
-  const Outcome raw = import_raw_bytes(bytes_of(same.samples), same.description());
-  ASSERT_EQ(raw.error, "");
+  const Outcome raw = imported(import_raw_bytes(bytes_of(same.samples), same.description()));
   ASSERT_EQ(raw.canonical.size(), kHeaderBytes + 48);
   for (const std::string& file :
        {same.as_nifti(false), same.as_nifti(true), gzip(same.as_nifti(false)), same.as_nrrd(false),
         same.as_nrrd(true), same.as_metaimage()}) {
-    const Outcome outcome = import_bytes(file);
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(file));
     EXPECT_EQ(outcome.canonical, raw.canonical);
     EXPECT_EQ(outcome.volume.geometry, raw.volume.geometry);
     EXPECT_EQ(outcome.volume.range, raw.volume.range);
@@ -83,6 +83,74 @@ TEST(Formats, AreReadByManyThreadsAtOnce) {
       }
     });
   }
+}
+
+// A file that says how far apart its samples are refuses another spacing; one that does not takes
+// it.
+struct Spaced {
+  std::string name;
+  std::string none;
+  Vector3 assumed;               // without a spacing; zeros: it must be given
+  std::vector<std::string> own;  // files with a spacing
+};
+
+TEST(Formats, TakeASpacingIfTheyHaveNone) {
+  const std::string samples(kSmallSamples);
+  const Lines plain =
+      with(with(with(small_nrrd(), "space", ""), "space directions", ""), "space origin", "");
+  // The steps of this matrix are not of length 1, which the given spacing replaces.
+  const Lines meta =
+      with(with(small_metaimage(), "ElementSpacing", ""), "TransformMatrix", "2 0 0 0 1 0 0 0 1");
+  const std::string points = "POINT_DATA 24\nSCALARS s char\nLOOKUP_TABLE default\n" + samples;
+  const auto without = [](std::string file, const std::string& part) {
+    return file.erase(file.find(part), part.size());
+  };
+  const std::string image = vti({.spacing = "7 8 9"}, samples);
+  const Spaced rows[] = {
+      {"nrrd",
+       nrrd(plain, samples),
+       {1, 1, 1},
+       {nrrd(small_nrrd(), samples), nrrd(with(plain, "spacings", "1 1 1"), samples),
+        nrrd(with(with(plain, "axis mins", "0 0 0"), "axis maxs", "4 3 2"), samples)}},
+      {"metaimage",
+       metaimage(meta, samples),
+       {2, 1, 1},
+       {metaimage(with(meta, "ElementSpacing", "1 1 1"), samples),
+        metaimage(with(meta, "ElementSize", "1 1 1"), samples)}},
+      {"vti", without(image, " Spacing=\"7 8 9\""), {1, 1, 1}, {image}},
+      {"vtk",
+       without(vtk_legacy(false, points), "\nSPACING 1 2 3"),
+       {1, 1, 1},
+       {vtk_legacy(false, points)}},
+      {"numpy", npy(npy_header("|u1", false, "(2, 3, 4)"), samples), {}, {}},
+      {"mrc", mrc({.cell = {0, 0, 0}}, samples), {}, {mrc({}, samples)}},
+      {"tiff", tiff({samples.substr(12), samples.substr(12)}), {}, {}}};
+  const ImportOptions spaced = {.spacing = Vector3{1, 2, 3}};
+  const auto is_unknown = testing::Contains("unit-unknown");
+  for (const auto& [name, none, assumed, own] : rows) {
+    SCOPED_TRACE(name);
+    const Outcome alone = import_bytes(none);
+    if (assumed == Vector3{}) {
+      ASSERT_EQ(alone.remedy.choices.size(), 1);
+      EXPECT_EQ(alone.remedy.choices[0].parameter, "spacing");
+      EXPECT_THAT(alone.error, HasSubstr("spacing=X,Y,Z"));
+    } else {
+      EXPECT_EQ(alone.volume.geometry.spacing, assumed);
+      EXPECT_THAT(codes_of(alone), is_unknown);
+      EXPECT_THAT(alone.volume.notes.at(0).detail, HasSubstr("spacing=X,Y,Z"));
+    }
+    const Outcome given = imported(import_bytes(none, {}, spaced));
+    EXPECT_EQ(given.volume.geometry.spacing, (Vector3{1, 2, 3}));
+    EXPECT_THAT(codes_of(given), testing::Not(is_unknown));
+    for (const std::string& file : own) {
+      EXPECT_EQ(import_bytes(file, {}, spaced).code, ErrorCode::kInvalidParameter);
+      EXPECT_THAT(codes_of(import_bytes(file)), testing::Not(is_unknown));
+    }
+  }
+  // The centres of cells lie half a step behind the origin.
+  std::string cells = "CELL_DATA 12\nSCALARS s char\nLOOKUP_TABLE default\n" + samples.substr(12);
+  cells = without(vtk_legacy(false, cells, "4 3 3"), "\nSPACING 1 2 3");
+  EXPECT_EQ(import_bytes(cells, {}, spaced).volume.geometry.origin, (Vector3{10.5, 21, 31.5}));
 }
 
 // In images_test.cpp and in dicom/ those of their formats.

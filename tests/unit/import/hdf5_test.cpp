@@ -19,8 +19,7 @@ TEST(Hdf5, ReadsAnImageOfItk) {
   Hdf5Image image = some_image();
   for (const bool is_chunked : {false, true}) {
     image.is_chunked = is_chunked;
-    const Outcome outcome = import_bytes(itk_hdf5(image));
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(itk_hdf5(image)));
     EXPECT_EQ(outcome.volume.format, "hdf5");
     EXPECT_EQ(outcome.volume.dims, (Dims{4, 3, 2}));
     EXPECT_EQ(samples_of<std::int16_t>(outcome), image.samples);
@@ -35,8 +34,7 @@ TEST(Hdf5, MincIsRasWithRealValuesOfEachSlice) {
   Hdf5Image image;
   for (std::int16_t at = 0; at < 24; ++at)
     image.samples.push_back(static_cast<std::int16_t>(at * 10 - 120));
-  const Outcome outcome = import_bytes(minc({}, image));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(minc({}, image)));
   EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-5, -6, 7}));
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{1, 2, 3}));
   EXPECT_EQ(outcome.volume.geometry.direction, (std::array<double, 9>{1, 0, 0, 0, -1, 0, 0, 0, 1}));
@@ -53,16 +51,14 @@ TEST(Hdf5, MincStaysWholeIfItsRangeChangesNothing) {
                            .valid_range = {-32768, 32767},
                            .least = {-32768, -32768},
                            .most = {32767, 32767}};
-  const Outcome outcome = import_bytes(minc(same, image));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(minc(same, image)));
   EXPECT_EQ(samples_of<std::int16_t>(outcome), image.samples);
   // The fastest axis is y, the slowest is x.
   EXPECT_EQ(outcome.volume.geometry.direction, (std::array<double, 9>{0, 0, 1, -1, 0, 0, 0, 1, 0}));
 }
 
 TEST(Hdf5, MincHasUnits) {
-  const Outcome micrometres = import_bytes(minc({.units = "um"}, some_image()));
-  ASSERT_EQ(micrometres.error, "");
+  const Outcome micrometres = imported(import_bytes(minc({.units = "um"}, some_image())));
   EXPECT_EQ(micrometres.volume.geometry.spacing, (Vector{0.001, 0.002, 0.003}));
   EXPECT_EQ(micrometres.volume.geometry.origin, (Vector{-0.005, -0.006, 0.007}));
   const Outcome pixels = import_bytes(minc({.units = "pixel"}, some_image()));

@@ -153,8 +153,7 @@ TEST(Tiff, ValuesAreCalibratedAsInImageJ) {
     return import_bytes(tiff({kFirst, kSecond}, "ImageJ=1.53t\nimages=2\nslices=2\n" + calibration),
                         {}, kSpaced);
   };
-  const Outcome outcome = of("cf=0\nc0=-100\nc1=0.5\nvunit=Gray Value\n");
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(of("cf=0\nc0=-100\nc1=0.5\nvunit=Gray Value\n"));
   EXPECT_EQ(samples_of<float>(outcome)[0], static_cast<float>(kFirst[0]) * 0.5F - 100);
   EXPECT_THAT(codes_of(outcome), Contains("values-rescaled"));
   for (const char* same : {"cf=20\n", "cf=0\nc0=0\nc1=1\n", "cf=0\nvunit=none\n"}) {
@@ -172,8 +171,7 @@ TEST(Tiff, FilesOfAFolderHaveOneCalibrationAndSpacing) {
         zip({{"s1.tif", tiff({kFirst}, first)}, {"s2.tif", tiff({kSecond}, second)}}), {}, options);
   };
   const std::string signed_values = "ImageJ=1.53t\ncf=0\nc0=-32768\nc1=1\n";
-  const Outcome outcome = of(signed_values, signed_values, kSpaced);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(of(signed_values, signed_values, kSpaced));
   EXPECT_EQ(samples_of<float>(outcome)[0], static_cast<float>(kFirst[0]) - 32768);
   EXPECT_THAT(codes_of(outcome), Contains("values-rescaled"));
   EXPECT_THAT(of(signed_values, "ImageJ=1.53t\n", kSpaced).error,
@@ -184,8 +182,7 @@ TEST(Tiff, FilesOfAFolderHaveOneCalibrationAndSpacing) {
            "PhysicalSizeY='2000' PhysicalSizeZ='" +
            between + "'/></Image></OME>";
   };
-  const Outcome spaced = of(ome("3000"), ome("3000"), {});
-  ASSERT_EQ(spaced.error, "");
+  const Outcome spaced = imported(of(ome("3000"), ome("3000"), {}));
   EXPECT_EQ(spaced.volume.geometry.spacing, (Vector{1, 2, 3}));
   EXPECT_THAT(of(ome("3000"), ome("4000"), {}).error, HasSubstr("spacing=X,Y,Z"));
 }
@@ -193,8 +190,7 @@ TEST(Tiff, FilesOfAFolderHaveOneCalibrationAndSpacing) {
 TEST(Tiff, PagesAreSlices) {
   const std::string file = tiff({kFirst, kSecond});
   EXPECT_THAT(import_bytes(file).error, HasSubstr("spacing=X,Y,Z"));
-  const Outcome outcome = import_bytes(file, {}, kSpaced);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(file, {}, kSpaced));
   EXPECT_EQ(outcome.volume.format, "tiff");
   EXPECT_EQ(outcome.volume.dims, (Dims{4, 3, 2}));
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{1, 2, 3}));
@@ -204,12 +200,11 @@ TEST(Tiff, PagesAreSlices) {
 }
 
 TEST(Tiff, TheDescriptionGivesSpacingAndVolumes) {
-  const Outcome spaced = import_bytes(
+  const Outcome spaced = imported(import_bytes(
       tiff({kFirst, kSecond},
            "<OME><Image><Pixels DimensionOrder='XYCZT' SizeZ='2' SizeC='1' SizeT='1' "
            "PhysicalSizeX='1' PhysicalSizeY='2' PhysicalSizeZ='3' PhysicalSizeXUnit='mm' "
-           "PhysicalSizeYUnit='mm' PhysicalSizeZUnit='mm'></Pixels></Image></OME>"));
-  ASSERT_EQ(spaced.error, "");
+           "PhysicalSizeYUnit='mm' PhysicalSizeZUnit='mm'></Pixels></Image></OME>")));
   EXPECT_EQ(spaced.volume.geometry.spacing, (Vector{1, 2, 3}));
   ImportOptions second = kSpaced;
   second.volume = 1;
@@ -279,8 +274,7 @@ TEST(Images, OfOtherNamesAreOtherVolumes) {
   const Outcome unchosen = import_pictures(two);
   ASSERT_EQ(unchosen.remedy.choices.size(), 2);
   EXPECT_EQ(unchosen.remedy.choices[1].value, "1/mask_*.png");
-  const Outcome chosen = import_pictures(two, "1/mask_*.png");
-  ASSERT_EQ(chosen.error, "");
+  const Outcome chosen = imported(import_pictures(two, "1/mask_*.png"));
   EXPECT_EQ(chosen.sample_bytes(), std::string(12, 'c') + std::string(12, 'd'));
   ASSERT_EQ(chosen.volume.ignored.size(), 1);
   EXPECT_EQ(chosen.volume.ignored[0].name, "legend.png");
@@ -292,8 +286,7 @@ TEST(Images, OfOtherNamesAreOtherVolumes) {
   EXPECT_THAT(import_pictures({"s1.png", "s2.png", "s4.png", "mip.png"}).error,
               HasSubstr("s3.png"));
   const Outcome preview =
-      import_pictures({"X3_rec_spr.png", "X3_rec01.png", "X3_rec02.png", "X3_rec03.png"});
-  ASSERT_EQ(preview.error, "");
+      imported(import_pictures({"X3_rec_spr.png", "X3_rec01.png", "X3_rec02.png", "X3_rec03.png"}));
   EXPECT_EQ(preview.volume.dims, (Dims{4, 3, 3}));
   EXPECT_THAT(preview.volume.ignored[0].reason, HasSubstr("numbered images"));
 }
@@ -371,9 +364,8 @@ TEST(Images, FoldersAreChosenAndPicturesBesideAVolumeIgnored) {
   ImportOptions second = kSpaced;
   second.member = "b/*.png";
   EXPECT_EQ(import_bytes(two, {}, second).sample_bytes(), kSamples);
-  const Outcome beside =
-      import_bytes(zip({{"1.png", image}, {"2.png", image}, {"a.nii", nifti({}, kSamples)}}));
-  ASSERT_EQ(beside.error, "");
+  const Outcome beside = imported(
+      import_bytes(zip({{"1.png", image}, {"2.png", image}, {"a.nii", nifti({}, kSamples)}})));
   EXPECT_EQ(beside.volume.format, "nifti");
   EXPECT_EQ(beside.volume.ignored.size(), 2);
 }

@@ -272,22 +272,6 @@ TEST(ItkSpace, NrrdIsReadAsItkReadsIt) {
   EXPECT_GT(refused, kHeaders / 20U);
 }
 
-// ITK is right about this space, but for axes without a direction, which it does not turn.
-TEST(ItkSpace, RightAnteriorSuperiorIsTurnedAsItkTurnsIt) {
-  const Folder folder;
-  Random random(7);
-  for (int round = 0; round < 100; ++round) {
-    NrrdHeader header = random_nrrd(random);
-    if (header.space.empty() || header.leaves_open) continue;
-    const auto is_directions = [](const auto& line) { return line.first == "space directions"; };
-    if (std::ranges::none_of(header.lines, is_directions)) continue;
-    const std::string file = file_of(header, "right-anterior-superior");
-    const auto expected =
-        kept(itk_geometry(ItkFormat::kNrrd, folder.write("header.nrrd", file)), header.dims);
-    EXPECT_EQ(ours(import_bytes(file)), expected) << file;
-  }
-}
-
 // --- MetaImage -----------------------------------------------------------------------------------
 
 struct MetaImageHeader {

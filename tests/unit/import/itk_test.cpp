@@ -8,12 +8,13 @@
 #include <itkNrrdImageIO.h>
 
 #include "tests/unit/import/files.h"
+#include "tests/unit/import/itk_reader.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
 
-constexpr std::array<unsigned, 3> kDims = {5, 4, 3};
+constexpr std::array<std::uint32_t, 3> kDims = {5, 4, 3};
 
 // A rotation about an axis that is none of the lattice's, its columns the axes' directions.
 std::array<std::array<double, 3>, 3> oblique() {
@@ -54,36 +55,36 @@ void write(const std::filesystem::path& path, const std::vector<std::int16_t>& s
   io->Write(samples.data());
 }
 
+void expect_near(const Geometry& geometry, const Geometry& expected, double rounding) {
+  for (std::size_t at = 0; at < 3; ++at) {
+    EXPECT_NEAR(geometry.origin[at], expected.origin[at], rounding);
+    EXPECT_NEAR(geometry.spacing[at], expected.spacing[at], rounding);
+  }
+  for (std::size_t at = 0; at < 9; ++at) {
+    EXPECT_NEAR(geometry.direction[at], expected.direction[at], rounding);
+  }
+}
+
 template <class Io>
-void expect_same_as_itk(const std::string& name, bool compressed) {
+void expect_same_as_itk(ItkFormat format, const std::string& name, bool compressed) {
   const Folder folder;
   const auto samples = some_samples<std::int16_t>(60);
   const std::filesystem::path path = folder.path(name);
   write<Io>(path, samples, compressed);
-  const auto io = Io::New();
-  io->SetFileName(path.string());
-  io->ReadImageInformation();
   const Outcome outcome = import_bytes(read_file(path));
   ASSERT_EQ(outcome.error, "") << name;
+  EXPECT_EQ(outcome.volume.dims, kDims) << name;
   EXPECT_EQ(samples_of<std::int16_t>(outcome), samples) << name;
-  const Geometry& geometry = outcome.volume.geometry;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(outcome.volume.dims[axis], io->GetDimensions(axis));
-    EXPECT_NEAR(geometry.origin[axis], io->GetOrigin(axis), 1e-5);
-    EXPECT_NEAR(geometry.spacing[axis], io->GetSpacing(axis), 1e-5);
-    for (std::size_t row = 0; row < 3; ++row) {
-      EXPECT_NEAR(geometry.direction[row * 3 + axis], io->GetDirection(axis)[row], 1e-6);
-    }
-  }
+  expect_near(outcome.volume.geometry, itk_geometry(format, path).value(), 1e-6);
 }
 
 TEST(Itk, AgreesAboutWhatItWrites) {
-  expect_same_as_itk<itk::NiftiImageIO>("volume.nii", false);
-  expect_same_as_itk<itk::NiftiImageIO>("volume.nii.gz", true);
-  expect_same_as_itk<itk::NrrdImageIO>("volume.nrrd", false);
-  expect_same_as_itk<itk::NrrdImageIO>("volume.nrrd", true);
-  expect_same_as_itk<itk::MetaImageIO>("volume.mha", false);
-  expect_same_as_itk<itk::MetaImageIO>("volume.mha", true);
+  expect_same_as_itk<itk::NiftiImageIO>(ItkFormat::kNifti, "volume.nii", false);
+  expect_same_as_itk<itk::NiftiImageIO>(ItkFormat::kNifti, "volume.nii.gz", true);
+  expect_same_as_itk<itk::NrrdImageIO>(ItkFormat::kNrrd, "volume.nrrd", false);
+  expect_same_as_itk<itk::NrrdImageIO>(ItkFormat::kNrrd, "volume.nrrd", true);
+  expect_same_as_itk<itk::MetaImageIO>(ItkFormat::kMetaImage, "volume.mha", false);
+  expect_same_as_itk<itk::MetaImageIO>(ItkFormat::kMetaImage, "volume.mha", true);
 }
 
 // Both forms one after the other, so that each is judged alone.
@@ -100,17 +101,8 @@ TEST(Itk, AgreesAboutQformAndSform) {
         .qoffset = {5, 6, 7}},
         NiftiFields{.pixdim = {1, 2, 3, 4, 0, 0, 0, 0}, .sform_code = 0}}) {
     const std::string bytes = nifti(fields, kSmallSamples);
-    const auto io = itk::NiftiImageIO::New();
-    io->SetFileName(folder.write("volume.nii", bytes).string());
-    io->ReadImageInformation();
-    const Geometry geometry = import_bytes(bytes).volume.geometry;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      EXPECT_NEAR(geometry.origin[axis], io->GetOrigin(axis), 1e-5);
-      EXPECT_NEAR(geometry.spacing[axis], io->GetSpacing(axis), 1e-5);
-      for (std::size_t row = 0; row < 3; ++row) {
-        EXPECT_NEAR(geometry.direction[row * 3 + axis], io->GetDirection(axis)[row], 1e-5);
-      }
-    }
+    expect_near(import_bytes(bytes).volume.geometry,
+                itk_geometry(ItkFormat::kNifti, folder.write("volume.nii", bytes)).value(), 1e-5);
   }
 }
 

@@ -61,23 +61,6 @@ TEST(LabelTable, HasTheFirstOfSeveralEntries) {
             ErrorCode::kUnusableVolume);
 }
 
-TEST(Combinations, AreTheSameHoweverTheyAreMade) {
-  Combinations combinations(9);
-  const auto one = combinations.with(Combinations::kNone, 4);
-  const auto both = combinations.with(one, 9);
-  EXPECT_EQ(combinations.with(one, 4), one);
-  EXPECT_EQ(combinations.with(combinations.with(Combinations::kNone, 4), 9), both);
-  EXPECT_EQ(combinations.value(Combinations::kNone), 0U);
-  EXPECT_EQ(combinations.value(one), 4U);
-  EXPECT_EQ(combinations.value(both), 10U);
-  EXPECT_EQ(combinations.value(combinations.with(Combinations::kNone, 9)), 9U);
-  EXPECT_EQ(combinations.new_label(), 11U);
-  EXPECT_THAT(
-      combinations.entries({{.label = 4, .name = "a"}, {.label = 5, .name = "b"}}),
-      ElementsAre(LabelEntry{.label = 4, .name = "a", .values = {4, 10}},
-                  LabelEntry{.label = 5, .name = "b"}, LabelEntry{.label = 9, .values = {9, 10}}));
-}
-
 // A state that no sample has in the end has no value.
 TEST(Combinations, OnTheWayToOthersTakeNoValue) {
   Combinations combinations(3);

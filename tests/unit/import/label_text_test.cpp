@@ -140,8 +140,7 @@ std::string label_volume() {
 
 std::vector<LabelEntry> labels_in(const std::vector<Member>& members,
                                   const std::string& chosen = "") {
-  const Outcome outcome = import_bytes(zip(members), {}, {.member = chosen});
-  EXPECT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(zip(members), {}, {.member = chosen}));
   return outcome.volume.labels;
 }
 
@@ -199,9 +198,8 @@ TEST(LabelsBeside, AreNoneWhereSeveralTablesWouldDo) {
 }
 
 TEST(LabelsBeside, AreNotForImagesNorForFilesThatNameTheirOwn) {
-  const Outcome image = import_bytes(
-      zip({{"ct.nii", nifti({}, kSmallSamples)}, {"labels.txt", std::string(kTable)}}));
-  EXPECT_EQ(image.error, "");
+  const Outcome image = imported(import_bytes(
+      zip({{"ct.nii", nifti({}, kSmallSamples)}, {"labels.txt", std::string(kTable)}})));
   EXPECT_THAT(image.volume.labels, IsEmpty());
   EXPECT_THAT(codes_of(image), IsEmpty());
   std::string own =

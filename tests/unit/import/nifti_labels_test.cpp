@@ -51,8 +51,7 @@ TEST(NiftiLabels, AreThoseOfCaret) {
       const NiftiFields fields = {.version = version, .big_endian = big_endian};
       const std::string extensions =
           extension("a comment", 6, big_endian) + extension(caret(kTwo), 30, big_endian);
-      const Outcome outcome = import_bytes(with_extensions(fields, extensions));
-      ASSERT_EQ(outcome.error, "");
+      const Outcome outcome = imported(import_bytes(with_extensions(fields, extensions)));
       EXPECT_EQ(outcome.volume.labels, two());
       EXPECT_EQ(outcome.sample_bytes(), kSamples);
       EXPECT_THAT(codes_of(outcome), Contains("looks-like-labels"));
@@ -79,8 +78,7 @@ TEST(NiftiLabels, AreThoseOfAfni) {
       " \"&lt;VALUE_LABEL_DTABLE ni_type=&quot;2*String&quot; ni_dimen=&quot;2&quot; &gt;&#x0a;"
       " &quot;12&quot; &quot;Left-Thalamus&quot;&#x0a; &quot;3&quot; &quot;Cortex&quot;&#x0a;"
       "&lt;/VALUE_LABEL_DTABLE&gt;\" </AFNI_atr></AFNI_attributes>";
-  const Outcome outcome = import_bytes(with_extensions({}, extension(text, 4, false)));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(with_extensions({}, extension(text, 4, false))));
   EXPECT_THAT(outcome.volume.labels, ElementsAre(LabelEntry{.label = 3, .name = "Cortex"},
                                                  LabelEntry{.label = 12, .name = "Left-Thalamus"}));
 }
@@ -94,8 +92,7 @@ TEST(NiftiLabels, OfDamagedExtensionsAreNone) {
        {extension(caret(kTwo).substr(0, 200), 30, false), extension(doctype, 30, false),
         lying + caret(kTwo), too_long + caret(kTwo), std::string("\1"),
         extension("<LabelTable><Label Key=\"x\">a</Label></LabelTable>", 30, false)}) {
-    const Outcome outcome = import_bytes(with_extensions({}, extensions));
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_bytes(with_extensions({}, extensions)));
     EXPECT_THAT(outcome.volume.labels, IsEmpty());
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
   }
@@ -111,8 +108,7 @@ TEST(NiftiLabels, AreDeclaredByTheIntent) {
   };
   std::vector<float> samples;
   for (int at = 0; at < 24; ++at) samples.push_back(static_cast<float>(at * 7 % 24));
-  const Outcome whole = of(samples);
-  ASSERT_EQ(whole.error, "");
+  const Outcome whole = imported(of(samples));
   EXPECT_EQ(whole.volume.type, SampleType::kUint8);
   ASSERT_THAT(codes_of(whole), ElementsAre("looks-like-labels"));
   EXPECT_THAT(whole.volume.notes[0].detail, HasSubstr("says that its samples are labels"));
@@ -125,9 +121,8 @@ TEST(NiftiLabels, AreDeclaredByTheIntent) {
 
 TEST(NiftiLabels, OfFractionsAreNone) {
   const NiftiFields fields = {.datatype = 16, .bitpix = 32};
-  const Outcome outcome = import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false),
-                                                       bytes_of(some_samples<float>(24))));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(with_extensions(
+      fields, extension(caret(kTwo), 30, false), bytes_of(some_samples<float>(24)))));
   EXPECT_THAT(outcome.volume.labels, IsEmpty());
 }
 
@@ -135,9 +130,8 @@ TEST(NiftiLabels, OfWholeNumbersAreKept) {
   const NiftiFields fields = {.datatype = 16, .bitpix = 32};
   std::vector<float> samples(24, 1);
   samples[5] = 7;
-  const Outcome outcome =
-      import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false), bytes_of(samples)));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(
+      import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false), bytes_of(samples))));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
   EXPECT_EQ(outcome.volume.labels, two());
 }

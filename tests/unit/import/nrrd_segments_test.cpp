@@ -31,8 +31,8 @@ Lines layered(const std::string& sizes, const std::string& kinds, const std::str
 }
 
 // Two layers of 2 x 2 x 2 samples, the layers first.
-Lines layers_first() {
-  return layered("2 2 2 2", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)");
+Lines layers_first(const std::string& sizes = "2 2 2 2", const std::string& kind = "list") {
+  return layered(sizes, kind + " domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)");
 }
 
 LabelEntry entry(std::int64_t label, const std::string& name,
@@ -46,17 +46,16 @@ const std::vector<Key> kTwoLayers = {{"0_Name", "liver"},  {"0_LabelValue", "1"}
 
 TEST(NrrdSegments, HaveNamesAndColors) {
   const std::string samples(24, '\3');
-  const Outcome outcome = import_bytes(with_segments(small_nrrd(),
-                                                     {{"0_ID", "a"},
-                                                      {"0_Name", "M\xc3\xbcller \x01"},
-                                                      {"0_LabelValue", "7"},
-                                                      {"0_Color", "1 0.5 0"},
-                                                      {"0_Layer", "0"},
-                                                      {"1_Name", "spleen"},
-                                                      {"1_LabelValue", "3"},
-                                                      {"1_Color", "red"}},
-                                                     samples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(with_segments(small_nrrd(),
+                                                              {{"0_ID", "a"},
+                                                               {"0_Name", "M\xc3\xbcller \x01"},
+                                                               {"0_LabelValue", "7"},
+                                                               {"0_Color", "1 0.5 0"},
+                                                               {"0_Layer", "0"},
+                                                               {"1_Name", "spleen"},
+                                                               {"1_LabelValue", "3"},
+                                                               {"1_Color", "red"}},
+                                                              samples)));
   EXPECT_EQ(outcome.sample_bytes(), samples);
   EXPECT_THAT(outcome.volume.labels,
               ElementsAre(entry(3, "spleen"), LabelEntry{.label = 7,
@@ -68,10 +67,9 @@ TEST(NrrdSegments, HaveNamesAndColors) {
 }
 
 TEST(NrrdSegments, OfFractionsAreNoLabels) {
-  const Outcome outcome =
+  const Outcome outcome = imported(
       import_bytes(with_segments(with(with(small_nrrd(), "type", "float"), "endian", "little"),
-                                 {{"0_Name", "liver"}}, bytes_of(some_samples<float>(24))));
-  ASSERT_EQ(outcome.error, "");
+                                 {{"0_Name", "liver"}}, bytes_of(some_samples<float>(24)))));
   EXPECT_THAT(outcome.volume.labels, IsEmpty());
   EXPECT_THAT(codes_of(outcome), Not(Contains("looks-like-labels")));
 }
@@ -83,8 +81,8 @@ TEST(NrrdSegments, InLayersMayOverlap) {
   first[0] = first[2] = second[1] = second[2] = '\1';
   std::string interleaved;
   for (std::size_t at = 0; at < 8; ++at) interleaved += std::string{first[at], second[at]};
-  const Outcome outcome = import_bytes(with_segments(layers_first(), kTwoLayers, interleaved));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome =
+      imported(import_bytes(with_segments(layers_first(), kTwoLayers, interleaved)));
   EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{2, 2, 2}));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
   // The tumour's value is the liver's in another layer, so that it gets another number.
@@ -105,9 +103,8 @@ TEST(NrrdSegments, InLayersMayOverlap) {
   EXPECT_EQ(planar.canonical, outcome.canonical);
   EXPECT_EQ(planar.volume.labels, outcome.volume.labels);
 
-  const Outcome chosen =
-      import_bytes(with_segments(layers_first(), kTwoLayers, interleaved), {}, {.volume = 1});
-  ASSERT_EQ(chosen.error, "");
+  const Outcome chosen = imported(
+      import_bytes(with_segments(layers_first(), kTwoLayers, interleaved), {}, {.volume = 1}));
   EXPECT_EQ(chosen.sample_bytes(), second);
   EXPECT_THAT(chosen.volume.labels, ElementsAre(entry(1, "tumour")));
 }
@@ -119,8 +116,7 @@ TEST(NrrdSegments, ThatDoNotOverlapKeepTheirNumbers) {
   std::vector<Key> keys = kTwoLayers;
   keys[1].second = "7";
   keys[4].second = "2";
-  const Outcome outcome = import_bytes(with_segments(layers_first(), keys, samples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(with_segments(layers_first(), keys, samples)));
   EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(7, 2, 0, 0, 0, 0, 0, 0));
   EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(2, "tumour"), entry(7, "liver")));
   EXPECT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
@@ -130,10 +126,8 @@ TEST(NrrdSegments, ThatDoNotOverlapKeepTheirNumbers) {
 TEST(NrrdSegments, OfOldVersionsAreALayerEach) {
   std::string samples(16, '\0');
   samples[0] = samples[1] = '\1';
-  const Outcome outcome = import_bytes(with_segments(
-      layered("2 2 2 2", "vector domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
-      {{"0_Name", "liver"}, {"1_Name", "tumour"}}, samples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(with_segments(
+      layers_first("2 2 2 2", "vector"), {{"0_Name", "liver"}, {"1_Name", "tumour"}}, samples)));
   EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(1, "liver", {3}), entry(2, "tumour", {3})));
 }
 
@@ -141,8 +135,8 @@ TEST(NrrdSegments, ValuesOfNoSegmentAreLabelsWithoutAName) {
   std::string samples(16, '\0');
   samples[0] = '\1';
   samples[2] = '\5';
-  const Outcome outcome = import_bytes(with_segments(layers_first(), kTwoLayers, samples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome =
+      imported(import_bytes(with_segments(layers_first(), kTwoLayers, samples)));
   EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(1, 3, 0, 0, 0, 0, 0, 0));
   EXPECT_THAT(outcome.volume.labels,
               ElementsAre(entry(1, "liver"), entry(2, "tumour"), entry(3, "")));
@@ -160,10 +154,8 @@ TEST(NrrdSegments, WithManyCombinationsHaveWiderValues) {
   for (int layer = 0; layer < 9; ++layer) {
     keys.emplace_back(std::to_string(layer) + "_Layer", std::to_string(layer));
   }
-  const Outcome outcome = import_bytes(
-      with_segments(layered("9 8 8 8", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
-                    keys, samples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome =
+      imported(import_bytes(with_segments(layers_first("9 8 8 8"), keys, samples)));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint16);
   const auto values = samples_of<std::uint16_t>(outcome);
   ASSERT_EQ(outcome.volume.labels.size(), 9U);
@@ -183,9 +175,8 @@ TEST(NrrdSegments, WithTooManyCombinationsAreRefused) {
   for (std::size_t at = 0; at < samples.size(); ++at) {
     samples[at] = static_cast<char>(at / 17 >> at % 17 & 1);
   }
-  const Outcome outcome = import_bytes(with_segments(
-      layered("17 64 64 32", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
-      {{"0_Layer", "0"}}, samples));
+  const Outcome outcome =
+      import_bytes(with_segments(layers_first("17 64 64 32"), {{"0_Layer", "0"}}, samples));
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("need more than the 65535 values"));
 }

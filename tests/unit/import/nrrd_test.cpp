@@ -121,8 +121,7 @@ TEST(Nrrd, ReadsPlainSpacingsAndMins) {
                  {"centers", "cell cell cell"},
                  {"axis mins", "0 0 0"},
                  {"encoding", "raw"}};
-  const Outcome outcome = import_nrrd(lines);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_nrrd(lines));
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{1, 2.5, 0.5}));
 }
 
@@ -160,33 +159,15 @@ TEST(Nrrd, MinsAndMaxsMustFitTheSpacings) {
                         "axis max 30"));
 }
 
-TEST(Nrrd, TakesASpacingIfItHasNone) {
-  const ImportOptions spaced = {.spacing = Vector3{1, 2, 3}};
-  const Lines plain =
-      with(with(with(small_nrrd(), "space", ""), "space directions", ""), "space origin", "");
-  const std::string none = nrrd(plain, kSmallSamples);
-  const Outcome assumed = import_bytes(none);
-  ASSERT_EQ(assumed.error, "");
-  EXPECT_EQ(assumed.volume.geometry.spacing, (Vector3{1, 1, 1}));
-  ASSERT_THAT(codes_of(assumed), testing::ElementsAre("unit-unknown"));
-  EXPECT_THAT(assumed.volume.notes[0].detail, HasSubstr("spacing=X,Y,Z"));
-  const Outcome given = import_bytes(none, {}, spaced);
-  ASSERT_EQ(given.error, "");
-  EXPECT_EQ(given.volume.geometry.spacing, (Vector3{1, 2, 3}));
-  EXPECT_THAT(codes_of(given), testing::IsEmpty());
-  for (const Lines& own : {small_nrrd(), with(plain, "spacings", "1 1 1"),
-                           with(with(plain, "axis mins", "0 0 0"), "axis maxs", "4 3 2")}) {
-    const std::string file = nrrd(own, kSmallSamples);
-    EXPECT_EQ(import_bytes(file, {}, spaced).code, ErrorCode::kInvalidParameter);
-    EXPECT_THAT(codes_of(import_bytes(file)), testing::IsEmpty());
-  }
-}
-
 TEST(Nrrd, RefusesSpacingsThatCannotBe) {
   for (const char* directions :
        {"(1,0,0) (0,nan,0) (0,0,1)", "(1,0,0) none (0,0,1)", "(1,0,0) (0,0,0) (0,0,1)",
         "(1,0,0) (1,0,0) (0,0,1)", "(1,0,0) (0,inf,0) (0,0,1)", "(1,0) (0,1) (0,0)",
-        "(1,0,0) (0,1,0)", "nonsense"}) {
+        "(1,0,0) (0,1,0)", "nonsense",
+        // ITK takes such steps for 1 mm along an axis of its own choice.
+        "(1e200,0,0) (0,1,0) (0,0,1)", "(1e-200,0,0) (0,1,0) (0,0,1)",
+        "(1e155,0,0) (0,1e155,0) (0,0,1e155)", "(1e100,0,0) (0,1e100,0) (0,0,1e100)",
+        "(1e-170,0,0) (0,1e-170,0) (0,0,1e-170)"}) {
     const Outcome outcome = import_with("space directions", directions);
     EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume) << directions;
   }
@@ -208,14 +189,6 @@ TEST(Nrrd, RefusesSpacingsThatCannotBe) {
             ErrorCode::kUnusableVolume);
   EXPECT_FALSE(import_with("space origin", "(nan,0,0)").imported());
   EXPECT_FALSE(import_with("space origin", "(0,0,nan)").imported());
-}
-
-// ITK takes such steps for 1 mm along an axis of its own choice.
-TEST(Nrrd, RefusesStepsWhoseLengthsCannotBeComputed) {
-  EXPECT_EQ(import_with("space directions", "(1e200,0,0) (0,1,0) (0,0,1)").code,
-            ErrorCode::kUnusableVolume);
-  EXPECT_EQ(import_with("space directions", "(1e-200,0,0) (0,1,0) (0,0,1)").code,
-            ErrorCode::kUnusableVolume);
 }
 
 TEST(Nrrd, RefusesFieldsOfSpaceWithoutOne) {
@@ -241,8 +214,8 @@ TEST(Nrrd, TakesASingleComponentForNone) {
   Lines lines = with(small_nrrd(), "dimension", "4");
   lines = with(lines, "sizes", "1 4 3 2");
   lines = with(lines, "space directions", "none (1,0,0) (0,2,0) (0,0,3)");
-  const Outcome outcome = import_nrrd(with(lines, "kinds", "vector domain domain domain"));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome =
+      imported(import_nrrd(with(lines, "kinds", "vector domain domain domain")));
   EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{1, 2, 3}));
 }
@@ -295,8 +268,6 @@ TEST(Nrrd, RefusesHeadersThatContradictThemselves) {
 
 // The header limits how much may be unpacked, not the general size limit.
 TEST(Nrrd, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
-  const std::string bomb = gzip(nrrd(small_nrrd(), std::string(10'000'000, '\0')));
-  EXPECT_THAT(import_bytes(bomb).error, HasSubstr("The compressed file unpacks to more than"));
   const Lines text = with(small_nrrd(), "encoding", "ascii");
   EXPECT_THAT(import_bytes(gzip(nrrd(text, std::string(10'000'000, ' ')))).error,
               HasSubstr("The compressed file unpacks to more than"));

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,8 +26,7 @@ TYPED_TEST(RawOfType, IsReadInBothByteOrders) {
   const auto samples = some_samples<TypeParam>(67 * 51 * 83);
   for (const bool big_endian : {false, true}) {
     description.big_endian = big_endian;
-    const Outcome outcome = import_raw_bytes(bytes_of(samples, big_endian), description);
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_raw_bytes(bytes_of(samples, big_endian), description));
     EXPECT_EQ(samples_of<TypeParam>(outcome), samples);
     EXPECT_EQ(outcome.volume.type, description.type);
     EXPECT_EQ(outcome.volume.format, "raw");
@@ -72,18 +70,6 @@ TEST(Raw, IsRefusedBeyondTheLimits) {
             ErrorCode::kTooLarge);
   EXPECT_TRUE(
       import_raw_bytes(kSmallSamples, small_description(), {.max_sample_bytes = 24}).imported());
-}
-
-TEST(Raw, NotesTheCountOfSamplesThatAreNotFinite) {
-  RawDescription description = small_description();
-  description.type = SampleType::kFloat32;
-  std::vector<float> samples(24, 1.0F);
-  samples[3] = std::numeric_limits<float>::infinity();
-  samples[7] = std::nanf("");
-  const Outcome outcome = import_raw_bytes(bytes_of(samples), description);
-  ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"non-finite-samples"});
-  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("2 of the 24 samples"));
-  EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{1, 1}));
 }
 
 TEST(Raw, KeepsItsGeometry) {

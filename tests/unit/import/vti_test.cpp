@@ -102,8 +102,7 @@ TEST(Vti, LiesWhereItsFirstSampleDoes) {
                          .origin = "100 200 300",
                          .spacing = "1 2 3",
                          .direction = "0 -1 0 1 0 0 0 0 1"};
-  const Outcome outcome = import_bytes(vti(fields, kSmallSamples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_bytes(vti(fields, kSmallSamples)));
   EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
   // 2 steps along y, -1 step of 2 along -x, 10 of 3 along z.
   EXPECT_EQ(outcome.volume.geometry.origin, (Vector3{102, 202, 330}));
@@ -121,8 +120,7 @@ TEST(Vti, TakesTheScalarsAmongSeveralArrays) {
   ASSERT_EQ(several.remedy.choices.size(), 2);
   EXPECT_EQ(several.remedy.choices[0].title, "array \"other\"");
   EXPECT_EQ(several.remedy.choices[1].title, "array \"samples\"");
-  const Outcome chosen = import_bytes(unnamed, {}, {.volume = 1});
-  ASSERT_EQ(chosen.error, "");
+  const Outcome chosen = imported(import_bytes(unnamed, {}, {.volume = 1}));
   EXPECT_EQ(chosen.sample_bytes(), kSmallSamples);
   EXPECT_THAT(codes_of(chosen), testing::ElementsAre("volume-chosen"));
 }
@@ -134,8 +132,8 @@ TEST(Vti, ArraysThatCannotBeSamplesNeedNoChoice) {
         "Name=\"velocity\" type=\"Float32\" NumberOfComponents=\"3\""}) {
     beside += "<DataArray " + attributes + " format=\"appended\" offset=\"0\"/>\n";
   }
-  const Outcome outcome = import_bytes(vti({.scalars = "", .more = beside}, kSmallSamples));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome =
+      imported(import_bytes(vti({.scalars = "", .more = beside}, kSmallSamples)));
   EXPECT_EQ(outcome.sample_bytes(), kSmallSamples);
   EXPECT_THAT(
       import_bytes(vti({.components = "3", .scalars = "", .more = beside}, kSmallSamples)).error,

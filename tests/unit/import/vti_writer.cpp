@@ -1,33 +1,16 @@
 #include "tests/unit/import/vti_writer.h"
 
-#include <algorithm>
 #include <stdexcept>
 #include <vector>
 
 #include <lz4.h>
 #include <lzma.h>
 
+#include "base/base64.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t at = 0; at < bytes.size(); at += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - at);
-    unsigned bits = 0;
-    for (std::size_t byte = 0; byte < 3; ++byte) {
-      bits = bits << 8 | (byte < count ? static_cast<unsigned char>(bytes[at + byte]) : 0U);
-    }
-    for (std::size_t digit = 0; digit < 4; ++digit) {
-      text += digit <= count ? kDigits[bits >> (18 - 6 * digit) & 63U] : '=';
-    }
-  }
-  return text;
-}
 
 std::string counts(const VtiFields& f, const std::vector<std::uint64_t>& values) {
   if (f.wide_header) return bytes_of(values, f.big_endian);
@@ -82,7 +65,7 @@ Encoded encode(const VtiFields& f, std::string_view samples) {
 std::string array_bytes(const VtiFields& f, std::string_view samples) {
   const auto [header, bytes] = encode(f, samples);
   if (f.form == VtiForm::kAppendedRaw) return header + bytes;
-  return f.compressed ? base64(header) + base64(bytes) : base64(header + bytes);
+  return f.compressed ? to_base64(header) + to_base64(bytes) : to_base64(header + bytes);
 }
 
 bool is_appended(const VtiFields& f) {

@@ -1,4 +1,4 @@
-// Texts that switch between character sets. The sets by themselves: import_test.cpp.
+// Character sets, and texts that switch between them.
 #include <random>
 
 #include <gtest/gtest.h>
@@ -26,6 +26,33 @@ TEST_P(CodeExtensions, BecomeUtf8) {
 }
 
 std::string case_name(const testing::TestParamInfo<SwitchCase>& each) { return each.param.name; }
+
+// Some are examples of PS3.5, annexes H to K.
+INSTANTIATE_TEST_SUITE_P(
+    Sets, CodeExtensions,
+    testing::Values(
+        SwitchCase{"Default", "", "Adams^John", "Adams^John"},
+        SwitchCase{"DefaultWithLatin1", "", "B\xe4r", "Bär"},
+        SwitchCase{"DefaultWithUtf8", "", "B\xc3\xa4r", "Bär"},
+        SwitchCase{"Latin2", "ISO_IR 101",
+                   "W\xb3"
+                   "adys\xb3"
+                   "aw",
+                   "Władysław"},
+        SwitchCase{"Cyrillic", "ISO_IR 144", "\xbb\xee\xda\x63\x65\xdc\xd1yp\xd3", "Люкceмбypг"},
+        SwitchCase{"Greek", "ISO_IR 126", "\xc4\xe9\xef\xed\xf5\xf3\xe9\xef\xf2", "Διονυσιος"},
+        SwitchCase{"Utf8", "ISO_IR 192", "Wang^XiaoDong=\xe7\x8e\x8b^\xe5\xb0\x8f\xe6\x9d\xb1",
+                   "Wang^XiaoDong=王^小東"},
+        SwitchCase{"BrokenUtf8", "ISO_IR 192", "a\xe7\x8e", "a\xEF\xBF\xBD\xEF\xBF\xBD"},
+        SwitchCase{"Gb18030", "GB18030", "Wang=\xcd\xf5^\xd0\xa1\xb6\xab", "Wang=王^小东"},
+        SwitchCase{"Japanese", "\\ISO 2022 IR 87", "Yamada=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B",
+                   "Yamada=山田^太郎"},
+        SwitchCase{"Korean", "\\ISO 2022 IR 149", "Hong=\x1b$)C\xfb\xf3", "Hong=洪"},
+        SwitchCase{"Unknown", "ISO_IR 999", "B\xe4r", "Bär"},
+        SwitchCase{"ControlCharacters", "ISO_IR 100", "a\nb",
+                   "a\xEF\xBF\xBD"
+                   "b"}),
+    case_name);
 
 // PS3.5: H.3.1, H.3.2, I.2 and K.2.
 INSTANTIATE_TEST_SUITE_P(

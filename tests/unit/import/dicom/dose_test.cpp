@@ -13,12 +13,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 DicomSeries dose_series() {
-  DicomSeries series;
-  series.slices = 3;
-  series.bits_allocated = 32;
-  series.bits_stored = 32;
-  series.high_bit = 31;
-  return series;
+  return {.slices = 3, .bits_allocated = 32, .bits_stored = 32, .high_bit = 31};
 }
 
 DicomObject dose(const DicomSeries& series, const std::string& offsets) {
@@ -40,8 +35,7 @@ Outcome import_dose(const DicomObject& object) {
 
 TEST(DicomDose, LiesWhereItsOffsetsSay) {
   const DicomSeries series = dose_series();
-  const Outcome outcome = import_dose(dose(series, "0\\2.5\\5"));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_dose(dose(series, "0\\2.5\\5")));
   EXPECT_THAT(outcome.volume.dims, ElementsAre(5, 4, 3));
   EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(-10, 20, 30));
   EXPECT_THAT(outcome.volume.geometry.spacing, ElementsAre(0.75, 0.5, 2.5));
@@ -68,8 +62,7 @@ TEST(DicomDose, OffsetsRunAlongTheNormal) {
   DicomSeries series = dose_series();
   series.along_row = {0, 1, 0};
   series.along_column = {0, 0, -1};
-  const Outcome outcome = import_dose(dose(series, "0\\-2\\-4"));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_dose(dose(series, "0\\-2\\-4")));
   // row x column is -x; the lattice begins at the last plane, which lies furthest along +x.
   EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(-6, 20, 30));
   EXPECT_THAT(outcome.volume.geometry.direction, ElementsAre(0, 0, -1, 1, 0, 0, 0, -1, 0));

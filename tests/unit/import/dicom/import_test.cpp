@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <random>
 
@@ -38,21 +37,9 @@ std::vector<Sample> expected_samples(const DicomSeries& series, bool from_last =
   return samples;
 }
 
-// Every slice with the same change.
-NamedFiles changed(const DicomSeries& series, const std::function<void(DicomObject&)>& change) {
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    DicomObject object = series.slice(k);
-    change(object);
-    files.emplace_back(std::to_string(k), object.file(series.syntax));
-  }
-  return files;
-}
-
 TEST(DicomSeriesImport, SortsByPositionAndKeepsGeometry) {
   const DicomSeries series;
-  const Outcome outcome = import_objects(series.files());
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(series.files()));
   const Volume& volume = outcome.volume;
   EXPECT_EQ(volume.format, "dicom");
   EXPECT_THAT(volume.dims, ElementsAre(5, 4, 6));
@@ -67,37 +54,22 @@ TEST(DicomSeriesImport, SortsByPositionAndKeepsGeometry) {
   EXPECT_TRUE(volume.ignored.empty());
 }
 
-// The series' slices, each as `bytes_of_slice` writes it.
-Outcome import_slices(const DicomSeries& series,
-                      const std::function<std::string(const DicomObject&)>& bytes_of_slice) {
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    files.emplace_back(std::to_string(k), bytes_of_slice(series.slice(k)));
-  }
-  return import_objects(files);
-}
-
-TEST(DicomSeriesImport, ReadsDataSetsAlone) {
-  const DicomSeries series;
-  const std::string expected = import_objects(series.files()).canonical;
-  for (const std::string_view syntax : {kExplicit, kImplicit}) {
-    const Outcome outcome =
-        import_slices(series, [&](const DicomObject& slice) { return slice.bare(syntax); });
-    EXPECT_EQ(outcome.error, "") << syntax;
-    EXPECT_EQ(outcome.canonical, expected) << syntax;
-  }
-}
-
-TEST(DicomSeriesImport, ReadsMetaInformationWithoutPreamble) {
+TEST(DicomSeriesImport, NeedsNoPreambleAndNoMetaInformation) {
   constexpr std::size_t kPreambleBytes = 132;
   const DicomSeries series;
   const std::string expected = import_objects(series.files()).canonical;
   for (const std::string_view syntax : {kExplicit, kImplicit, kBigEndian, kDeflate}) {
-    const Outcome outcome = import_slices(series, [&](const DicomObject& slice) {
-      return slice.file(syntax).substr(kPreambleBytes);
-    });
-    EXPECT_EQ(outcome.error, "") << syntax;
-    EXPECT_EQ(outcome.canonical, expected) << syntax;
+    NamedFiles alone;
+    NamedFiles with_meta;
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      const DicomObject slice = series.slice(k);
+      alone.emplace_back(std::to_string(k), slice.bare(syntax));
+      with_meta.emplace_back(std::to_string(k), slice.file(syntax).substr(kPreambleBytes));
+    }
+    EXPECT_EQ(imported(import_objects(with_meta)).canonical, expected) << syntax;
+    // Without meta information only these two can be told.
+    if (syntax != kExplicit && syntax != kImplicit) continue;
+    EXPECT_EQ(imported(import_objects(alone)).canonical, expected) << syntax;
   }
 }
 
@@ -122,8 +94,7 @@ TEST(DicomSeriesImport, SlicesMayBeGzipped) {
 TEST(DicomSeriesImport, RunsAlongTheNormalWhateverTheScannersOrder) {
   DicomSeries series;
   series.step = {0, 0, -2.5};
-  const Outcome outcome = import_objects(series.files());
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(series.files()));
   EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(-10, 20, 17.5));
   EXPECT_THAT(outcome.volume.geometry.direction, ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1));
   EXPECT_EQ(samples_of<std::uint16_t>(outcome), expected_samples<std::uint16_t>(series, true));
@@ -134,8 +105,7 @@ TEST(DicomSeriesImport, KeepsObliqueAxes) {
   series.along_row = {0.6, 0.8, 0};
   series.along_column = {0, 0, -1};
   series.step = {-0.8 * 3, 0.6 * 3, 0};  // row x column
-  const Outcome outcome = import_objects(series.files());
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(series.files()));
   const auto& direction = outcome.volume.geometry.direction;
   const std::array<double, 9> expected = {0.6, 0, -0.8, 0.8, 0, 0.6, 0, -1, 0};
   for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(direction[i], expected[i], 1e-12) << i;
@@ -147,8 +117,7 @@ TEST(DicomSeriesImport, ShearsTheLatticeOfATiltedGantry) {
   const double tilt = 20 * std::numbers::pi / 180;
   series.along_column = {0, std::cos(tilt), -std::sin(tilt)};
   series.step = {0, 0, 5};  // the table moves along z, not along the slices' normal
-  const Outcome outcome = import_objects(series.files());
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(series.files()));
   const Geometry& geometry = outcome.volume.geometry;
   EXPECT_NEAR(geometry.spacing[2], 5, 1e-12);
   EXPECT_NEAR(geometry.direction[2], 0, 1e-12);
@@ -166,44 +135,29 @@ TEST(DicomSeriesImport, ShearsTheLatticeOfATiltedGantry) {
 }
 
 TEST(DicomSeriesImport, ToleratesRoundedPositions) {
-  DicomSeries series;
-  series.step = {0, 0, 0.625};
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    const double rounded = std::round(series.position(k)[2] * 100) / 100;
-    files.emplace_back(
-        std::to_string(k),
-        series.slice(k).text(kImagePosition, "DS", "-10\\20\\" + std::to_string(rounded)).file());
-  }
-  const Outcome outcome = import_objects(files);
-  ASSERT_EQ(outcome.error, "");
+  const DicomSeries series = {.step = {0, 0, 0.625}};
+  const Outcome outcome =
+      imported(import_objects(changed(series, [&](DicomObject& object, std::uint32_t k) {
+        const double rounded = std::round(series.position(k)[2] * 100) / 100;
+        object.text(kImagePosition, "DS", "-10\\20\\" + std::to_string(rounded));
+      })));
   EXPECT_NEAR(outcome.volume.geometry.spacing[2], 0.625, 0.01);
 }
 
 // --- Values --------------------------------------------------------------------------------------
 
-struct Scale {
-  std::string slope;
-  std::string intercept;
-  SampleType type;
-};
-
-Outcome import_scaled(const DicomSeries& series, const std::vector<Scale>& scales) {
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    const Scale& scale = scales[k % scales.size()];
-    files.emplace_back(std::to_string(k), series.slice(k)
-                                              .text(kRescaleSlope, "DS", scale.slope)
-                                              .text(kRescaleIntercept, "DS", scale.intercept)
-                                              .file());
-  }
-  return import_objects(files);
+// With slopes and intercepts that take turns.
+Outcome import_scaled(const DicomSeries& series,
+                      const std::vector<std::pair<std::string, std::string>>& scales) {
+  return import_objects(changed(series, [&](DicomObject& object, std::uint32_t k) {
+    const auto& [slope, intercept] = scales[k % scales.size()];
+    object.text(kRescaleSlope, "DS", slope).text(kRescaleIntercept, "DS", intercept);
+  }));
 }
 
 TEST(DicomValues, StayIntegersWhereTheyCan) {
   DicomSeries series;
-  const Outcome outcome = import_scaled(series, {{"1", "-1024", {}}});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_scaled(series, {{"1", "-1024"}}));
   EXPECT_EQ(outcome.volume.type, SampleType::kInt16);
   const auto samples = samples_of<std::int16_t>(outcome);
   const auto stored = expected_samples<std::int16_t>(series);
@@ -214,8 +168,7 @@ TEST(DicomValues, AreWidenedOnlyWhenTheyMustBe) {
   DicomSeries series;
   series.bits_stored = 16;
   series.high_bit = 15;
-  const Outcome wide = import_scaled(series, {{"1", "-1024", {}}});
-  ASSERT_EQ(wide.error, "");
+  const Outcome wide = imported(import_scaled(series, {{"1", "-1024"}}));
   EXPECT_EQ(wide.volume.type, SampleType::kInt32);
   EXPECT_EQ(samples_of<std::int32_t>(wide)[0], series.stored(0, 0, 0) - 1024);
 
@@ -226,16 +179,14 @@ TEST(DicomValues, AreWidenedOnlyWhenTheyMustBe) {
     for (int i = 0; i < 20; ++i) pixels += std::string(1, static_cast<char>(i)) + '\x0c';
     object.pixels(pixels, 2);
   });
-  const Outcome narrow = import_objects(files);
-  ASSERT_EQ(narrow.error, "");
+  const Outcome narrow = imported(import_objects(files));
   EXPECT_EQ(narrow.volume.type, SampleType::kInt16);
   EXPECT_EQ(samples_of<std::int16_t>(narrow)[5], 0x0c05 - 1024);
 }
 
 TEST(DicomValues, AreScaledSliceBySlice) {
   const DicomSeries series;
-  const Outcome outcome = import_scaled(series, {{"0.5", "1.25", {}}, {"2", "-3", {}}});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_scaled(series, {{"0.5", "1.25"}, {"2", "-3"}}));
   EXPECT_EQ(outcome.volume.type, SampleType::kFloat32);
   const auto samples = samples_of<float>(outcome);
   const auto stored = expected_samples<float>(series);
@@ -247,20 +198,19 @@ TEST(DicomValues, AreScaledSliceBySlice) {
 
 TEST(DicomValues, StayDifferentBesideALargeIntercept) {
   const DicomSeries series;
-  const Outcome outcome = import_scaled(series, {{"0.5", "10000000", {}}});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_scaled(series, {{"0.5", "10000000"}}));
   ASSERT_EQ(outcome.volume.type, SampleType::kFloat64);
   const auto samples = samples_of<double>(outcome);
   const auto stored = expected_samples<double>(series);
   for (std::size_t i = 0; i < samples.size(); ++i) ASSERT_EQ(samples[i], stored[i] * 0.5 + 1e7);
-  EXPECT_EQ(import_scaled(series, {{"0.5", "4000000.5", {}}}).volume.type, SampleType::kFloat32);
+  EXPECT_EQ(import_scaled(series, {{"0.5", "4000000.5"}}).volume.type, SampleType::kFloat32);
 }
 
 TEST(DicomValues, WithoutAMeaningAreRefused) {
   const DicomSeries series;
   for (const auto& [slope, intercept] :
        {std::pair{"0", "0"}, std::pair{"nan", "0"}, std::pair{"1", "x"}, std::pair{"1e999", "0"}}) {
-    EXPECT_THAT(import_scaled(series, {{slope, intercept, {}}}).error, HasSubstr("rescale slope"))
+    EXPECT_THAT(import_scaled(series, {{slope, intercept}}).error, HasSubstr("rescale slope"))
         << slope;
   }
 }
@@ -268,8 +218,7 @@ TEST(DicomValues, WithoutAMeaningAreRefused) {
 TEST(DicomValues, AreScaledByWhatIsTold) {
   const DicomSeries series;
   const auto first_of = [&](const char* slope, const char* intercept) {
-    const Outcome outcome = import_scaled(series, {{slope, intercept, {}}});
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_scaled(series, {{slope, intercept}}));
     return samples_of<std::int16_t>(outcome)[0];
   };
   EXPECT_EQ(first_of("3", ""), series.stored(0, 0, 0) * 3);
@@ -282,15 +231,14 @@ TEST(DicomValues, AreCutOutOfTheirBits) {
   series.high_bit = 13;
   series.is_signed = true;
   // Bits beside the stored ones are of overlays, and no part of the samples.
-  const Outcome outcome = import_objects(changed(series, [&](DicomObject& object) {
+  const Outcome outcome = imported(import_objects(changed(series, [&](DicomObject& object) {
     std::string pixels = series.native_bytes(2);
     for (std::size_t i = 0; i < pixels.size(); i += 2) {
       pixels[i] = static_cast<char>(pixels[i] | 0x0f);
       pixels[i + 1] = static_cast<char>(pixels[i + 1] | '\xc0');
     }
     object.pixels(pixels, 2);
-  }));
-  ASSERT_EQ(outcome.error, "");
+  })));
   EXPECT_EQ(outcome.volume.type, SampleType::kInt16);
   const auto samples = samples_of<std::int16_t>(outcome);
   for (std::uint32_t i = 0; i < 20; ++i) ASSERT_EQ(samples[i], series.stored(i % 5, i / 5, 2));
@@ -299,10 +247,9 @@ TEST(DicomValues, AreCutOutOfTheirBits) {
 
 TEST(DicomValues, OfMonochrome1AreKeptAsTheyAreStored) {
   const DicomSeries series;
-  const Outcome outcome = import_objects(changed(series, [](DicomObject& object) {
+  const Outcome outcome = imported(import_objects(changed(series, [](DicomObject& object) {
     object.text(kPhotometricInterpretation, "CS", "MONOCHROME1");
-  }));
-  ASSERT_EQ(outcome.error, "");
+  })));
   EXPECT_EQ(samples_of<std::uint16_t>(outcome), expected_samples<std::uint16_t>(series));
 }
 
@@ -310,7 +257,7 @@ TEST(DicomValues, OfMonochrome1AreKeptAsTheyAreStored) {
 
 TEST(DicomPresets, AreThoseOfACtInHounsfieldUnits) {
   const DicomSeries series;
-  const Outcome outcome = import_scaled(series, {{"1", "-1024", {}}});
+  const Outcome outcome = import_scaled(series, {{"1", "-1024"}});
   ASSERT_EQ(outcome.volume.presets.size(), 3);
   EXPECT_EQ(outcome.volume.presets[0], (Preset{"skin", -300}));
   EXPECT_EQ(outcome.volume.presets[2], (Preset{"bone", 250}));
@@ -338,14 +285,13 @@ TEST(DicomPresets, LieWithinTheSamples) {
 
 TEST(DicomIdentityImport, IsKeptInUtf8) {
   const DicomSeries series;
-  const Outcome outcome = import_objects(changed(series, [](DicomObject& object) {
+  const Outcome outcome = imported(import_objects(changed(series, [](DicomObject& object) {
     object.text(kSpecificCharacterSet, "CS", "ISO_IR 100")
         .text(kPatientName, "PN", "M\xfcller^Eva")
         .text(kPatientId, "LO", "4711")
         .text(kStudyInstanceUid, "UI", "1.2.3")
         .text(kSeriesDescription, "LO", "axial \xe0 1 mm");
-  }));
-  ASSERT_EQ(outcome.error, "");
+  })));
   ASSERT_TRUE(outcome.volume.dicom);
   const DicomIdentity& identity = *outcome.volume.dicom;
   EXPECT_EQ(identity.patient_name, "Müller^Eva");
@@ -367,56 +313,6 @@ TEST(DicomIdentityImport, IsNoPartOfTheCanonicalFile) {
   EXPECT_EQ(known.canonical, import_objects(series.files()).canonical);
   EXPECT_EQ(known.canonical.find("Somebody"), std::string::npos);
 }
-
-struct CharacterSetCase {
-  const char* name;
-  const char* term;
-  std::string stored;
-  const char* utf8;
-};
-
-class DicomCharacterSet : public testing::TestWithParam<CharacterSetCase> {};
-
-TEST_P(DicomCharacterSet, BecomesUtf8) {
-  DicomSeries series;
-  series.slices = 2;
-  const Outcome outcome = import_objects(changed(series, [&](DicomObject& object) {
-    if (*GetParam().term != '\0') object.text(kSpecificCharacterSet, "CS", GetParam().term);
-    object.text(kPatientName, "PN", GetParam().stored);
-  }));
-  ASSERT_EQ(outcome.error, "");
-  EXPECT_EQ(outcome.volume.dicom->patient_name, GetParam().utf8);
-}
-
-// The examples of PS3.5, annexes H to K, where there are.
-INSTANTIATE_TEST_SUITE_P(
-    Sets, DicomCharacterSet,
-    testing::Values(
-        CharacterSetCase{"Default", "", "Adams^John", "Adams^John"},
-        CharacterSetCase{"DefaultWithLatin1", "", "B\xe4r", "Bär"},
-        CharacterSetCase{"DefaultWithUtf8", "", "B\xc3\xa4r", "Bär"},
-        CharacterSetCase{"Latin2", "ISO_IR 101",
-                         "W\xb3"
-                         "adys\xb3"
-                         "aw",
-                         "Władysław"},
-        CharacterSetCase{"Cyrillic", "ISO_IR 144", "\xbb\xee\xda\x63\x65\xdc\xd1yp\xd3",
-                         "Люкceмбypг"},
-        CharacterSetCase{"Greek", "ISO_IR 126", "\xc4\xe9\xef\xed\xf5\xf3\xe9\xef\xf2",
-                         "Διονυσιος"},
-        CharacterSetCase{"Utf8", "ISO_IR 192",
-                         "Wang^XiaoDong=\xe7\x8e\x8b^\xe5\xb0\x8f\xe6\x9d\xb1",
-                         "Wang^XiaoDong=王^小東"},
-        CharacterSetCase{"BrokenUtf8", "ISO_IR 192", "a\xe7\x8e", "a\xEF\xBF\xBD\xEF\xBF\xBD"},
-        CharacterSetCase{"Gb18030", "GB18030", "Wang=\xcd\xf5^\xd0\xa1\xb6\xab", "Wang=王^小东"},
-        CharacterSetCase{"Japanese", "\\ISO 2022 IR 87", "Yamada=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B",
-                         "Yamada=山田^太郎"},
-        CharacterSetCase{"Korean", "\\ISO 2022 IR 149", "Hong=\x1b$)C\xfb\xf3", "Hong=洪"},
-        CharacterSetCase{"Unknown", "ISO_IR 999", "B\xe4r", "Bär"},
-        CharacterSetCase{"ControlCharacters", "ISO_IR 100", "a\nb",
-                         "a\xEF\xBF\xBD"
-                         "b"}),
-    [](const auto& each) { return std::string(each.param.name); });
 
 // --- All of it at once ---------------------------------------------------------------------------
 

@@ -105,8 +105,7 @@ TEST(DicomMosaic, IsUnfoldedByItsProtocol) {
     // The creator is what anonymisers remove first.
     for (const bool has_creator : {true, false}) {
       if (!has_creator) object.erase(0x00290010);
-      const Outcome outcome = import_one(object);
-      ASSERT_EQ(outcome.error, "");
+      const Outcome outcome = imported(import_one(object));
       EXPECT_EQ(outcome.volume.dims[2], kTiles);
       EXPECT_EQ(outcome.volume.geometry.spacing[2], 4);
       EXPECT_EQ(outcome.volume.geometry.origin[2], is_reversed ? 30 - 16 : 30);
@@ -131,8 +130,7 @@ TEST(DicomMosaic, IsNoneWithFunctionalGroups) {
   const DicomSeries series;
   const DicomObject object =
       series.enhanced({0, 1, 2}).text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\MOSAIC");
-  const Outcome outcome = import_one(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_one(object));
   EXPECT_EQ(outcome.volume.dims[2], 3);
 }
 
@@ -169,8 +167,7 @@ TEST(DicomGrid, HasAPlaceForEachSlice) {
 
 // Its slices have positions; the object itself often has none.
 TEST(DicomGrid, NeedsNoPositionOfItsOwn) {
-  const Outcome outcome = import_one(united_imaging_grid().erase(kImagePosition));
-  EXPECT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_one(united_imaging_grid().erase(kImagePosition)));
   EXPECT_EQ(outcome.canonical, import_one(united_imaging_grid()).canonical);
 }
 
@@ -187,14 +184,11 @@ TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {
 // The same tags of another maker hold other things.
 TEST(DicomGrid, IsKnownByItsMaker) {
   const DicomSeries series;
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    files.emplace_back("F" + std::to_string(k), series.slice(k)
-                                                    .text(0x00650010, "LO", "SOMEBODY ELSE")
-                                                    .text(kGridImages, "DS", "5")
-                                                    .text(kGridFrames, "LO", "no sequence")
-                                                    .file(kImplicit));
-  }
+  const NamedFiles files = changed({.syntax = std::string(kImplicit)}, [](DicomObject& object) {
+    object.text(0x00650010, "LO", "SOMEBODY ELSE")
+        .text(kGridImages, "DS", "5")
+        .text(kGridFrames, "LO", "no sequence");
+  });
   EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
 }
 

@@ -6,6 +6,7 @@
 
 #include "server/import/dicom/elements/private_elements.h"
 #include "server/import/dicom/elements/tags.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 
@@ -15,23 +16,18 @@ namespace {
 
 // Tiles in rows of `across`, of which those behind the last slice are empty.
 std::string tiles(std::uint32_t across, std::uint32_t down) {
-  std::string bytes;
+  std::vector<std::uint16_t> samples;
   for (std::uint32_t y = 0; y < down * kTileRows; ++y) {
     for (std::uint32_t x = 0; x < across * kTileColumns; ++x) {
       const std::uint32_t k = y / kTileRows * across + x / kTileColumns;
-      const unsigned value = k < kTiles ? tile_sample(x % kTileColumns, y % kTileRows, k) : 0;
-      bytes += static_cast<char>(value & 0xFF);
-      bytes += static_cast<char>(value >> 8);
+      samples.push_back(k < kTiles ? tile_sample(x % kTileColumns, y % kTileRows, k) : 0);
     }
   }
-  return bytes;
+  return bytes_of(samples);
 }
 
 std::string number(std::uint64_t value) {
-  std::string bytes;
-  for (unsigned shift = 0; shift < 32; shift += 8)
-    bytes += static_cast<char>(value >> shift & 0xFF);
-  return bytes;
+  return bytes_of(std::vector{static_cast<std::uint32_t>(value)});
 }
 
 std::string filled(std::string text, std::size_t size) {
@@ -64,13 +60,12 @@ std::uint16_t tile_sample(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
 }
 
 DicomObject tiled_object(std::uint32_t across, std::uint32_t down) {
-  DicomSeries series;
-  series.columns = across * kTileColumns;
-  series.rows = down * kTileRows;
-  series.bits_stored = 16;
-  series.high_bit = 15;
-  series.between_rows = 2;
-  series.between_columns = 3;
+  const DicomSeries series = {.columns = across * kTileColumns,
+                              .rows = down * kTileRows,
+                              .between_rows = 2,
+                              .between_columns = 3,
+                              .bits_stored = 16,
+                              .high_bit = 15};
   return series.slice(0).text(kImagePosition, "DS", "10\\20\\30").pixels(tiles(across, down), 2);
 }
 

@@ -226,20 +226,11 @@ DicomObject DicomSeries::enhanced(const std::vector<std::uint32_t>& order) const
   std::vector<DicomObject> frames;
   std::string pixels;
   for (const std::uint32_t number : order) {
-    DicomObject position_of_plane;
-    position_of_plane.text(dicom::kImagePosition, "DS", joined(position(number)));
-    DicomObject frame;
-    frame.items(dicom::kPlanePositionSequence, {position_of_plane});
-    frames.push_back(frame);
+    frames.push_back(frame_at(position(number)));
     pixels += native_bytes(number);
   }
-  DicomObject orientation;
-  orientation.text(dicom::kImageOrientation, "DS", joined(along_row, along_column));
-  DicomObject measures;
-  measures.text(dicom::kPixelSpacing, "DS", joined({between_rows, between_columns}));
-  DicomObject shared;
-  shared.items(dicom::kPlaneOrientationSequence, {orientation})
-      .items(dicom::kPixelMeasuresSequence, {measures});
+  const DicomObject shared =
+      shared_groups(joined({between_rows, between_columns}), joined(along_row, along_column));
   return object.erase(dicom::kImagePosition)
       .erase(dicom::kImageOrientation)
       .erase(dicom::kPixelSpacing)
@@ -258,6 +249,34 @@ NamedFiles DicomSeries::files() const {
     result.emplace_back("IM" + std::to_string(k + 8), slice(number).file(syntax));
   }
   return result;
+}
+
+NamedFiles changed(const DicomSeries& series,
+                   const std::function<void(DicomObject&, std::uint32_t)>& change) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject object = series.slice(k);
+    change(object, k);
+    files.emplace_back("IM" + std::to_string(k + 1), object.file(series.syntax));
+  }
+  return files;
+}
+
+NamedFiles changed(const DicomSeries& series, const std::function<void(DicomObject&)>& change) {
+  return changed(series, [&](DicomObject& object, std::uint32_t) { change(object); });
+}
+
+DicomObject frame_at(const Vector3& position) {
+  return DicomObject().items(dicom::kPlanePositionSequence,
+                             {DicomObject().text(dicom::kImagePosition, "DS", joined(position))});
+}
+
+DicomObject shared_groups(const std::string& spacing, const std::string& orientation) {
+  return DicomObject()
+      .items(dicom::kPlaneOrientationSequence,
+             {DicomObject().text(dicom::kImageOrientation, "DS", orientation)})
+      .items(dicom::kPixelMeasuresSequence,
+             {DicomObject().text(dicom::kPixelSpacing, "DS", spacing)});
 }
 
 std::string compressed(std::string_view transfer_syntax, const dicom::PixelLayout& layout,
@@ -292,19 +311,13 @@ Outcome import_objects(const NamedFiles& files, const ImportOptions& options,
   const Folder target;
   std::vector<NamedFile> paths;
   for (const auto& [name, bytes] : files) paths.push_back(named(sources.write(name, bytes)));
-  Outcome outcome;
-  try {
-    outcome.volume = import_dicom(paths, {.source = {},
-                                          .scratch = target.path(""),
-                                          .target = target.path("target"),
-                                          .options = options,
-                                          .limits = limits});
-    outcome.canonical = read_file(target.path("target"));
-  } catch (const Error& error) {
-    outcome.code = error.code();
-    outcome.error = error.what();
-    outcome.remedy = error.remedy();
-  }
+  const Outcome outcome = outcome_of(target.path("target"), [&](const auto& path) {
+    return import_dicom(paths, {.source = {},
+                                .scratch = target.path(""),
+                                .target = path,
+                                .options = options,
+                                .limits = limits});
+  });
   std::filesystem::remove(target.path("target"));
   if (target.entries() != 0) throw std::logic_error("an import left files behind");
   return outcome;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -93,11 +94,21 @@ struct DicomSeries {
   std::vector<std::pair<std::string, std::string>> files() const;
 };
 
+using NamedFiles = std::vector<std::pair<std::string, std::string>>;
+
+// The slices in their order, from "IM1" on, each as a function leaves it.
+NamedFiles changed(const DicomSeries& series,
+                   const std::function<void(DicomObject&, std::uint32_t slice)>& change);
+NamedFiles changed(const DicomSeries& series, const std::function<void(DicomObject&)>& change);
+
+// An item of functional groups with the position of a frame, and one that all frames share.
+DicomObject frame_at(const Vector3& position);
+DicomObject shared_groups(const std::string& spacing = "0.5\\0.75",
+                          const std::string& orientation = "1\\0\\0\\0\\1\\0");
+
 // One frame's native bytes compressed by GDCM. JPEG, JPEG-LS, JPEG 2000 and RLE.
 std::string compressed(std::string_view transfer_syntax, const dicom::PixelLayout& layout,
                        const std::string& native);
-
-using NamedFiles = std::vector<std::pair<std::string, std::string>>;
 
 // Imports files by names and bytes as import_dicom does; scratch files that are left are an error.
 Outcome import_objects(const NamedFiles& files, const ImportOptions& options = {},

@@ -12,6 +12,7 @@
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/pixels/decode.h"
 #include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -48,28 +49,24 @@ struct Depth {
 };
 
 DicomSeries compressible(const Depth& depth) {
-  DicomSeries series;
-  series.is_smooth = true;
-  series.columns = 32;
-  series.rows = 24;
-  series.slices = 3;
-  series.bits_allocated = depth.allocated;
-  series.bits_stored = depth.stored;
-  series.high_bit = depth.stored - 1;
-  series.is_signed = depth.is_signed;
-  return series;
+  return {.columns = 32,
+          .rows = 24,
+          .slices = 3,
+          .bits_allocated = depth.allocated,
+          .bits_stored = depth.stored,
+          .high_bit = depth.stored - 1,
+          .is_signed = depth.is_signed,
+          .is_smooth = true};
 }
 
-NamedFiles compressed_files(const DicomSeries& series, std::string_view syntax,
+NamedFiles compressed_files(DicomSeries series, std::string_view syntax,
                             const std::function<void(std::string&)>& damage = {}) {
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
+  series.syntax = syntax;
+  return changed(series, [&](DicomObject& object, std::uint32_t k) {
     std::string stream = compressed(syntax, series.layout(), series.native_bytes(k));
     if (damage && k == 1) damage(stream);
-    files.emplace_back("IM" + std::to_string(k + 1),
-                       series.slice(k).fragments({stream}, {}).file(syntax));
-  }
-  return files;
+    object.fragments({stream}, {});
+  });
 }
 
 class DicomSyntax : public testing::TestWithParam<std::tuple<std::string_view, Depth>> {};
@@ -77,10 +74,8 @@ class DicomSyntax : public testing::TestWithParam<std::tuple<std::string_view, D
 TEST_P(DicomSyntax, GivesTheSamplesBack) {
   const auto& [syntax, depth] = GetParam();
   const DicomSeries series = compressible(depth);
-  const Outcome plain = import_objects(series.files());
-  ASSERT_EQ(plain.error, "");
-  const Outcome outcome = import_objects(compressed_files(series, syntax));
-  EXPECT_EQ(outcome.error, "");
+  const Outcome plain = imported(import_objects(series.files()));
+  const Outcome outcome = imported(import_objects(compressed_files(series, syntax)));
   EXPECT_EQ(outcome.canonical, plain.canonical);
 }
 
@@ -93,21 +88,20 @@ INSTANTIATE_TEST_SUITE_P(All, DicomSyntax,
 // A stream may have fewer bytes to a sample than the header allocates.
 TEST(DicomPixels, OfBytesMayBeAllocatedWords) {
   for (const bool is_signed : {false, true}) {
-    const DicomSeries words = compressible({16, 8, is_signed});
+    DicomSeries words = compressible({16, 8, is_signed});
+    const std::string expected = import_objects(words.files()).canonical;
     const PixelLayout bytes = {words.columns, words.rows, 8, 8, 7, is_signed};
     for (const std::string_view syntax : {kJpegLossless, kJpegLs, kJpeg2000}) {
-      NamedFiles files;
-      for (std::uint32_t k = 0; k < words.slices; ++k) {
+      words.syntax = syntax;
+      const NamedFiles files = changed(words, [&](DicomObject& object, std::uint32_t k) {
         const std::string native = words.native_bytes(k);
         std::string low;
         for (std::size_t at = 0; at < native.size(); at += 2) low += native[at];
-        files.emplace_back(
-            std::to_string(k),
-            words.slice(k).fragments({compressed(syntax, bytes, low)}, {}).file(syntax));
-      }
+        object.fragments({compressed(syntax, bytes, low)}, {});
+      });
       const Outcome outcome = import_objects(files);
       EXPECT_EQ(outcome.error, "") << syntax;
-      EXPECT_EQ(outcome.canonical, import_objects(words.files()).canonical) << syntax;
+      EXPECT_EQ(outcome.canonical, expected) << syntax;
     }
   }
 }
@@ -127,15 +121,14 @@ TEST(DicomPixels, OfSignedStreamsNeedASignedHeader) {
 
 // GDCM ends the process for them.
 TEST(DicomPixels, OfMoreBitsThanJpegHasAreRefused) {
-  const DicomSeries series = compressible({16, 12, false});
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
+  DicomSeries series = compressible({16, 12, false});
+  series.syntax = kJpegLossless;
+  const NamedFiles files = changed(series, [&](DicomObject& object, std::uint32_t k) {
     std::string stream = compressed(kJpegLossless, series.layout(), series.native_bytes(k));
     stream.at(stream.find("\xFF\xC3") + 4) = 32;
-    DicomObject object = series.slice(k).fragments({stream}, {});
+    object.fragments({stream}, {});
     object.number(kBitsAllocated, 32).number(kBitsStored, 32).number(kHighBit, 31);
-    files.emplace_back(std::to_string(k), object.file(kJpegLossless));
-  }
+  });
   EXPECT_THAT(import_objects(files).error,
               HasSubstr("stream has 32 bits, but it may have at most 16"));
 }
@@ -186,15 +179,14 @@ INSTANTIATE_TEST_SUITE_P(All, DamagedStream,
                          testing::Values(kRle, kJpegLossless, kJpegLs, kJpeg2000));
 
 TEST(DicomFragments, OfOneFrameAreJoined) {
-  const DicomSeries series = compressible({16, 12, false});
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
+  DicomSeries series = compressible({16, 12, false});
+  const std::string expected = import_objects(series.files()).canonical;
+  series.syntax = kJpegLs;
+  const NamedFiles files = changed(series, [&](DicomObject& object, std::uint32_t k) {
     const std::string stream = compressed(kJpegLs, series.layout(), series.native_bytes(k));
-    files.emplace_back(
-        std::to_string(k),
-        series.slice(k).fragments({stream.substr(0, 40), stream.substr(40)}, {0}).file(kJpegLs));
-  }
-  EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
+    object.fragments({stream.substr(0, 40), stream.substr(40)}, {0});
+  });
+  EXPECT_EQ(import_objects(files).canonical, expected);
 }
 
 // All frames in one file, of which each lies in two fragments.
@@ -226,8 +218,7 @@ TEST(DicomFragments, OfSeveralFramesAreToldApart) {
         for (std::uint32_t& offset : table) offset += 8;
       }};
   for (const auto& change : changes) {
-    const Outcome outcome = import_objects({{"one", in_halves(series, change)}});
-    EXPECT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_objects({{"one", in_halves(series, change)}}));
     EXPECT_EQ(outcome.canonical, plain.canonical);
   }
 }
@@ -236,12 +227,8 @@ TEST(DicomFragments, OfSeveralFramesAreToldApart) {
 TEST(DicomFragments, MayEndWithTheFile) {
   const DicomSeries series = compressible({16, 12, false});
   constexpr std::size_t kEndBytes = 8;
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    const std::string stream = compressed(kJpegLs, series.layout(), series.native_bytes(k));
-    const std::string file = series.slice(k).fragments({stream}, {}).file(kJpegLs);
-    files.emplace_back(std::to_string(k), file.substr(0, file.size() - kEndBytes));
-  }
+  NamedFiles files = compressed_files(series, kJpegLs);
+  for (auto& [name, file] : files) file.resize(file.size() - kEndBytes);
   EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
   files[1].second.pop_back();
   EXPECT_EQ(import_objects(files).code, ErrorCode::kUnusableVolume);
@@ -263,14 +250,10 @@ TEST(DicomFragments, ThatAreMissingAreNoticed) {
 
 TEST(DicomFragments, OfAnIconAreNoPixels) {
   const DicomSeries series = compressible({16, 12, false});
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    DicomObject icon;
-    icon.fragments({std::string("\xff\xd8\xff\xe0 icon", 10)}, {0});
-    files.emplace_back(std::to_string(k), series.slice(k).items(0x00880200, {icon}).file());
-  }
-  const Outcome outcome = import_objects(files);
-  EXPECT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(changed(series, [](DicomObject& object) {
+    object.items(0x00880200,
+                 {DicomObject().fragments({std::string("\xff\xd8\xff\xe0 icon", 10)}, {0})});
+  })));
   EXPECT_EQ(outcome.canonical, import_objects(series.files()).canonical);
 }
 
@@ -308,10 +291,9 @@ TEST(DicomObjects, AreReadByGdcm) {
 template <class Real>
 DicomObject real_object(Tag tag, const char* vr) {
   const DicomSeries series;
-  std::string bytes;
+  std::vector<Real> values;
   for (std::size_t at = 0; at < 3 * series.layout().samples(); ++at) {
-    const Real value = static_cast<Real>(at) * static_cast<Real>(0.25) - 3;
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+    values.push_back(static_cast<Real>(at) * static_cast<Real>(0.25) - 3);
   }
   return series.enhanced({0, 1, 2})
       .erase(kPixelData)
@@ -319,13 +301,12 @@ DicomObject real_object(Tag tag, const char* vr) {
       .erase(kHighBit)
       .erase(kPixelRepresentation)
       .number(kBitsAllocated, sizeof(Real) * 8)
-      .bytes(tag, vr, bytes);
+      .bytes(tag, vr, bytes_of(values));
 }
 
 template <class Real>
 void expect_reals(const DicomObject& object, SampleType type) {
-  const Outcome outcome = import_objects({{"map", object.file()}});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects({{"map", object.file()}}));
   EXPECT_EQ(outcome.volume.type, type);
   const auto samples = samples_of<Real>(outcome);
   for (std::size_t at = 0; at < samples.size(); ++at) {
@@ -341,8 +322,7 @@ TEST(DicomReals, AreReadAsTheyAre) {
 TEST(DicomReals, AreScaled) {
   DicomObject object = real_object<float>(kFloatPixelData, "OF");
   object.text(kRescaleSlope, "DS", "2").text(kRescaleIntercept, "DS", "1");
-  const Outcome outcome = import_objects({{"map", object.file()}});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects({{"map", object.file()}}));
   EXPECT_EQ(samples_of<float>(outcome)[4], -3);
 }
 
@@ -355,9 +335,7 @@ TEST(DicomReals, AreRefusedWhenSomeAreMissing) {
 
 // --- Parametric maps -----------------------------------------------------------------------------
 
-std::string real_bytes(double value) {
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
+std::string real_bytes(double value) { return bytes_of(std::vector{value}); }
 
 DicomObject mapping(double slope, double intercept) {
   return DicomObject()
@@ -374,10 +352,7 @@ DicomObject map_of(const std::function<std::vector<DicomObject>(std::uint32_t)>&
   const DicomSeries series;
   std::vector<DicomObject> frames;
   for (std::uint32_t k = 0; k < series.slices; ++k) {
-    DicomObject frame;
-    frame.items(kPlanePositionSequence,
-                {DicomObject().text(kImagePosition, "DS",
-                                    "-10\\20\\" + std::to_string(series.position(k)[2]))});
+    DicomObject frame = frame_at(series.position(k));
     const std::vector<DicomObject> mappings = mappings_of(k);
     if (!mappings.empty()) frame.items(kRealWorldValueMappingSequence, mappings);
     frames.push_back(frame);
@@ -395,10 +370,9 @@ TEST(DicomMaps, HaveRealWorldValues) {
   const DicomSeries series;
   for (const std::string_view syntax : {kImplicit, kExplicit}) {
     const Outcome outcome =
-        import_objects({{"map", map_of([](std::uint32_t k) {
-                                  return std::vector<DicomObject>{mapping(k + 0.5, -10)};
-                                }).file(syntax)}});
-    ASSERT_EQ(outcome.error, "");
+        imported(import_objects({{"map", map_of([](std::uint32_t k) {
+                                           return std::vector<DicomObject>{mapping(k + 0.5, -10)};
+                                         }).file(syntax)}}));
     const auto samples = samples_of<float>(outcome);
     for (std::uint32_t k = 0; k < series.slices; ++k) {
       EXPECT_EQ(samples[k * 20 + 7], static_cast<double>(series.stored(2, 1, k)) * (k + 0.5) - 10);
@@ -413,15 +387,9 @@ TEST(DicomMaps, HaveRealWorldValues) {
 TEST(DicomMaps, OfRealsMayShareAMapping) {
   DicomObject object = real_object<float>(kFloatPixelData, "OF");
   object.text(kSopClassUid, "UI", "1.2.840.10008.5.1.4.1.1.30");
-  DicomObject shared;
-  shared
-      .items(kPlaneOrientationSequence,
-             {DicomObject().text(kImageOrientation, "DS", "1\\0\\0\\0\\1\\0")})
-      .items(kPixelMeasuresSequence, {DicomObject().text(kPixelSpacing, "DS", "0.5\\0.75")})
-      .items(kRealWorldValueMappingSequence, {mapping(2, 10)});
-  object.items(kSharedFunctionalGroups, {shared});
-  const Outcome outcome = import_objects({{"map", object.file()}});
-  ASSERT_EQ(outcome.error, "");
+  object.items(kSharedFunctionalGroups,
+               {shared_groups().items(kRealWorldValueMappingSequence, {mapping(2, 10)})});
+  const Outcome outcome = imported(import_objects({{"map", object.file()}}));
   EXPECT_EQ(outcome.volume.type, SampleType::kFloat32);
   EXPECT_EQ(samples_of<float>(outcome)[5], (5 * 0.25F - 3) * 2 + 10);
   // A CT image's values are those of its rescale.

@@ -7,6 +7,7 @@
 
 #include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -17,13 +18,9 @@ using testing::HasSubstr;
 TEST(DicomFiles, MayHaveBlankRepresentations) {
   const DicomSeries series;
   for (const std::string_view blank : {std::string_view("  "), std::string_view("\0\0", 2)}) {
-    NamedFiles files;
-    for (std::uint32_t k = 0; k < series.slices; ++k) {
-      files.emplace_back("F" + std::to_string(k), series.slice(k)
-                                                      .bytes(kPixelPaddingValue, blank, "ab")
-                                                      .bytes(0x00200010, blank, "")
-                                                      .file());
-    }
+    const NamedFiles files = changed(series, [&](DicomObject& object) {
+      object.bytes(kPixelPaddingValue, blank, "ab").bytes(0x00200010, blank, "");
+    });
     EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
   }
 }
@@ -38,11 +35,10 @@ TEST(DicomFiles, MayHaveUnknownRepresentations) {
        {std::string_view("??\2\0ab", 6), std::string_view("ox\2\0ab", 6),
         std::string_view("XY\2\0ab", 6), std::string_view("\2\0\0\0ab", 6),
         std::string_view("xs\0\0\2\0\0\0ab", 10), std::string_view("ZZ\0\0\2\0\0\0ab", 10)}) {
-    NamedFiles files;
-    for (std::uint32_t k = 0; k < series.slices; ++k) {
-      std::string file = series.slice(k).bytes(kPixelPaddingValue, "US", "ab").file();
+    NamedFiles files =
+        changed(series, [](DicomObject& object) { object.bytes(kPixelPaddingValue, "US", "ab"); });
+    for (auto& [name, file] : files) {
       file.replace(file.find(plain), plain.size(), padding + std::string(odd));
-      files.emplace_back("F" + std::to_string(k), file);
     }
     const Outcome outcome = import_objects(files);
     EXPECT_EQ(outcome.error, "") << odd;
@@ -63,15 +59,9 @@ Outcome import_deflated(const std::function<void(std::string&, const std::string
 }
 
 std::string trailer_of(const std::string& data) {
-  const auto word = [](std::uint64_t value) {
-    std::string bytes;
-    for (unsigned shift = 0; shift < 32; shift += 8) {
-      bytes += static_cast<char>(value >> shift & 0xFF);
-    }
-    return bytes;
-  };
   const auto* bytes = reinterpret_cast<const unsigned char*>(data.data());
-  return word(crc32(0, bytes, static_cast<unsigned>(data.size()))) + word(data.size());
+  const auto size = static_cast<std::uint32_t>(data.size());
+  return bytes_of(std::vector{static_cast<std::uint32_t>(crc32(0, bytes, size)), size});
 }
 
 TEST(DicomFiles, MayHaveAChecksumBehindDeflatedData) {

@@ -18,57 +18,54 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-// The files of a series of which some slices are left out, changed or moved.
-NamedFiles files_of(const DicomSeries& series,
-                    const std::function<bool(std::uint32_t, DicomObject&)>& keep) {
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    DicomObject object = series.slice(k);
-    if (keep(k, object)) files.emplace_back("IM" + std::to_string(k + 1), object.file());
+// The files without some, the first of which is 0.
+NamedFiles without(NamedFiles files, const std::vector<std::size_t>& slices) {
+  for (auto at = slices.rbegin(); at != slices.rend(); ++at) {
+    files.erase(files.begin() + static_cast<std::ptrdiff_t>(*at));
   }
   return files;
 }
 
-NamedFiles with_slice(std::uint32_t number, const std::function<void(DicomObject&)>& change) {
-  return files_of(DicomSeries{}, [&](std::uint32_t k, DicomObject& object) {
+NamedFiles in_order(const DicomSeries& series) {
+  return changed(series, [](DicomObject&) {});
+}
+
+using Edit = std::function<void(DicomObject&)>;
+
+Edit setting(Tag tag, const char* vr, const char* value) {
+  return [=](DicomObject& object) { object.text(tag, vr, value); };
+}
+Edit setting(Tag tag, unsigned value) {
+  return [=](DicomObject& object) { object.number(tag, value); };
+}
+Edit erasing(Tag tag) {
+  return [=](DicomObject& object) { object.erase(tag); };
+}
+
+NamedFiles with_slice(std::uint32_t number, const Edit& change) {
+  return changed(DicomSeries{}, [&](DicomObject& object, std::uint32_t k) {
     if (k == number) change(object);
-    return true;
   });
 }
 
-DicomSeries long_series() {
-  DicomSeries series;
-  series.slices = 93;
-  return series;
-}
+const DicomSeries kLong = {.slices = 93};
 
-TEST(DicomRefusal, NamesAMissingSlice) {
-  const Outcome outcome = import_objects(
-      files_of(long_series(), [](std::uint32_t k, DicomObject&) { return k != 40; }));
+// Slices are numbered as by the scanner.
+TEST(DicomRefusal, NamesMissingSlices) {
+  const Outcome outcome = import_objects(without(in_order(kLong), {40}));
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("slice 41 of 93 is missing"));
+  const DicomSeries downward = {.slices = 93, .step = {0, 0, -2.5}};
+  EXPECT_THAT(import_objects(without(in_order(downward), {40})).error,
+              HasSubstr("slice 41 of 93 is missing"));
+  EXPECT_THAT(import_objects(without(in_order(kLong), {10, 40, 41})).error,
+              HasSubstr("slices 11, 41 and 42 of 93 are missing"));
 }
 
 TEST(DicomRefusal, KeepsTheSpacingThatTheScannerGave) {
-  const Outcome outcome =
-      import_objects(files_of(DicomSeries{}, [](std::uint32_t, DicomObject&) { return true; }),
-                     {.spacing = {{1, 1, 1}}});
+  const Outcome outcome = import_objects(DicomSeries{}.files(), {.spacing = {{1, 1, 1}}});
   EXPECT_EQ(outcome.code, ErrorCode::kInvalidParameter);
   EXPECT_THAT(outcome.error, HasSubstr("this file has its own"));
-}
-
-TEST(DicomRefusal, NumbersSlicesAsTheScannerDid) {
-  DicomSeries series = long_series();
-  series.step = {0, 0, -2.5};
-  const Outcome outcome =
-      import_objects(files_of(series, [](std::uint32_t k, DicomObject&) { return k != 40; }));
-  EXPECT_THAT(outcome.error, HasSubstr("slice 41 of 93 is missing"));
-}
-
-TEST(DicomRefusal, NamesSeveralMissingSlices) {
-  const Outcome outcome = import_objects(files_of(
-      long_series(), [](std::uint32_t k, DicomObject&) { return k != 10 && k != 40 && k != 41; }));
-  EXPECT_THAT(outcome.error, HasSubstr("slices 11, 41 and 42 of 93 are missing"));
 }
 
 TEST(DicomRefusal, NamesADoubledSlice) {
@@ -80,63 +77,37 @@ TEST(DicomRefusal, NamesADoubledSlice) {
 }
 
 TEST(DicomRefusal, NamesUnevenSlices) {
-  const Outcome outcome = import_objects(with_slice(3, [](DicomObject& object) {
-    object.text(kImagePosition, "DS", "-10\\20\\37.9");  // 37.5 would be right
-  }));
+  const Outcome outcome = import_objects(
+      with_slice(3, setting(kImagePosition, "DS", "-10\\20\\37.9")));  // 37.5 would be right
   EXPECT_THAT(outcome.error, AllOf(HasSubstr("unevenly spaced"), HasSubstr("slices 3 and 4 of 6"),
                                    HasSubstr("2.9 mm"), HasSubstr("2.5 mm")));
 }
 
 TEST(DicomRefusal, NamesASliceThatIsShiftedInItsPlane) {
-  const Outcome outcome = import_objects(with_slice(
-      3, [](DicomObject& object) { object.text(kImagePosition, "DS", "-10.5\\20\\37.5"); }));
+  const Outcome outcome =
+      import_objects(with_slice(3, setting(kImagePosition, "DS", "-10.5\\20\\37.5")));
   EXPECT_THAT(outcome.error, AllOf(HasSubstr("Slice 4 of 6"), HasSubstr("0.5 mm")));
 }
 
-struct Mixture {
-  const char* name;
-  std::function<void(DicomObject&)> change;
-  const char* what;
-};
-
-class DicomMixture : public testing::TestWithParam<Mixture> {};
-
-TEST_P(DicomMixture, IsRefusedAndNamed) {
-  const Outcome outcome = import_objects(with_slice(4, GetParam().change));
-  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, AllOf(HasSubstr("1 of its 6 slices"), HasSubstr(GetParam().what),
-                                   HasSubstr("\"IM5\"")));
+TEST(DicomRefusal, NamesASliceOfAnotherKind) {
+  const std::pair<Edit, const char*> mixtures[] = {
+      {setting(kImageOrientation, "DS", "0\\1\\0\\1\\0\\0"), "orientation"},
+      {[](DicomObject& object) { object.number(kRows, 2).pixels(std::string(20, 'x'), 2); },
+       "size"},
+      {setting(kPixelSpacing, "DS", "0.5\\0.8"), "pixel spacing"},
+      {setting(kPhotometricInterpretation, "CS", "MONOCHROME1"), "photometric"}};
+  for (const auto& [change, what] : mixtures) {
+    const Outcome outcome = import_objects(with_slice(4, change));
+    EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+    EXPECT_THAT(outcome.error,
+                AllOf(HasSubstr("1 of its 6 slices"), HasSubstr(what), HasSubstr("\"IM5\"")));
+  }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Of, DicomMixture,
-    testing::Values(Mixture{"Orientations",
-                            [](DicomObject& object) {
-                              object.text(kImageOrientation, "DS", "0\\1\\0\\1\\0\\0");
-                            },
-                            "orientation"},
-                    Mixture{"Sizes",
-                            [](DicomObject& object) {
-                              object.number(kRows, 2).pixels(std::string(20, 'x'), 2);
-                            },
-                            "size"},
-                    Mixture{
-                        "Spacings",
-                        [](DicomObject& object) { object.text(kPixelSpacing, "DS", "0.5\\0.8"); },
-                        "pixel spacing"},
-                    Mixture{"Photometry",
-                            [](DicomObject& object) {
-                              object.text(kPhotometricInterpretation, "CS", "MONOCHROME1");
-                            },
-                            "photometric"}),
-    [](const auto& each) { return std::string(each.param.name); });
-
-NamedFiles rescaled(const char* slope, const char* intercept,
-                    const std::function<void(DicomObject&)>& change) {
-  return files_of(DicomSeries{}, [&](std::uint32_t k, DicomObject& object) {
+NamedFiles rescaled(const char* slope, const char* intercept, const Edit& change) {
+  return changed(DicomSeries{}, [&](DicomObject& object, std::uint32_t k) {
     object.text(kRescaleSlope, "DS", slope).text(kRescaleIntercept, "DS", intercept);
     if (k == 4) change(object);
-    return true;
   });
 }
 
@@ -152,33 +123,22 @@ TEST(DicomRescale, ThatOneSliceLacksIsRefused) {
   EXPECT_THAT(error_of(rescaled("2", "0", without_both)),
               AllOf(HasSubstr("rescale slope (0028,1053)"), HasSubstr("\"IM5\"")));
   // An empty value is missing, too.
-  EXPECT_THAT(
-      error_of(rescaled("1", "-1024",
-                        [](DicomObject& object) { object.text(kRescaleIntercept, "DS", ""); })),
-      HasSubstr("rescale intercept"));
+  EXPECT_THAT(error_of(rescaled("1", "-1024", setting(kRescaleIntercept, "DS", ""))),
+              HasSubstr("rescale intercept"));
   // The assumed factors are those of the others.
   EXPECT_EQ(error_of(rescaled("1", "0", without_both)), "");
-  EXPECT_EQ(
-      error_of(rescaled("1", "-1024", [](DicomObject& object) { object.erase(kRescaleSlope); })),
-      "");
+  EXPECT_EQ(error_of(rescaled("1", "-1024", erasing(kRescaleSlope))), "");
 }
 
 TEST(DicomRescale, MayDifferFromSliceToSlice) {
-  EXPECT_EQ(
-      import_objects(rescaled("1", "-1024",
-                              [](DicomObject& object) { object.text(kRescaleSlope, "DS", "0.5"); }))
-          .error,
-      "");
+  EXPECT_EQ(import_objects(rescaled("1", "-1024", setting(kRescaleSlope, "DS", "0.5"))).error, "");
 }
 
 TEST(DicomRescale, ThatOneFrameLacksIsRefused) {
   const DicomSeries series;
   std::vector<DicomObject> frames;
   for (std::uint32_t k = 0; k < series.slices; ++k) {
-    DicomObject frame;
-    frame.items(kPlanePositionSequence,
-                {DicomObject().text(kImagePosition, "DS",
-                                    "-10\\20\\" + std::to_string(series.position(k)[2]))});
+    DicomObject frame = frame_at(series.position(k));
     if (k != 2) {
       frame.items(
           kPixelValueTransformationSequence,
@@ -203,81 +163,47 @@ TEST(DicomTable, ThatOneSliceLacksIsRefused) {
 
 // --- Single objects ------------------------------------------------------------------------------
 
-struct Fault {
-  const char* name;
-  std::function<void(DicomObject&)> change;
-  const char* reason;
-};
-
-class DicomFault : public testing::TestWithParam<Fault> {};
-
-TEST_P(DicomFault, IsRefusedWithItsReason) {
-  const Outcome outcome = import_objects(with_slice(2, GetParam().change));
-  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, AllOf(HasSubstr("File \"IM3\""), HasSubstr(GetParam().reason)));
-  // Alone it needs no name, and must not have the one of the daemon's own file.
-  DicomObject object = DicomSeries{}.slice(2);
-  GetParam().change(object);
-  const std::string alone = import_objects({{"upload-17", object.file()}}).error;
-  EXPECT_THAT(alone, AllOf(HasSubstr(GetParam().reason), Not(HasSubstr("upload-17"))));
+TEST(DicomRefusal, OfASliceTellsItsReason) {
+  const std::pair<Edit, const char*> faults[] = {
+      {erasing(kPixelData), "no pixel data"},
+      {[](DicomObject& object) { object.pixels(std::string(38, 'x'), 2); },
+       "5 x 4 x 1 samples take 40 bytes, but the file has 38"},
+      {[](DicomObject& object) { object.number(kRows, 65535).number(kColumns, 65535); },
+       "65535 x 65535 x 1 samples take 8589672450 bytes, but the file has 40"},
+      {erasing(kRows), "rows (0028,0010)"},
+      {setting(kRows, 0), "size is 0"},
+      {setting(kBitsStored, 17), "it stores 17 bits"},
+      {setting(kBitsAllocated, 12), "12 bits"},
+      {[](DicomObject& object) {
+         object.number(kSamplesPerPixel, 3).text(kPhotometricInterpretation, "CS", "RGB");
+       },
+       "in colour"},
+      {setting(kPhotometricInterpretation, "CS", "PALETTE COLOR"), "palette"},
+      {erasing(kImagePosition), "position (0020,0032)"},
+      {setting(kImagePosition, "DS", "a\\b\\c"), "\"a\\b\\c\""},
+      {setting(kImagePosition, "DS", "1\\nan\\2"), "not 3 numbers"},
+      {erasing(kPixelSpacing), "pixel spacing (0028,0030)"},
+      {setting(kPixelSpacing, "DS", "0\\1"), "not positive"},
+      {setting(kImageOrientation, "DS", "2\\0\\0\\0\\1\\0"), "unit vectors"},
+      {setting(kImageOrientation, "DS", "1\\0\\0\\0.6\\0.8\\0"), "perpendicular"},
+      {[](DicomObject& object) { object.items(kModalityLutSequence, {DicomObject{}}); },
+       "by a lookup table"},
+      {[](DicomObject& object) {
+         object.text(kNumberOfFrames, "IS", "2").pixels(std::string(80, 'x'), 2);
+       },
+       "no position for each of them"},
+      {setting(kNumberOfFrames, "IS", "-1"), "\"-1\""}};
+  for (const auto& [change, reason] : faults) {
+    const Outcome outcome = import_objects(with_slice(2, change));
+    EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+    EXPECT_THAT(outcome.error, AllOf(HasSubstr("File \"IM3\""), HasSubstr(reason)));
+    // Alone it needs no name, and must not have the one of the daemon's own file.
+    DicomObject object = DicomSeries{}.slice(2);
+    change(object);
+    const std::string alone = import_objects({{"upload-17", object.file()}}).error;
+    EXPECT_THAT(alone, AllOf(HasSubstr(reason), Not(HasSubstr("upload-17"))));
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    Of, DicomFault,
-    testing::Values(
-        Fault{"NoPixels", [](DicomObject& object) { object.erase(kPixelData); }, "no pixel data"},
-        Fault{"FewPixels", [](DicomObject& object) { object.pixels(std::string(38, 'x'), 2); },
-              "5 x 4 x 1 samples take 40 bytes, but the file has 38"},
-        Fault{"HugeSize",
-              [](DicomObject& object) { object.number(kRows, 65535).number(kColumns, 65535); },
-              "65535 x 65535 x 1 samples take 8589672450 bytes, but the file has 40"},
-        Fault{"NoRows", [](DicomObject& object) { object.erase(kRows); }, "rows (0028,0010)"},
-        Fault{"ZeroRows", [](DicomObject& object) { object.number(kRows, 0); }, "size is 0"},
-        Fault{"Bits", [](DicomObject& object) { object.number(kBitsStored, 17); },
-              "it stores 17 bits"},
-        Fault{"PackedBits", [](DicomObject& object) { object.number(kBitsAllocated, 12); },
-              "12 bits"},
-        Fault{"Colour",
-              [](DicomObject& object) {
-                object.number(kSamplesPerPixel, 3).text(kPhotometricInterpretation, "CS", "RGB");
-              },
-              "in colour"},
-        Fault{"Palette",
-              [](DicomObject& object) {
-                object.text(kPhotometricInterpretation, "CS", "PALETTE COLOR");
-              },
-              "palette"},
-        Fault{"NoPosition", [](DicomObject& object) { object.erase(kImagePosition); },
-              "position (0020,0032)"},
-        Fault{"PositionOfWords",
-              [](DicomObject& object) { object.text(kImagePosition, "DS", "a\\b\\c"); },
-              "\"a\\b\\c\""},
-        Fault{"PositionNotFinite",
-              [](DicomObject& object) { object.text(kImagePosition, "DS", "1\\nan\\2"); },
-              "not 3 numbers"},
-        Fault{"NoSpacing", [](DicomObject& object) { object.erase(kPixelSpacing); },
-              "pixel spacing (0028,0030)"},
-        Fault{"ZeroSpacing", [](DicomObject& object) { object.text(kPixelSpacing, "DS", "0\\1"); },
-              "not positive"},
-        Fault{"LongAxes",
-              [](DicomObject& object) { object.text(kImageOrientation, "DS", "2\\0\\0\\0\\1\\0"); },
-              "unit vectors"},
-        Fault{"SkewAxes",
-              [](DicomObject& object) {
-                object.text(kImageOrientation, "DS", "1\\0\\0\\0.6\\0.8\\0");
-              },
-              "perpendicular"},
-        Fault{"Table",
-              [](DicomObject& object) { object.items(kModalityLutSequence, {DicomObject{}}); },
-              "by a lookup table"},
-        Fault{"UnplacedFrames",
-              [](DicomObject& object) {
-                object.text(kNumberOfFrames, "IS", "2").pixels(std::string(80, 'x'), 2);
-              },
-              "no position for each of them"},
-        Fault{"FramesOfWords",
-              [](DicomObject& object) { object.text(kNumberOfFrames, "IS", "-1"); }, "\"-1\""}),
-    [](const auto& each) { return std::string(each.param.name); });
 
 TEST(DicomRefusal, OfASingleSlice) {
   const Outcome outcome = import_objects({{"one", DicomSeries{}.slice(0).file()}});
@@ -338,14 +264,10 @@ TEST(DicomRefusal, OfSequencesThatLieTooDeep) {
 // --- Several series and other objects ------------------------------------------------------------
 
 NamedFiles two_series() {
-  DicomSeries second;
-  second.uid = "1.2.3.9";
-  second.slices = 4;
   NamedFiles files = DicomSeries{}.files();
-  for (std::uint32_t k = 0; k < second.slices; ++k) {
-    files.emplace_back("B" + std::to_string(k),
-                       second.slice(k).text(kSeriesDescription, "LO", "scout").file());
-  }
+  const NamedFiles others =
+      changed({.slices = 4, .uid = "1.2.3.9"}, setting(kSeriesDescription, "LO", "scout"));
+  for (const auto& [name, file] : others) files.emplace_back("B" + name, file);
   return files;
 }
 
@@ -359,8 +281,7 @@ TEST(DicomChoice, IsAskedForWhenThereAreSeveralSeries) {
 }
 
 TEST(DicomChoice, TakesTheSeriesThatIsNamed) {
-  const Outcome outcome = import_objects(two_series(), {.series = "1.2.3.9"});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(two_series(), {.series = "1.2.3.9"}));
   EXPECT_EQ(outcome.volume.dims[2], 4);
   EXPECT_EQ(outcome.volume.dicom->series_uid, "1.2.3.9");
 }
@@ -374,9 +295,8 @@ TEST(DicomChoice, ListsAllForAnUnknownName) {
 
 TEST(DicomChoice, IsNotHinderedByFaultsOfOthers) {
   NamedFiles files = DicomSeries{}.files();
-  DicomSeries other;
-  other.uid = "1.9";
-  files.emplace_back("report", other.slice(0)
+  files.emplace_back("report", DicomSeries{.uid = "1.9"}
+                                   .slice(0)
                                    .number(kSamplesPerPixel, 3)
                                    .text(kPhotometricInterpretation, "CS", "RGB")
                                    .file());
@@ -387,20 +307,17 @@ TEST(DicomChoice, IsNotHinderedByFaultsOfOthers) {
 
 TEST(DicomIgnored, AreNamedWithTheirReasons) {
   NamedFiles files = DicomSeries{}.files();
-  DicomObject report;
-  report.text(kModality, "CS", "SR").text(kSeriesInstanceUid, "UI", "1.2.77");
-  files.emplace_back("report.dcm", report.file());
-  DicomObject directory;
-  directory.items(kDirectoryRecordSequence, {});
-  files.emplace_back("DICOMDIR", directory.file());
+  files.emplace_back(
+      "report.dcm",
+      DicomObject().text(kModality, "CS", "SR").text(kSeriesInstanceUid, "UI", "1.2.77").file());
+  files.emplace_back("DICOMDIR", DicomObject().items(kDirectoryRecordSequence, {}).file());
   files.emplace_back("readme.txt", "not DICOM");
   files.emplace_back("empty", "");
-  DicomSeries scout;
-  scout.along_column = {0, 0, -1};
-  files.emplace_back("scout",
-                     scout.slice(0).text(kImageType, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER").file());
-  const Outcome outcome = import_objects(files);
-  ASSERT_EQ(outcome.error, "");
+  files.emplace_back("scout", DicomSeries{.along_column = {0, 0, -1}}
+                                  .slice(0)
+                                  .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER")
+                                  .file());
+  const Outcome outcome = imported(import_objects(files));
   EXPECT_THAT(
       outcome.volume.ignored,
       testing::ElementsAre(IgnoredObject{"report.dcm", "it is not an image (modality \"SR\")"},

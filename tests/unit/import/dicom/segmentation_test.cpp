@@ -44,8 +44,7 @@ TEST(DicomSegmentation, WithHighNumbersHasWiderLabels) {
   SegmentObject object = two_segments();
   object.frames[2].segment = 300;
   object.frames[3].segment = 300;
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   EXPECT_EQ(samples_of<std::uint16_t>(outcome)[kSegmentSamples + 3], 300);
 }
 
@@ -86,8 +85,7 @@ TEST(DicomSegmentation, NamesItsLabels) {
   object.segments = {"liver", "spleen", "absent"};
   // As dcmqi writes red, and the liver's colour of 3D Slicer.
   object.colors = {{34891, 53480, 50167}, {41661, 41167, 40792}, {0, 32896, 32896}};
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   LabelEntry liver = entry(1, "liver");
   LabelEntry spleen = entry(2, "spleen");
   liver.color = "#ff0000";
@@ -100,8 +98,7 @@ TEST(DicomSegmentation, NamesItsLabels) {
 TEST(DicomSegmentation, WithOverlapsNumbersTheirCombinations) {
   SegmentObject object = two_segments();
   object.frames[2].labels = {3, 14};
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
   EXPECT_EQ(label_at(outcome, 14, 1), 3);
   EXPECT_EQ(label_at(outcome, 3, 1), 2);
@@ -114,8 +111,7 @@ TEST(DicomSegmentation, WithOverlapsNumbersTheirCombinations) {
   std::swap(object.frames[1], object.frames[2]);
   EXPECT_EQ(import_labels(object).canonical, outcome.canonical);
 
-  const Outcome chosen = import_labels(object, {.volume = 1});
-  ASSERT_EQ(chosen.error, "");
+  const Outcome chosen = imported(import_labels(object, {.volume = 1}));
   EXPECT_EQ(chosen.volume.dims[2], 2);
   EXPECT_EQ(label_at(chosen, 14, 0), 2);
   EXPECT_EQ(label_at(chosen, 1, 1), 2);
@@ -130,8 +126,7 @@ TEST(DicomSegmentation, WithOverlapsBeyondEightBitsHasWiderValues) {
     if (frame.segment == 2) frame.segment = 255;
   }
   object.frames[2].labels = {14};
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   const auto samples = samples_of<std::uint16_t>(outcome);
   EXPECT_EQ(samples.at(kSegmentSamples + 14), 256);
   EXPECT_EQ(samples.at(2 * kSegmentSamples + 1), 255);
@@ -142,8 +137,7 @@ TEST(DicomSegmentation, WithOverlapsBeyondEightBitsHasWiderValues) {
 TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   SegmentObject object = two_segments();
   object.slice_distance = "1.0";
-  const Outcome told = import_labels(object);
-  ASSERT_EQ(told.error, "");
+  const Outcome told = imported(import_labels(object));
   EXPECT_EQ(told.volume.dims[2], 5);
   EXPECT_EQ(told.volume.geometry.spacing[2], 1);
   EXPECT_THAT(note_detail(told, NoteCode::kEmptyPlanes), HasSubstr("2 of the 5 planes"));
@@ -157,8 +151,7 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   // Without it the smallest gap is the distance.
   object.slice_distance = "";
   object.frames[3].z = 12;
-  const Outcome sparse = import_labels(object);
-  ASSERT_EQ(sparse.error, "");
+  const Outcome sparse = imported(import_labels(object));
   EXPECT_EQ(sparse.volume.dims[2], 7);
   EXPECT_EQ(label_at(sparse, 1, 6), 2);
 }
@@ -167,8 +160,7 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereGapsAreOfSeveralSlices) {
   SegmentObject object = two_segments();
   object.frames[3].z = 6;
   object.thickness = "1";
-  const Outcome thick = import_labels(object);
-  ASSERT_EQ(thick.error, "");
+  const Outcome thick = imported(import_labels(object));
   EXPECT_EQ(thick.volume.dims[2], 7);
   EXPECT_EQ(thick.volume.geometry.spacing[2], 1);
   EXPECT_EQ(label_at(thick, 1, 6), 2);
@@ -222,14 +214,12 @@ TEST(DicomSegmentation, MayHaveCompressedFrames) {
     for (const unsigned place : frame.labels) bytes[place] = 1;
     return bytes;
   };
-  const Outcome deflated = import_frames(kDeflatedFrames, [](const SegmentFrame& frame) {
+  const Outcome deflated = imported(import_frames(kDeflatedFrames, [](const SegmentFrame& frame) {
     return isomesh::test::raw_deflate(packed_bits(frame));
-  });
-  EXPECT_EQ(deflated.error, "");
+  }));
   EXPECT_EQ(deflated.canonical, expected);
-  const Outcome runs =
-      import_frames(kRle, [](const SegmentFrame& frame) { return rle_of(packed_bits(frame)); });
-  EXPECT_EQ(runs.error, "");
+  const Outcome runs = imported(
+      import_frames(kRle, [](const SegmentFrame& frame) { return rle_of(packed_bits(frame)); }));
   EXPECT_EQ(runs.canonical, expected);
   // Some programs write a byte for each bit.
   const Outcome bytes =
@@ -277,8 +267,7 @@ TEST(DicomSegmentation, OfOneFractionalSegmentKeepsItsSamples) {
                                 .segments = {"liver"},
                                 .type = "FRACTIONAL",
                                 .maximum = 255};
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   EXPECT_EQ(label_at(outcome, 2, 0), 200);
   EXPECT_EQ(label_at(outcome, 3, 1), 60);
   EXPECT_EQ(outcome.volume.suggested_iso, 127.5);
@@ -295,8 +284,7 @@ TEST(DicomSegmentation, OfFractionalSegmentsBeginsAtAHalf) {
   object.frames[1].value = 101;
   object.frames[2] = {.z = 2, .segment = 2, .labels = {3, 14}, .value = 255};
   object.frames[3].value = 50;
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   EXPECT_EQ(label_at(outcome, 7, 0), 1);
   EXPECT_EQ(label_at(outcome, 14, 1), 3);
   EXPECT_EQ(label_at(outcome, 3, 1), 2);
@@ -304,8 +292,7 @@ TEST(DicomSegmentation, OfFractionalSegmentsBeginsAtAHalf) {
   EXPECT_THAT(note_detail(outcome, NoteCode::kFractionalSegments), HasSubstr("50.5 or more"));
   EXPECT_THAT(outcome.volume.presets, testing::IsEmpty());
   // One of them alone is as it is stored.
-  const Outcome chosen = import_labels(object, {.volume = 1});
-  ASSERT_EQ(chosen.error, "");
+  const Outcome chosen = imported(import_labels(object, {.volume = 1}));
   EXPECT_EQ(label_at(chosen, 1, 1), 50);
 }
 
@@ -321,8 +308,7 @@ TEST(DicomSegmentation, OfLabelsKeepsThem) {
   const SegmentObject object = {.frames = {{.z = 0, .labels = {2}}, {.z = 5, .labels = {3}}},
                                 .type = "LABELMAP",
                                 .slice_distance = "2.5"};
-  const Outcome outcome = import_labels(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_labels(object));
   EXPECT_EQ(outcome.volume.dims[2], 3);
   EXPECT_EQ(outcome.volume.geometry.spacing[2], 2.5);
   EXPECT_EQ(label_at(outcome, 2, 0), 7);

@@ -34,16 +34,11 @@ std::string unpacked(const std::vector<SegmentFrame>& frames) {
 }  // namespace
 
 DicomObject segmentation(const SegmentObject& what) {
-  DicomSeries series;
-  series.columns = kSegmentColumns;
-  series.rows = kSegmentRows;
-  series.uid = what.uid;
+  const DicomSeries series = {.columns = kSegmentColumns, .rows = kSegmentRows, .uid = what.uid};
   DicomObject object = series.enhanced({0});
   std::vector<DicomObject> frames;
   for (const SegmentFrame& each : what.frames) {
-    DicomObject frame;
-    frame.items(kPlanePositionSequence,
-                {DicomObject().text(kImagePosition, "DS", "0\\0\\" + std::to_string(each.z))});
+    DicomObject frame = frame_at({0, 0, each.z});
     if (each.segment > 0) {
       frame.items(kSegmentIdentificationSequence,
                   {DicomObject().number(kReferencedSegmentNumber, each.segment)});
@@ -66,10 +61,7 @@ DicomObject segmentation(const SegmentObject& what) {
     measures.text(kSpacingBetweenSlices, "DS", what.slice_distance);
   }
   if (!what.thickness.empty()) measures.text(kSliceThickness, "DS", what.thickness);
-  DicomObject orientation;
-  orientation.text(kImageOrientation, "DS", "1\\0\\0\\0\\1\\0");
-  DicomObject shared;
-  shared.items(kPlaneOrientationSequence, {orientation}).items(kPixelMeasuresSequence, {measures});
+  const DicomObject shared = shared_groups().items(kPixelMeasuresSequence, {measures});
   const bool is_binary = what.type == "BINARY";
   object.text(kModality, "CS", "SEG")
       .text(kNumberOfFrames, "IS", std::to_string(frames.size()))

@@ -4,6 +4,7 @@
 
 #include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -12,14 +13,7 @@ using namespace dicom;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::string words(const std::vector<unsigned>& values) {
-  std::string bytes;
-  for (const unsigned value : values) {
-    bytes += static_cast<char>(value & 0xFF);
-    bytes += static_cast<char>(value >> 8);
-  }
-  return bytes;
-}
+std::string words(const std::vector<std::uint16_t>& values) { return bytes_of(values); }
 
 // Three slices, the first at (1, 2, 30), each further one 4 mm against the normal.
 DicomObject tomogram(std::uint32_t frames = 3) {
@@ -45,8 +39,7 @@ Outcome import_one(const DicomObject& object, const ImportOptions& options = {})
 }
 
 TEST(DicomTomogram, LiesWhereItsDetectorSays) {
-  const Outcome outcome = import_one(tomogram());
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_one(tomogram()));
   EXPECT_THAT(outcome.volume.dims, ElementsAre(5, 4, 3));
   EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(1, 2, 30 - 8));
   EXPECT_THAT(outcome.volume.geometry.spacing, ElementsAre(0.75, 0.5, 4));
@@ -60,8 +53,7 @@ TEST(DicomTomogram, WithoutAPlaceIsReadIfTheRequestAcceptsIt) {
   const Outcome refused = import_one(object);
   EXPECT_THAT(refused.error, HasSubstr("accept=space-assumed"));
   EXPECT_EQ(refused.remedy.overridable, "space-assumed");
-  const Outcome outcome = import_one(object, {.accept = {"space-assumed"}});
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_one(object, {.accept = {"space-assumed"}}));
   EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(0, 0, -8));
   EXPECT_THAT(note_detail(outcome, NoteCode::kSpaceAssumed), HasSubstr("at the origin"));
 }
@@ -91,30 +83,27 @@ TEST(DicomTomogram, IsRefusedIfItsFramesAreNoSlices) {
   EXPECT_THAT(note_detail(thick, NoteCode::kDistanceAssumed), HasSubstr("5 mm"));
 }
 
-std::string reals(const std::vector<double>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double)};
-}
-
 // PS3.3, A.59: positions in the space of the volume, as binary numbers.
 TEST(DicomUltrasound, IsReadInItsOwnSpace) {
   const DicomSeries series;
   DicomObject object = series.enhanced({0, 1, 2});
   std::vector<DicomObject> frames;
   for (int k = 0; k < 3; ++k) {
-    frames.push_back(DicomObject().items(
-        kPlanePositionVolumeSequence,
-        {DicomObject().bytes(kImagePositionVolume, "FD", reals({1, 2, 3.0 + k}))}));
+    frames.push_back(
+        DicomObject().items(kPlanePositionVolumeSequence,
+                            {DicomObject().bytes(kImagePositionVolume, "FD",
+                                                 bytes_of(std::vector<double>{1, 2, 3.0 + k}))}));
   }
   DicomObject shared;
   shared
       .items(kPlaneOrientationVolumeSequence,
-             {DicomObject().bytes(kImageOrientationVolume, "FD", reals({1, 0, 0, 0, 1, 0}))})
+             {DicomObject().bytes(kImageOrientationVolume, "FD",
+                                  bytes_of(std::vector<double>{1, 0, 0, 0, 1, 0}))})
       .items(kPixelMeasuresSequence, {DicomObject().text(kPixelSpacing, "DS", "0.5\\0.75")});
   object.text(kModality, "CS", "US")
       .items(kSharedFunctionalGroups, {shared})
       .items(kPerFrameFunctionalGroups, frames);
-  const Outcome outcome = import_one(object);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_one(object));
   EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(1, 2, 3));
   EXPECT_THAT(outcome.volume.geometry.spacing, ElementsAre(0.75, 0.5, 1));
   EXPECT_THAT(note_detail(outcome, NoteCode::kSpaceAssumed), HasSubstr("transducer"));
@@ -122,27 +111,17 @@ TEST(DicomUltrasound, IsReadInItsOwnSpace) {
 
 // Two entries, for the stored values 2 and 3; others have the value of the nearer one.
 TEST(DicomTable, GivesSamplesTheirValues) {
-  NamedFiles files;
-  DicomSeries series;
-  series.bits_allocated = 8;
-  series.bits_stored = 8;
-  series.high_bit = 7;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    std::string pixels(20, '\1');
-    pixels[1] = 3;
-    pixels[2] = 9;
-    files.emplace_back(
-        "F" + std::to_string(k),
-        series.slice(k)
-            .pixels(pixels, 1)
-            .items(kModalityLutSequence, {DicomObject()
-                                              .numbers(kLutDescriptor, {2, 2, 16})
-                                              .text(kModalityLutType, "LO", "HU")
-                                              .bytes(kLutData, "OW", words({1000, 40000}))})
-            .file());
-  }
-  const Outcome outcome = import_objects(files);
-  ASSERT_EQ(outcome.error, "");
+  std::string pixels(20, '\1');
+  pixels[1] = 3;
+  pixels[2] = 9;
+  const DicomSeries series = {.bits_allocated = 8, .bits_stored = 8, .high_bit = 7};
+  const Outcome outcome = imported(import_objects(changed(series, [&](DicomObject& object) {
+    object.pixels(pixels, 1).items(kModalityLutSequence,
+                                   {DicomObject()
+                                        .numbers(kLutDescriptor, {2, 2, 16})
+                                        .text(kModalityLutType, "LO", "HU")
+                                        .bytes(kLutData, "OW", words({1000, 40000}))});
+  })));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint16);
   const auto samples = samples_of<std::uint16_t>(outcome);
   EXPECT_EQ(samples[0], 1000);
@@ -151,15 +130,11 @@ TEST(DicomTable, GivesSamplesTheirValues) {
 }
 
 TEST(DicomTable, OfTooFewEntriesIsRefused) {
-  NamedFiles files;
-  const DicomSeries series;
-  files.emplace_back("one",
-                     series.slice(0)
-                         .items(kModalityLutSequence, {DicomObject()
-                                                           .numbers(kLutDescriptor, {0, 0, 16})
-                                                           .bytes(kLutData, "OW", words({1, 2}))})
-                         .file());
-  EXPECT_THAT(import_objects(files).error, HasSubstr("4 bytes for 65536 entries"));
+  DicomObject object = DicomSeries{}.slice(0);
+  object.items(
+      kModalityLutSequence,
+      {DicomObject().numbers(kLutDescriptor, {0, 0, 16}).bytes(kLutData, "OW", words({1, 2}))});
+  EXPECT_THAT(import_one(object).error, HasSubstr("4 bytes for 65536 entries"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -51,8 +52,7 @@ NamedFiles with_echoes() {
 
 void expect_all_volumes(const NamedFiles& files) {
   for (std::uint32_t volume = 0; volume < kVolumes; ++volume) {
-    const Outcome outcome = import_objects(files, {.volume = volume});
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_objects(files, {.volume = volume}));
     EXPECT_EQ(outcome.volume.dims[2], 6);
     for (std::size_t slice = 0; slice < 6; ++slice) {
       ASSERT_EQ(samples_of<std::int16_t>(outcome)[slice * 20], volume);
@@ -74,17 +74,14 @@ TEST(DicomVolumes, AreOfferedWithWhatTheyDifferIn) {
 }
 
 TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
-  const auto double_bytes = [](double value) {
-    return std::string(reinterpret_cast<const char*>(&value), sizeof value);
-  };
   const std::pair<const char*, Change> changes[] = {
       {"TemporalPositionIdentifier",
        [](DicomObject& object, std::uint32_t volume, std::uint32_t) {
          object.text(kTemporalPositionIdentifier, "IS", std::to_string(volume + 9));
        }},
       {"DiffusionBValue",
-       [&](DicomObject& object, std::uint32_t volume, std::uint32_t) {
-         object.bytes(kDiffusionBValue, "FD", double_bytes(volume * 1000.0));
+       [](DicomObject& object, std::uint32_t volume, std::uint32_t) {
+         object.bytes(kDiffusionBValue, "FD", bytes_of(std::vector{volume * 1000.0}));
        }},
       {"ImageType",
        [](DicomObject& object, std::uint32_t volume, std::uint32_t) {
@@ -102,17 +99,12 @@ TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
 TEST(DicomVolumes, AreToldApartWhereTheyAlternate) {
   DicomSeries series;
   const auto files_of = [&](Tag tag, const std::vector<std::string>& values) {
-    NamedFiles files;
-    for (std::uint32_t k = 0; k < series.slices; ++k) {
-      files.emplace_back("F" + std::to_string(k),
-                         series.slice(k).text(tag, "DS", values[k]).file());
-    }
-    return files;
+    return changed(
+        series, [&](DicomObject& object, std::uint32_t k) { object.text(tag, "DS", values[k]); });
   };
   const NamedFiles echoes = files_of(kEchoTime, {"5", "80", "5", "80", "5", "80"});
   EXPECT_THAT(import_objects(echoes).error, HasSubstr("2 volumes that differ in EchoTime"));
-  const Outcome second = import_objects(echoes, {.volume = 1});
-  ASSERT_EQ(second.error, "");
+  const Outcome second = imported(import_objects(echoes, {.volume = 1}));
   EXPECT_EQ(second.volume.dims[2], 3);
   EXPECT_EQ(second.volume.geometry.spacing[2], 5);
   EXPECT_EQ(samples_of<std::int16_t>(second)[0], series.stored(0, 0, 1));
@@ -132,8 +124,7 @@ TEST(DicomVolumes, AreToldApartWhereTheyAlternate) {
            files_of(kTriggerTime,
                     {"5", "80", "5", "80", "5", "80", "5"})  // of acquisition in turns
        }) {
-    const Outcome outcome = import_objects(whole);
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_objects(whole));
     EXPECT_EQ(outcome.volume.dims[2], 7);
   }
 }
@@ -212,16 +203,12 @@ TEST(DicomVolumes, ThatWereBrokenOffAreNotTaken) {
 
 TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
   const DicomSeries axial;
-  DicomSeries coronal;
-  coronal.along_column = {0, 0, -1};
-  coronal.step = {0, 3, 0};
-  coronal.slices = 4;
+  const DicomSeries coronal = {.slices = 4, .along_column = {0, 0, -1}, .step = {0, 3, 0}};
   NamedFiles files = axial.files();
-  for (std::uint32_t k = 0; k < coronal.slices; ++k) {
-    files.emplace_back(
-        "C" + std::to_string(k),
-        coronal.slice(k).text(kSopInstanceUid, "UI", "1.9." + std::to_string(k)).file());
-  }
+  const NamedFiles others = changed(coronal, [](DicomObject& object, std::uint32_t k) {
+    object.text(kSopInstanceUid, "UI", "1.9." + std::to_string(k));
+  });
+  for (const auto& [name, file] : others) files.emplace_back("C" + name, file);
   const Outcome outcome = import_objects(files);
   EXPECT_THAT(
       outcome.remedy.choices,
@@ -239,14 +226,10 @@ TEST(DicomVolumes, ThatAreAloneNeedNoChoice) {
 
 // --- Frames of reference -------------------------------------------------------------------------
 
-NamedFiles with_frames_of_reference(const std::function<std::string(std::uint32_t)>& uid,
-                                    const DicomSeries& series = {}) {
-  NamedFiles files;
-  for (std::uint32_t k = 0; k < series.slices; ++k) {
-    files.emplace_back("F" + std::to_string(k),
-                       series.slice(k).text(kFrameOfReferenceUid, "UI", uid(k)).file());
-  }
-  return files;
+NamedFiles with_frames_of_reference(const std::function<std::string(std::uint32_t)>& uid) {
+  return changed(DicomSeries{}, [&](DicomObject& object, std::uint32_t k) {
+    object.text(kFrameOfReferenceUid, "UI", uid(k));
+  });
 }
 
 std::string one_each(std::uint32_t slice) {
@@ -256,8 +239,7 @@ std::string one_each(std::uint32_t slice) {
 std::string in_groups(std::uint32_t slice) { return slice < 3 ? "1.2.1" : "1.2.2"; }
 
 TEST(DicomFramesOfReference, OfEachSliceAreNoted) {
-  const Outcome outcome = import_objects(with_frames_of_reference(one_each));
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(with_frames_of_reference(one_each)));
   EXPECT_THAT(note_detail(outcome, NoteCode::kFrameOfReference),
               HasSubstr("5 frames of reference"));
   EXPECT_EQ(outcome.volume.dicom->frame_of_reference_uid, "");
@@ -269,8 +251,7 @@ TEST(DicomFramesOfReference, ThatFormGroupsMayBeAccepted) {
   EXPECT_EQ(refused.code, ErrorCode::kUnusableVolume);
   EXPECT_EQ(refused.remedy.overridable, "frame-of-reference");
   EXPECT_THAT(refused.error, HasSubstr("2 frames of reference"));
-  const Outcome accepted = import_objects(files, {.accept = {"frame-of-reference"}});
-  ASSERT_EQ(accepted.error, "");
+  const Outcome accepted = imported(import_objects(files, {.accept = {"frame-of-reference"}}));
   EXPECT_THAT(note_detail(accepted, NoteCode::kFrameOfReference), HasSubstr("The request accepts"));
 }
 
@@ -292,8 +273,7 @@ TEST(DicomUpload, TakesAFileOnceThatCameTwice) {
   NamedFiles files = DicomSeries{}.files();
   files.emplace_back("copy", files[1].second);
   files.emplace_back("another", files[2].second);
-  const Outcome outcome = import_objects(files);
-  ASSERT_EQ(outcome.error, "");
+  const Outcome outcome = imported(import_objects(files));
   EXPECT_EQ(outcome.canonical, import_objects(DicomSeries{}.files()).canonical);
   EXPECT_THAT(outcome.volume.ignored,
               ElementsAre(IgnoredObject{"copy", "it is the same as \"IM9\""},
@@ -319,22 +299,19 @@ TEST(DicomUpload, LeavesOutRawDataReportsAndPresentations) {
                       .text(kModality, "CS", "MR")
                       .erase(kPhotometricInterpretation)
                       .file());
-    const Outcome outcome = import_objects(files);
-    ASSERT_EQ(outcome.error, "");
+    const Outcome outcome = imported(import_objects(files));
     EXPECT_THAT(outcome.volume.ignored, ElementsAre(IgnoredObject{"beside", reason}));
   }
 }
 
 TEST(DicomUpload, NamesASeriesWithoutUidByItsNumber) {
   NamedFiles files = DicomSeries{}.files();
-  const DicomSeries other;
-  for (std::uint32_t k = 0; k < 3; ++k) {
-    files.emplace_back("N" + std::to_string(k), other.slice(k)
-                                                    .erase(kSeriesInstanceUid)
-                                                    .text(kSeriesNumber, "IS", "3")
-                                                    .text(kSeriesDescription, "LO", "neck")
-                                                    .file());
-  }
+  const NamedFiles others = changed({.slices = 3}, [](DicomObject& object) {
+    object.erase(kSeriesInstanceUid)
+        .text(kSeriesNumber, "IS", "3")
+        .text(kSeriesDescription, "LO", "neck");
+  });
+  for (const auto& [name, file] : others) files.emplace_back("N" + name, file);
   const Outcome all = import_objects(files);
   EXPECT_THAT(all.remedy.choices, ElementsAre(Choice{"series", "1.2.3.4", "CT, 6 slices"},
                                               Choice{"series", "3.0", "neck, CT, 3 slices"}));
@@ -344,16 +321,12 @@ TEST(DicomUpload, NamesASeriesWithoutUidByItsNumber) {
 
 TEST(DicomUpload, NamesTheOneThatDiffersWhereverItComes) {
   for (const std::size_t odd : {0U, 3U}) {
-    DicomSeries series;
-    NamedFiles files;
-    for (std::uint32_t k = 0; k < series.slices; ++k) {
-      DicomObject object = series.slice(k);
+    const NamedFiles files = changed(DicomSeries{}, [&](DicomObject& object, std::uint32_t k) {
       if (k == odd) object.text(kPixelSpacing, "DS", "0.5\\0.8");
-      files.emplace_back("F" + std::to_string(k), object.file());
-    }
+    });
     EXPECT_THAT(import_objects(files).error,
                 AllOf(HasSubstr("1 of its 6 slices differs in pixel spacing"),
-                      HasSubstr("\"F" + std::to_string(odd) + "\" differs from")));
+                      HasSubstr("\"IM" + std::to_string(odd + 1) + "\" differs from")));
   }
 }
 
@@ -400,8 +373,7 @@ TEST(DicomVolumes, AreNamedByTheirInstancesIfNothingElseDiffers) {
 TEST(DicomUpload, TellsEqualSeriesApartByTheirNumbers) {
   NamedFiles files;
   for (int copy = 1; copy <= 2; ++copy) {
-    DicomSeries series;
-    series.uid = "1.2." + std::to_string(copy);
+    const DicomSeries series = {.uid = "1.2." + std::to_string(copy)};
     for (std::uint32_t k = 0; k < series.slices; ++k) {
       const std::string name = std::to_string(copy * 10 + int(k));
       files.emplace_back("F" + name, series.slice(k)
