@@ -27,6 +27,7 @@
 namespace {
 
 using namespace isomesh;
+using namespace isomesh::import;
 using namespace isomesh::process;
 
 std::string read_order() {
