@@ -51,6 +51,7 @@ export class Daemon {
   private async answer(request: IncomingMessage, response: ServerResponse): Promise<void> {
     const [path = '', query] = request.url?.split('?') ?? [];
     this.query = new URLSearchParams(query);
+    const isLast = this.query.get('cursor') === 'the rest';
     this.asked.push(`${request.method} ${path}`);
     this.tokens.add(request.headers.authorization);
     const keep = (all: Set<ServerResponse>): void => {
@@ -70,10 +71,8 @@ export class Daemon {
     } else if (path === `/v1/jobs/${id}/mesh.glb`) {
       response.end('glTF');
     } else if (path === `/v1/jobs/${id}/labels`) {
-      const isLast = request.url?.endsWith('?cursor=the%20rest') === true;
       response.end(JSON.stringify(isLast ? { labels: [{ label: 3 }], next: null } : { labels: [{ label: 1 }, { label: 2 }], next: 'the rest' }));
     } else if (path === `/v1/volumes/${id}/labels`) {
-      const isLast = request.url?.endsWith('?background=0&cursor=the%20rest') === true;
       const labels = isLast ? [{ label: 3 }] : [{ label: 1 }, { label: 2 }];
       response.end(JSON.stringify({ volume: id, background: 0, labels, next: isLast ? null : 'the rest' }));
     } else if (path === '/v1/jobs' && request.method === 'POST') {

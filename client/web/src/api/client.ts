@@ -109,11 +109,10 @@ export class Client {
 
   /** Lists the labels of a volume in ascending order. Samples with the value `background` belong to none. */
   async labelsOf(id: string, background: number, signal?: GlobalAbortSignal): Promise<VolumeLabels> {
-    const path = `${volumePath(id)}/labels?background=${background}`;
-    const list: VolumeLabels = await this.connection.json(path, { signal });
+    const pageAt = (cursor = ''): Promise<VolumeLabels> => this.connection.json(`${volumePath(id)}/labels${queryOf({ background, cursor })}`, { signal });
+    const list = await pageAt();
     while (list.next !== null) {
-      const query: string = `&cursor=${encodeURIComponent(list.next)}`;
-      const page: VolumeLabels = await this.connection.json(path + query, { signal });
+      const page = await pageAt(list.next);
       list.labels.push(...page.labels);
       list.next = page.next;
     }
@@ -127,14 +126,12 @@ export class Client {
     window: [number, number],
     signal?: GlobalAbortSignal,
   ): Promise<GlobalBlob> {
-    const query = new URLSearchParams({ axis, index: String(index), window: window.join() }).toString();
-    return this.connection.blob(`${volumePath(id)}/slice.png?${query}`, { signal });
+    return this.connection.blob(`${volumePath(id)}/slice.png${queryOf({ axis, index, window: window.join() })}`, { signal });
   }
 
   /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
-    const query = new URLSearchParams({ size: String(size), window: window.join() }).toString();
-    return this.connection.bytes(`${volumePath(id)}/preview?${query}`, { signal });
+    return this.connection.bytes(`${volumePath(id)}/preview${queryOf({ size, window: window.join() })}`, { signal });
   }
 
   // --- Jobs ---
@@ -180,15 +177,14 @@ export class Client {
 
   /** Returns at once, or with `waitSeconds` when the job has finished or the time is over. */
   getJob(id: string, waitSeconds = 0, signal?: GlobalAbortSignal): Promise<Job> {
-    return this.connection.json(`${jobPath(id)}${waitSeconds > 0 ? `?wait=${waitSeconds}` : ''}`, { signal });
+    return this.connection.json(`${jobPath(id)}${queryOf({ wait: waitSeconds || undefined })}`, { signal });
   }
 
   /** Lists the labels of a finished job in ascending order, also if the job itself has only `labels_count`. */
   async labelsOfJob(id: string, signal?: GlobalAbortSignal): Promise<LabelSummary[]> {
     const labels: LabelSummary[] = [];
     for (let cursor: string | null = ''; cursor !== null; ) {
-      const query: string = cursor === '' ? '' : `?cursor=${encodeURIComponent(cursor)}`;
-      const page: LabelSummaryList = await this.connection.json(`${jobPath(id)}/labels${query}`, { signal });
+      const page: LabelSummaryList = await this.connection.json(`${jobPath(id)}/labels${queryOf({ cursor })}`, { signal });
       labels.push(...page.labels);
       cursor = page.next;
     }

@@ -69,32 +69,29 @@ function fromJson(text: string): Value {
 
 // Each three numbers are one place.
 function placesFrom(text: string): number[][] {
-  const numbers = text.split(',').map(Number);
+  const numbers = numbersFrom(text);
   return Array.from({ length: Math.ceil(numbers.length / 3) }, (_, n) => numbers.slice(3 * n, 3 * n + 3));
 }
 
+function numbersFrom(text: string): number[] {
+  return text.split(',').map(Number);
+}
+
+const readers: Record<Parameter['kind'], (text: string, values: Parameter['values']) => Value> = {
+  number: Number,
+  integer: Number,
+  switch: (text) => text === 'true',
+  choice: (text, values) => values?.find((value) => String(value) === text) ?? text,
+  choices: (text, values) => text.split(',').filter((one) => values?.includes(one)),
+  text: String,
+  labels: (text) => (text === 'all' ? text : numbersFrom(text)),
+  numbers: numbersFrom,
+  places: placesFrom,
+  'by label': fromJson,
+};
+
 export function fromText({ kind, values }: Parameter, text: string): Value {
-  switch (kind) {
-    case 'number':
-    case 'integer':
-      return Number(text);
-    case 'switch':
-      return text === 'true';
-    case 'choice':
-      return values?.find((value) => String(value) === text) ?? text;
-    case 'choices':
-      return text.split(',').filter((one) => values?.includes(one));
-    case 'text':
-      return text;
-    case 'labels':
-      return text === 'all' ? text : text.split(',').map(Number);
-    case 'numbers':
-      return text.split(',').map(Number);
-    case 'places':
-      return placesFrom(text);
-    case 'by label':
-      return fromJson(text);
-  }
+  return readers[kind](text, values);
 }
 
 // Takes over what the query says and is valid; a link that was typed wrongly does no harm.

@@ -149,40 +149,30 @@ function isWithin(parameter: Parameter, value: number, job: JobParameters): bool
   return value >= minimum && value > above && value <= (maximumOf(parameter, job) ?? Infinity);
 }
 
+const checks: Record<Parameter['kind'], (value: Value, parameter: Parameter, job: JobParameters) => boolean> = {
+  number: (value, parameter, job) => Number.isFinite(value) && isWithin(parameter, value as number, job),
+  integer: (value, parameter, job) => Number.isInteger(value) && isWithin(parameter, value as number, job),
+  switch: (value) => typeof value === 'boolean',
+  choice: (value, parameter, job) => choicesOf(parameter, job).includes(value as string | number),
+  choices: (value, { values = [] }) => areSome(value) && value.every((one) => values.includes(one as string)),
+  text: (value) => typeof value === 'string',
+  labels: (value) => value === 'all' || areLabels(value),
+  numbers: (value, parameter, job) => areSome(value) && value.every((one) => Number.isFinite(one) && isWithin(parameter, one as number, job)),
+  places: (value) => areSome(value) && value.every((place) => areSome(place) && place.length === 3 && place.every(Number.isFinite)),
+  'by label': (value) => value !== null && typeof value === 'object' && Object.entries(value).every(([label, of]) => isOfLabel(label, of)),
+};
+
 // True if the daemon accepts this value of the parameter in this job.
 export function fits(parameter: Parameter, value: Value, job: JobParameters): boolean {
-  const { kind, values = [] } = parameter;
-  if (value === null) return parameter.isNullable;
-  switch (kind) {
-    case 'number':
-      return Number.isFinite(value) && isWithin(parameter, value as number, job);
-    case 'integer':
-      return Number.isInteger(value) && isWithin(parameter, value as number, job);
-    case 'switch':
-      return typeof value === 'boolean';
-    case 'choice':
-      return choicesOf(parameter, job).includes(value as string | number);
-    case 'choices':
-      return Array.isArray(value) && value.length > 0 && value.every((one) => values.includes(one as string));
-    case 'text':
-      return typeof value === 'string';
-    case 'labels':
-      return value === 'all' || areLabels(value);
-    case 'numbers':
-      return areNumbers(value) && value.length > 0 && value.every((one) => isWithin(parameter, one, job));
-    case 'places':
-      return Array.isArray(value) && value.length > 0 && value.every((one) => areNumbers(one) && one.length === 3);
-    case 'by label':
-      return typeof value === 'object' && Object.entries(value).every(([label, of]) => isOfLabel(label, of));
-  }
+  return value === null ? parameter.isNullable : checks[parameter.kind](value, parameter, job);
 }
 
-function areNumbers(value: unknown): value is number[] {
-  return Array.isArray(value) && value.every(Number.isFinite);
+function areSome(value: unknown): value is unknown[] {
+  return Array.isArray(value) && value.length > 0;
 }
 
 function areLabels(value: unknown): boolean {
-  return Array.isArray(value) && value.length > 0 && value.every(Number.isInteger);
+  return areSome(value) && value.every(Number.isInteger);
 }
 
 function isOfLabel(label: string, value: unknown): boolean {

@@ -183,24 +183,23 @@ function formatsControl(parameter: Parameter, host: FormHost): Control {
   return { element };
 }
 
+// By names, else by kinds.
+const controls: Partial<Record<string, (parameter: Parameter, host: FormHost) => Control>> = {
+  max_error_mm: errorControl,
+  certify: certifyControl,
+  formats: formatsControl,
+  number: numberControl,
+  integer: numberControl,
+  switch: switchControl,
+  choice: choiceControl,
+  numbers: listControl,
+  places: listControl,
+};
+
 function controlFor(parameter: Parameter, host: FormHost): Control {
-  if (parameter.name === 'max_error_mm') return errorControl(parameter, host);
-  if (parameter.name === 'certify') return certifyControl(parameter, host);
-  switch (parameter.kind) {
-    case 'number':
-    case 'integer':
-      return numberControl(parameter, host);
-    case 'switch':
-      return switchControl(parameter, host);
-    case 'choice':
-      return choiceControl(parameter, host);
-    case 'numbers':
-    case 'places':
-      return listControl(parameter, host);
-    case 'choices':
-      if (parameter.name === 'formats') return formatsControl(parameter, host);
-  }
-  throw new Error(`${parameter.name}: the page has no control for it`);
+  const make = controls[parameter.name] ?? controls[parameter.kind];
+  if (!make) throw new Error(`${parameter.name}: the page has no control for it`);
+  return make(parameter, host);
 }
 
 // For a job at an iso-value, or for one by labels, as the present one is. With `isOpen` all of it is shown.
