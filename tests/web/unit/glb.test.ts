@@ -58,6 +58,14 @@ function read(file: Uint8Array, pieceBytes: number): { streams: number[][]; at: 
   return { streams, at, complete: reader.isComplete };
 }
 
+// All of it at once.
+function taken(file: Uint8Array): { found: DracoPrimitive[]; order: number[]; complete: boolean } {
+  const result = { found: [] as DracoPrimitive[], order: [] as number[] };
+  const reader = new GlbReader({ onPrimitives: (parts) => (result.found = parts), onStream: (index) => result.order.push(index) });
+  reader.take(file);
+  return { ...result, complete: reader.isComplete };
+}
+
 const three = [[1, 2, 3], [4, 5, 6, 7, 8], [9]];
 
 describe('GlbReader', () => {
@@ -76,16 +84,11 @@ describe('GlbReader', () => {
   });
 
   it('says what a primitive holds', () => {
-    let found: unknown;
-    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
-    reader.take(glb([[1]]));
-    expect(found).toEqual([{ offset: 0, length: 1, positionId: 7, distanceId: null, isCoarse: false, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3], part: null }]);
+    expect(taken(glb([[1]])).found).toEqual([{ offset: 0, length: 1, positionId: 7, distanceId: null, isCoarse: false, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3], part: null }]);
   });
 
   it('says whose surface a primitive is, and its colour as a screen has it', () => {
-    let found: DracoPrimitive[] = [];
-    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
-    reader.take(
+    const { found } = taken(
       glb(three, (gltf) => {
         const [{ primitives }] = gltf.meshes as [{ primitives: Record<string, unknown>[] }];
         const [first, second, last] = primitives;
@@ -110,10 +113,7 @@ describe('GlbReader', () => {
   });
 
   it('takes the coarsest level of detail, whose bytes come first, and the finest', () => {
-    let found: DracoPrimitive[] = [];
-    const order: number[] = [];
-    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: (index) => order.push(index) });
-    reader.take(
+    const { found, order, complete } = taken(
       glb(three, (gltf) => {
         const [mesh] = gltf.meshes as { primitives: unknown[] }[];
         gltf.meshes = mesh?.primitives.map((primitive) => ({ primitives: [primitive] })).reverse();
@@ -130,13 +130,11 @@ describe('GlbReader', () => {
       [3, true, 3],
     ]);
     expect(order).toEqual([1, 0]);
-    expect(reader.isComplete).toBe(true);
+    expect(complete).toBe(true);
   });
 
   it('says which attribute of a stream holds distances', () => {
-    let found: DracoPrimitive[] = [];
-    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
-    reader.take(
+    const { found } = taken(
       glb(three, (gltf) => {
         const [mesh] = gltf.meshes as { primitives: Record<string, { KHR_draco_mesh_compression: { attributes: object } }>[] }[];
         const draco = mesh?.primitives[1]?.extensions?.KHR_draco_mesh_compression;

@@ -33,9 +33,13 @@ const up = new Ray(new Vector3(1, 2, -1), new Vector3(0, 0, 1));
 // Blocks are at the graphics processor as soon as they come.
 const atOnce = { add: ({ onThere }: Waiting): void => onThere() };
 
-function labelled(): { parts: Parts; scene: Scene } {
+function none(uploading = atOnce): { parts: Parts; scene: Scene } {
   const scene = new Scene();
-  const parts = new Parts(scene, atOnce, () => undefined);
+  return { parts: new Parts(scene, uploading, () => undefined), scene };
+}
+
+function labelled(): { parts: Parts; scene: Scene } {
+  const { parts, scene } = none();
   parts.add([square(0)], { label: 1, colour: '#d02020' });
   parts.add([square(2), square(5)], { label: 2, colour: '#2040d0' });
   return { parts, scene };
@@ -43,8 +47,7 @@ function labelled(): { parts: Parts; scene: Scene } {
 
 describe('the parts of a surface', () => {
   it('are of one colour, and of no label, without labels', () => {
-    const scene = new Scene();
-    const parts = new Parts(scene, atOnce, () => undefined);
+    const { parts, scene } = none();
     parts.add([square(0), square(3)], null);
     expect(new Set(colours(scene)).size).toBe(1);
     expect(parts.trianglesThere).toBe(4);
@@ -92,9 +95,8 @@ describe('the parts of a surface', () => {
   });
 
   it('are not drawn before they are at the graphics processor', () => {
-    const scene = new Scene();
     const waiting: Waiting[] = [];
-    const parts = new Parts(scene, { add: (one) => waiting.push(one) }, () => undefined);
+    const { parts, scene } = none({ add: (one) => void waiting.push(one) });
     parts.add([square(0), square(3)], null);
     parts.setStyle({ ...defaultStyle, opacity: 0.5 });
     expect(drawn(scene)).toEqual([]);
@@ -104,8 +106,7 @@ describe('the parts of a surface', () => {
   });
 
   it('are seen by their coarse level until all is there', () => {
-    const scene = new Scene();
-    const parts = new Parts(scene, atOnce, () => undefined);
+    const { parts, scene } = none();
     const heights = (): number[] => drawn(scene).map(({ geometry }) => geometry.getAttribute('position').array[2] ?? NaN);
     parts.add([square(9)], null, true);
     parts.add([square(1)], null);
@@ -149,7 +150,7 @@ describe('the parts of a surface', () => {
   });
 
   it('tell the distance where they are hit, and how far all reach', () => {
-    const parts = new Parts(new Scene(), atOnce, () => undefined);
+    const { parts } = none();
     parts.add([square(0)], null);
     expect([parts.hit(up, wholeRay), parts.reach()]).toMatchObject([{ at: 1, label: null }, null]);
     parts.add([square(-0.5, true)], null);
@@ -161,8 +162,7 @@ describe('the parts of a surface', () => {
   });
 
   it('join their normals within a label and not across a wall that two share', () => {
-    const scene = new Scene();
-    const parts = new Parts(scene, atOnce, () => undefined);
+    const { parts } = none();
     const front = square(0);
     const back = prepare({ positions: front.positions.slice(), index: Uint32Array.from([0, 2, 1, 0, 3, 2]) });
     parts.add([front], { label: 1, colour: '#d02020' });
