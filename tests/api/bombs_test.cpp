@@ -4,11 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "proto/json.h"
+#include "server/import/dicom/elements/tags.h"
 #include "tests/api/daemon.h"
-#include "tests/api/dicom_bytes.h"
 #include "tests/api/problems.h"
 #include "tests/support/deflate.h"
 #include "tests/unit/import/archives.h"
+#include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::test {
 namespace {
@@ -38,26 +39,15 @@ std::string blank_jpeg_2000(std::uint32_t size) {
 }
 
 // A slice of a CT in JPEG 2000 whose every header tells that size.
-std::string blank_slice(std::uint16_t size, int index) {
-  const std::string place = "0\\0\\" + std::to_string(index);
+std::string blank_slice(std::uint16_t size, std::uint32_t number) {
   std::string stream = blank_jpeg_2000(size);
-  if (stream.size() % 2 != 0) stream += '\0';
-  const auto item = [](std::uint16_t number, const std::string& value) {
-    std::string head("\xFE\xFF\0\0", 4);
-    put(head, 2, number);
-    return head + little(static_cast<std::uint32_t>(value.size())) + value;
-  };
-  std::string pixels("\xE0\x7F\x10\0OB\0\0\xFF\xFF\xFF\xFF", 12);
-  pixels += item(0xE000, "") + item(0xE000, stream) + item(0xE0DD, "");
-  return dicom(
-      element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-          element(8, 0x18, "UI", "1.2.3." + std::to_string(index)) + element(8, 0x60, "CS", "CT") +
-          element(0x20, 0xe, "UI", "1.2.3.4") + element(0x20, 0x32, "DS", place) +
-          element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + number(0x28, 2, 1) +
-          element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, size) +
-          number(0x28, 0x11, size) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 16) +
-          number(0x28, 0x101, 16) + number(0x28, 0x102, 15) + number(0x28, 0x103, 0) + pixels,
-      "1.2.840.10008.1.2.4.90");
+  stream.resize((stream.size() + 1) / 2 * 2);
+  return import::test::DicomSeries{.bits_stored = 16, .high_bit = 15}
+      .slice(number)
+      .number(import::dicom::kRows, size)
+      .number(import::dicom::kColumns, size)
+      .fragments({stream}, {})
+      .file("1.2.840.10008.1.2.4.90");
 }
 
 std::string blank_series(std::uint16_t size) {

@@ -1,19 +1,32 @@
 // Tests of notes about how a volume was read, and of the options that errors offer, from file to
 // mesh.
+#include <cmath>
 #include <map>
+#include <numeric>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "client/isomesh/package.h"
 #include "proto/json.h"
+#include "server/import/dicom/elements/tags.h"
 #include "tests/api/daemon.h"
-#include "tests/api/dicom_bytes.h"
 #include "tests/support/deflate.h"
+#include "tests/unit/import/dicom/mosaics.h"
+#include "tests/unit/import/dicom/segments.h"
+#include "tests/unit/import/dicom/structures.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::test {
 namespace {
 
+using import::test::box;
+using import::test::DicomSeries;
+using import::test::nifti;
+using import::test::segmentation;
+using import::test::siemens_mosaic;
 using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
@@ -39,159 +52,73 @@ std::string metaimage(const std::string& fields, const std::string& samples = kS
          "ElementDataFile = LOCAL\n" + samples;
 }
 
-struct NiftiFields {
-  std::int16_t axes = 3;
-  std::int16_t datatype = 2;
-  std::int16_t bits = 8;
-  float pixdim = 1;
-  float qoffset = 0;  // of a qform, unless it is 0
-  std::string samples = kSamples;
-};
-
-std::string nifti(const NiftiFields& fields) {
-  std::string file(352, '\0');
-  put<std::int32_t>(file, 0, 348);
-  const std::int16_t dim[] = {fields.axes, static_cast<std::int16_t>(fields.axes == 4 ? 2 : 4), 3,
-                              2, 2};
-  for (std::size_t at = 0; at < std::size(dim); ++at) put(file, 40 + 2 * at, dim[at]);
-  put(file, 70, fields.datatype);
-  put(file, 72, fields.bits);
-  for (std::size_t at = 0; at < 5; ++at) put<float>(file, 76 + 4 * at, at == 0 ? 1 : fields.pixdim);
-  put<float>(file, 108, 352);
-  put<std::int16_t>(file, 252, fields.qoffset == 0 ? 0 : 1);
-  put<std::int16_t>(file, 254, 2);
-  put(file, 268, fields.qoffset);
-  for (const std::size_t at : {280, 300, 320}) put<float>(file, at, 1);
-  file.replace(344, 3, "n+1");
-  return file + fields.samples;
-}
+// Two volumes.
+std::string two_times() { return nifti({.dim = {4, 2, 3, 2, 2, 1, 1, 1}}, kSamples); }
 
 std::string not_finite() {
-  std::string samples;
-  for (int at = 0; at < 24; ++at) {
-    std::string one(4, '\0');
-    put<float>(one, 0, at == 5 ? std::nanf("") : static_cast<float>(at));
-    samples += one;
-  }
-  return samples;
+  std::vector<float> samples(24);
+  std::iota(samples.begin(), samples.end(), 0.0F);
+  samples[5] = std::nanf("");
+  return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(samples));
 }
 
-// One slice of a CT of 4 x 4 samples.
-std::string slice(int index, const std::string& frame_of_reference) {
-  return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-               element(8, 0x18, "UI", "1.2.826.0.1.3680043.9.1." + std::to_string(index)) +
-               element(8, 0x60, "CS", "CT") + element(0x20, 0xd, "UI", "1.2.3") +
-               element(0x20, 0xe, "UI", "1.2.3.4") +
-               element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(index)) +
-               element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
-               element(0x20, 0x52, "UI", frame_of_reference) + number(0x28, 2, 1) +
-               element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 4) +
-               number(0x28, 0x11, 4) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 16) +
-               number(0x28, 0x101, 16) + number(0x28, 0x102, 15) + number(0x28, 0x103, 0) +
-               element(0x7fe0, 0x10, "OW",
-                       std::string(16, static_cast<char>(index)) + std::string(16, 'a')));
-}
-
-// 8 x 8 samples of 8 bits.
-std::string square_image() {
-  return number(0x28, 2, 1) + element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 8) +
-         number(0x28, 0x11, 8) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 8) +
-         number(0x28, 0x101, 8) + number(0x28, 0x102, 7) + number(0x28, 0x103, 0);
-}
-
-// The part that the frames of a segmentation share.
-std::string shared_geometry() {
-  return sequence(0x5200, 0x9229,
-                  {sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
-                   sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")})});
-}
-
-std::string halves(std::size_t samples) {
-  return std::string(samples / 2, '\0') + std::string(samples / 2, '\1');
+// One slice of a CT of 4 x 4 samples, 1 mm apart.
+std::string slice(std::uint32_t number, const std::string& frame_of_reference) {
+  const DicomSeries series = {.columns = 4,
+                              .rows = 4,
+                              .slices = 4,
+                              .origin = {0, 0, 0},
+                              .step = {0, 0, 1},
+                              .between_rows = 1,
+                              .between_columns = 1};
+  return series.slice(number)
+      .text(import::dicom::kFrameOfReferenceUid, "UI", frame_of_reference)
+      .file();
 }
 
 // A label map with a frame at 0, 1 and 3 mm.
 std::string sparse_segmentation() {
-  std::vector<std::string> frames;
-  for (const char* z : {"0", "1", "3"}) {
-    frames.push_back(
-        sequence(0x20, 0x9113, {element(0x20, 0x32, "DS", "0\\0\\" + std::string(z))}));
-  }
-  return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.7") +
-               element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
-               element(0x28, 8, "IS", "3") + square_image() + element(0x62, 1, "CS", "LABELMAP") +
-               shared_geometry() + sequence(0x5200, 0x9230, frames) +
-               element(0x7fe0, 0x10, "OW", halves(3 * 64)));
+  return segmentation(
+             {.frames = {{.z = 0, .labels = {2}}, {.z = 1, .labels = {3}}, {.z = 3, .labels = {3}}},
+              .type = "LABELMAP"})
+      .file();
 }
 
-// A FRACTIONAL segmentation with one segment in two planes.
+// One segment in two planes.
 std::string fractional_segmentation() {
-  std::vector<std::string> frames;
-  for (const char* z : {"0", "1"}) {
-    frames.push_back(
-        sequence(0x20, 0x9113, {element(0x20, 0x32, "DS", "0\\0\\" + std::string(z))}) +
-        sequence(0x62, 0xa, {number(0x62, 0xb, 1)}));
-  }
-  return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.4") +
-               element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
-               element(0x28, 8, "IS", "2") + square_image() + element(0x62, 1, "CS", "FRACTIONAL") +
-               number(0x62, 0xe, 255) + shared_geometry() + sequence(0x5200, 0x9230, frames) +
-               element(0x7fe0, 0x10, "OW", halves(2 * 64)));
+  return segmentation({.frames = {{.z = 0, .segment = 1, .labels = {2}, .value = 255},
+                                  {.z = 1, .segment = 1, .labels = {3}, .value = 255}},
+                       .segments = {"liver"},
+                       .type = "FRACTIONAL",
+                       .maximum = 255})
+      .file();
 }
 
-std::string csa_field(std::string name, const std::vector<std::string>& values) {
-  name.resize(64, '\0');
-  std::string field = name + little(0) + "FD" + std::string(2, '\0') + little(4) +
-                      little(static_cast<std::uint32_t>(values.size())) + little(0);
-  for (std::string value : values) {
-    value.resize(4, ' ');
-    field += little(4) + little(4) + little(77) + little(4) + value;
-  }
-  return field;
-}
-
-// Four slices in two by two tiles, with a thickness and no distance.
+// Slices in tiles, with a thickness and no distance.
 std::string mosaic() {
-  const std::string header = "SV10\4\3\2\1" + little(2) + little(77) +
-                             csa_field("NumberOfImagesInMosaic", {"4"}) +
-                             csa_field("SliceNormalVector", {"0", "0", "1"});
-  return dicom(element(8, 8, "CS", "ORIGINAL\\PRIMARY\\M\\MOSAIC") +
-               element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.4") + element(8, 0x60, "CS", "MR") +
-               element(0x18, 0x50, "DS", "3") + element(0x20, 0xe, "UI", "1.2.3.4") +
-               element(0x20, 0x32, "DS", "0\\0\\0") +
-               element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + square_image() +
-               element(0x29, 0x10, "LO", "SIEMENS CSA HEADER") +
-               element(0x29, 0x1010, "OB", header) + element(0x7fe0, 0x10, "OW", halves(64)));
+  return siemens_mosaic()
+      .erase(import::dicom::kSpacingBetweenSlices)
+      .text(import::dicom::kSliceThickness, "DS", "3")
+      .file();
 }
 
-// A structure with a square in the slices 1 and 4 of a series, and a point.
+// A structure with a square in the first and last slice of a series, and a point.
 std::string structure_set() {
-  const auto contour = [](const std::string& type, const std::string& points) {
-    return element(0x3006, 0x42, "CS", type) + element(0x3006, 0x50, "DS", points);
-  };
-  const auto square = [&](const std::string& z) {
-    const std::string end = "\\" + z;
-    return contour("CLOSED_PLANAR",
-                   "0.5\\0.5" + end + "\\2.5\\0.5" + end + "\\2.5\\2.5" + end + "\\0.5\\2.5" + end);
-  };
-  return dicom(
-      element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.481.3") + element(8, 0x18, "UI", "1.2.9.1") +
-      element(8, 0x60, "CS", "RTSTRUCT") + element(0x20, 0xe, "UI", "1.2.9") +
-      sequence(0x3006, 0x10, {element(0x20, 0x52, "UI", "1.9")}) +
-      sequence(0x3006, 0x20,
-               {element(0x3006, 0x22, "IS", "5") + element(0x3006, 0x26, "LO", "heart")}) +
-      sequence(0x3006, 0x39,
-               {element(0x3006, 0x2a, "IS", "255\\0\\0") +
-                sequence(0x3006, 0x40, {square("1"), square("4"), contour("POINT", "1\\1\\1")}) +
-                element(0x3006, 0x84, "IS", "5")}));
+  return import::test::structure_set({{.number = 5,
+                                       .name = "heart",
+                                       .contours = {{box(0.5, 0.5, 2.5, 2.5, 0)},
+                                                    {box(0.5, 0.5, 2.5, 2.5, 3)},
+                                                    {{{1, 1, 1}}, "POINT"}}}})
+      .file();
 }
 
 using Files = std::map<std::string, std::string>;
 
 Files structures_and_images() {
   Files files = {{"RS", structure_set()}};
-  for (int index = 1; index <= 4; ++index)
-    files["CT" + std::to_string(index)] = slice(index, "1.9");
+  for (std::uint32_t number = 0; number < 4; ++number) {
+    files["CT" + std::to_string(number)] = slice(number, "1.2.3.frame");
+  }
   return files;
 }
 
@@ -203,9 +130,9 @@ struct Shown {
 // By the note's name, so that whoever adds a note adds how it is shown.
 const std::map<std::string, Shown>& shown() {
   static const std::map<std::string, Shown> all = {
-      {"forms-differ", {{{"a.nii", nifti({.qoffset = 3})}}}},
-      {"pixdim-differs", {{{"a.nii", nifti({.pixdim = 2})}}}},
-      {"volume-chosen", {{{"a.nii", nifti({.axes = 4})}}, {"--volume", "1"}}},
+      {"forms-differ", {{{"a.nii", nifti({.qform_code = 1, .qoffset = {3, 0, 0}}, kSamples)}}}},
+      {"pixdim-differs", {{{"a.nii", nifti({.pixdim = {1, 2, 2, 2, 1, 1, 1, 1}}, kSamples)}}}},
+      {"volume-chosen", {{{"a.nii", two_times()}}, {"--volume", "1"}}},
       {"space-assumed",
        {{{"a.nrrd",
           "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 4 3 2 1\nencoding: raw\nspace "
@@ -217,8 +144,7 @@ const std::map<std::string, Shown>& shown() {
                "\"pixel\" \"pixel\"\n")}}}},
       {"unit-angstrom",
        {{{"a.cube", "title\n\n1 0 0 0\n2 1 0 0\n2 0 1 0\n2 0 0 1\n6 6 0 0 0\n1 2 3 4 5 6 7 8\n"}}}},
-      {"non-finite-samples",
-       {{{"a.nii", nifti({.datatype = 16, .bits = 32, .samples = not_finite()})}}}},
+      {"non-finite-samples", {{{"a.nii", not_finite()}}}},
       {"trailing-bytes", {{{"a.nrrd", nrrd("", kSamples + "more")}}}},
       {"values-rescaled", {{{"a.mha", metaimage("ElementToIntensityFunctionSlope = 2\n")}}}},
       {"duplicate-file",
@@ -287,7 +213,7 @@ TEST_F(NotesTest, EveryCodeIsShownByAFileAndCarriedToTheEnd) {
 }
 
 TEST_F(NotesTest, ARefusalOffersTheVolumesOfAFile) {
-  const std::string file = nifti({.axes = 4});
+  const std::string file = two_times();
   const Answer open = daemon_.send("POST", "/v1/volumes", file);
   EXPECT_EQ(open.status, 422);
   EXPECT_THAT(problem_from_json(open.body).remedy.choices,
@@ -315,7 +241,7 @@ TEST_F(NotesTest, AStructureSetAloneNeedsASpacing) {
 }
 
 TEST_F(NotesTest, ARefusedUploadIsKeptForWhoWantsToChoose) {
-  const std::string file = nifti({.axes = 4});
+  const std::string file = two_times();
   EXPECT_EQ(daemon_.send("POST", "/v1/volumes", file).header("isomesh-upload"), "");
   const Answer open = daemon_.send("POST", "/v1/volumes?keep=true", file,
                                    {{"Content-Disposition", "attachment; filename=\"t.nii\""}});
@@ -345,7 +271,7 @@ TEST_F(NotesTest, ARefusedUploadIsKeptForWhoWantsToChoose) {
 }
 
 TEST_F(NotesTest, AKeptFolderHasEachOfItsVolumesRead) {
-  const Shown several = {{{"a.nii", nifti({.axes = 4})}, {"b.nrrd", nrrd("")}}};
+  const Shown several = {{{"a.nii", two_times()}, {"b.nrrd", nrrd("")}}};
   const std::filesystem::path folder = folder_ / "kept";
   std::filesystem::create_directory(folder);
   for (const auto& [name, bytes] : several.files) write_file(folder / name, bytes);
@@ -360,10 +286,11 @@ TEST_F(NotesTest, AKeptFolderHasEachOfItsVolumesRead) {
 }
 
 TEST_F(NotesTest, EveryVolumeOfAFolderIsAnsweredFor) {
-  const Shown several = {{{"a.nrrd", nrrd("")},
-                          {"b.nii.gz", gzip(nifti({.qoffset = 3}))},
-                          {"broken.nrrd", nrrd("", "few")},
-                          {"readme", "text"}}};
+  const Shown several = {
+      {{"a.nrrd", nrrd("")},
+       {"b.nii.gz", gzip(nifti({.qform_code = 1, .qoffset = {3, 0, 0}}, kSamples))},
+       {"broken.nrrd", nrrd("", "few")},
+       {"readme", "text"}}};
   const Finished uploaded = upload_files(several, "several");
   EXPECT_EQ(uploaded.status, 1);
   EXPECT_THAT(uploaded.errors, HasSubstr("broken.nrrd: The file is truncated"));
