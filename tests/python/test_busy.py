@@ -2,8 +2,6 @@
 
 import contextlib
 import http.client
-import subprocess
-import sys
 import threading
 import unittest
 from collections import Counter
@@ -253,28 +251,6 @@ class Crowd(DaemonTest):
                 thread.join()
         self.assertEqual(len(sizes), self.crowd)
         self.assertIn("the server is busy", waits.output[0])
-
-    def test_processes(self):
-        code = (
-            "import logging, sys, numpy, isomesh\n"
-            "logging.basicConfig(level=logging.INFO)\n"
-            "samples = numpy.zeros((64, 64, 64), numpy.float32)\n"
-            "samples[10:50, 10:50, 10:50] = int(sys.argv[1])\n"
-            "mesh = isomesh.Client(sys.argv[2]).mesh(samples, iso=0.5)\n"
-            "sys.stdout.write(f'{len(mesh.faces)}\\n')\n"
-        )
-        numbers = "\n".join(str(number) for number in range(1, self.crowd + 1))
-        command = ["xargs", "-P", str(self.crowd), "-I", "{}", sys.executable, "-c", code, "{}", self.url]
-        with self.place_taken() as release:
-            done = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            done.stdin.write(numbers)
-            done.stdin.close()
-            self.assertIn("the server is busy", done.stderr.readline())
-            release()
-            with done:
-                errors, made = done.stderr.read(), done.stdout.read()
-        self.assertEqual(done.returncode, 0, errors)
-        self.assertEqual(len(made.split()), self.crowd)
 
 
 if __name__ == "__main__":

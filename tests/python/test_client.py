@@ -77,11 +77,6 @@ class Files(DaemonTest):
             self.client.upload(numpy.zeros((200, 200, 200)))
         self.assertEqual(refused.exception.status, 413)
 
-    def test_what_is_no_volume_is_refused_with_the_reason(self):
-        with self.assertRaises(isomesh.Refused) as refused:
-            self.client.upload(b"not a volume at all")
-        self.assertEqual(refused.exception.status, 415)
-
     def test_names_lists_and_erasing(self):
         volume = self.client.upload(ball() * 2, name="Größe 1")
         self.assertEqual(volume["name"], "Größe 1")

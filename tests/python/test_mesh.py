@@ -322,14 +322,6 @@ class Notes(DaemonTest):
         with self.assertWarnsRegex(isomesh.VolumeWarning, "looks-like-labels"):
             self.client.mesh(samples, iso=0.5)
 
-    def test_labels_are_advised_for_a_mask_at_an_iso_value(self):
-        mask = ball() > -8
-        with self.assertWarnsRegex(isomesh.VolumeWarning, "each is 0 or 1.*looks-like-labels"):
-            self.client.mesh(mask, iso=0.5)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            self.assertGreater(len(self.client.mesh(mask, labels="all").faces), 0)
-
 
 class Limits(LimitedTest):
     def test_a_test_that_hangs_fails_by_its_name(self):
