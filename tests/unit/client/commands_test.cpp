@@ -84,9 +84,8 @@ TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
   EXPECT_THAT(outcome.err, HasSubstr(" fetch 7 -o OUT"));
 }
 
-// The server has the job, but its response did not come.
-TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
-  job_.state = JobState::kRunning;
+// During the submission: the server has the job, but its response did not come.
+TEST_F(Commands, AnInterruptCancelsTheJobUnlessItHasEnded) {
   std::stop_source stop;
   std::vector<std::string> keys;
   int cancelled = 0;
@@ -101,27 +100,18 @@ TEST_F(Commands, AnInterruptDuringTheSubmissionCancelsTheJob) {
     ++cancelled;
     response.set_content(to_json(job_), "application/json");
   });
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(run(options_, stop.get_token()), kRefused);
-  EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "isomesh: interrupted; the job 7 was cancelled\n");
-  EXPECT_EQ(cancelled, 1);
-  EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
-}
-
-TEST_F(Commands, AnInterruptAfterTheEndOfTheJobCancelsNothing) {
-  server_.http.Delete("/v1/jobs/7", [&](const auto&, auto& response) {
-    response.set_content(to_json(job_), "application/json");
-  });
-  std::stop_source stop;
-  server_.http.set_pre_routing_handler([&](const auto& request, auto&) {
-    if (request.path == "/v1/jobs") stop.request_stop();
-    return httplib::Server::HandlerResponse::Unhandled;
-  });
-  testing::internal::CaptureStderr();
-  EXPECT_EQ(run(options_, stop.get_token()), kRefused);
-  EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "isomesh: interrupted; the job 7 had already ended\n");
+  for (const JobState state : {JobState::kRunning, JobState::kSucceeded}) {
+    job_.state = state;
+    stop = {};
+    keys.clear();
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run(options_, stop.get_token()), kRefused);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(),
+              std::string("isomesh: interrupted; the job 7 ") +
+                  (state == JobState::kRunning ? "was cancelled\n" : "had already ended\n"));
+    EXPECT_EQ(std::set(keys.begin(), keys.end()).size(), 1U) << "a repetition has the same key";
+  }
+  EXPECT_EQ(cancelled, 2);
 }
 
 TEST_F(Commands, NothingOfAServerControlsTheTerminal) {
@@ -164,19 +154,6 @@ TEST_F(Commands, QuietSaysNothing) {
   EXPECT_EQ(test::read_file(folder_ / "head.drc"), "mesh");
 }
 
-TEST_F(Commands, SeveralInputsHaveAMeshEach) {
-  test::write_file(folder_ / "knee.nii", "another");
-  options_.files.emplace_back(folder_ / "knee.nii");
-  options_.outputs = {{.path = folder_ / "{name}.drc", .format = MeshFormat::kDrc}};
-  options_.jobs = 2;
-  const Outcome outcome = outcome_of(options_);
-  EXPECT_EQ(outcome.status, kDone) << outcome.err;
-  EXPECT_EQ(test::read_file(folder_ / "head.drc"), "mesh");
-  EXPECT_EQ(test::read_file(folder_ / "knee.drc"), "mesh");
-  options_.json = true;
-  EXPECT_EQ(std::ranges::count(outcome_of(options_).out, '\n'), 2);
-}
-
 TEST_F(Commands, AnEmptySurfaceWritesNothingUnlessThatIsAccepted) {
   job_.mesh->empty = true;
   test::write_file(folder_ / "head.drc", "old");
@@ -190,20 +167,21 @@ TEST_F(Commands, AnEmptySurfaceWritesNothingUnlessThatIsAccepted) {
   options_.outputs = {{.path = folder_ / "new" / "{name}.drc", .format = MeshFormat::kDrc}};
   EXPECT_EQ(outcome_of(options_).status, kRefused);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "new"));
-  options_.allow_empty = true;
+  Options fetching = options_;
+  fetching.command = Command::kFetch;
+  fetching.id = "7";
+  fetching.outputs = {{.path = folder_ / "fetched.drc", .format = MeshFormat::kDrc}};
+  EXPECT_EQ(outcome_of(fetching).status, kRefused);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "fetched.drc"));
+  Options piped = options_;
+  piped.json = false;
+  piped.outputs = {{.path = "-", .format = MeshFormat::kDrc}};
+  EXPECT_EQ(outcome_of(piped).out, "");
+  options_.allow_empty = fetching.allow_empty = true;
   EXPECT_EQ(outcome_of(options_).status, kDone);
   EXPECT_EQ(test::read_file(folder_ / "new" / "head.drc"), "mesh");
-}
-
-TEST_F(Commands, AnEmptySurfaceIsNotFetchedUnlessThatIsAccepted) {
-  job_.mesh->empty = true;
-  options_.command = Command::kFetch;
-  options_.id = "7";
-  EXPECT_EQ(outcome_of(options_).status, kRefused);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "head.drc"));
-  options_.allow_empty = true;
-  EXPECT_EQ(outcome_of(options_).status, kDone);
-  EXPECT_EQ(test::read_file(folder_ / "head.drc"), "mesh");
+  EXPECT_EQ(outcome_of(fetching).status, kDone);
+  EXPECT_EQ(test::read_file(folder_ / "fetched.drc"), "mesh");
 }
 
 TEST_F(Commands, EachLineOfJsonSaysItsInput) {
@@ -262,19 +240,6 @@ TEST_F(Commands, AMeshDoesNotOverwriteAVolume) {
   options_.outputs = {{.path = folder_ / "{name}.vtk", .format = MeshFormat::kVtk}};
   EXPECT_THROW(run(options_, {}), EarlyExit);
   EXPECT_EQ(test::read_file(folder_ / "head.vtk"), "volume");
-}
-
-TEST_F(Commands, AnAddressThatIsNoneIsWrongUsage) {
-  options_.server = "ftp://somewhere";
-  EXPECT_EQ(outcome_of(options_).status, kWrongUsage);
-}
-
-TEST_F(Commands, UploadAndSubmitPrintTheBareIdForTheShell) {
-  options_.command = Command::kUpload;
-  EXPECT_EQ(outcome_of(options_).out, "abc\n");
-  options_.command = Command::kSubmit;
-  options_.id = "abc";
-  EXPECT_EQ(outcome_of(options_).out, "7\n");
 }
 
 TEST_F(Commands, StatusAnswersWhateverTheStateIs) {
