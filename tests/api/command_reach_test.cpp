@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 
 #include "base/descriptor.h"
-#include "tests/api/daemon.h"
+#include "tests/api/command.h"
 
 namespace isomesh {
 namespace {
@@ -23,49 +23,31 @@ using namespace test;
 using testing::HasSubstr;
 using testing::Not;
 
-class CommandReachTest : public testing::Test {
- protected:
-  CommandReachTest() { write_file(folder_ / "sphere.raw", sphere_.bytes); }
-
-  // `words` and the options that describe the sphere.
-  std::vector<std::string> raw(const std::vector<std::string>& words) {
-    return with(words, sphere_.options);
-  }
-
-  Daemon daemon_;
-  TemporaryFolder folder_;
-  const RawUpload sphere_ = sphere_upload();
-};
+using CommandReachTest = CommandTest;
 
 TEST_F(CommandReachTest, IdsMayBeShortened) {
   const Job job = finished_job(daemon_);
   const std::string volume = job.parameters.volume;
   const std::string short_volume = volume.substr(0, 8);
   const std::string end_of_job = job.id.substr(job.id.size() - 6);
-  for (const std::vector<std::string>& words :
-       std::vector<std::vector<std::string>>{{"info", short_volume},
-                                             {"labels", short_volume},
-                                             {"estimate", short_volume, "--iso", "100"},
-                                             {"submit", short_volume, "--iso", "100"},
-                                             {"rename", short_volume, "ball"},
-                                             {"status", job.id.substr(0, 20)},
-                                             {"wait", end_of_job},
-                                             {"fetch", end_of_job, "-o", folder_ / "out.drc"},
-                                             {"cancel", job.id.substr(0, 20)}}) {
-    const Finished result = daemon_.command(words);
-    EXPECT_EQ(result.status, 0) << words[0] << ": " << result.errors;
+  for (const std::string& line :
+       {"info " + short_volume, "labels " + short_volume, "estimate --iso 100 " + short_volume,
+        "submit --iso 100 " + short_volume, "rename " + short_volume + " ball",
+        "status " + job.id.substr(0, 20), "wait " + end_of_job, "fetch -o @out.drc " + end_of_job,
+        "cancel " + job.id.substr(0, 20)}) {
+    const Finished result = command(line);
+    EXPECT_EQ(result.status, 0) << line << ": " << result.errors;
   }
-  EXPECT_THAT(daemon_.command({"list"}).output, HasSubstr("ball"));
+  EXPECT_THAT(command("list").output, HasSubstr("ball"));
   // It serves completion, so it tells nothing rather than late.
   const auto is_offered = [&](const std::string& kind, const std::string& id) {
-    return eventually([&] {
-      return daemon_.command({"ids", kind}).output.find(id + '\n') != std::string::npos;
-    });
+    return eventually(
+        [&] { return command("ids " + kind).output.find(id + '\n') != std::string::npos; });
   };
   EXPECT_TRUE(is_offered("volumes", volume));
   EXPECT_TRUE(is_offered("jobs", job.id));
 
-  const Finished none = daemon_.command({"info", "ffff0000ffff"});
+  const Finished none = command("info ffff0000ffff");
   EXPECT_EQ(none.status, 1);
   EXPECT_THAT(none.errors, HasSubstr("there is no volume whose id begins or ends with"));
   // Ids of jobs begin with the time.
@@ -73,32 +55,26 @@ TEST_F(CommandReachTest, IdsMayBeShortened) {
   std::size_t same = 0;
   while (other.id[same] == job.id[same]) ++same;
   ASSERT_GE(same, 4U);
-  const Finished several = daemon_.command({"cancel", job.id.substr(0, same)});
+  const Finished several = command("cancel " + job.id.substr(0, same));
   EXPECT_EQ(several.status, 1);
   EXPECT_THAT(several.errors, HasSubstr("is ambiguous"));
   EXPECT_THAT(several.errors, HasSubstr(job.id));
   EXPECT_THAT(several.errors, HasSubstr(other.id));
 
-  EXPECT_EQ(daemon_.command({"erase", short_volume}).status, 0);
+  EXPECT_EQ(command("erase " + short_volume).status, 0);
   EXPECT_TRUE(daemon_.client().volumes().empty());
 }
 
 TEST_F(CommandReachTest, MeshTakesAStoredVolume) {
-  const Volume volume = upload(daemon_, sphere_);
-  const Finished result = daemon_.command(
-      {"mesh", volume.id.substr(0, 10), "--iso", "100", "-o", folder_ / "stored.stl"});
+  const std::string id = upload().substr(0, 10);
+  const Finished result = command("mesh --iso 100 -o @stored.stl " + id);
   ASSERT_EQ(result.status, 0) << result.errors;
-  ASSERT_EQ(daemon_
-                .command(raw(
-                    {"mesh", folder_ / "sphere.raw", "--iso", "100", "-o", folder_ / "sent.stl"}))
-                .status,
-            0);
+  ASSERT_EQ(command("mesh @sphere.raw $raw --iso 100 -o @sent.stl").status, 0);
   EXPECT_EQ(read_file(folder_ / "stored.stl"), read_file(folder_ / "sent.stl"));
-  const Finished dry = daemon_.command({"mesh", volume.id, "--iso", "100", "--dry-run"});
+  const Finished dry = command("mesh --iso 100 --dry-run " + id);
   EXPECT_EQ(dry.status, 0) << dry.errors;
   EXPECT_EQ(daemon_.client().volumes().size(), 1U) << "a dry run keeps what was stored before";
-  const Finished absent =
-      daemon_.command({"mesh", "ffff0000ffff", "--iso", "100", "-o", folder_ / "absent.stl"});
+  const Finished absent = command("mesh ffff0000ffff --iso 100 -o @absent.stl");
   EXPECT_EQ(absent.status, 1);
   EXPECT_THAT(absent.errors, HasSubstr("no volume whose id"));
 }
@@ -113,8 +89,7 @@ TEST_F(CommandReachTest, NotesNameTheirInputAndTheOption) {
     write_file(folder_ / name, bytes);
   }
   const Finished both =
-      daemon_.command({"mesh", folder_ / "a.raw", folder_ / "b.raw", "-o", folder_ / "{name}.stl",
-                       "--dims", "32,32,32", "--type", "uint8", "--iso", "2"});
+      command("mesh @a.raw @b.raw -o @{name}.stl --dims 32,32,32 --type uint8 --iso 2");
   EXPECT_EQ(both.status, 0) << both.errors;
   EXPECT_THAT(both.errors, HasSubstr("isomesh: a: note: "));
   EXPECT_THAT(both.errors, HasSubstr("isomesh: b: note: "));
@@ -123,14 +98,13 @@ TEST_F(CommandReachTest, NotesNameTheirInputAndTheOption) {
 }
 
 TEST_F(CommandReachTest, AnIsoValueBeyondTheSamplesIsExplained) {
-  const Finished result = daemon_.command(
-      raw({"mesh", folder_ / "sphere.raw", "--iso", "9999", "-o", folder_ / "out.stl"}));
+  const Finished result = command("mesh @sphere.raw $raw --iso 9999 -o @out.stl");
   EXPECT_EQ(result.status, 1);
   EXPECT_THAT(result.errors, HasSubstr("isomesh: "));
   EXPECT_THAT(result.errors,
               HasSubstr("no surface at the iso-value 9999; its samples range from 0 to "));
   const std::string job = daemon_.client().jobs().jobs.at(0).id;
-  EXPECT_THAT(daemon_.command({"wait", job}).errors, HasSubstr("its samples range from 0 to "));
+  EXPECT_THAT(command("wait " + job).errors, HasSubstr("its samples range from 0 to "));
 }
 
 // A shell ends its loop if the command has died by SIGINT, and goes on if it has exited.
@@ -162,8 +136,85 @@ TEST(CommandInterrupted, EndsTheShellsLoop) {
   EXPECT_EQ(daemon.client().jobs().jobs.size(), 1U);
 }
 
+// A daemon of the command's own, with temporary files in a folder.
+class LocalCommandTest : public testing::Test {
+ protected:
+  LocalCommandTest() { std::filesystem::create_directory(folder_ / "tmp"); }
+
+  std::vector<std::string> local(const RawUpload& upload, const std::vector<std::string>& more) {
+    write_file(folder_ / "volume.raw", upload.bytes);
+    return with(with({ISOMESH, "local", folder_ / "volume.raw", "-o", folder_ / "out.stl"}, more),
+                upload.options);
+  }
+
+  const TemporaryFolder folder_;
+  const std::vector<std::string> environment_ = {"TMPDIR=" + (folder_ / "tmp").string(),
+                                                 "ISOMESH_SERVER=http://127.0.0.1:1",
+                                                 "ISOMESH_LISTEN=nonsense"};
+};
+
+TEST_F(LocalCommandTest, MeshesWithoutAServerAndLeavesNothing) {
+  const std::vector<std::string> words = local(sphere_upload(), {"--iso", "100"});
+  const Finished result = run(words, environment_);
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_GT(read_file(folder_ / "out.stl").size(), 1000U);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "tmp"));
+
+  const Finished lost = run(words, {"TMPDIR=/no/such/folder"});
+  EXPECT_EQ(lost.status, 1);
+  EXPECT_THAT(lost.errors, HasSubstr("TMPDIR=/no/such/folder: No such file"));
+
+  const Finished broken = run(with(words, {"--daemon", "/bin/false"}), environment_);
+  EXPECT_EQ(broken.status, 3);
+  EXPECT_THAT(broken.errors, HasSubstr("/bin/false did not start"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "tmp"));
+}
+
+// If it is killed it cannot remove its folder. The next run does.
+TEST_F(LocalCommandTest, EndsItsDaemonHoweverItEnds) {
+  for (const int signal : {SIGINT, SIGKILL}) {
+    Process command(local(long_upload(), {"--iso", "50", "--passes", "1000"}), environment_);
+    ASSERT_TRUE(eventually([&] { return children_of(command.pid()).size() == 1; }));
+    const pid_t daemon = *children_of(command.pid()).begin();
+    ASSERT_TRUE(eventually([&] { return program_of(daemon) == "isomeshd"; }));
+    ASSERT_TRUE(eventually([&] {
+      return std::ranges::any_of(files_below(folder_ / "tmp"), [](const std::string& name) {
+        return name.find("/data/") != std::string::npos;
+      });
+    }));
+    command.send_signal(signal);
+    EXPECT_NE(command.wait(), 0);
+    EXPECT_TRUE(eventually([&] { return program_of(daemon).empty(); })) << "signal " << signal;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out.stl"));
+  }
+  EXPECT_FALSE(std::filesystem::is_empty(folder_ / "tmp"));
+  // The processes of the daemon end with it, but not in the same moment.
+  EXPECT_TRUE(eventually([&] {
+    const Finished next = run(local(sphere_upload(), {"--iso", "100"}), environment_);
+    EXPECT_EQ(next.status, 0) << next.errors;
+    return std::filesystem::is_empty(folder_ / "tmp");
+  }));
+}
+
+TEST(CommandWithoutServer, IsStatus3) {
+  std::string url;
+  {
+    Daemon gone;
+    url = gone.url();
+    gone.stop();
+  }
+  const Finished result = run({ISOMESH, "--server", url, "list"});
+  EXPECT_EQ(result.status, 3);
+  EXPECT_FALSE(result.errors.empty());
+  EXPECT_EQ(run({ISOMESH, "list"}, {"ISOMESH_SERVER=" + url}).status, 3);
+  const Finished absent = run({ISOMESH, "--server", "unix:/no/such/socket", "list"});
+  EXPECT_EQ(absent.status, 3);
+  EXPECT_THAT(absent.errors, HasSubstr("start isomeshd, or use `isomesh local`"));
+  EXPECT_EQ(run({ISOMESH, "--server", "nonsense", "list"}).status, 2);
+}
+
 // Standard input is a pipe that the test holds open.
-class CommandReadsTest : public testing::Test {
+class CommandReadsTest : public CommandTest {
  protected:
   CommandReadsTest() {
     std::filesystem::create_directory(folder_ / "tmp");
@@ -190,9 +241,6 @@ class CommandReadsTest : public testing::Test {
 
   void send(std::string_view bytes) const { write_all(pipe_, std::as_bytes(std::span(bytes))); }
 
-  const Daemon daemon_;
-  const TemporaryFolder folder_;
-  const RawUpload sphere_ = sphere_upload();
   const std::size_t half_ = sphere_.bytes.size() / 2;
   Descriptor pipe_;
   std::optional<Process> command_;
