@@ -80,6 +80,16 @@ inline CLI::Option* add(CLI::App& app, const std::string& name, const std::strin
   return app.add_option_function<std::string>(name, take, help)->type_name(value);
 }
 
+// The same for an option that may be repeated: `take` gets all of its values.
+inline CLI::Option* add_repeated(CLI::App& app, const std::string& name, const std::string& value,
+                                 const std::string& help,
+                                 const std::function<void(const std::vector<std::string>&)>& take) {
+  return app.add_option_function<std::vector<std::string>>(name, take, help + ". May be repeated")
+      ->type_name(value)
+      ->expected(1)
+      ->take_all();
+}
+
 template <class Number>
 CLI::Option* add_number(CLI::App& app, const std::string& name, const std::string& help,
                         std::function<void(Number)> take,

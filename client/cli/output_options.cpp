@@ -91,14 +91,12 @@ void refuse_list(const std::string& path) {
 }  // namespace
 
 void add_outputs(CLI::App& app, GivenOutputs& given) {
-  app.add_option("-o,--output", given.paths,
-                 "File to write the mesh to; its suffix chooses the format: " + suffixes() +
-                     ". A folder, which is created if it ends in /, or {name} in the file's name, "
-                     "gives each FILE a mesh of its own. {folder} stands for the FILE's folder. "
-                     "- is standard output. May be repeated")
-      ->type_name("OUT")
-      ->expected(1)
-      ->take_all();
+  add_repeated(app, "-o,--output", "OUT",
+               "File to write the mesh to; its suffix chooses the format: " + suffixes() +
+                   ". A folder, which is created if it ends in /, or {name} in the file's name, "
+                   "gives each FILE a mesh of its own. {folder} stands for the FILE's folder. "
+                   "- is standard output",
+               [&given](const std::vector<std::string>& paths) { given.paths = paths; });
   add(app, "--format", type_of_names<MeshFormat>() + ",..",
       "Formats of the files in a folder (default: drc), or the format of - or a pipe",
       [&given](const std::string& text) {

@@ -93,13 +93,19 @@ class ParameterOptions {
 
  private:
   template <class Number>
+  CLI::Option* add_plain(const std::string& name, const Parameter& parameter,
+                         const std::string& help, auto& value) {
+    return add_number<Number>(
+        app_, name, help, [&value](Number given) { value = given; },
+        must_be(parameter, std::is_integral_v<Number>));
+  }
+
+  template <class Number>
   requires std::is_arithmetic_v<Number> CLI::Option* add_kind(const std::string& name,
                                                               const Parameter& parameter,
                                                               const std::string& help,
                                                               Number& value) {
-    return add_number<Number>(
-        app_, name, help, [&value](Number given) { value = given; },
-        must_be(parameter, std::is_integral_v<Number>));
+    return add_plain<Number>(name, parameter, help, value);
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
@@ -126,11 +132,7 @@ class ParameterOptions {
                                                               const Parameter& parameter,
                                                               const std::string& help,
                                                               std::optional<Number>& value) {
-    if (parameter.when_empty == nullptr) {
-      return add_number<Number>(
-          app_, name, help, [&value](Number given) { value = given; },
-          must_be(parameter, std::is_integral_v<Number>));
-    }
+    if (parameter.when_empty == nullptr) return add_plain<Number>(name, parameter, help, value);
     const std::string word = parameter.when_empty;
     const bool is_iso = std::string_view(parameter) == "iso";
     std::vector<std::string> words = {word};
@@ -203,17 +205,12 @@ class ParameterOptions {
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, std::vector<std::array<double, 3>>& value) {
-    return app_
-        .add_option_function<std::vector<std::string>>(
-            name,
-            [&value, name](const std::vector<std::string>& texts) {
-              value.clear();
-              for (const auto& text : texts) value.push_back(numbers_from<double, 3>(name, text));
-            },
-            help + ". May be repeated")
-        ->type_name("X,Y,Z")
-        ->expected(1)
-        ->take_all();
+    return add_repeated(app_, name, "X,Y,Z", help,
+                        [&value, name](const std::vector<std::string>& texts) {
+                          value.clear();
+                          for (const auto& text : texts)
+                            value.push_back(numbers_from<double, 3>(name, text));
+                        });
   }
 
   // `--label-name 3=Liver`, once per label.
@@ -221,29 +218,23 @@ class ParameterOptions {
   CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
                         const std::string& help, std::map<std::int64_t, T>& value) {
     constexpr bool kIsList = std::is_same_v<T, std::vector<std::int64_t>>;
-    return app_
-        .add_option_function<std::vector<std::string>>(
-            name,
-            [&value, name, range = range_of(parameter)](const std::vector<std::string>& texts) {
-              for (const std::string& text : texts) {
-                const std::size_t sign = text.find('=');
-                const auto label =
-                    number_from<std::int64_t>(std::string_view(text).substr(0, sign));
-                if (sign == std::string::npos || !label) {
-                  refuse(name, "\"" + text + "\" must begin with a label and =, such as 3=");
-                }
-                const std::string own = text.substr(sign + 1);
-                if constexpr (kIsList) {
-                  value[*label] = labels_from(name, own, range);
-                } else {
-                  value[*label] = own;
-                }
-              }
-            },
-            help + ". May be repeated")
-        ->type_name(kIsList ? "LABEL=N,.." : "LABEL=TEXT")
-        ->expected(1)
-        ->take_all();
+    return add_repeated(
+        app_, name, kIsList ? "LABEL=N,.." : "LABEL=TEXT", help,
+        [&value, name, range = range_of(parameter)](const std::vector<std::string>& texts) {
+          for (const std::string& text : texts) {
+            const std::size_t sign = text.find('=');
+            const auto label = number_from<std::int64_t>(std::string_view(text).substr(0, sign));
+            if (sign == std::string::npos || !label) {
+              refuse(name, "\"" + text + "\" must begin with a label and =, such as 3=");
+            }
+            const std::string own = text.substr(sign + 1);
+            if constexpr (kIsList) {
+              value[*label] = labels_from(name, own, range);
+            } else {
+              value[*label] = own;
+            }
+          }
+        });
   }
 
   // "1,3-5": values and ranges of values. `range` says in words what a label may be.
