@@ -1,4 +1,4 @@
-// What the end of a job means for the command; private to this folder.
+// The end of a job, as the command reports it; private to this folder.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// What the command does, against a real daemon.
+// The command against a real daemon: meshes, batches, pipes, refusals.
 #include "tests/api/command.h"
 
 #include <filesystem>
