@@ -203,7 +203,7 @@ TEST_F(DatabaseTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
   const auto kept = test::read_file(data_.records());
   using Case = std::pair<const char*, std::uint64_t>;
   for (const auto& [sql, misfit] :
-       {Case{"UPDATE audit SET record = replace(record, '\"7\"', '\"8\"') WHERE id = 11", 11},
+       {Case{"UPDATE audit SET record = replace(record, '\"7\"', '\"8\"') WHERE id = 8", 8},
         Case{"UPDATE audit SET at = '2024-01-01T00:00:00.000Z' WHERE id = 700", 700},
         Case{"DELETE FROM audit WHERE id = 600", 601}, Case{"DELETE FROM audit WHERE id < 50", 50},
         Case{"UPDATE audit SET record = '{}' WHERE id = 2", 2},
