@@ -34,17 +34,6 @@ TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
   EXPECT_EQ(blob_count(), 1U);
 }
 
-TEST_F(Leases, AJobsProcessDiesWithItsDaemon) {
-  start();
-  long_job(daemon());
-  const std::set<pid_t> processes = job_processes();
-  ASSERT_FALSE(processes.empty());
-  kill();
-  for (const pid_t process : processes) {
-    EXPECT_TRUE(eventually([&] { return program_of(process) != kJobProgram; }));
-  }
-}
-
 TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
   start({"--workers", "2"});
   const Job neighbour = long_job(daemon());
@@ -99,20 +88,6 @@ TEST_F(Leases, AVolumeThatIsCutUnderARunningJobEndsThatJobAlone) {
     EXPECT_TRUE(
         is_problem(daemon().get("/v1/volumes/" + volume.id + view), ErrorCode::kUnusableVolume));
   }
-  EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
-}
-
-TEST_F(Leases, AJobStopsInTheMiddleOfAStream) {
-  start({"--workers", "1"});
-  const std::string id =
-      submit(daemon(), upload(daemon(), long_upload()), 50, R"("passes": 0, "draco": {"speed": 0})")
-          .id;
-  ASSERT_TRUE(eventually([&] { return job(id).stage == Stage::kEncode; }));
-  const std::set<pid_t> before = job_processes();
-  ASSERT_EQ(before.size(), 1U);
-  daemon().client().cancel(id);
-  EXPECT_EQ(ended(id).state, JobState::kCancelled);
-  EXPECT_FALSE(job_processes().contains(*before.begin())) << "it was not interrupted";
   EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
 }
 

@@ -111,19 +111,6 @@ TEST_F(ClusterTest, TimingsAreReadByTheirNames) {
   EXPECT_EQ(timing, (Timing{.load = 1, .smooth = 3}));
 }
 
-TEST_F(ClusterTest, OfJobsAlikeOneRunsOverAllNodes) {
-  const std::string first = submit();
-  const std::string second = job_of(two().jobs.submit(spec())).id;
-  const Lease lease = one().claimed();
-  EXPECT_FALSE(two().jobs.claim("worker", kLongLease));
-  EXPECT_TRUE(one().jobs.finish(lease, mesh()));
-  for (const std::string& id : {first, second}) {
-    EXPECT_EQ(two().jobs.get("", id).state, JobState::kSucceeded);
-  }
-  EXPECT_TRUE(two().jobs.get("", second).reused);
-  EXPECT_TRUE(job_of(two().jobs.submit(spec())).reused);
-}
-
 TEST_F(ClusterTest, TheEndOfAJobIsHeardAtOnceByTheOtherNode) {
   const std::string id = submit();
   const Lease lease = two().claimed();
