@@ -59,11 +59,14 @@ thread_local int borrowed = 0;
 
 }  // namespace
 
-Database::Database(DatabaseOptions options) : options_(std::move(options)), node_(random_uuid()) {
+Database::Database(DatabaseOptions options)
+    : options_(std::move(options)),
+      schemas_(schemas_with(options_.components)),
+      node_(random_uuid()) {
   with_reason(options_.url, [&] {
     ask([&](Connection& connection, bool) {
       check_encoding(connection);
-      upgrade(connection, options_.components);
+      upgrade(connection, schemas_);
     });
   });
   ask([&](Connection& connection, bool) {

@@ -69,6 +69,8 @@ class Database : public SqlDatabase {
   const std::string& node() const { return node_; }  // a UUID, new at each start of the process
   const std::string& node_name() const { return options_.node; }
   const std::string& url() const { return options_.url; }
+  // Of the service and the components.
+  const std::vector<Schema>& schemas() const { return schemas_; }
 
   // Microseconds since 1970 by the database's clock, as in the tables. Each new connection reads
   // that clock; in between, the steady clock advances it.
@@ -112,6 +114,7 @@ class Database : public SqlDatabase {
   void look_at_clock(Connection& connection);
 
   const DatabaseOptions options_;
+  const std::vector<Schema> schemas_;
   const std::string node_;
   // The database's clock minus the steady clock, and minus this machine's clock. They are adjusted
   // only when wrong by a second, so that a time converted there and back is unchanged.

@@ -36,8 +36,8 @@ std::string name_of_database(Database& database, const std::string& proposed) {
 // True if there are records that may name blobs.
 bool has_records(Database& database) {
   Rows row = database.query(
-      "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
-      "expired) OR EXISTS(SELECT 1 FROM received)");
+      "SELECT EXISTS(SELECT 1 FROM named_blobs) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 "
+      "FROM expired)");
   row.next();
   return row.boolean(0);
 }
@@ -80,7 +80,8 @@ Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides
     : database_(database),
       clock_(time_to_start_with(last_seen(database), overrides, clock), clock) {
   check(database, blobs, overrides.adopt);
-  if (overrides.trust_clock) trust(database, last_seen(database), clock_.now(), clock.tolerance);
+  if (overrides.trust_clock)
+    trust(database, database.schemas(), last_seen(database), clock_.now(), clock.tolerance);
 }
 
 Time Identity::now() {

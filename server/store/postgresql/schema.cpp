@@ -21,6 +21,8 @@ constexpr std::chrono::seconds kBetweenUpgrades{1};
 constexpr const char* kUpgradeSession =
     "SET LOCAL statement_timeout = '10min'; SET LOCAL lock_timeout = '1s'";
 
+constexpr const char* kPlace = "the database";
+
 // The service's tables. Times are microseconds since 1970 by the database's clock. A job's record
 // is its JSON in the API as submitted, and after its end as ended. Columns and the row of its run
 // have what changes in between.
@@ -183,18 +185,11 @@ CREATE TABLE tasks(                    -- that one process has at a time; see He
 ) WITH (fillfactor = 50);
 )sql";
 
-std::vector<Schema> with_own(std::vector<Schema> components) {
-  components.insert(components.begin(),
-                    {.component = kService, .steps = {kTables}, .named_blobs = kBlobsOfService});
-  return components;
-}
-
-void try_to_upgrade(Connection& connection, const std::vector<Schema>& components) {
+void try_to_upgrade(Connection& connection, const std::vector<Schema>& schemas) {
   Transaction transaction(connection);
   transaction->query("SELECT pg_advisory_xact_lock(?1)", kUpgradeLock);
   transaction->script(kUpgradeSession);
-  check_versions(connection, components);
-  const std::vector<Schema> schemas = with_own(components);
+  check_versions(connection, kPlace, schemas);
   if (needs_upgrade(connection, schemas)) {
     store::upgrade(connection, schemas);
     transaction->script(kQueuedOwners);
@@ -205,16 +200,20 @@ void try_to_upgrade(Connection& connection, const std::vector<Schema>& component
 
 }  // namespace
 
-void check_versions(Connection& connection, const std::vector<Schema>& components) {
-  store::check_versions(connection, "the database", with_own(components));
+std::vector<Schema> schemas_with(const std::vector<Schema>& components) {
+  return with_service(kTables, components);
 }
 
-void upgrade(Connection& connection, const std::vector<Schema>& components) {
+void check_versions(Connection& connection, const std::vector<Schema>& components) {
+  store::check_versions(connection, kPlace, schemas_with(components));
+}
+
+void upgrade(Connection& connection, const std::vector<Schema>& schemas) {
   const auto end = Connection::Clock::now() + kLongestUpgrade;
   for (bool is_told = false;; is_told = true) {
     try {
       connection.wait_until(Connection::Clock::now() + kLongestUpgrade);
-      return try_to_upgrade(connection, components);
+      return try_to_upgrade(connection, schemas);
     } catch (const Interrupted& error) {
       if (!connection.is_open() || Connection::Clock::now() >= end) throw;
       if (!is_told) {

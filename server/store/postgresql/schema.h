@@ -8,10 +8,13 @@
 
 namespace isomesh::store::postgresql {
 
-// Creates missing tables of the service and of `components`, and upgrades those of an older
-// version, in one transaction and by one process at a time. Retries for ten minutes while other
-// sessions hold the tables; a statement may take as long. Throws as check_versions().
-void upgrade(Connection& connection, const std::vector<Schema>& components);
+// The tables of the service, and those of the components.
+std::vector<Schema> schemas_with(const std::vector<Schema>& components);
+
+// Creates missing tables and upgrades those of an older version, in one transaction and by one
+// process at a time. Retries for ten minutes while other sessions hold the tables; a statement may
+// take as long. Throws as check_versions().
+void upgrade(Connection& connection, const std::vector<Schema>& schemas);
 
 // Throws Error kUnavailable as check_versions() of sql/schema.h does. Changes nothing.
 void check_versions(Connection& connection, const std::vector<Schema>& components);

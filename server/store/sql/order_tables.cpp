@@ -64,7 +64,8 @@ Schema order_tables() {
           .named_blobs =
               "SELECT blob, 'an object of the order ' AS what, \"order\" AS name FROM "
               "order_blobs UNION ALL SELECT blob, 'the received image ', instance FROM "
-              "received"};
+              "received",
+          .kept_from = {{"orders", "finished"}}};
 }
 
 }  // namespace isomesh::store

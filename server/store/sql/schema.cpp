@@ -41,6 +41,18 @@ std::string view_of_named_blobs(std::span<const Schema> schemas) {
 
 }  // namespace
 
+std::vector<Schema> with_service(std::string tables, std::vector<Schema> components) {
+  Schema service;
+  service.component = "service";
+  service.steps.push_back(std::move(tables));
+  service.named_blobs =
+      "SELECT id AS blob, 'the volume ' AS what, id AS name FROM volumes UNION ALL "
+      "SELECT blob, 'a mesh of the job ', job FROM meshes";
+  service.kept_from = {{"volumes", "used"}, {"jobs", "finished"}};
+  components.insert(components.begin(), std::move(service));
+  return components;
+}
+
 void check_versions(SqlConnection& connection, const std::string& place,
                     std::span<const Schema> schemas) {
   for (const auto& [component, version] : versions_of(connection)) {

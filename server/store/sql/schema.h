@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/store/sql/sql.h"
@@ -22,13 +23,13 @@ struct Schema {
   // A SELECT of the blobs that these tables name, in columns `blob`, `what` ("the volume ") and
   // `name`. They are kept, and copied by backups.
   std::string named_blobs = {};
+  // Columns with the time from which a row is kept, each with its table. `--trust-clock` moves
+  // them.
+  std::vector<std::pair<std::string, std::string>> kept_from = {};
 };
 
-// The component that has what is not another's, and the blobs that its tables name.
-inline constexpr const char* kService = "service";
-inline constexpr const char* kBlobsOfService =
-    "SELECT id AS blob, 'the volume ' AS what, id AS name FROM volumes UNION ALL "
-    "SELECT blob, 'a mesh of the job ', job FROM meshes";
+// The service's own tables, which `tables` creates, and then those of the components.
+std::vector<Schema> with_service(std::string tables, std::vector<Schema> components);
 
 // Throws Error kUnavailable if a newer isomeshd made the tables of one of these components, or if
 // one without a schema here has tables. `place` begins the text: "the data folder".

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <chrono>
+#include <span>
 
 #include "server/store/believed_clock.h"
 #include "server/store/operator_overrides.h"
-#include "server/store/sql/sql.h"
+#include "server/store/sql/schema.h"
 
 namespace isomesh::store {
 
@@ -18,6 +19,7 @@ Time time_to_start_with(Time last_seen, const OperatorOverrides& overrides,
 // have been behind until then. So records used shortly before count as used now, and only those
 // already old keep their age. Times are the database's; `tolerance` is the undetected error of its
 // clock. Throws Error kOutOfSpace, kUnavailable or kInternal.
-void trust(SqlDatabase& database, Time last_seen, Time now, std::chrono::milliseconds tolerance);
+void trust(SqlDatabase& database, std::span<const Schema> schemas, Time last_seen, Time now,
+           std::chrono::milliseconds tolerance);
 
 }  // namespace isomesh::store

@@ -11,6 +11,8 @@
 namespace isomesh::store {
 namespace {
 
+constexpr const char* kPlace = "the data folder";
+
 // The service's tables. A record is the JSON of the API; the other columns serve queries.
 constexpr const char* kTables = R"sql(
 CREATE TABLE volumes(
@@ -129,21 +131,16 @@ CREATE TABLE audit_sent(      -- one row: up to which entry a collector has had 
 INSERT INTO audit_sent VALUES(0);
 )sql";
 
-std::vector<Schema> with_own(std::vector<Schema> components) {
-  components.insert(components.begin(), {.component = kService,
-                                         .steps = {std::string(kTables) + kQueuedOwners},
-                                         .named_blobs = kBlobsOfService});
-  return components;
+std::vector<Schema> with_own(const std::vector<Schema>& components) {
+  return with_service(std::string(kTables) + kQueuedOwners, components);
 }
 
 // Upgrades the tables before any other access.
-Connection::Mode upgraded(const std::filesystem::path& file,
-                          const std::vector<Schema>& components) {
+Connection::Mode upgraded(const std::filesystem::path& file, const std::vector<Schema>& schemas) {
   // Records may identify patients. SQLite's other files get the access rights of this one.
   if (!std::filesystem::exists(file)) File::create(file);
   Connection connection(file, Connection::Mode::kWrite);
-  check_versions(connection, components);
-  const std::vector<Schema> schemas = with_own(components);
+  check_versions(connection, kPlace, schemas);
   if (!needs_upgrade(connection, schemas)) return Connection::Mode::kWrite;
   Transaction transaction(connection);
   upgrade(connection, schemas);
@@ -161,11 +158,13 @@ std::uint64_t log_bytes(std::uint64_t disk) {
 }  // namespace
 
 void check_versions(Connection& connection, const std::vector<Schema>& components) {
-  store::check_versions(connection, "the data folder", with_own(components));
+  check_versions(connection, kPlace, with_own(components));
 }
 
 Database::Database(const DataFolder& folder, const std::vector<Schema>& components)
-    : folder_(folder), writer_(folder.records(), upgraded(folder.records(), components)) {
+    : folder_(folder),
+      schemas_(with_own(components)),
+      writer_(folder.records(), upgraded(folder.records(), schemas_)) {
   const auto disk_responds = [&folder] { return folder.works(); };
   for (auto& reader : readers_) {
     reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);

@@ -36,6 +36,9 @@ class Database : public SqlDatabase {
   // Sets a time that is certain to have passed: times that decide about expiry are never older.
   void know_newest(Time time) { newest_us_ = store::to_us(time); }
 
+  // Of the service and the components.
+  const std::vector<Schema>& schemas() const { return schemas_; }
+
   // Number of rows changed since the file was opened.
   std::int64_t changes();
 
@@ -66,6 +69,7 @@ class Database : public SqlDatabase {
   void make_way();
 
   const DataFolder& folder_;
+  const std::vector<Schema> schemas_;
   std::atomic<std::int64_t> newest_us_ = 0;
   Connection writer_;
   static constexpr std::size_t kReaders = 6;

@@ -74,7 +74,9 @@ Identity::Identity(Database& database, BlobStore& blobs, const OperatorOverrides
   if (!overrides.adopt) check(records, theirs);
   const Time now = clock_.now();
   database_.know_newest(now);
-  if (overrides.trust_clock) trust(database_, last_seen(database, clock), now, clock.tolerance);
+  if (overrides.trust_clock) {
+    trust(database_, database_.schemas(), last_seen(database, clock), now, clock.tolerance);
+  }
   const Lock lock(mutex_);
   const bool belong_together = !records.id.empty() && records.id == theirs.id;
   mark_ = belong_together ? records : Mark{random_hex(16), 0, records.seen};

@@ -53,9 +53,9 @@ TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
   std::optional<Transaction> dump(std::in_place, connection);
   connection.query("SELECT count(*) FROM jobs");
   std::optional<ErrorCode> failure;
-  std::jthread upgrade([&] {
+  std::jthread upgrading([&] {
     Connection own(url_);
-    failure = code_thrown_by([&] { upgrade(own, {newer}); });
+    failure = code_thrown_by([&] { upgrade(own, schemas_with({order_tables(), newer})); });
   });
   const auto waits = [&] {
     return ask("SELECT count(*) FROM pg_locks WHERE NOT granted AND mode = 'AccessExclusiveLock' "
@@ -64,7 +64,7 @@ TEST_F(ClusterTest, AnUpgradeMayTakeLongAndWaitsForWhoeverHoldsTheTables) {
   EXPECT_TRUE(test::eventually(waits));
   EXPECT_TRUE(test::eventually([&] { return !waits(); })) << "running daemons have their turn";
   dump.reset();
-  upgrade.join();
+  upgrading.join();
   EXPECT_FALSE(failure);
   submit();
   EXPECT_EQ(ask("SELECT trial FROM jobs"), "7");
