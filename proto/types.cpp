@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "base/text.h"
-#include "proto/orders.h"
 #include "proto/samples.h"
 
 namespace isomesh {
@@ -87,15 +86,6 @@ struct Names<JobState> {
       std::pair{JobState::kQueued, "queued"}, std::pair{JobState::kRunning, "running"},
       std::pair{JobState::kSucceeded, "succeeded"}, std::pair{JobState::kFailed, "failed"},
       std::pair{JobState::kCancelled, "cancelled"}};
-};
-
-template <>
-struct Names<OrderState> {
-  static constexpr std::array kTable = {
-      std::pair{OrderState::kWaiting, "waiting"},     std::pair{OrderState::kFetching, "fetching"},
-      std::pair{OrderState::kMeshing, "meshing"},     std::pair{OrderState::kSending, "sending"},
-      std::pair{OrderState::kSucceeded, "succeeded"}, std::pair{OrderState::kFailed, "failed"},
-      std::pair{OrderState::kCancelled, "cancelled"}};
 };
 
 template <>

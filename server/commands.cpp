@@ -20,6 +20,7 @@
 #include "server/store/postgresql/move.h"
 #include "server/store/sqlite/backup.h"
 #include "server/token_command.h"
+#include "server/wings.h"
 
 namespace isomesh {
 namespace {
@@ -127,26 +128,27 @@ struct Commands::State {
             "Restore the data folder from a backup; the folder must be missing or empty", [this] {
               refuse_database("use pg_restore to restore them (docs/cluster.md)");
               check_is_whole();
-              tell("restored", store::restore(folder, options.data, components()));
+              tell("restored", store::restore(folder, options.data, wing_entry().tables));
             });
     restored.add_option("DIR", folder, "Folder that `isomeshd backup` created")->required();
   }
 
   void add_move_command() {
-    CLI::App& move = add(
-        cli, "move",
-        "Move the records of the folder of --data to an empty database. No daemon may use the "
-        "folder meanwhile. The files of volumes and meshes stay where they are",
-        [this] {
-          store::postgresql::check_url(target);
-          const store::DataFolder folder_of_data(options.data, options.disk_reserve);
-          const auto moved = store::postgresql::move_records(folder_of_data, target, components());
-          std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs";
-          for (const auto& [name, count] : moved.others) {
-            std::cout << " and " << count << ' ' << name;
-          }
-          std::cout << std::endl;
-        });
+    CLI::App& move =
+        add(cli, "move",
+            "Move the records of the folder of --data to an empty database. No daemon may use the "
+            "folder meanwhile. The files of volumes and meshes stay where they are",
+            [this] {
+              store::postgresql::check_url(target);
+              const store::DataFolder folder_of_data(options.data, options.disk_reserve);
+              const auto moved =
+                  store::postgresql::move_records(folder_of_data, target, wing_entry().tables);
+              std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs";
+              for (const auto& [name, count] : moved.others) {
+                std::cout << " and " << count << ' ' << name;
+              }
+              std::cout << std::endl;
+            });
     move.add_option("--to", target, "The database, as postgresql://USER@HOST/NAME")->required();
   }
 
@@ -157,8 +159,10 @@ struct Commands::State {
         "Print the audit trail of the folder of --data, or of --store, as one JSON object per line",
         [this] {
           if (verify) return verify_trail();
-          read_audit_trail(options, after,
-                           [](std::string_view line) { std::cout << valid_utf8(line) << '\n'; });
+          with_trail(options, [this](store::SqlConnection& connection) {
+            store::read_trail(connection, after,
+                              [](std::string_view line) { std::cout << valid_utf8(line) << '\n'; });
+          });
           std::cout.flush();
           if (!std::cout) {
             throw Error(ErrorCode::kInternal,
@@ -175,7 +179,9 @@ struct Commands::State {
   }
 
   void verify_trail() {
-    const store::AuditCheck check = verify_audit_trail(options);
+    store::AuditCheck check;
+    with_trail(options,
+               [&](store::SqlConnection& connection) { check = store::verify_trail(connection); });
     if (check.misfit) {
       std::cerr << "isomeshd: entry " << *check.misfit
                 << " of the audit trail does not fit: it or one before it was changed, removed or "

@@ -12,6 +12,7 @@
 
 #include "base/hex.h"
 #include "base/text.h"
+#include "server/wings.h"
 
 namespace isomesh {
 namespace {
@@ -86,9 +87,10 @@ const CLI::Option& option_of(const std::string& key, const toml::node& value, co
     refuse(value.source(), '"' + key + "\" is only for the command line");
   }
   if (value.is_table() || value.is_array_of_tables()) {
-    refuse(value.source(),
-           "there is no section [" + key +
-               "]; this file has none, and those of a hospital belong in the file of --hospital");
+    const std::string& wing = wing_entry().option;
+    refuse(value.source(), "there is no section [" + key +
+                               "]; this file has none, and those of a " + wing +
+                               " belong in the file of --" + wing);
   }
   refuse(value.source(), "there is no option \"" + key + "\"; `isomeshd --help` lists all options");
 }

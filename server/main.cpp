@@ -52,9 +52,7 @@
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
 #include "server/store/retention.h"
-#ifdef ISOMESH_HOSPITAL
-#include "server/hospital/hospital.h"
-#endif
+#include "server/wings.h"
 
 namespace {
 
@@ -165,29 +163,13 @@ void check_places(const Options& options) {
   }
 }
 
-#ifndef ISOMESH_HOSPITAL
-namespace hospital {
-
-ConfiguredFiles check(const std::filesystem::path& /*file*/) {
-  throw invalid_parameter("hospital", "is not known to this isomeshd: it was built without");
-}
-
-std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
-                                 const http::WingServices& /*services*/) {
-  if (!settings.file.empty()) check(settings.file);
-  return nullptr;
-}
-
-}  // namespace hospital
-#endif
-
 // Prints the effective configuration. Throws as a start would for errors in it; touches neither the
 // data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
   if (!options.store.empty()) store::postgresql::check_url(options.store);
   check_configured_files(
-      options, options.hospital.empty() ? ConfiguredFiles() : hospital::check(options.hospital));
+      options, options.wing.empty() ? ConfiguredFiles() : wing_entry().check(options.wing));
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
   check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);
@@ -209,11 +191,12 @@ void tell_start(const Options& options, const std::string& url, std::size_t conn
       .add("connections", connections);
 }
 
-void take_orders(RecordStores& records) {
-  const std::string reason = records.keep_orders();
+// Only one of the daemons that share records does the work of wings.
+void take_task(RecordStores& records) {
+  const std::string reason = records.keep_task();
   if (reason.empty()) return;
-  throw Error(ErrorCode::kUnavailable,
-              "only one daemon may have --hospital, and this one cannot: " + reason);
+  throw Error(ErrorCode::kUnavailable, "only one daemon may have --" + wing_entry().option +
+                                           ", and this one cannot: " + reason);
 }
 
 void run_interrupted_again(store::JobStore& jobs) {
@@ -276,23 +259,24 @@ int run(const Options& options, const sigset_t& signals) {
   server_options.tls = files.tls.get();
   server_options.part_bytes = options.max_disk / 4;
   server_options.connections = net::connections_within(descriptors);
-  if (!options.hospital.empty()) take_orders(*records);
-  const std::unique_ptr<http::Wing> hospital =
-      hospital::open({.file = options.hospital,
-                      .max_upload_bytes = options.http.upload.max_bytes,
-                      .keep = std::chrono::duration_cast<std::chrono::hours>(keep),
-                      .program = program_of_ours},
-                     {.folder = folder,
-                      .blobs = blobs,
-                      .volumes = volumes,
-                      .jobs = jobs,
-                      .library = library,
-                      .labels = labels,
-                      .orders = records->orders(),
-                      .audit = records->audit(),
-                      .received = records->received(),
-                      .believed_now = [&records] { return records->now(); },
-                      .keep_orders = [&records] { return records->keep_orders(); }});
+  if (!options.wing.empty()) take_task(*records);
+  const std::unique_ptr<http::Wing> wing = wing_entry().open(
+      {.file = options.wing,
+       .max_upload_bytes = options.http.upload.max_bytes,
+       .keep = std::chrono::duration_cast<std::chrono::hours>(keep),
+       .program = program_of_ours},
+      {.folder = folder,
+       .blobs = blobs,
+       .volumes = volumes,
+       .jobs = jobs,
+       .library = library,
+       .labels = labels,
+       .records = records->database(),
+       .audit = records->audit(),
+       .believed_now = [&records] { return records->now(); },
+       .keep_task = [&records] { return records->keep_task(); },
+       .has_task =
+           [&records](store::SqlConnection& connection) { return records->has_task(connection); }});
   const http::Services services = {.folder = folder,
                                    .blobs = blobs,
                                    .volumes = volumes,
@@ -307,7 +291,7 @@ int run(const Options& options, const sigset_t& signals) {
                                    .callbacks = callbacks,
                                    .callback_targets = targets,
                                    .tokens = files.tokens.get(),
-                                   .hospital = hospital.get()};
+                                   .wing = wing.get()};
   http::Server server(services, server_options);
   const std::string url = server.bind(address);
   server.start();
@@ -330,12 +314,12 @@ int run(const Options& options, const sigset_t& signals) {
   while (::sigwait(&signals, &signal) == 0 && signal == SIGHUP) reload(options, files, callbacks);
   log_info("signal {}: draining", signal);
   server.begin_drain();
-  if (hospital) hospital->begin_drain();
+  if (wing) wing->begin_drain();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
     log_warning("jobs are still running after {} s; they are stopped and put back",
                 options.drain_seconds);
   }
-  if (hospital) hospital->stop();
+  if (wing) wing->stop();
   server.stop();
   return 0;
 }

@@ -20,6 +20,7 @@
 #include "base/text.h"
 #include "server/config_file.h"
 #include "server/http/guards/origin.h"
+#include "server/wings.h"
 
 namespace isomesh {
 namespace {
@@ -234,9 +235,7 @@ std::vector<Row> rows_of(Options& options) {
        "daemon waits: TimeoutStopSec= of systemd, --stop-timeout of Docker"},
       {"open-network", options.open_network, no_limits,
        "Listen beyond loopback although requests are not authenticated"},
-      {"hospital", options.hospital, no_limits,
-       "File of PACS and rules (TOML): orders fetch images from these PACS and send "
-       "meshes to them"},
+      {wing_entry().option.c_str(), options.wing, no_limits, wing_entry().help.c_str()},
       {"log-level", options.log_level, one_name_of(kLogLevels, "info"),
        "Least severe messages to log: debug, info, warn, error or off"},
       {"log-format", options.log_format, one_name_of(kLogFormats, "text"),

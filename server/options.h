@@ -38,7 +38,7 @@ struct Options {
   std::filesystem::path tokens;  // empty: no authentication
   std::filesystem::path tls_certificate;
   std::filesystem::path tls_key;
-  std::filesystem::path hospital;  // empty: no PACS
+  std::filesystem::path wing;  // configuration of the wing; empty: none
   std::vector<std::string> callback_targets;
   std::filesystem::path callback_secrets;
   std::filesystem::path callback_authorities;

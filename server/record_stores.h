@@ -2,25 +2,20 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "server/options.h"
-#include "server/store/audit_trail.h"
+#include "server/store/audit/trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/job_store.h"
-#include "server/store/order_store.h"
 #include "server/store/outbox.h"
-#include "server/store/received_store.h"
-#include "server/store/sql/schema.h"
+#include "server/store/sql/sql.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh {
-
-// The tables of the components that this daemon was built with.
-std::vector<store::Schema> components();
 
 // Thread safe.
 class RecordStores {
@@ -30,16 +25,18 @@ class RecordStores {
   virtual store::JobStore& jobs() = 0;
   virtual store::VolumeStore& volumes() = 0;
   virtual store::Outbox& outbox() = 0;
-  virtual store::OrderStore& orders() = 0;
   virtual store::AuditTrail& audit() = 0;
-  virtual store::ReceivedStore& received() = 0;
+  // All of them, for components with own tables.
+  virtual store::SqlDatabase& database() = 0;
   // The current time, as far as the clock is plausible (store/believed_clock.h).
   virtual store::Time now() = 0;
 
-  // Makes this process responsible for orders, or keeps it so. Returns an empty text if it is until
-  // the next call, which must come within a second or so; otherwise why it is not, for example
-  // because another process that shares the records is. Does not throw.
-  virtual std::string keep_orders() = 0;
+  // Makes this process responsible for the work of wings, such as orders, or keeps it so. Returns
+  // an empty text if it is until the next call, which must come within a second or so; otherwise
+  // why it is not, for example because another process that shares the records is. Does not throw.
+  virtual std::string keep_task() = 0;
+  // True if it is, until the transaction ends.
+  virtual bool has_task(store::SqlConnection& connection) = 0;
 };
 
 // Opens the stores of --store; `tolerance` is how far a clock may be ahead. Throws Error
@@ -49,12 +46,8 @@ std::unique_ptr<RecordStores> open_record_stores(const Options& options,
                                                  store::BlobStore& blobs,
                                                  std::chrono::milliseconds tolerance);
 
-// Opens only the audit trail, also beside daemons, and reads it; see AuditTrail::read. Changes
-// nothing.
-void read_audit_trail(const Options& options, std::uint64_t after,
-                      const std::function<void(std::string_view line)>& line);
-
-// The same, but verifies the digests of all entries.
-store::AuditCheck verify_audit_trail(const Options& options);
+// Opens only the audit trail, also beside daemons, and changes nothing. Calls `act` with a
+// connection, for read_trail() and verify_trail().
+void with_trail(const Options& options, const std::function<void(store::SqlConnection&)>& act);
 
 }  // namespace isomesh

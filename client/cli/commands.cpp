@@ -14,7 +14,6 @@
 #include "client/cli/job_end.h"
 #include "client/cli/local_daemon.h"
 #include "client/cli/option_groups.h"
-#include "client/cli/orders.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/report.h"
 #include "client/cli/uploads.h"
@@ -205,7 +204,10 @@ int rename(Client& client, const Options& options) {
 }
 
 int ids(Client& client, const Options& options) {
-  for (const Candidate& each : ids_of(client, options.kind)) std::cout << each.id << '\n';
+  const std::vector<Candidate> all = options.added_ids != nullptr
+                                         ? options.added_ids->newest(client)
+                                         : ids_of(client, options.kind);
+  for (const Candidate& each : all) std::cout << each.id << '\n';
   return kDone;
 }
 
@@ -225,27 +227,20 @@ struct CommandRow {
   int (*run)(Client& client, const Options& options);
 };
 
-constexpr std::array kCommands = {CommandRow{Command::kEstimate, estimate},
-                                  CommandRow{Command::kSubmit, submit},
-                                  CommandRow{Command::kStatus, status},
-                                  CommandRow{Command::kWait, wait},
-                                  CommandRow{Command::kFetch, fetch},
-                                  CommandRow{Command::kCancel, cancel},
-                                  CommandRow{Command::kRename, rename},
-                                  CommandRow{Command::kErase, erase},
-                                  CommandRow{Command::kList, list},
-                                  CommandRow{Command::kInfo, info},
-                                  CommandRow{Command::kLabels, labels},
-                                  CommandRow{Command::kOrder, order},
-                                  CommandRow{Command::kOrders, orders},
-                                  CommandRow{Command::kPacs, pacs},
-                                  CommandRow{Command::kIds, ids}};
+constexpr std::array kCommands = {
+    CommandRow{Command::kEstimate, estimate}, CommandRow{Command::kSubmit, submit},
+    CommandRow{Command::kStatus, status},     CommandRow{Command::kWait, wait},
+    CommandRow{Command::kFetch, fetch},       CommandRow{Command::kCancel, cancel},
+    CommandRow{Command::kRename, rename},     CommandRow{Command::kErase, erase},
+    CommandRow{Command::kList, list},         CommandRow{Command::kInfo, info},
+    CommandRow{Command::kLabels, labels},     CommandRow{Command::kIds, ids}};
 
 int dispatch(const Options& options, const std::stop_token& stop) {
   if (options.command == Command::kMesh) return mesh(options, stop);
   Client client =
       options.command == Command::kIds ? quick_client(options, stop) : client_of(options, stop);
   if (options.command == Command::kUpload) return upload(client, options, stop);
+  if (options.added != nullptr) return options.added->run(client, options);
   return std::ranges::find(kCommands, options.command, &CommandRow::command)->run(client, options);
 }
 

@@ -75,18 +75,6 @@ constexpr std::array kExamples = {
     Examples{"labels", R"(
   isomesh labels 3f2a91c0
 )"},
-    Examples{"order", R"(
-  isomesh order archive 1.2.840.1 1.2.840.1.3 --rule ct-bone
-  isomesh order archive 1.2.840.1 1.2.840.1.3 --parameters '{"iso": 250}' \
-      --send viewer --no-wait
-)"},
-    Examples{"orders", R"(
-  isomesh orders --state failed
-  isomesh orders 0192e4b1-77c3 --retry
-)"},
-    Examples{"pacs", R"(
-  isomesh pacs
-)"},
     Examples{"completion", R"(
   isomesh completion bash >~/.local/share/bash-completion/completions/isomesh
   isomesh completion zsh >~/.zfunc/_isomesh

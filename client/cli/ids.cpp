@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kShortest = 4;
 constexpr std::size_t kVolumeId = 64;  // a SHA-256 in hexadecimal
-constexpr std::size_t kTimedId = 36;   // of jobs and orders: a UUID
+constexpr std::size_t kTimedId = 36;   // of jobs and the like: a UUID
 constexpr std::size_t kMostListed = 10;
 
 bool is_hexadecimal(const std::string& text) {
@@ -42,19 +42,6 @@ std::vector<Candidate> jobs_of(Client& client, bool is_first_page) {
     const JobPage page = client.jobs(std::nullopt, cursor);
     for (const Job& job : page.jobs) {
       all.push_back({job.id, std::string(to_string(job.state)) + "  " + job.created});
-    }
-    cursor = page.next;
-  } while (!is_first_page && !cursor.empty());
-  return all;
-}
-
-std::vector<Candidate> orders_of(Client& client, bool is_first_page) {
-  std::vector<Candidate> all;
-  std::string cursor;
-  do {
-    const OrderPage page = client.orders(std::nullopt, {}, cursor);
-    for (const Order& order : page.orders) {
-      all.push_back({order.id, std::string(to_string(order.state))});
     }
     cursor = page.next;
   } while (!is_first_page && !cursor.empty());
@@ -99,21 +86,22 @@ std::string whole_id(const std::string& text, const std::string& kind,
                                                 ' ' + kind + "s have it\n" + list);
 }
 
+std::string timed_id(const std::string& text, const std::string& kind,
+                     const std::function<std::vector<Candidate>()>& candidates) {
+  return is_whole(text, kTimedId) ? text : whole_id(text, kind, candidates());
+}
+
 std::string volume_id(Client& client, const std::string& text) {
   return is_whole(text, kVolumeId) ? text : whole_id(text, "volume", volumes_of(client));
 }
 
 std::string job_id(Client& client, const std::string& text) {
-  return is_whole(text, kTimedId) ? text : whole_id(text, "job", jobs_of(client, false));
-}
-
-std::string order_id(Client& client, const std::string& text) {
-  return is_whole(text, kTimedId) ? text : whole_id(text, "order", orders_of(client, false));
+  return timed_id(text, "job", [&client] { return jobs_of(client, false); });
 }
 
 std::vector<Candidate> ids_of(Client& client, const std::string& kind) {
   if (kind == "volumes") return volumes_of(client);
-  return kind == "jobs" ? jobs_of(client, true) : orders_of(client, true);
+  return jobs_of(client, true);
 }
 
 }  // namespace isomesh::cli

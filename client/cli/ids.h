@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,8 @@ bool may_be_volume_id(const std::string& text);
 bool is_stored_volume(const std::filesystem::path& path);
 
 // The only id that equals, begins with or ends with `text`. Throws Error kNotFound if there is
-// none, and kInvalidParameter, which lists them, if there are several. `kind` is "volume", "job" or
-// "order".
+// none, and kInvalidParameter, which lists them, if there are several. `kind` is "volume", "job"
+// and so on.
 std::string whole_id(const std::string& text, const std::string& kind,
                      const std::vector<Candidate>& candidates);
 
@@ -30,10 +31,11 @@ std::string whole_id(const std::string& text, const std::string& kind,
 // unchanged, without a request. Throws Error as whole_id and Client do.
 std::string volume_id(Client& client, const std::string& text);
 std::string job_id(Client& client, const std::string& text);
-std::string order_id(Client& client, const std::string& text);
+// The same for objects with the ids of jobs.
+std::string timed_id(const std::string& text, const std::string& kind,
+                     const std::function<std::vector<Candidate>()>& candidates);
 
-// All volumes, or the newest page of jobs or orders, for completion by shells. `kind` is "volumes",
-// "jobs" or "orders".
+// All volumes, or the newest page of jobs, for completion by shells. `kind` is "volumes" or "jobs".
 std::vector<Candidate> ids_of(Client& client, const std::string& kind);
 
 }  // namespace isomesh::cli

@@ -19,7 +19,6 @@
 #include "client/cli/ids.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/option_values.h"
-#include "client/cli/orders.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
 
@@ -73,7 +72,7 @@ bool is_utf8(const std::string& text) {
 
 class Parser {
  public:
-  Parser() : app_(kDescription, "isomesh") {
+  explicit Parser(const Added& added) : app_(kDescription, "isomesh"), added_(added) {
     app_.formatter(command_line::wrapped_help());
     app_.set_help_flag("-h,--help", "Print this help and exit");
     app_.set_version_flag("-V,--version", "isomesh " ISOMESH_VERSION, "Print the version and exit");
@@ -169,17 +168,20 @@ class Parser {
     add_number<std::int64_t>(labels, "--background",
                              "Value of samples without a label (default: 0)",
                              [&](std::int64_t value) { options_.background = value; });
-    add_order_commands();
+    add_commands();
     add_descriptions();
   }
 
-  void add_order_commands() {
-    add_order_options(command(Command::kOrder, "order",
-                              "Mesh a series from a PACS, send the mesh to a PACS, and wait"),
-                      options_);
-    add_orders_options(
-        command(Command::kOrders, "orders", "List orders; show, cancel or retry one"), options_);
-    command(Command::kPacs, "pacs", "List the PACS that the server knows, and their state");
+  void add_commands() {
+    for (const AddedCommand& each : added_.commands) {
+      CLI::App& app = command(Command::kAdded, each.name, each.help);
+      app.footer("Examples:\n" + each.examples);
+      app.callback([this, &each] {
+        options_.command = Command::kAdded;
+        options_.added = &each;
+      });
+      each.add_options(app, options_);
+    }
   }
 
   Options parse(int argc, const char* const* argv) {
@@ -245,7 +247,14 @@ class Parser {
     CLI::App& ids = command(Command::kIds, "ids", "Print ids, one a line");
     ids.add_option("KIND", options_.kind, "What to list")
         ->required()
-        ->check(CLI::IsMember({"volumes", "jobs", "orders"}));
+        ->check([this](const std::string& kind) {
+          for (const AddedIds& each : added_.ids) {
+            if (each.kind == kind) options_.added_ids = &each;
+          }
+          const bool is_known =
+              kind == "volumes" || kind == "jobs" || options_.added_ids != nullptr;
+          return is_known ? std::string() : "there is no kind " + kind;
+        });
     ids.group("");
   }
 
@@ -260,11 +269,11 @@ class Parser {
   // Only the server knows ids.
   Options completed(const std::vector<std::string>& words) {
     const command_line::Candidates found = command_line::candidates(app_, words);
-    const std::map<std::string, const char*> kinds = {
-        {"VOLUME", "volumes"}, {"JOB", "jobs"}, {"ORDER", "orders"}};
+    std::map<std::string, std::string> kinds = {{"VOLUME", "volumes"}, {"JOB", "jobs"}};
+    for (const AddedIds& each : added_.ids) kinds[each.operand] = each.kind;
     const auto kind = kinds.find(found.operand);
     if (kind == kinds.end()) throw EarlyExit(0, found.lines);
-    const std::array arguments = {"isomesh", "ids", kind->second};
+    const std::array arguments = {"isomesh", "ids", kind->second.c_str()};
     return parse(static_cast<int>(arguments.size()), arguments.data());
   }
 
@@ -405,6 +414,7 @@ class Parser {
   Options options_;
   GivenOutputs outputs_;
   CLI::App app_;
+  const Added& added_;
   CLI::App* completion_ = nullptr;
   CLI::App* manual_ = nullptr;
   std::string shell_;
@@ -422,6 +432,8 @@ void wrong_usage(const std::string& message) {
   throw EarlyExit(kWrongUsage, "isomesh: " + message + '\n');
 }
 
-Options parse_options(int argc, const char* const* argv) { return Parser().parse(argc, argv); }
+Options parse_options(int argc, const char* const* argv, const Added& added) {
+  return Parser(added).parse(argc, argv);
+}
 
 }  // namespace isomesh::cli

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/added.h"
 #include "client/isomesh/client.h"
-#include "proto/orders.h"
 #include "proto/types.h"
 
 namespace isomesh::cli {
@@ -27,25 +27,8 @@ enum class Command {
   kList,
   kInfo,
   kLabels,
-  kOrder,
-  kOrders,
-  kPacs,
   kIds,
-};
-
-struct OrderOptions {
-  std::string pacs;
-  std::string study;
-  std::string series;
-  std::string rule;
-  std::string parameters;  // JSON
-  std::vector<std::string> send;
-  bool sends_nothing = false;
-  std::optional<Priority> priority = {};
-  bool does_not_wait = false;
-  std::optional<OrderState> state = {};
-  bool cancels = false;
-  bool retries = false;
+  kAdded,
 };
 
 // A file to write a mesh to, in the format that its suffix names. "-" is standard output; "{name}"
@@ -70,7 +53,7 @@ struct Options {
 
   std::vector<std::filesystem::path> files;  // mesh, upload; "-" is standard input
   UploadOptions upload;                      // mesh, upload; without progress
-  std::string id;                            // of a job, a volume or an order; may be shortened
+  std::string id;                            // of a job, a volume and so on; may be shortened
   JobParameters parameters;                  // mesh, submit, estimate
   std::string preset;                        // the iso-value's name; empty: see parameters
   bool dry_run = false;                      // mesh: only an estimate
@@ -87,8 +70,9 @@ struct Options {
   std::vector<std::string> ids;              // erase
   std::optional<std::int64_t> label;         // fetch
   std::int64_t background = 0;               // labels
-  OrderOptions order;                        // order, orders
-  std::string kind;                          // ids: volumes, jobs or orders
+  std::string kind;                          // ids: volumes, jobs, or an added kind
+  const AddedCommand* added = nullptr;       // if it is one
+  const AddedIds* added_ids = nullptr;       // ids: of an added kind
 };
 
 // True for a pipe or a device, which is written to; any other file is replaced.
@@ -109,7 +93,8 @@ class EarlyExit : public std::runtime_error {
 // Throws EarlyExit with kWrongUsage and "isomesh: `message`".
 [[noreturn]] void wrong_usage(const std::string& message);
 
-// Reads the arguments, and ISOMESH_SERVER and ISOMESH_TOKEN of the environment. Throws EarlyExit.
-Options parse_options(int argc, const char* const* argv);
+// Reads the arguments, and ISOMESH_SERVER and ISOMESH_TOKEN of the environment. `added` must
+// outlive the result. Throws EarlyExit.
+Options parse_options(int argc, const char* const* argv, const Added& added = {});
 
 }  // namespace isomesh::cli

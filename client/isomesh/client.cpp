@@ -313,4 +313,21 @@ void Client::fetch(const std::string& id, MeshFormat format, const std::filesyst
   download.publish();
 }
 
+std::string Client::ask(const RouteRequest& request) {
+  HttpRequest sent = {.method = request.method,
+                      .target = request.path.front(),
+                      .body = request.json,
+                      .patience = request.patience};
+  for (std::size_t n = 1; n < request.path.size(); ++n) {
+    sent.target += '/' + path_segment(request.path[n]);
+  }
+  sent.target += query_string(request.query);
+  if (!request.json.empty()) sent.headers.emplace_back("Content-Type", "application/json");
+  const std::string& key = request.idempotency_key;
+  if (!key.empty()) sent.headers.emplace_back("Idempotency-Key", key);
+  return request.method == "GET" || !key.empty() ? impl_->repeat(sent) : impl_->send(sent);
+}
+
+void Client::pause(std::chrono::milliseconds duration) const { impl_->pause(duration); }
+
 }  // namespace isomesh

@@ -17,10 +17,10 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "proto/error.h"
-#include "proto/orders.h"
 #include "proto/types.h"
 
 namespace isomesh {
@@ -93,16 +93,20 @@ Error several_volumes(const std::vector<UploadedVolume>& volumes);
 
 using JobListener = std::function<void(const JobEvent& event)>;
 
-using OrderProgress = std::function<void(const Order& order)>;
-
-struct OrderPage {
-  std::vector<Order> orders;
-  std::string next;  // see JobPage
-};
-
 struct JobPage {
   std::vector<Job> jobs;
   std::string next;  // the cursor of the next page; empty on the last
+};
+
+// A request to a route of the API.
+struct RouteRequest {
+  std::string method = "GET";
+  // The route, and segments that follow it; only these are encoded.
+  std::vector<std::string> path;
+  std::vector<std::pair<std::string, std::string>> query = {};
+  std::string json = {};             // the body; empty: none
+  std::string idempotency_key = {};  // empty: none
+  std::chrono::seconds patience{0};  // for which the server may wait before it responds
 };
 
 // Every method throws Error: kUnreachable without a response from a server; the server's own code
@@ -183,21 +187,12 @@ class Client {
              const TransferProgress& progress = {},
              std::optional<std::int64_t> label = std::nullopt);
 
-  // Orders meshes of a series in a PACS. An equal key returns the same order.
-  Order submit_order(const OrderRequest& request, const std::string& idempotency_key = {});
-  // The order when it has ended, or its state after `wait` (whole seconds, limited to 30 by the
-  // server).
-  Order order(const std::string& id, std::chrono::seconds wait = std::chrono::seconds(0));
-  // Returns the order in its final state. With a callback it is polled often at first, to report
-  // short steps, and later once a second.
-  Order wait_for_order(const std::string& id, const OrderProgress& progress = {});
-  // One page of the orders, in that state and of that rule if given.
-  OrderPage orders(std::optional<OrderState> state = std::nullopt, const std::string& rule = {},
-                   const std::string& cursor = {});
-  Order cancel_order(const std::string& id);
-  // Restarts a failed order. Throws kNotReady for one that has not failed.
-  Order retry_order(const std::string& id);
-  std::vector<PacsStatus> pacs();
+  // Sends a request to a route without a method here and returns the body of its response. After a
+  // broken connection, sends a GET or a request with a key again.
+  std::string ask(const RouteRequest& request);
+
+  // Waits that long. Throws kCancelled immediately on a stop request.
+  void pause(std::chrono::milliseconds duration) const;
 
  private:
   class Impl;

@@ -15,6 +15,9 @@
 #include "server/hospital/orders/orders.h"
 #include "server/hospital/orders/received.h"
 #include "server/hospital/orders/settings.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/received_store.h"
+#include "server/hospital/records/tables.h"
 #include "server/hospital/routes.h"
 #include "server/jobs/library/import_runner.h"
 #include "server/process/prepared.h"
@@ -64,6 +67,8 @@ class OpenHospital {
  public:
   OpenHospital(const http::WingSettings& settings, const http::WingServices& services)
       : settings_(orders::read_settings(settings.file)),
+        order_store_(services.records, services.has_task),
+        received_(services.records),
         responses_(response_runner(settings)),
         dimse_(prepare_dimse(settings_, settings)),
         peers_(peers(settings, services)),
@@ -74,14 +79,14 @@ class OpenHospital {
                  .jobs = services.jobs,
                  .library = services.library,
                  .labels = services.labels,
-                 .orders = services.orders,
+                 .orders = order_store_,
                  .audit = services.audit,
-                 .received = services.received,
+                 .received = received_,
                  .peers = peers_},
                 settings_,
                 {.keep = settings.keep,
                  .believed_now = services.believed_now,
-                 .keep_orders = services.keep_orders,
+                 .keep_orders = services.keep_task,
                  .cut_off = [this, &services] {
                    responses_.stop();
                    if (dimse_) dimse_->stop();
@@ -92,7 +97,7 @@ class OpenHospital {
         c_store::ListenerServices{.folder = services.folder,
                                   .blobs = services.blobs,
                                   .volumes = services.volumes,
-                                  .received = services.received,
+                                  .received = received_,
                                   .audit = services.audit,
                                   .processes = *dimse_},
         *settings_.dimse);
@@ -115,9 +120,8 @@ class OpenHospital {
                     const std::filesystem::path& scratch) {
     orders::Peer peer;
     if (!pacs.dicomweb.empty()) {
-      const auto web = std::make_shared<dicomweb::DicomWeb>(
-          pacs, scratch, settings.max_upload_bytes,
-          [this](const std::filesystem::path& file) { return responses_.read_response(file); });
+      const auto web = std::make_shared<dicomweb::DicomWeb>(pacs, scratch,
+                                                            settings.max_upload_bytes, responses_);
       peer = {.source = web, .archive = web, .receiver = web};
     }
     if (pacs.send_by == orders::SendBy::kCStore) {
@@ -134,12 +138,14 @@ class OpenHospital {
     if (!settings_.dimse) return all;
     for (const auto& [title, rule] : settings_.dimse->routes) {
       all[orders::received_by(title)].source =
-          std::make_shared<orders::Received>(title, services.received, services.blobs);
+          std::make_shared<orders::Received>(title, received_, services.blobs);
     }
     return all;
   }
 
   const orders::HospitalSettings settings_;
+  store::OrderStore order_store_;
+  store::ReceivedStore received_;
   jobs::ImportRunner responses_;
   std::unique_ptr<process::PreparedProcesses> dimse_;
   const orders::Peers peers_;
@@ -234,6 +240,8 @@ class HospitalWing final : public http::Wing {
 };
 
 }  // namespace
+
+std::vector<store::Schema> tables() { return {store::order_tables()}; }
 
 http::ConfiguredFiles check(const std::filesystem::path& file) {
   const orders::HospitalSettings hospital = orders::read_settings(file);

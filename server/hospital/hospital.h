@@ -4,10 +4,13 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "server/http/app/wing.h"
 
 namespace isomesh::hospital {
+
+std::vector<store::Schema> tables();
 
 // Returns the files named by the file of --hospital. Throws Error kInvalidParameter if that is
 // invalid. Has no side effects.

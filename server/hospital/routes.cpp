@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/sha256.h"
-#include "proto/orders.h"
+#include "server/hospital/protocol/orders.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 

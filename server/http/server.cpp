@@ -30,7 +30,7 @@ void watch_jobs(App& app) {
         is_heard |= app.events.publish(event);
         if (event.kind != store::EventKind::kDone) continue;
         app.connections.job_ended(event.job);
-        if (app.services.hospital != nullptr) app.services.hospital->job_ended(event.job);
+        if (app.services.wing != nullptr) app.services.wing->job_ended(event.job);
         if (!event.is_elsewhere) report_ended(app, event.job);
       }
       if (is_heard) app.connections.wake_sources();
@@ -62,12 +62,12 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_inspect_routes(state_->app);
   add_page_routes(state_->app);
   add_service_routes(state_->app);
-  if (services.hospital != nullptr) services.hospital->add_routes(state_->app);
+  if (services.wing != nullptr) services.wing->add_routes(state_->app);
 }
 
 Server::~Server() {
   // Its threads tell the app of ended orders, also if a start fails after start().
-  if (Wing* const hospital = state_->app.services.hospital) hospital->stop();
+  if (Wing* const wing = state_->app.services.wing) wing->stop();
   if (state_->watching.joinable()) stop();
 }
 
@@ -85,8 +85,8 @@ std::string Server::bind(const net::Address& address) {
 void Server::start() {
   App& app = state_->app;
   app.connections.open(state_->listener->descriptor());
-  if (app.services.hospital != nullptr) {
-    app.services.hospital->on_end([&app](const std::string& order) {
+  if (app.services.wing != nullptr) {
+    app.services.wing->on_end([&app](const std::string& order) {
       app.connections.job_ended(order);
       app.services.callbacks.wake();
     });

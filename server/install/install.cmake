@@ -1,9 +1,6 @@
 # The component daemon: programs, unit, configuration, manual page, completions.
 install(TARGETS isomeshd RUNTIME DESTINATION ${CMAKE_INSTALL_SBINDIR} COMPONENT daemon)
-install(TARGETS isomesh-import isomesh-job RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
-if(ISOMESH_HOSPITAL)
-  install(TARGETS isomesh-dimse RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
-endif()
+install(TARGETS ${ISOMESH_DAEMON_PROGRAMS} RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
 
 set(made ${CMAKE_CURRENT_BINARY_DIR}/installed)
 file(MAKE_DIRECTORY ${made})

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "proto/orders.h"
+#include "server/hospital/protocol/orders.h"
 #include "tests/api/daemon.h"
 #include "tests/api/schema.h"
 

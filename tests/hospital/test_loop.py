@@ -105,22 +105,6 @@ class TheWay(Loop):
                                 ("110104", "out", "PAT-4711", "success"),
                                 ("110121", None, None, "success")])
 
-    def test_cancelled(self):
-        series = self.series()
-        self.proxy.fault = lambda *_: (503, {"Retry-After": "1"}, b"")
-        daemon = self.daemon()
-        identity = self.order(daemon, series)
-        peers.until(lambda: daemon.get(identity)["attempts"] >= 1)
-        cancelled = daemon.call("DELETE", "/v1/orders/" + identity)[2]
-        self.assertEqual(cancelled["state"], "cancelled")
-        # The delays double: an order that begins now and has made two attempts more is past the next one of this order.
-        later = self.order(daemon, self.series())
-        peers.until(lambda: daemon.get(later)["attempts"] >= cancelled["attempts"] + 2)
-        self.proxy.fault = None
-        self.succeeded(daemon, later)
-        self.assertEqual(daemon.get(identity), cancelled)
-        self.assertEqual(self.stored(series), [])
-
 
 class Faults(Loop):
     def test_pacs_down_then_up(self):
@@ -220,13 +204,6 @@ class Faults(Loop):
         boundary = b"--" + headers["Content-Type"].split("boundary=")[1].split(";")[0].strip(
             '"').encode()
         return boundary, text.split(boundary)
-
-    def test_half_a_series(self):
-        """A valid answer with half of the slices: never a mesh of half a head."""
-        def halved(answer):
-            boundary, parts = self.parts_of(answer)
-            return answer[0], answer[1], boundary.join(parts[:7] + parts[-1:])
-        self.after_one_incomplete(halved)
 
     def test_foreign_series(self):
         other = self.series()

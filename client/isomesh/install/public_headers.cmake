@@ -1,7 +1,8 @@
 # isomesh_public_headers(HEADER FOLDER): copies that header of the project and all that it includes to
-# FOLDER/isomesh, client/isomesh/x.h as x.h and the others as they lie, so that they include each other
+# FOLDER/isomesh, those of its folder and client/isomesh/x.h as x.h and the others as they lie, so that they include each other
 # as isomesh/... there. Done when CMake is run, and again when one of them has changed.
 function(isomesh_public_headers header folder)
+  get_filename_component(own ${header} DIRECTORY)
   set(waiting ${header})
   set(copied)
   while(waiting)
@@ -17,8 +18,8 @@ function(isomesh_public_headers header folder)
         list(APPEND waiting ${included})
       endif()
     endforeach()
-    string(REGEX REPLACE "#include \"(client/isomesh/)?([^\"]+)\"" "#include \"isomesh/\\2\"" text "${text}")
-    string(REGEX REPLACE "^client/isomesh/" "" name ${one})
+    string(REGEX REPLACE "#include \"(client/isomesh/|${own}/)?([^\"]+)\"" "#include \"isomesh/\\2\"" text "${text}")
+    string(REGEX REPLACE "^(client/isomesh|${own})/" "" name ${one})
     # CONFIGURE writes only what has changed; nothing in a header looks like a variable of CMake's.
     file(CONFIGURE OUTPUT ${folder}/isomesh/${name} CONTENT "${text}" @ONLY)
   endwhile()

@@ -6,7 +6,7 @@
 
 #include "server/hospital/audit/message.h"
 #include "server/hospital/audit/tls_client.h"
-#include "server/store/audit_trail.h"
+#include "server/store/audit/trail.h"
 
 namespace isomesh::audit {
 

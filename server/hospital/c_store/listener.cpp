@@ -19,10 +19,10 @@
 namespace isomesh::c_store {
 namespace {
 
-using process::DimseEnded;
-using process::DimseObject;
-using process::DimseRefusal;
-using process::DimseVerdict;
+using dimse::DimseEnded;
+using dimse::DimseObject;
+using dimse::DimseRefusal;
+using dimse::DimseVerdict;
 using Clock = std::chrono::steady_clock;
 
 // Limit of the time between two objects, or to the end; longer than any object takes.
@@ -207,19 +207,18 @@ void DimseListener::receive(Association& association, Transfers& transfers) {
   const std::stop_token stop = association.end.get_token();
   const store::ScratchFolder scratch(services_.folder.scratch());
   process::Child child = services_.processes.take(Clock::now() + settings_.idle, stop);
-  child.send(
-      process::to_line(process::DimseReceiving{.called = titles_of(settings_),
-                                               .calling = settings_.calling,
-                                               .folder = scratch.path(),
-                                               .max_object_bytes = settings_.max_object_bytes,
-                                               .idle = settings_.idle}),
-      association.peer.number());
+  child.send(dimse::to_line(dimse::DimseReceiving{.called = titles_of(settings_),
+                                                  .calling = settings_.calling,
+                                                  .folder = scratch.path(),
+                                                  .max_object_bytes = settings_.max_object_bytes,
+                                                  .idle = settings_.idle}),
+             association.peer.number());
   association.told = Clock::now();
   Lines lines(child);
   while (true) {
     const std::string line = lines.next(stop);
     if (line.empty()) break;
-    const process::DimseReport report = process::dimse_report_from(line);
+    const dimse::DimseReport report = dimse::dimse_report_from(line);
     if (const auto* ended = std::get_if<DimseEnded>(&report))
       return note_end(*ended, association.party);
     const auto* object = std::get_if<DimseObject>(&report);
@@ -280,7 +279,7 @@ void DimseListener::note_transfers(const Transfers& transfers, const std::string
   for (const auto& [what, count] : transfers) {
     const auto& [called, calling, study] = what;
     services_.audit.add({.event = store::AuditEvent::kTransferred,
-                         .pacs = orders::received_by(called),
+                         .peer_name = orders::received_by(called),
                          .direction = "in",
                          .study = study,
                          .instances = count,
@@ -310,7 +309,7 @@ void DimseListener::note_end(const DimseEnded& ended, const std::string& party) 
       .add("unlisted", unlisted);
   services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
                        .success = false,
-                       .pacs = "dimse",
+                       .peer_name = "dimse",
                        .direction = "in",
                        .peer = party,
                        .called = ended.called,

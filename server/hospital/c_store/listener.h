@@ -15,15 +15,15 @@
 
 #include "base/mutex.h"
 #include "server/hospital/c_store/acceptor.h"
+#include "server/hospital/dimse/message.h"
 #include "server/hospital/orders/settings.h"
+#include "server/hospital/records/received_store.h"
 #include "server/net/fair_places.h"
 #include "server/net/listener.h"
-#include "server/process/dimse_message.h"
 #include "server/process/prepared.h"
-#include "server/store/audit_trail.h"
+#include "server/store/audit/trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
-#include "server/store/received_store.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::c_store {
@@ -84,10 +84,10 @@ class DimseListener {
   std::shared_ptr<Association> next_association(const std::stop_token& stop);
   void serve_association(Association& association);
   void receive(Association& association, Transfers& transfers);
-  process::DimseVerdict keep(const process::DimseObject& object, const std::stop_token& stop,
-                             const std::filesystem::path& folder);
+  dimse::DimseVerdict keep(const dimse::DimseObject& object, const std::stop_token& stop,
+                           const std::filesystem::path& folder);
   bool has_room(std::uint64_t more_bytes) const;
-  void note_end(const process::DimseEnded& ended, const std::string& party);
+  void note_end(const dimse::DimseEnded& ended, const std::string& party);
   // Adds what an association has stored to the audit trail.
   void note_transfers(const Transfers& transfers, const std::string& party);
 

@@ -1,15 +1,15 @@
 #include "server/hospital/c_store/sender.h"
 
+#include "server/hospital/dimse/message.h"
 #include "server/hospital/objects/encapsulated_document.h"
 #include "server/net/connect.h"
-#include "server/process/dimse_message.h"
 
 namespace isomesh::c_store {
 namespace {
 
+using dimse::DimseEnd;
 using orders::PacsFailure;
 using orders::PacsFault;
-using process::DimseEnd;
 
 // A response has a few bytes. A peer may be slow as long as it makes progress.
 constexpr std::size_t kMostResponseBytes = 4096;
@@ -40,7 +40,7 @@ void check_stored(std::uint16_t status) {
   throw PacsFailure(PacsFault::kBusy, said);
 }
 
-void check_sent(const process::DimseSent& sent, std::string_view sop_class) {
+void check_sent(const dimse::DimseSent& sent, std::string_view sop_class) {
   switch (sent.end) {
     case DimseEnd::kResponded:
       return check_stored(sent.status);
@@ -66,7 +66,7 @@ void check_sent(const process::DimseSent& sent, std::string_view sop_class) {
                     "sending the object took too long: it ended after " + limit);
 }
 
-process::DimseSent sent_of(const process::Output& output, process::Child& child) {
+dimse::DimseSent sent_of(const process::Output& output, process::Child& child) {
   using Ending = process::Output::Ending;
   if (output.ending == Ending::kStopped) throw Error(ErrorCode::kCancelled, "stopped");
   if (output.ending == Ending::kTooLong) {
@@ -79,8 +79,8 @@ process::DimseSent sent_of(const process::Output& output, process::Child& child)
   if (output.ending != Ending::kClosed || !output.text.ends_with('\n')) {
     return {.end = DimseEnd::kUnreadable, .status = 0};
   }
-  const process::DimseReport report = process::dimse_report_from(output.text);
-  if (const auto* sent = std::get_if<process::DimseSent>(&report)) return *sent;
+  const dimse::DimseReport report = dimse::dimse_report_from(output.text);
+  if (const auto* sent = std::get_if<dimse::DimseSent>(&report)) return *sent;
   return {.end = DimseEnd::kUnreadable, .status = 0};
 }
 
@@ -101,7 +101,7 @@ Descriptor connected(const orders::PacsSettings& settings, const std::stop_token
 void Sender::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
   // As for DICOMweb: one more second for each 4 MiB to store.
   constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
-  const process::DimseSending order = {
+  const dimse::DimseSending order = {
       .calling = settings_.calling_aet,
       .called = settings_.aet,
       .file = object.file.path,
@@ -112,10 +112,10 @@ void Sender::store(const orders::OutgoingObject& object, const std::stop_token& 
   const Descriptor peer = connected(settings_, stop);
   process::Child child =
       processes_.take(std::chrono::steady_clock::now() + settings_.timeout, stop);
-  child.send(process::to_line(order), peer.number());
+  child.send(dimse::to_line(order), peer.number());
   const process::Output output =
       child.receive(kMostResponseBytes, std::chrono::steady_clock::now() + kLongest, stop);
-  const process::DimseSent sent = sent_of(output, child);
+  const dimse::DimseSent sent = sent_of(output, child);
   if (sent.end == DimseEnd::kUnreadable) processes_.renew();
   check_sent(sent, object.sop_class);
 }

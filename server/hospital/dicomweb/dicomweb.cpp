@@ -98,13 +98,27 @@ bool names(const std::vector<PeersObject>& objects, const std::string& instance)
 
 }  // namespace
 
+PeersResponse read_response(jobs::ImportRunner& runner, const std::filesystem::path& file) {
+  try {
+    return runner.read_response(file);
+  } catch (const jobs::ImportTookTooLong&) {
+    throw Error(ErrorCode::kPacsUnreachable, "reading the response of the PACS took too long");
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInvalidParameter) {
+      throw Error(ErrorCode::kPacsUnreachable, error.what());
+    }
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS cannot be read");
+  }
+}
+
 DicomWeb::DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
-                   std::uint64_t most_series_bytes, ResponseReader read_response)
+                   std::uint64_t most_series_bytes, jobs::ImportRunner& responses)
     : settings_(settings),
       peer_(settings),
       scratch_(std::move(scratch)),
       most_series_bytes_(most_series_bytes),
-      read_response_(std::move(read_response)) {}
+      responses_(responses) {}
 
 std::vector<PeersObject> DicomWeb::search(const std::string& target, const std::stop_token& stop) {
   constexpr int kNotFound = 404;
@@ -116,7 +130,7 @@ std::vector<PeersObject> DicomWeb::search(const std::string& target, const std::
                                            stop);
   if (head.status == kNotFound) return {};  // some PACS respond so if nothing is found
   check_status(head);
-  return read_response_(response.path()).objects;
+  return read_response(responses_, response.path()).objects;
 }
 
 std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
@@ -233,7 +247,7 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
                                            stop);
   constexpr int kConflict = 409;  // the body has the reason
   if (head.status != kConflict) check_status(head);
-  const PeersResponse said = read_response_(response.path());
+  const PeersResponse said = read_response(responses_, response.path());
   const std::string& instance = object.place.instance;
   if (names(said.stored, instance)) return;
   const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);

@@ -2,25 +2,27 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 
 #include "server/hospital/dicomweb/http_peer.h"
 #include "server/hospital/orders/pacs.h"
 #include "server/import/message/import_message.h"
+#include "server/jobs/library/import_runner.h"
 
 namespace isomesh::dicomweb {
 
 using import::PeersObject;
 using import::PeersResponse;
 
-// Parses a PACS response in a confined process: see jobs::ImportRunner::read_response.
-using ResponseReader = std::function<PeersResponse(const std::filesystem::path& file)>;
+// Parses a PACS's response in a confined process. Throws Error kPacsUnreachable if it cannot be
+// read, and as jobs::ImportRunner::read_response does.
+PeersResponse read_response(jobs::ImportRunner& runner, const std::filesystem::path& file);
 
 class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
  public:
-  // `scratch` is a folder for responses; the limit of bytes applies to one series.
+  // `scratch` is a folder for responses; the limit of bytes applies to one series. `responses`
+  // reads them, and must outlive this object.
   DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
-           std::uint64_t most_series_bytes, ResponseReader read_response);
+           std::uint64_t most_series_bytes, jobs::ImportRunner& responses);
 
   std::vector<orders::FoundSeries> find_recent(const std::string& from_day,
                                                const std::string& modality,
@@ -49,7 +51,7 @@ class DicomWeb : public orders::Archive, public orders::ObjectReceiver {
   const HttpPeer peer_;
   const std::filesystem::path scratch_;
   const std::uint64_t most_series_bytes_;
-  const ResponseReader read_response_;
+  jobs::ImportRunner& responses_;
 };
 
 }  // namespace isomesh::dicomweb

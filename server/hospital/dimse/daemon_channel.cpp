@@ -36,14 +36,14 @@ std::string read_order() {
 
 int peer_socket() { return peer().number(); }
 
-process::DimseVerdict read_verdict() {
+dimse::DimseVerdict read_verdict() {
   char verdict = 0;
   ssize_t count = 0;
   do {
     count = ::read(process::kChildDescriptor, &verdict, 1);
   } while (count < 0 && errno == EINTR);
   if (count != 1) std::_Exit(EXIT_FAILURE);
-  return static_cast<process::DimseVerdict>(verdict);
+  return static_cast<dimse::DimseVerdict>(verdict);
 }
 
 }  // namespace isomesh::dimse

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/process/dimse_message.h"
+#include "server/hospital/dimse/message.h"
 
 namespace isomesh::dimse {
 
@@ -16,6 +16,6 @@ int peer_socket();
 
 // The daemon's verdict on the object reported last. Ends the process if the daemon has closed its
 // end.
-process::DimseVerdict read_verdict();
+dimse::DimseVerdict read_verdict();
 
 }  // namespace isomesh::dimse

@@ -19,6 +19,7 @@ namespace {
 
 using namespace isomesh;
 using namespace isomesh::process;
+using namespace isomesh::dimse;
 
 // Objects are streamed, so memory holds only the association and the head of one object.
 constexpr std::uint64_t kMemoryBytes = std::uint64_t{512} << 20;

@@ -18,7 +18,7 @@
 #include "base/descriptor.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "proto/orders.h"
+#include "proto/dicom_uid.h"
 #include "server/hospital/dimse/associations.h"
 #include "server/hospital/dimse/daemon_channel.h"
 #include "server/hospital/objects/data_set.h"
@@ -28,10 +28,10 @@
 namespace isomesh::dimse {
 namespace {
 
-using process::DimseEnded;
-using process::DimseObject;
-using process::DimseReceiving;
-using process::DimseRefusal;
+using dimse::DimseEnded;
+using dimse::DimseObject;
+using dimse::DimseReceiving;
+using dimse::DimseRefusal;
 
 // Transfer syntaxes that isomesh-import reads, in order of preference: objects are accepted as
 // stored, and uncompressed ones cost the sender no time.
@@ -155,7 +155,7 @@ class Association {
     const DimseRefusal refusal = accept();
     if (refusal == DimseRefusal::kNone) answer_messages();
     const auto valid = [](const std::string& title) {
-      return process::is_ae_title(title) ? title : "";
+      return dimse::is_ae_title(title) ? title : "";
     };
     return {.refusal = refusal, .called = valid(called_), .calling = valid(calling_)};
   }
@@ -294,9 +294,9 @@ DIC_US Association::status_of(const T_DIMSE_C_StoreRQ& request) {
       !is_uid(told.study) || !is_uid(told.series)) {
     return STATUS_STORE_Error_DataSetDoesNotMatchSOPClass;
   }
-  process::respond(process::to_line(told));
-  return read_verdict() == process::DimseVerdict::kStored ? STATUS_Success
-                                                          : STATUS_STORE_Refused_OutOfResources;
+  process::respond(dimse::to_line(told));
+  return read_verdict() == dimse::DimseVerdict::kStored ? STATUS_Success
+                                                        : STATUS_STORE_Refused_OutOfResources;
 }
 
 }  // namespace

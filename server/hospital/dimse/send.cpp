@@ -12,8 +12,8 @@
 namespace isomesh::dimse {
 namespace {
 
-using process::DimseEnd;
-using process::DimseSent;
+using dimse::DimseEnd;
+using dimse::DimseSent;
 
 // Never resolved: daemon_channel.cpp has the connection.
 constexpr const char* kPeersAddress = "127.0.0.1:104";
@@ -49,7 +49,7 @@ DimseEnd end_of(const OFCondition& condition) {
 }
 
 // Proposes the object's own transfer syntax and the default one that every peer must support.
-OFCondition propose(const process::DimseSending& order, T_ASC_Parameters* parameters) {
+OFCondition propose(const dimse::DimseSending& order, T_ASC_Parameters* parameters) {
   std::array<const char*, 1> own = {UID_LittleEndianExplicitTransferSyntax};
   std::array<const char*, 1> plain = {UID_LittleEndianImplicitTransferSyntax};
   const OFCondition done =
@@ -71,7 +71,7 @@ T_ASC_PresentationContextID accepted_context(T_ASC_Association* association,
   return own != 0 ? own : ASC_findAcceptedPresentationContextID(association, sop_class.c_str());
 }
 
-DimseSent store(const process::DimseSending& order, T_ASC_Association* association,
+DimseSent store(const dimse::DimseSending& order, T_ASC_Association* association,
                 T_ASC_PresentationContextID context) {
   T_DIMSE_C_StoreRQ request = {};
   request.MessageID = association->nextMsgID++;
@@ -93,7 +93,7 @@ DimseSent store(const process::DimseSending& order, T_ASC_Association* associati
 
 }  // namespace
 
-DimseSent send_object(const process::DimseSending& order) {
+DimseSent send_object(const dimse::DimseSending& order) {
   const int timeout = static_cast<int>(order.timeout.count());
   dcmSocketSendTimeout.set(timeout);
   dcmSocketReceiveTimeout.set(timeout);

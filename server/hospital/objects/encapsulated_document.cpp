@@ -8,9 +8,9 @@
 
 #include "base/clock.h"
 #include "proto/error.h"
-#include "proto/orders.h"
 #include "server/hospital/objects/data_set.h"
 #include "server/hospital/objects/uid.h"
+#include "server/hospital/protocol/orders.h"
 
 namespace isomesh::dicom {
 namespace {

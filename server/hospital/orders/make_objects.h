@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "proto/orders.h"
 #include "proto/types.h"
+#include "server/hospital/protocol/orders.h"
+#include "server/hospital/records/order_store.h"
 #include "server/store/blob_store.h"
-#include "server/store/order_store.h"
 
 namespace isomesh::orders {
 

@@ -428,7 +428,7 @@ void Orders::note_failure(const std::string& pacs, const PacsFailure& failure,
     services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
                          .success = false,
                          .order = order,
-                         .pacs = pacs});
+                         .peer_name = pacs});
   }
   const Lock lock(mutex_);
   ++failed_[{pacs, failure.fault()}];

@@ -1,54 +1,38 @@
 #include "server/hospital/orders/pacs.h"
 
+#include <algorithm>
+#include <array>
+
 namespace isomesh::orders {
 namespace {
 
-ErrorCode code_of(PacsFault fault) {
-  switch (fault) {
-    case PacsFault::kUnauthorized:
-    case PacsFault::kRefused:
-      return ErrorCode::kPacsRefused;
-    case PacsFault::kIncomplete:
-    case PacsFault::kChanged:
-      return ErrorCode::kSeriesIncomplete;
-    case PacsFault::kUnreachable:
-    case PacsFault::kTimeout:
-    case PacsFault::kBusy:
-    case PacsFault::kUnreadable:
-    case PacsFault::kNotStored:
-      break;
-  }
-  return ErrorCode::kPacsUnreachable;
+struct FaultRow {
+  PacsFault fault;
+  std::string_view name;
+  ErrorCode code;
+};
+
+constexpr std::array kFaults = {
+    FaultRow{PacsFault::kUnreachable, "unreachable", ErrorCode::kPacsUnreachable},
+    FaultRow{PacsFault::kTimeout, "timeout", ErrorCode::kPacsUnreachable},
+    FaultRow{PacsFault::kBusy, "busy", ErrorCode::kPacsUnreachable},
+    FaultRow{PacsFault::kUnauthorized, "unauthorized", ErrorCode::kPacsRefused},
+    FaultRow{PacsFault::kRefused, "refused", ErrorCode::kPacsRefused},
+    FaultRow{PacsFault::kUnreadable, "unreadable", ErrorCode::kPacsUnreachable},
+    FaultRow{PacsFault::kIncomplete, "incomplete", ErrorCode::kSeriesIncomplete},
+    FaultRow{PacsFault::kNotStored, "not-stored", ErrorCode::kPacsUnreachable},
+    FaultRow{PacsFault::kChanged, "changed", ErrorCode::kSeriesIncomplete}};
+
+const FaultRow& row_of(PacsFault fault) {
+  return *std::ranges::find(kFaults, fault, &FaultRow::fault);
 }
 
 }  // namespace
 
-std::string_view to_string(PacsFault fault) {
-  switch (fault) {
-    case PacsFault::kUnreachable:
-      return "unreachable";
-    case PacsFault::kTimeout:
-      return "timeout";
-    case PacsFault::kBusy:
-      return "busy";
-    case PacsFault::kUnauthorized:
-      return "unauthorized";
-    case PacsFault::kRefused:
-      return "refused";
-    case PacsFault::kUnreadable:
-      return "unreadable";
-    case PacsFault::kIncomplete:
-      return "incomplete";
-    case PacsFault::kNotStored:
-      return "not-stored";
-    case PacsFault::kChanged:
-      return "changed";
-  }
-  return "";
-}
+std::string_view to_string(PacsFault fault) { return row_of(fault).name; }
 
 PacsFailure::PacsFailure(PacsFault fault, const std::string& detail,
                          std::chrono::seconds retry_after)
-    : Error(Error(code_of(fault), detail).with_retry_after(retry_after)), fault_(fault) {}
+    : Error(Error(row_of(fault).code, detail).with_retry_after(retry_after)), fault_(fault) {}
 
 }  // namespace isomesh::orders

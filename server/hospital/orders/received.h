@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "server/hospital/orders/pacs.h"
-#include "server/store/received_store.h"
+#include "server/hospital/records/received_store.h"
 
 namespace isomesh::orders {
 

@@ -48,15 +48,21 @@ void add_sent_formats(Order& order) {
   }
 }
 
+store::OrderRecord new_record() {
+  store::OrderRecord record;
+  record.order.id = time_ordered_id();
+  record.order.created = timestamp();
+  record.work.begun = record.order.created;
+  return record;
+}
+
 }  // namespace
 
 store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& orderer,
                               const OrderRequest& request) {
   const Rule* rule = rule_of(settings, orderer, request);
-  store::OrderRecord record;
+  store::OrderRecord record = new_record();
   Order& order = record.order;
-  order.id = time_ordered_id();
-  order.created = timestamp();
   order.rule = request.rule;
   order.source = request.source;
   const PacsSettings& source = pacs_of(settings, request.source.pacs, "source.pacs");
@@ -79,7 +85,6 @@ store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& o
   add_sent_formats(order);
   record.owner = rule != nullptr && orderer.is_administrator && !rule->owner.empty() ? rule->owner
                                                                                      : orderer.name;
-  record.work.begun = order.created;
   record.work.label = rule == nullptr ? kLabel : rule->label;
   record.work.series_number = rule == nullptr ? kSeriesNumber : rule->series_number;
   if (rule != nullptr) record.work.max_error_mm = rule->max_error_mm;
@@ -89,17 +94,14 @@ store::OrderRecord make_order(const HospitalSettings& settings, const Orderer& o
 
 store::OrderRecord make_order(const Rule& rule, const std::string& pacs,
                               const FoundSeries& series) {
-  store::OrderRecord record;
+  store::OrderRecord record = new_record();
   record.owner = rule.owner;
   Order& order = record.order;
-  order.id = time_ordered_id();
-  order.created = timestamp();
   order.rule = rule.name;
   order.source = {.pacs = pacs, .study = series.study, .series = series.series};
   order.parameters = parse_order_parameters(rule.parameters, "", "parameters.");
   order.send = rule.send;
   add_sent_formats(order);
-  record.work.begun = order.created;
   record.work.label = rule.label;
   record.work.series_number = rule.series_number;
   record.work.max_error_mm = rule.max_error_mm;

@@ -5,7 +5,7 @@
 
 #include "server/hospital/orders/pacs.h"
 #include "server/hospital/orders/settings.h"
-#include "server/store/order_store.h"
+#include "server/hospital/records/order_store.h"
 
 namespace isomesh::orders {
 

@@ -10,8 +10,9 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "proto/dicom_uid.h"
 #include "proto/error.h"
-#include "server/process/dimse_message.h"
+#include "server/hospital/dimse/message.h"
 
 namespace isomesh::orders {
 namespace {
@@ -166,7 +167,7 @@ void check_name(const Section& section, const std::string& name) {
 }
 
 void check_title(const std::string& key, const std::string& title) {
-  if (!process::is_ae_title(title)) {
+  if (!dimse::is_ae_title(title)) {
     refuse(key, "must be 1 to 16 printable ASCII characters without a backslash");
   }
 }

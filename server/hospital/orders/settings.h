@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/orders.h"
+#include "server/hospital/protocol/orders.h"
 
 namespace isomesh::orders {
 

@@ -91,7 +91,7 @@ store::AuditEntry transfer(const store::OrderRecord& record, const std::string& 
           .success = false,
           .order = record.order.id,
           .owner = record.owner,
-          .pacs = pacs,
+          .peer_name = pacs,
           .direction = direction,
           .study = study};
 }
@@ -202,7 +202,7 @@ void OrderSteps::note_query(store::OrderRecord& record, bool success) const {
                        .success = success,
                        .order = record.order.id,
                        .owner = record.owner,
-                       .pacs = source.pacs,
+                       .peer_name = source.pacs,
                        .study = source.study});
   record.work.queried = timestamp_of(now_());
 }

@@ -10,14 +10,14 @@
 
 #include "server/hospital/orders/pacs.h"
 #include "server/hospital/orders/settings.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/received_store.h"
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/volume_library.h"
-#include "server/store/audit_trail.h"
+#include "server/store/audit/trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/job_store.h"
-#include "server/store/order_store.h"
-#include "server/store/received_store.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::orders {

@@ -49,7 +49,7 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
       // A watch repeats its query all day; only queries that led to orders are recorded.
       if (!std::exchange(is_told, true)) {
         services_.audit.add(
-            {.event = store::AuditEvent::kQuery, .owner = rule.owner, .pacs = *rule.watch});
+            {.event = store::AuditEvent::kQuery, .owner = rule.owner, .peer_name = *rule.watch});
       }
       log(record, "");
       changed();

@@ -44,8 +44,8 @@ void report_refused(Metrics& metrics, const std::string& address, const Error& e
 
 // Requests wait for jobs, and for what wings make of them.
 bool has_ended(const Services& services, const std::string& id) {
-  if (services.hospital != nullptr) {
-    if (const auto ended = services.hospital->has_ended(id)) return *ended;
+  if (services.wing != nullptr) {
+    if (const auto ended = services.wing->has_ended(id)) return *ended;
   }
   try {
     return is_final(services.jobs.get(std::nullopt, id).state);

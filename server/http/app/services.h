@@ -61,7 +61,7 @@ struct Services {
   callbacks::Callbacks& callbacks;
   const callbacks::CallbackTargets& callback_targets;
   const Tokens* tokens = nullptr;  // null: requests are not authenticated
-  Wing* hospital = nullptr;        // null: the build has none
+  Wing* wing = nullptr;            // null: the build has none
 };
 
 }  // namespace isomesh::http

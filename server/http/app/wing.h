@@ -15,13 +15,12 @@
 #include "server/jobs/library/label_lists.h"
 #include "server/jobs/library/volume_library.h"
 #include "server/process/child.h"
-#include "server/store/audit_trail.h"
+#include "server/store/audit/trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/expiry.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/job_store.h"
-#include "server/store/order_store.h"
-#include "server/store/received_store.h"
+#include "server/store/sql/schema.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::http {
@@ -44,12 +43,13 @@ struct WingServices {
   store::JobStore& jobs;
   jobs::VolumeLibrary& library;
   jobs::LabelLists& labels;
-  store::OrderStore& orders;
+  store::SqlDatabase& records;  // with the wing's own tables
   store::AuditTrail& audit;
-  store::ReceivedStore& received;
   std::function<store::Time()> believed_now;
-  // Makes this process responsible for orders; see RecordStores.
-  std::function<std::string()> keep_orders;
+  // Makes this process the one that does the wing's work, and tells in a transaction whether it
+  // is; see RecordStores.
+  std::function<std::string()> keep_task;
+  std::function<bool(store::SqlConnection&)> has_task;
 };
 
 // Each file with the setting that names it; a path may be empty.
@@ -83,6 +83,20 @@ class Wing {
 
   // Aborts running work; the next process continues it.
   virtual void stop() = 0;
+};
+
+// How the daemon gets a wing.
+struct WingEntry {
+  // The option that names the configuration file, without dashes, and its help.
+  std::string option;
+  std::string help;
+  std::vector<store::Schema> tables = {};
+  // Returns the files that the configuration names. Throws Error kInvalidParameter if that is
+  // invalid. Has no side effects.
+  std::function<ConfiguredFiles(const std::filesystem::path& file)> check;
+  // Without a file, the wing is not open. Returns null if the build has none. Throws as `check`
+  // does, and Error kUnavailable if the wing cannot begin.
+  std::function<std::unique_ptr<Wing>(const WingSettings&, const WingServices&)> open;
 };
 
 }  // namespace isomesh::http

@@ -24,7 +24,7 @@ Levels levels_of(const App& app) {
   std::error_code unknown;  // then 0 is reported
   const auto space = std::filesystem::space(app.services.folder.blobs(), unknown);
   if (!unknown) levels.disk_free_bytes = space.available;
-  if (app.services.hospital != nullptr) levels.others = app.services.hospital->measure();
+  if (app.services.wing != nullptr) levels.others = app.services.wing->measure();
   return levels;
 }
 
@@ -50,7 +50,7 @@ void add_service_routes(App& app) {
   });
   add_get(app, "/version", [&app](const auto& request, auto& response) {
     check_known(request, {});
-    const bool takes_orders = app.services.hospital != nullptr && app.services.hospital->is_open();
+    const bool takes_orders = app.services.wing != nullptr && app.services.wing->is_open();
     JsonTree version;
     json_values::write_field(version.root(), "version", std::string(ISOMESH_VERSION));
     json_values::write_field(version.root(), "mesher", std::string(jobs::kMesherVersion));

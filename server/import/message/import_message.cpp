@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "proto/orders.h"
+#include "proto/dicom_uid.h"
 #include "server/process/message.h"
 
 namespace isomesh::import {

@@ -6,9 +6,9 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "proto/dicom_uid.h"
 #include "proto/error.h"
 #include "proto/json_tree.h"
-#include "proto/orders.h"
 #include "server/import/dicom/elements/dataset.h"
 
 namespace isomesh::import {
@@ -29,7 +29,7 @@ constexpr const char* kSeriesInstanceUid = "0020000E";
 constexpr const char* kNumberOfSeriesRelatedInstances = "00201209";
 
 [[noreturn]] void throw_unreadable() {
-  throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS is not DICOM JSON");
+  throw Error(ErrorCode::kInvalidParameter, "the response of the PACS is not DICOM JSON");
 }
 
 JsonTree parsed(std::string_view text) {

@@ -8,7 +8,7 @@
 namespace isomesh::import {
 
 // Reads a response of QIDO-RS (a list of objects) or STOW-RS (one object with stored and failed
-// instances). An empty file is an empty list. Throws Error kPacsUnreachable for anything else.
+// instances). An empty file is an empty list. Throws Error kInvalidParameter for anything else.
 PeersResponse read_response(const std::filesystem::path& file);
 
 }  // namespace isomesh::import

@@ -126,19 +126,12 @@ Volume ImportRunner::run(const ImportTask& task, const std::string& party,
 
 PeersResponse ImportRunner::read_response(const std::filesystem::path& file) {
   const ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
-  try {
-    ImportReport report = until_stopped({}, [&](const std::stop_token& stop) {
-      return report_of(import::to_message(import::ResponseOrder{{file}, bounds}), bounds, "", stop);
-    });
-    if (report.error) throw *report.error;
-    if (!report.response) throw_lying();
-    return *std::move(report.response);
-  } catch (const ImportTookTooLong&) {
-    throw Error(ErrorCode::kPacsUnreachable, "reading the response of the PACS took too long");
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kUnusableVolume) throw;
-    throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS cannot be read");
-  }
+  ImportReport report = until_stopped({}, [&](const std::stop_token& stop) {
+    return report_of(import::to_message(import::ResponseOrder{{file}, bounds}), bounds, "", stop);
+  });
+  if (report.error) throw *report.error;
+  if (!report.response) throw_lying();
+  return *std::move(report.response);
 }
 
 ImportReport ImportRunner::report_of(const std::string& message, const ImportBounds& bounds,

@@ -54,8 +54,8 @@ class ImportRunner {
   Volume run(const ImportTask& task, const std::string& party = {},
              const std::stop_token& cancelled = {});
 
-  // Reads a PACS response from `file` in such a process. Throws Error kPacsUnreachable if it cannot
-  // be read, also if the process crashes or exceeds its bounds; kUnavailable after stop().
+  // Reads a peer's response from `file` in such a process. Throws Error kInvalidParameter if it is
+  // malformed; otherwise as run() does.
   PeersResponse read_response(const std::filesystem::path& file);
 
   // Calls `run` with a token that stop() and `cancelled` stop, and returns its result. If it throws

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "base/error.h"
-#include "proto/orders.h"
 #include "proto/types.h"
 #include "server/store/job_store.h"
 
@@ -26,8 +25,7 @@ constexpr std::array kNames = {
     Name{"job.running", JobState::kRunning},
     Name{"job.succeeded", JobState::kSucceeded},
     Name{"job.cancelled", JobState::kCancelled},
-    Name{"job.final", JobState::kSucceeded},      // the first of the final states
-    Name{"order.final", OrderState::kSucceeded},  // likewise
+    Name{"job.final", JobState::kSucceeded},  // the first of the final states
     Name{"event.stage", EventKind::kStage},
     Name{"event.done", EventKind::kDone},
     Name{"stage.queue", Stage::kQueue},
@@ -41,8 +39,6 @@ constexpr std::array kNames = {
 // Databases and their indexes contain these numbers, so they stay.
 static_assert(static_cast<int>(JobState::kSucceeded) == 2);
 static_assert(static_cast<int>(JobState::kCancelled) == 4);
-static_assert(static_cast<int>(OrderState::kSucceeded) == 4);
-static_assert(static_cast<int>(OrderState::kCancelled) == 6);
 static_assert(static_cast<int>(EventKind::kDone) == 2);
 static_assert(static_cast<int>(Priority::kBulk) == 2);
 

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include <isomesh/client.h>
+#include <isomesh/orders.h>
 
 #include "base/error.h"
 #include "proto/types.h"
@@ -26,6 +27,11 @@ int main(int argc, char** argv) {
     parameters.formats = {isomesh::MeshFormat::kStl};
     const isomesh::Job job = client.wait(client.submit(parameters).id);
     client.fetch(job.id, isomesh::MeshFormat::kStl, argv[3]);
+    try {
+      isomesh::OrderClient(client).pacs();
+    } catch (const isomesh::Error& error) {
+      if (error.code() != isomesh::ErrorCode::kNotFound) throw;  // the server has no PACS
+    }
     std::printf("%llu\n", static_cast<unsigned long long>(job.mesh->triangles));
   } catch (const isomesh::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <functional>
 #include <iostream>
+#include <map>
 #include <set>
 #include <sstream>
 #include <stop_token>
@@ -16,6 +17,8 @@
 
 #include "client/cli/exit_status.h"
 #include "proto/json.h"
+#include "server/hospital/command/orders.h"
+#include "server/hospital/protocol/orders.h"
 #include "tests/unit/client/support.h"
 
 namespace isomesh::cli {
@@ -139,11 +142,16 @@ TEST_F(Commands, NothingOfAPacsControlsTheTerminal) {
     const PacsStatus main{.name = "main", .last_failure = "today", .reason = "no\x1b[2J"};
     response.set_content(to_json(std::vector{main}), "application/json");
   });
-  options_.command = Command::kOrders;
-  EXPECT_EQ(outcome_of(options_).out, "8 failed: no\uFFFD[2J\n");
-  options_.command = Command::kPacs;
-  EXPECT_EQ(outcome_of(options_).out,
-            "main  last success never  last failure today (no\uFFFD[2J)\n");
+  const Added added = order_commands();
+  options_.command = Command::kAdded;
+  std::map<std::string, std::string> told;
+  for (const AddedCommand& each : added.commands) {
+    if (each.name == "order") continue;
+    options_.added = &each;
+    told[each.name] = outcome_of(options_).out;
+  }
+  EXPECT_EQ(told["orders"], "8 failed: no\uFFFD[2J\n");
+  EXPECT_EQ(told["pacs"], "main  last success never  last failure today (no\uFFFD[2J)\n");
 }
 
 TEST_F(Commands, QuietSaysNothing) {

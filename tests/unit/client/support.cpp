@@ -10,6 +10,7 @@
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "proto/json.h"
+#include "server/hospital/command/orders.h"
 
 namespace isomesh::test {
 namespace {
@@ -148,7 +149,8 @@ Job finished_job(const std::string& id, const std::string& mesh_bytes) {
 cli::Options options_from(const std::vector<std::string>& words) {
   std::vector<const char*> arguments = {"isomesh"};
   for (const std::string& word : words) arguments.push_back(word.c_str());
-  return cli::parse_options(static_cast<int>(arguments.size()), arguments.data());
+  static const cli::Added kAdded = cli::order_commands();
+  return cli::parse_options(static_cast<int>(arguments.size()), arguments.data(), kAdded);
 }
 
 std::pair<int, std::string> end_of(const std::vector<std::string>& words) {

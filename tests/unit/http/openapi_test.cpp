@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
-#include "server/hospital/routes.h"
 #include "server/http/routes/routes.h"
 #include "tests/unit/http/services.h"
+#ifdef ISOMESH_HOSPITAL
+#include "server/hospital/routes.h"
+#endif
 
 namespace isomesh::http {
 namespace {
@@ -25,7 +27,9 @@ class OpenApi : public testing::Test {
     add_inspect_routes(app_);
     add_page_routes(app_);
     add_service_routes(app_);
+#ifdef ISOMESH_HOSPITAL
     hospital::add_order_routes(app_, nullptr);
+#endif
   }
 
   static Methods methods_of(const Route& route) {

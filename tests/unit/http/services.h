@@ -48,7 +48,7 @@ class OpenServices {
  public:
   store::SqlVolumeStore& volumes() { return volumes_; }
   LateJobStore& jobs() { return jobs_; }
-  Services all(Wing* hospital = nullptr) {
+  Services all(Wing* wing = nullptr) {
     return {.folder = data_,
             .blobs = blobs_,
             .volumes = volumes_,
@@ -62,7 +62,7 @@ class OpenServices {
             .metrics = metrics_,
             .callbacks = callbacks_,
             .callback_targets = targets_,
-            .hospital = hospital};
+            .wing = wing};
   }
 
  private:

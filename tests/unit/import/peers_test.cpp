@@ -137,12 +137,12 @@ TEST(Answer, ThatIsNoneIsRefused) {
   for (const char* text :
        {"<html>", "1", "\"x\"", "null", "[1]", "[[]]", "[", "{\"00081199\": {\"Value\": [1]}}",
         R"([{"0020000E": {"Value": ["../../secrets"]}}])"}) {
-    EXPECT_EQ(test::code_thrown_by([&] { answer_of(text); }), ErrorCode::kPacsUnreachable) << text;
+    EXPECT_EQ(test::code_thrown_by([&] { answer_of(text); }), ErrorCode::kInvalidParameter) << text;
   }
   const std::string nothing = "[]";
   EXPECT_FALSE(test::code_thrown_by([&] { answer_of(nothing); }));
   EXPECT_EQ(test::code_thrown_by([&] { answer_of(nothing + '\0' + nothing); }),
-            ErrorCode::kPacsUnreachable);
+            ErrorCode::kInvalidParameter);
   // As deep as it may be, it is refused like the others and ends nothing.
   EXPECT_TRUE(test::code_thrown_by([] { answer_of(std::string(2'000'000, '[')); }));
 }

@@ -89,15 +89,6 @@ TEST(ImportRunner, AnImportThatTookTooLongSaysSoAndWhatToDo) {
   expect_refused(Faulty().run("crash"), "the file is damaged or malicious");
 }
 
-TEST(ImportRunner, AResponseThatTookTooLongSaysSo) {
-  Faulty faulty;
-  const TemporaryFolder folder;
-  test::write_file(folder / "response", "run out of time");
-  const Error error = test::error_of([&] { faulty.runner().read_response(folder / "response"); });
-  EXPECT_EQ(error.code(), ErrorCode::kPacsUnreachable);
-  EXPECT_STREQ(error.what(), "reading the response of the PACS took too long");
-}
-
 TEST(ImportRunner, ACrowdOfWordsIsCutOff) { expect_refused(Faulty().run("chatter"), "ended"); }
 
 TEST(ImportRunner, WordsThatAreNoneOfOursAreAnInternalError) {

@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 
 #include "base/ids.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/received_store.h"
+#include "server/hospital/records/tables.h"
 #include "server/store/files/blob_store.h"
-#include "server/store/sql/order_store.h"
-#include "server/store/sql/order_tables.h"
-#include "server/store/sql/received_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/identity.h"
 #include "tests/support/errors.h"
@@ -32,10 +32,10 @@ class BackupOfAHospitalTest : public testing::Test {
     Database database(data, {order_tables()});
     FileBlobStore blobs(data);
     image_ = test::put(blobs, "an image").key;
-    SqlReceivedStore(database).add({"BONE", "1.2", "1.3"},
-                                   {.instance = "1.3.1", .blob = image_, .bytes = 8});
+    ReceivedStore(database).add({"BONE", "1.2", "1.3"},
+                                {.instance = "1.3.1", .blob = image_, .bytes = 8});
     object_ = test::put(blobs, "an object").key;
-    SqlOrderStore orders(database);
+    OrderStore orders(database);
     OrderSpec spec;
     spec.record.order.id = order_;
     spec.record.order.source = {.pacs = "main", .study = "1.2", .series = "1.3"};

@@ -5,10 +5,10 @@
 #include <gmock/gmock.h>
 
 #include "base/clock.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/tables.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/retention.h"
-#include "server/store/sql/order_store.h"
-#include "server/store/sql/order_tables.h"
 #include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/job_store.h"
@@ -87,7 +87,7 @@ class Life {
   Identity identity_;
   SqlVolumeStore volumes_;
   SqliteJobStore jobs_;
-  SqlOrderStore orders_;
+  OrderStore orders_;
 };
 
 class ClockSteps : public testing::TestWithParam<int> {

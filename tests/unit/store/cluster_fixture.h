@@ -11,12 +11,12 @@
 
 #include <gmock/gmock.h>
 
+#include "server/hospital/records/tables.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/job_rules.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
-#include "server/store/sql/order_tables.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/support/postgres.h"

@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/tables.h"
+#include "server/store/audit/trail.h"
 #include "server/store/postgresql/held_task.h"
 #include "server/store/postgresql/identity.h"
 #include "server/store/postgresql/schema.h"
-#include "server/store/sql/audit_trail.h"
-#include "server/store/sql/order_store.h"
-#include "server/store/sql/order_tables.h"
 #include "tests/support/errors.h"
 #include "tests/unit/store/cluster_fixture.h"
 
@@ -89,9 +89,9 @@ TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
 }
 
 TEST_F(ClusterTest, WhoeverReadsTheAuditTrailChangesNothing) {
-  SqlAuditTrail(one().database).add({});
+  AuditTrail(one().database).add({});
   const auto entries = [&] {
-    return verify_audit_trail(*connect_to_trail(url_, {order_tables()})).entries;
+    return verify_trail(*connect_to_trail(url_, {order_tables()})).entries;
   };
   EXPECT_EQ(entries(), 1U);
   EXPECT_EQ(ask("SELECT count(*) FROM nodes"), "2");
@@ -105,10 +105,10 @@ TEST_F(ClusterTest, WhoeverReadsTheAuditTrailChangesNothing) {
 }
 
 TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
-  for (int n = 0; n < 5; ++n) SqlAuditTrail((n % 2 ? one() : two()).database).add({});
-  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_, {order_tables()})).entries, 5U);
+  for (int n = 0; n < 5; ++n) AuditTrail((n % 2 ? one() : two()).database).add({});
+  EXPECT_EQ(verify_trail(*connect_to_trail(url_, {order_tables()})).entries, 5U);
   ask("ALTER TABLE audit DISABLE TRIGGER audit_is_kept; UPDATE audit SET at = '' WHERE id = 3");
-  EXPECT_EQ(verify_audit_trail(*connect_to_trail(url_, {order_tables()})).misfit, 3U);
+  EXPECT_EQ(verify_trail(*connect_to_trail(url_, {order_tables()})).misfit, 3U);
 }
 
 // --- What is not kept
@@ -176,9 +176,9 @@ OrderSpec an_order() {
   return order;
 }
 
-SqlOrderStore orders_of(Node& node, const HeldTask& task) {
-  return SqlOrderStore(node.database,
-                       [&](SqlConnection& connection) { return task.is_ours(connection); });
+OrderStore orders_of(Node& node, const HeldTask& task) {
+  return OrderStore(node.database,
+                    [&](SqlConnection& connection) { return task.is_ours(connection); });
 }
 
 TEST_F(ClusterTest, OneCarriesOutOrdersAtATime) {
@@ -207,8 +207,8 @@ TEST_F(ClusterTest, WhoLostTheOrdersSavesNoStep) {
   HeldTask first(one().database, "orders", {.now = clock.reader()});
   HeldTask second(two().database, "orders");
   ASSERT_EQ(first.keep(), "");
-  SqlOrderStore of_first = orders_of(one(), first);
-  SqlOrderStore of_second = orders_of(two(), second);
+  OrderStore of_first = orders_of(one(), first);
+  OrderStore of_second = orders_of(two(), second);
   OrderSpec order = an_order();
   // Who does not carry them out accepts them, too.
   ASSERT_EQ(of_second.submit(order, 1).kind, OrderSubmission::Kind::kNew);

@@ -327,7 +327,7 @@ TEST_P(OrderConformance, TheAuditTrailGrowsInOrder) {
                .success = false,
                .order = "o",
                .owner = "radiology",
-               .pacs = "main",
+               .peer_name = "main",
                .direction = "out",
                .study = "1.2",
                .instances = 3,

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "server/store/sql/audit_trail.h"
+#include "server/store/audit/trail.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
@@ -146,7 +146,7 @@ TEST_F(DatabaseTest, ThatCannotBeUpgradedStaysAsItWas) {
 // Not even by whoever has the file open.
 TEST_F(DatabaseTest, TheAuditTrailIsNeitherChangedNorRemoved) {
   Database database(data_);
-  SqlAuditTrail(database).add({.event = AuditEvent::kStart});
+  AuditTrail(database).add({.event = AuditEvent::kStart});
   for (const char* sql :
        {"UPDATE audit SET record = ''", "DELETE FROM audit",
         "INSERT OR REPLACE INTO audit(id, at, record, chain) VALUES(1, '', '{}', '')",
@@ -177,7 +177,7 @@ TEST_F(DatabaseTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
   const auto add = [this](int count) {
     Database database(data_);
     for (int n = 0; n < count; ++n) {
-      SqlAuditTrail(database).add({.event = AuditEvent::kQuery, .study = std::to_string(n)});
+      AuditTrail(database).add({.event = AuditEvent::kQuery, .study = std::to_string(n)});
     }
   };
   const auto tamper = [this](const std::string& sql) {
@@ -189,7 +189,7 @@ TEST_F(DatabaseTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
   };
   const auto check = [this] {
     Connection connection(data_.records(), Connection::Mode::kRead);
-    return verify_audit_trail(connection);
+    return verify_trail(connection);
   };
   { const Database database(data_); }
   EXPECT_EQ(check().entries, 0U);

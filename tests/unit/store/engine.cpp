@@ -4,16 +4,16 @@
 #include <vector>
 
 #include "base/clock.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/received_store.h"
+#include "server/hospital/records/tables.h"
+#include "server/store/audit/trail.h"
 #include "server/store/file.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
-#include "server/store/sql/audit_trail.h"
-#include "server/store/sql/order_store.h"
-#include "server/store/sql/order_tables.h"
 #include "server/store/sql/outbox.h"
-#include "server/store/sql/received_store.h"
 #include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
@@ -75,9 +75,9 @@ class EngineOn : public Engine {
   std::optional<Database> database_;
   std::optional<store::SqlVolumeStore> volumes_;
   std::optional<OutboxOfKind> outbox_;
-  std::optional<store::SqlOrderStore> orders_;
-  std::optional<store::SqlAuditTrail> audit_;
-  std::optional<store::SqlReceivedStore> received_;
+  std::optional<store::OrderStore> orders_;
+  std::optional<store::AuditTrail> audit_;
+  std::optional<store::ReceivedStore> received_;
   std::optional<JobStoreOfKind> jobs_;
 };
 

@@ -10,12 +10,12 @@
 
 #include <gtest/gtest.h>
 
-#include "server/store/audit_trail.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/received_store.h"
+#include "server/store/audit/trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
-#include "server/store/order_store.h"
 #include "server/store/outbox.h"
-#include "server/store/received_store.h"
 #include "server/store/sql/sql.h"
 #include "server/store/volume_store.h"
 

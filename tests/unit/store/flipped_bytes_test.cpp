@@ -10,10 +10,10 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "proto/json.h"
+#include "server/hospital/records/order_store.h"
+#include "server/hospital/records/tables.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/job_rules.h"
-#include "server/store/sql/order_store.h"
-#include "server/store/sql/order_tables.h"
 #include "server/store/sql/outbox.h"
 #include "server/store/sql/undamaged_rows.h"
 #include "server/store/sql/volume_store.h"
@@ -236,7 +236,7 @@ TEST_F(FlippedBytes, OfAnOrderStopNoOther) {
   std::vector<OrderSpec> specs(kRows);
   {
     Database database(data_, {order_tables()});
-    SqlOrderStore orders(database);
+    OrderStore orders(database);
     for (std::size_t n = 0; n < kRows; ++n) {
       Order& order = specs[n].record.order;
       order.id = "order-" + std::string(40, static_cast<char>('a' + n));
@@ -249,7 +249,7 @@ TEST_F(FlippedBytes, OfAnOrderStopNoOther) {
   std::size_t hidden = 0;
   for_each_flip(flipped.id, to_json(flipped), [&](Database& database, std::size_t offset) {
     const Time later = std::chrono::system_clock::now() + std::chrono::hours(1);
-    const std::size_t due = SqlOrderStore(database).due(later, 9).size();
+    const std::size_t due = OrderStore(database).due(later, 9).size();
     hidden += due < kRows ? 1 : 0;
     EXPECT_GE(due, std::max<std::size_t>(least_of(offset), 1)) << offset;
   });

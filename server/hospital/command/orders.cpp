@@ -1,0 +1,272 @@
+#include "server/hospital/command/orders.h"
+
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/ids.h"
+#include "client/cli/option_values.h"
+#include "client/cli/options.h"
+#include "client/cli/text.h"
+#include "proto/json_tree.h"
+#include "server/hospital/client/orders.h"
+
+namespace isomesh::cli {
+namespace {
+
+using Seconds = std::chrono::duration<double>;
+
+struct OrderOptions {
+  std::string pacs;
+  std::string study;
+  std::string series;
+  std::string rule;
+  std::string parameters;  // JSON
+  std::vector<std::string> send;
+  bool sends_nothing = false;
+  std::optional<Priority> priority = {};
+  bool does_not_wait = false;
+};
+
+struct ListOptions {
+  std::string rule;
+  std::optional<OrderState> state = {};
+  bool cancels = false;
+  bool retries = false;
+};
+
+std::string in_seconds(Seconds time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f s", time.count());
+  return text;
+}
+
+OrderRequest request_of(const OrderOptions& asked) {
+  OrderRequest request;
+  request.source = {.pacs = asked.pacs, .study = asked.study, .series = asked.series};
+  if (!asked.rule.empty()) request.rule = asked.rule;
+  if (!asked.parameters.empty()) request.parameters = asked.parameters;
+  if (!asked.send.empty() || asked.sends_nothing) {
+    request.send.emplace();
+    for (const std::string& name : asked.send) request.send->push_back({.pacs = name});
+  }
+  if (asked.priority) request.priority = asked.priority;
+  return request;
+}
+
+std::string reason_of(const Order& order) {
+  return order.error ? ": " + printable_lines(order.error->detail) : std::string();
+}
+
+// Prints one line for each step when it ends.
+class StepTimes {
+ public:
+  void see(const Order& order) {
+    if (order.state != state_) {
+      const auto now = std::chrono::steady_clock::now();
+      std::cerr << to_string(state_) << ' ' << in_seconds(now - began_) << '\n';
+      began_ = now;
+      state_ = order.state;
+    }
+    if (order.attempts != attempts_ && order.error) {
+      attempts_ = order.attempts;
+      std::cerr << "attempt " << attempts_ << " failed" << reason_of(order) << '\n';
+    }
+  }
+
+ private:
+  OrderState state_ = OrderState::kWaiting;
+  std::uint32_t attempts_ = 0;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+};
+
+void show(const Order& order) {
+  std::cout << order.id << ' ' << to_string(order.state) << reason_of(order) << '\n';
+  if (order.next_attempt) std::cout << "  next attempt " << *order.next_attempt << '\n';
+  for (const OrderResult& result : order.results) {
+    std::cout << "  " << result.pacs << ' ' << (result.stored ? "has" : "lacks") << ' '
+              << result.sop_instance_uid << " (" << result.bytes << " bytes)\n";
+  }
+}
+
+void print(const Order& order, bool json) {
+  if (json) {
+    std::cout << to_json(order) << '\n';
+  } else {
+    show(order);
+  }
+}
+
+bool is_json_object(std::string_view text) {
+  try {
+    return json_values::is_object(JsonTree(text).root());
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+void add_order_options(CLI::App& app, Options& options, OrderOptions& order) {
+  app.add_option("PACS", order.pacs, "Name of a PACS that the server knows")->required();
+  app.add_option("STUDY", order.study, "Study Instance UID")->required();
+  app.add_option("SERIES", order.series, "Series Instance UID")->required();
+  app.add_option("--rule", order.rule,
+                 "Rule on the server that supplies everything that is not given here");
+  app.add_option("--parameters", order.parameters,
+                 "Parameters of the mesh as a JSON object, as in POST /v1/jobs: '{\"iso\": 250}'")
+      ->type_name("JSON")
+      ->check([](const std::string& text) {
+        return is_json_object(text) ? std::string() : std::string("must be a JSON object");
+      });
+  app.add_option("--send", order.send,
+                 "PACS that receive the mesh, instead of those of the rule. May be repeated")
+      ->type_name("PACS")
+      ->allow_extra_args(false);
+  app.add_flag("--send-nothing", order.sends_nothing, "Make the mesh, but send it nowhere")
+      ->excludes("--send");
+  add_name<Priority>(app, "--priority", "Priority of the order",
+                     [&order](Priority priority) { order.priority = priority; });
+  app.add_option("--key", options.key,
+                 "Idempotency key: the same key returns the same order (default: a new key)")
+      ->type_name("KEY");
+  app.add_flag("--no-wait", order.does_not_wait, "Print the id of the order and exit");
+}
+
+void add_list_options(CLI::App& app, Options& options, ListOptions& order) {
+  app.add_option("ORDER", options.id,
+                 "Id of an order to show; its beginning or end is enough if unique")
+      ->type_name("ID");
+  add(app, "--state", "waiting|fetching|meshing|sending|succeeded|failed|cancelled",
+      "Only orders in this state", [&order](const std::string& name) {
+        order.state = from_string<OrderState>(name);
+        if (!order.state) refuse("--state", "there is no state " + name);
+      });
+  app.add_option("--rule", order.rule, "Only orders of this rule");
+  app.add_option("--cursor", options.cursor,
+                 "Cursor of the page to show; the previous page prints it");
+  auto* cancel = app.add_flag("--cancel", order.cancels, "Cancel this order")->needs("ORDER");
+  app.add_flag("--retry", order.retries, "Retry this order if it has failed")
+      ->needs("ORDER")
+      ->excludes(cancel);
+}
+
+// Reports the time of each step.
+int order(Client& server, const Options& options, const OrderOptions& asked) {
+  OrderClient client(server);
+  const Order accepted = client.submit(request_of(asked), options.key);
+  if (asked.does_not_wait) {
+    std::cout << (options.json ? to_json(accepted) : accepted.id) << '\n';
+    return kDone;
+  }
+  StepTimes times;
+  const Order ended = client.wait_for(accepted.id, [&times](const Order& now) { times.see(now); });
+  print(ended, options.json);
+  return ended.state == OrderState::kSucceeded ? kDone : kRefused;
+}
+
+// All pages, or the first one.
+std::vector<Candidate> candidates(OrderClient& client, bool is_first_page) {
+  std::vector<Candidate> all;
+  std::string cursor;
+  do {
+    const OrderPage page = client.list(std::nullopt, {}, cursor);
+    for (const Order& order : page.orders) {
+      all.push_back({order.id, std::string(to_string(order.state))});
+    }
+    cursor = page.next;
+  } while (!is_first_page && !cursor.empty());
+  return all;
+}
+
+int orders(Client& server, const Options& options, const ListOptions& asked) {
+  OrderClient client(server);
+  if (!options.id.empty()) {
+    const std::string id =
+        timed_id(options.id, "order", [&client] { return candidates(client, false); });
+    print(asked.cancels   ? client.cancel(id)
+          : asked.retries ? client.retry(id)
+                          : client.get(id),
+          options.json);
+    return kDone;
+  }
+  const OrderPage page = client.list(asked.state, asked.rule, options.cursor);
+  if (options.json) {
+    std::cout << to_json(page.orders, page.next) << '\n';
+    return kDone;
+  }
+  for (const Order& each : page.orders) show(each);
+  if (!page.next.empty()) std::cerr << "More: isomesh orders --cursor " << page.next << '\n';
+  return kDone;
+}
+
+int pacs(Client& client, const Options& options) {
+  const std::vector<PacsStatus> all = OrderClient(client).pacs();
+  if (options.json) {
+    std::cout << to_json(all) << '\n';
+    return kDone;
+  }
+  for (const PacsStatus& each : all) {
+    std::cout << each.name << "  last success " << each.last_success.value_or("never");
+    if (each.last_failure) {
+      std::cout << "  last failure " << *each.last_failure << " ("
+                << printable(each.reason.value_or("?")) << ')';
+    }
+    std::cout << '\n';
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Added order_commands() {
+  const auto order_options = std::make_shared<OrderOptions>();
+  const auto list_options = std::make_shared<ListOptions>();
+  Added added;
+  added.commands = {{.name = "order",
+                     .help = "Mesh a series from a PACS, send the mesh to a PACS, and wait",
+                     .examples = R"(  isomesh order archive 1.2.840.1 1.2.840.1.3 --rule ct-bone
+  isomesh order archive 1.2.840.1 1.2.840.1.3 --parameters '{"iso": 250}' \
+      --send viewer --no-wait
+)",
+                     .add_options =
+                         [order_options](CLI::App& app, Options& options) {
+                           add_order_options(app, options, *order_options);
+                         },
+                     .run =
+                         [order_options](Client& client, const Options& options) {
+                           return order(client, options, *order_options);
+                         }},
+                    {.name = "orders",
+                     .help = "List orders; show, cancel or retry one",
+                     .examples = R"(  isomesh orders --state failed
+  isomesh orders 0192e4b1-77c3 --retry
+)",
+                     .add_options =
+                         [list_options](CLI::App& app, Options& options) {
+                           add_list_options(app, options, *list_options);
+                         },
+                     .run =
+                         [list_options](Client& client, const Options& options) {
+                           return orders(client, options, *list_options);
+                         }},
+                    {.name = "pacs",
+                     .help = "List the PACS that the server knows, and their state",
+                     .examples = "  isomesh pacs\n",
+                     .add_options = [](CLI::App& /*app*/, Options& /*options*/) {},
+                     .run = pacs}};
+  added.ids = {{.operand = "ORDER", .kind = "orders", .newest = [](Client& client) {
+                  OrderClient orders(client);
+                  return candidates(orders, true);
+                }}};
+  return added;
+}
+
+}  // namespace isomesh::cli
