@@ -89,13 +89,14 @@ TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
 
 // During the submission: the server has the job, but its response did not come.
 TEST_F(Commands, AnInterruptCancelsTheJobUnlessItHasEnded) {
-  std::stop_source stop;
+  std::map<JobState, std::stop_source> stops = {{JobState::kRunning, {}},
+                                                {JobState::kSucceeded, {}}};
   std::vector<std::string> keys;
   int cancelled = 0;
   server_.http.set_pre_routing_handler([&](const auto& request, auto&) {
     if (request.path == "/v1/jobs") {
       keys.push_back(request.get_header_value("Idempotency-Key"));
-      stop.request_stop();
+      stops.at(job_.state).request_stop();
     }
     return httplib::Server::HandlerResponse::Unhandled;
   });
@@ -103,9 +104,8 @@ TEST_F(Commands, AnInterruptCancelsTheJobUnlessItHasEnded) {
     ++cancelled;
     response.set_content(to_json(job_), "application/json");
   });
-  for (const JobState state : {JobState::kRunning, JobState::kSucceeded}) {
+  for (auto& [state, stop] : stops) {
     job_.state = state;
-    stop = {};
     keys.clear();
     testing::internal::CaptureStderr();
     EXPECT_EQ(run(options_, stop.get_token()), kRefused);
