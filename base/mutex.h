@@ -1,5 +1,5 @@
-// A mutex for clang's thread-safety analysis, which tests/lint runs. It reports access to guarded
-// members without the lock. Other compilers see a plain mutex.
+// A mutex for clang's thread-safety analysis. Builds with clang++ fail at an access to a guarded
+// member without the lock. Other compilers see a plain mutex.
 //
 //   Mutex mutex_;
 //   int count_ ISOMESH_GUARDED_BY(mutex_) = 0;
