@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/http/limits.h"
+
 namespace isomesh::http {
 namespace {
 
