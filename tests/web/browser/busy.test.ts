@@ -1,19 +1,14 @@
 // A daemon that takes few uploads at once: the page and the JavaScript client wait for it.
 import { once } from 'node:events';
 import { connect, type Socket } from 'node:net';
-import { afterEach, beforeEach, describe, expect, test } from 'vitest';
+import { describe, expect } from 'vitest';
 import { Client } from '../../../client/web/src/api/index';
-import { ballNrrd, Daemon, drop, openPage, setup } from './support';
+import { ballNrrd, drop, setup, type Daemon } from './support';
 
-const { at, it } = setup();
+const { alone } = setup();
 const crowd = 12;
 // Takes one upload of a client at a time, which is half of its places.
-let few: Daemon;
-
-beforeEach(async () => {
-  few = await Daemon.start(undefined, undefined, ['--upload-places', '2']);
-});
-afterEach(() => few.remove());
+const few = ['--upload-places', '2'];
 
 // Uploads without an end, until it is destroyed.
 async function occupy({ url }: Daemon): Promise<Socket> {
@@ -26,42 +21,36 @@ async function occupy({ url }: Daemon): Promise<Socket> {
 }
 
 describe('the page', () => {
-  test.each([
-    ['in one request', 64],
-    ['in parts', 208],
-  ])('says that the server is busy, and uploads %s when it is not', async (_, size) => {
-    const { page, faults } = await openPage(at.browser, few.url);
-    await page.goto(few.url);
-    const other = await occupy(few);
-    await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(size, 20) }]);
-    await expect.poll(() => page.locator('.upload-status').innerText()).toBe('The server is busy. The upload is tried again automatically');
-    await expect.poll(() => page.locator('.banner').innerText()).toBe('The server is busy. The page tries again automatically.');
-    expect(await page.locator('.refusal').count()).toBe(0);
-    other.destroy();
-    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-    await expect.poll(() => page.locator('.banner').isVisible()).toBe(false);
-    await page.close();
-    expect(faults).toEqual([]);
-  });
+  for (const [how, size] of [['in one request', 64], ['in parts', 208]] as const) {
+    alone(`says that the server is busy, and uploads ${how} when it is not`, async ({ page, daemon }) => {
+      await page.goto(daemon.url);
+      const other = await occupy(daemon);
+      await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(size, 20) }]);
+      await expect.poll(() => page.locator('.upload-status').innerText()).toBe('The server is busy. The upload is tried again automatically');
+      await expect.poll(() => page.locator('.banner').innerText()).toBe('The server is busy. The page tries again automatically.');
+      expect(await page.locator('.refusal').count()).toBe(0);
+      other.destroy();
+      await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+      await expect.poll(() => page.locator('.banner').isVisible()).toBe(false);
+    }, few);
+  }
 
-  it('ends its wait when a person cancels it', async () => {
-    const { page } = await openPage(at.browser, few.url);
-    await page.goto(few.url);
-    const other = await occupy(few);
+  alone('ends its wait when a person cancels it', async ({ page, daemon }) => {
+    await page.goto(daemon.url);
+    const other = await occupy(daemon);
     await drop(page, [{ name: 'ball.nrrd', bytes: ballNrrd(64, 20) }]);
     await page.locator('.banner').waitFor();
     await page.getByRole('button', { name: 'Cancel' }).click();
     await page.getByRole('heading', { name: 'Drop a volume here' }).waitFor();
     await expect.poll(() => page.locator('.banner').isVisible()).toBe(false);
     other.destroy();
-    await page.close();
-  });
+  }, few);
 });
 
 describe('many uploads at once', () => {
-  it('all arrive from Node', async () => {
-    const client = new Client({ server: few.url });
-    const other = await occupy(few);
+  alone('all arrive from Node', async ({ daemon }) => {
+    const client = new Client({ server: daemon.url });
+    const other = await occupy(daemon);
     let waits = 0;
     const onBusy = (): void => {
       waits += 1;
@@ -71,5 +60,5 @@ describe('many uploads at once', () => {
     const ids = (await Promise.all(uploads)).map(({ volumes }) => volumes[0]?.volume?.id);
     expect(new Set(ids).size).toBe(crowd);
     expect(waits).toBeGreaterThan(0);
-  });
+  }, few);
 });

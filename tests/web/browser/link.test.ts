@@ -2,24 +2,18 @@
 import { describe, expect } from 'vitest';
 import { smallNrrd } from './files';
 import { silhouette } from './seen';
-import { ballNrrd, boxOf, Daemon, keepNotices, noiseNrrd, noted, openPage, openSurface, pause, settled, setup, still, surfaceLoaded } from './support';
+import { ballNrrd, boxOf, keepNotices, measured, noiseNrrd, noted, openPage, openSurface, pause, settled, setup, still, surfaceLoaded } from './support';
 
-const { at, it } = setup();
+const { at, it, alone } = setup();
 
 describe('a link to a surface', () => {
   it('carries its camera, cut, style and measurements', async ({ page, daemon, browser }) => {
     const volume = await daemon.upload(ballNrrd(48, 18));
     const { id } = await daemon.make({ volume, iso: 100, formats: ['glb'] });
     await openSurface(at, id);
-    const box = await boxOf(page.locator('.viewport canvas'));
     await page.keyboard.press('a');
-    await page.keyboard.press('m');
-    const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
     await still(page);
-    await page.mouse.click(middle.x - 60, middle.y);
-    await page.mouse.click(middle.x + 60, middle.y);
-    await expect.poll(() => page.locator('.ruler-labels span').count()).toBe(1);
-    const length = await page.locator('.ruler-labels span').innerText();
+    const length = await measured(page, 60);
     await page.keyboard.press('m');
     await page.keyboard.press('t');
     await page.getByLabel('Opacity').fill('0.6');
@@ -116,86 +110,64 @@ describe('the jobs that are chosen to compare', () => {
 });
 
 describe('a job that was left', () => {
-  it('tells when it has ended, also after the page was loaded anew', async ({ browser }) => {
-    const own = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
-    try {
-      const { page } = await openPage(browser, own.url);
-      await keepNotices(page);
-      const volume = await own.upload(noiseNrrd(80));
-      // The page's job waits behind one that takes long.
-      const before = await own.submit({ volume, iso: 100, passes: 1000, max_error_mm: 0.01, formats: ['glb'] });
-      await page.goto(`${own.url}/#/volumes/${volume}?iso=128`);
-      await page.getByRole('button', { name: 'Make the surface' }).click();
-      await page.waitForURL(/#\/jobs\//);
-      const id = /jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
-      await page.locator('.brand').click();
-      await page.reload();
-      await own.json(`/v1/jobs/${before.id}`, { method: 'DELETE' });
-      const toast = page.locator('.toast', { hasText: 'iso 128' });
-      await expect.poll(() => toast.innerText()).toMatch(/The surface for iso 128 is ready/);
-      await toast.getByRole('link').click();
-      await page.waitForURL(new RegExp(`#/jobs/${id}`));
-      await page.close();
-    } finally {
-      await own.remove();
-    }
-  });
+  alone('tells when it has ended, also after the page was loaded anew', async ({ page, daemon }) => {
+    await keepNotices(page);
+    const volume = await daemon.upload(noiseNrrd(80));
+    // The page's job waits behind one that takes long.
+    const before = await daemon.submit({ volume, iso: 100, passes: 1000, max_error_mm: 0.01, formats: ['glb'] });
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=128`);
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.waitForURL(/#\/jobs\//);
+    const id = /jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
+    await page.locator('.brand').click();
+    await page.reload();
+    await daemon.json(`/v1/jobs/${before.id}`, { method: 'DELETE' });
+    const toast = page.locator('.toast', { hasText: 'iso 128' });
+    await expect.poll(() => toast.innerText()).toMatch(/The surface for iso 128 is ready/);
+    await toast.getByRole('link').click();
+    await page.waitForURL(new RegExp(`#/jobs/${id}`));
+  }, ['--workers', '1']);
 });
 
 describe('the list of volumes', () => {
-  it('is searched, sorted, and its volumes renamed', async ({ browser }) => {
-    const other = await Daemon.start();
-    try {
-      const { page } = await openPage(browser, other.url);
-      for (let n = 0; n < 62; n += 1) {
-        const bytes = Buffer.alloc(24, 1);
-        bytes.writeUInt16LE(n + 2, 0);
-        const body = new Blob([new Uint8Array(smallNrrd([], bytes))]);
-        await fetch(`${other.url}/v1/volumes`, { method: 'POST', body, headers: { 'Content-Disposition': `attachment; filename="${n === 0 ? 'elbow' : `case ${n}`}.nrrd"` } });
-      }
-      await page.goto(other.url);
-      const names = page.locator('.cards strong');
-      await expect.poll(() => names.first().innerText()).toBe('case 61.nrrd');
-      await expect.poll(() => names.count()).toBe(60);
-      // The oldest is on no page that is there yet.
-      // Letter by letter, faster than the others come.
-      await page.getByLabel('Search volumes').pressSequentially('ELBOW');
-      await expect.poll(() => names.allInnerTexts()).toEqual(['elbow.nrrd']);
-      await expect.poll(() => page.locator('.count').innerText()).toBe('1 of 62');
-      await page.locator('.card').hover();
-      await page.getByRole('button', { name: 'Rename elbow.nrrd' }).click();
-      await page.getByLabel('Name of this volume').and(page.locator('input')).fill('a knee');
-      await page.keyboard.press('Enter');
-      await expect.poll(() => page.locator('.cards').innerText()).toContain('No volume matches the search');
-      await page.getByLabel('Search volumes').fill('');
-      await page.getByLabel('Sort volumes').selectOption('name');
-      await expect.poll(async () => (await names.allInnerTexts()).slice(0, 3)).toEqual(['a knee', 'case 1.nrrd', 'case 2.nrrd']);
-      await page.close();
-    } finally {
-      await other.remove();
+  alone('is searched, sorted, and its volumes renamed', async ({ page, daemon }) => {
+    for (let n = 0; n < 62; n += 1) {
+      const bytes = Buffer.alloc(24, 1);
+      bytes.writeUInt16LE(n + 2, 0);
+      const body = new Blob([new Uint8Array(smallNrrd([], bytes))]);
+      await fetch(`${daemon.url}/v1/volumes`, { method: 'POST', body, headers: { 'Content-Disposition': `attachment; filename="${n === 0 ? 'elbow' : `case ${n}`}.nrrd"` } });
     }
+    await page.goto(daemon.url);
+    const names = page.locator('.cards strong');
+    await expect.poll(() => names.first().innerText()).toBe('case 61.nrrd');
+    await expect.poll(() => names.count()).toBe(60);
+    // The oldest is on no page that is there yet.
+    // Letter by letter, faster than the others come.
+    await page.getByLabel('Search volumes').pressSequentially('ELBOW');
+    await expect.poll(() => names.allInnerTexts()).toEqual(['elbow.nrrd']);
+    await expect.poll(() => page.locator('.count').innerText()).toBe('1 of 62');
+    await page.locator('.card').hover();
+    await page.getByRole('button', { name: 'Rename elbow.nrrd' }).click();
+    await page.getByLabel('Name of this volume').and(page.locator('input')).fill('a knee');
+    await page.keyboard.press('Enter');
+    await expect.poll(() => page.locator('.cards').innerText()).toContain('No volume matches the search');
+    await page.getByLabel('Search volumes').fill('');
+    await page.getByLabel('Sort volumes').selectOption('name');
+    await expect.poll(async () => (await names.allInnerTexts()).slice(0, 3)).toEqual(['a knee', 'case 1.nrrd', 'case 2.nrrd']);
   });
 
-  it('that is empty says what is made here, and offers a sample', async ({ browser }) => {
-    const other = await Daemon.start();
-    try {
-      const { page, faults } = await openPage(browser, other.url);
-      await page.goto(other.url);
-      const intro = page.locator('.intro');
-      await expect.poll(() => intro.innerText()).toBe('isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
-      await page.getByRole('button', { name: 'try a sample' }).click();
-      await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-      await expect.poll(() => page.locator('h1').first().innerText()).toContain('Sample head');
-      await expect.poll(() => page.locator('.live[data-size] .live-picture[data-still]').count()).toBe(1);
-      expect((await silhouette(page, page.locator('.live-picture'))).part).toBeGreaterThan(0.1);
-      // With a volume the page needs no introduction.
-      await page.goto(other.url);
-      await expect.poll(() => page.locator('.cards > li a').count()).toBe(1);
-      await expect.poll(() => intro.isVisible()).toBe(false);
-      await page.close();
-      expect(faults).toEqual([]);
-    } finally {
-      await other.remove();
-    }
+  alone('that is empty says what is made here, and offers a sample', async ({ page, daemon }) => {
+    await page.goto(daemon.url);
+    const intro = page.locator('.intro');
+    await expect.poll(() => intro.innerText()).toBe('isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
+    await page.getByRole('button', { name: 'try a sample' }).click();
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    await expect.poll(() => page.locator('h1').first().innerText()).toContain('Sample head');
+    await expect.poll(() => page.locator('.live[data-size] .live-picture[data-still]').count()).toBe(1);
+    expect((await silhouette(page, page.locator('.live-picture'))).part).toBeGreaterThan(0.1);
+    // With a volume the page needs no introduction.
+    await page.goto(daemon.url);
+    await expect.poll(() => page.locator('.cards > li a').count()).toBe(1);
+    await expect.poll(() => intro.isVisible()).toBe(false);
   });
 });

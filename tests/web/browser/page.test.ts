@@ -9,15 +9,14 @@ import {
   brain,
   brainHull,
   chordOfBall,
-  Daemon,
   drag,
   drop,
   type JobAnswer,
   keepNotices,
+  measured,
   noiseNrrd,
   noted,
   openedJob,
-  openPage,
   openSurface,
   settled,
   setup,
@@ -25,7 +24,7 @@ import {
   surfaceLoaded,
 } from './support';
 
-const { at, it } = setup();
+const { at, it, alone } = setup();
 
 describe('a real volume', () => {
   it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async ({ daemon, page }) => {
@@ -133,15 +132,8 @@ describe('a surface', () => {
 
     // The slice can be measured as well: across the volume, of which the ball is only a part.
     const seen = await silhouette(page, page.locator('.viewport'));
-    await page.keyboard.press('m');
     const view = await boxOf(page.locator('.viewport'));
-    const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
-    const half = (seen.width * view.width) / 2;
-    await page.mouse.click(middle.x - 0.9 * half, middle.y);
-    await page.mouse.click(middle.x + 0.9 * half, middle.y);
-    const label = page.locator('.ruler-labels span');
-    await expect.poll(() => label.count()).toBe(1);
-    const millimetres = Number.parseFloat(await label.innerText());
+    const millimetres = Number.parseFloat(await measured(page, 0.9 * ((seen.width * view.width) / 2)));
     expect(millimetres).toBeGreaterThan(0.9 * 48 * 0.97);
     expect(millimetres).toBeLessThan(0.9 * 48 * 1.03);
   });
@@ -154,17 +146,10 @@ describe('a surface', () => {
     const view = await boxOf(page.locator('.viewport'));
     const disc = await silhouette(page, page.locator('.viewport'));
     const [x = 0, y = 0, z = 0] = (await settled(page, () => noted(page, 'cam'))).split(',').map(Number);
-    await page.keyboard.press('m');
-    const radius = (disc.height * view.height) / 2;
-    const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
-    await page.mouse.click(middle.x, view.y + 3);
-    await expect.poll(() => page.locator('.toasts').innerText()).toMatch(/no surface/);
     const expected = chordOfBall(18, Math.hypot(x, y, z), 0.8);
-    await page.mouse.click(middle.x - 0.8 * radius, middle.y);
-    await page.mouse.click(middle.x + 0.8 * radius, middle.y);
-    const label = page.locator('.ruler-labels span');
-    await expect.poll(() => label.count()).toBe(1);
-    const millimetres = Number.parseFloat(await label.innerText());
+    const millimetres = Number.parseFloat(await measured(page, 0.8 * ((disc.height * view.height) / 2)));
+    await page.mouse.click(view.x + view.width / 2, view.y + 3);
+    await expect.poll(() => page.locator('.toasts').innerText()).toMatch(/no surface/);
     expect(millimetres).toBeGreaterThan(expected * 0.97);
     expect(millimetres).toBeLessThan(expected * 1.03);
   });
@@ -226,30 +211,16 @@ describe('a job', () => {
     expect((await openedJob(at)).state).toBe('cancelled');
   });
 
-  it('is shown as lost when nobody answers, and goes on when somebody does', async ({ browser, faults }) => {
-    const other = await Daemon.start();
-    try {
-      const volume = await other.upload(ballNrrd(24, 8));
-      faults.length = 0;
-      const { page: mine, faults: none } = await openPage(browser, other.url);
-      await mine.goto(`${other.url}/#/jobs`);
-      await expect.poll(() => mine.getByRole('heading', { name: 'Jobs' }).count()).toBe(1);
-      const { host } = new URL(other.url);
-      await other.kill();
-      await expect.poll(() => mine.locator('.banner').isVisible()).toBe(true);
-      const again = await Daemon.start(other.data, host);
-      try {
-        await expect.poll(() => mine.locator('.banner').isVisible()).toBe(false);
-        await mine.goto(`${other.url}/#/volumes/${volume}`);
-        await expect.poll(() => mine.locator('[data-plane]').count()).toBe(3);
-      } finally {
-        await again.kill();
-      }
-      await mine.close();
-      expect(none).toEqual([]);
-    } finally {
-      await other.remove();
-    }
+  alone('is shown as lost when nobody answers, and goes on when somebody does', async ({ daemon, page }) => {
+    const volume = await daemon.upload(ballNrrd(24, 8));
+    await page.goto(`${daemon.url}/#/jobs`);
+    await expect.poll(() => page.getByRole('heading', { name: 'Jobs' }).count()).toBe(1);
+    await daemon.kill();
+    await expect.poll(() => page.locator('.banner').isVisible()).toBe(true);
+    await daemon.restart();
+    await expect.poll(() => page.locator('.banner').isVisible()).toBe(false);
+    await page.goto(`${daemon.url}/#/volumes/${volume}`);
+    await expect.poll(() => page.locator('[data-plane]').count()).toBe(3);
   });
 });
 

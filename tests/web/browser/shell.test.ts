@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import type { Route } from 'playwright-core';
 import { beforeAll, describe, expect } from 'vitest';
 import { pixelsOf } from './seen';
-import { ballNrrd, boxOf, noted, openPage, openSurface, pause, settled, setup, still, withTokens } from './support';
+import { ballNrrd, measured, noted, openPage, openSurface, pause, settled, setup, still, withTokens } from './support';
 
 const { at, it } = setup();
 let ball: string;
@@ -102,12 +102,7 @@ describe('a surface', () => {
     await openSurface(at, job);
     await page.keyboard.press('a');
     await still(page);
-    await page.keyboard.press('m');
-    const view = await boxOf(page.locator('.viewport'));
-    const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
-    await page.mouse.click(middle.x - 60, middle.y);
-    await page.mouse.click(middle.x + 60, middle.y);
-    await expect.poll(() => page.locator('.ruler-labels span').count()).toBe(1);
+    await measured(page, 60);
     const download = page.waitForEvent('download');
     await page.getByRole('button', { name: 'Picture' }).click();
     const pixels = await pixelsOf(page, readFileSync(await (await download).path()));

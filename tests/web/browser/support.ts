@@ -21,7 +21,7 @@ function fromEnvironment(name: string): string {
 
 export class Daemon {
   private constructor(
-    private readonly process: ChildProcess,
+    private process: ChildProcess,
     readonly data: string,
     readonly url: string,
   ) {}
@@ -47,6 +47,11 @@ export class Daemon {
     const ended = new Promise((resolve) => this.process.once('exit', resolve));
     this.process.kill('SIGKILL');
     await ended;
+  }
+
+  // At its address, with its data.
+  async restart(): Promise<void> {
+    this.process = (await Daemon.start(this.data, new URL(this.url).host)).process;
   }
 
   async remove(): Promise<void> {
@@ -165,11 +170,12 @@ export interface Setup extends OpenPage {
   daemon: Daemon;
 }
 
-type It = (name: string, run: (at: Setup) => Promise<void>) => void;
+type It = (name: string, run: (at: Setup) => Promise<void>, more?: string[]) => void;
 
 // A browser and a daemon for the tests of a file, with a fresh page for each of them, that may have no
-// faults. `it` gives them to a test; `at` is to be taken apart inside of one.
-export function setup(options: Parameters<Browser['newPage']>[0] = {}): { at: Setup; it: It } {
+// faults. `it` gives them to a test, `alone` gives it a daemon of its own, which may have more options; `at` is to be taken
+// apart inside of one.
+export function setup(options: Parameters<Browser['newPage']>[0] = {}): { at: Setup; it: It; alone: It } {
   const made = {} as Setup;
   beforeAll(async () => {
     made.browser = await startBrowser();
@@ -186,7 +192,22 @@ export function setup(options: Parameters<Browser['newPage']>[0] = {}): { at: Se
     await made.page.close();
     expect(made.faults).toEqual([]);
   });
-  return { at: made, it: (name, run) => test(name, () => run(made)) };
+  const runAlone = async (run: (at: Setup) => Promise<void>, more: string[]): Promise<void> => {
+    const daemon = await Daemon.start(undefined, undefined, more);
+    try {
+      const { page, faults } = await openPage(made.browser, daemon.url, options);
+      await run({ ...made, daemon, page, faults });
+      await page.close();
+      expect(faults).toEqual([]);
+    } finally {
+      await daemon.remove();
+    }
+  };
+  return {
+    at: made,
+    it: (name, run) => test(name, () => run(made)),
+    alone: (name, run, more = []) => test(name, () => runAlone(run, more)),
+  };
 }
 
 // The job whose page is open.
@@ -341,6 +362,16 @@ export async function drag(page: Page, from: readonly [number, number], to: read
   await page.mouse.down();
   await page.mouse.move(...to, { steps });
   await page.mouse.up();
+}
+
+// Measures between two points so far left and right of the middle of the view, and gives what its label says.
+export async function measured(page: Page, reach: number): Promise<string> {
+  await page.keyboard.press('m');
+  const { x, y, width, height } = await boxOf(page.locator('.viewport'));
+  for (const side of [-reach, reach]) await page.mouse.click(x + width / 2 + side, y + height / 2);
+  const label = page.locator('.ruler-labels span');
+  await expect.poll(() => label.count()).toBe(1);
+  return label.innerText();
 }
 
 // Waits until the surfaces are drawn as they are to be seen.

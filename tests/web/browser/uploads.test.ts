@@ -5,9 +5,9 @@ import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { describe, expect, test } from 'vitest';
 import { ctSlice, seriesNifti } from './files';
-import { ballNrrd, Daemon, drop, keepNotices, openPage, setup } from './support';
+import { ballNrrd, drop, keepNotices, setup } from './support';
 
-const { at, it } = setup();
+const { at, it, alone } = setup();
 const volumePage = /#\/volumes\/[0-9a-f]{64}/;
 
 // The bodies of uploads wait until they are let through.
@@ -224,28 +224,17 @@ describe('what was uploaded and refused', () => {
 });
 
 describe('what fails for want of a connection', () => {
-  it('promises nothing that the page does not do', async ({ browser }) => {
-    const other = await Daemon.start();
-    try {
-      const volume = await other.upload(ballNrrd(24, 8, 31));
-      const { page } = await openPage(browser, other.url);
-      await page.goto(`${other.url}/#/volumes/${volume}?iso=100`);
-      await expect.poll(() => page.locator('.estimate dl').count()).toBe(1);
-      await other.kill();
-      await page.getByRole('button', { name: 'Make the surface' }).click();
-      const refusal = page.locator('.panel .refusal');
-      await expect.poll(() => refusal.count()).toBe(1);
-      expect(await refusal.innerText()).not.toContain('automatically');
-      const again = await Daemon.start(other.data, new URL(other.url).host);
-      try {
-        await refusal.getByRole('button', { name: 'Try again' }).click();
-        await page.waitForURL(/#\/jobs\//);
-        await page.close();
-      } finally {
-        await again.kill();
-      }
-    } finally {
-      await other.remove();
-    }
+  alone('promises nothing that the page does not do', async ({ daemon, page }) => {
+    const volume = await daemon.upload(ballNrrd(24, 8, 31));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+    await expect.poll(() => page.locator('.estimate dl').count()).toBe(1);
+    await daemon.kill();
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    const refusal = page.locator('.panel .refusal');
+    await expect.poll(() => refusal.count()).toBe(1);
+    expect(await refusal.innerText()).not.toContain('automatically');
+    await daemon.restart();
+    await refusal.getByRole('button', { name: 'Try again' }).click();
+    await page.waitForURL(/#\/jobs\//);
   });
 });
