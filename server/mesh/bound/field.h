@@ -83,7 +83,8 @@ class PlaneCrossings {
  public:
   PlaneCrossings(const Field& field, const Crossings& crossings, std::uint32_t z);
 
-  // That of a sample of the plane in a direction 1..7 in which it has one.
+  // The number of the crossing on a sample's edge of a direction 1..7. The sample must be one of
+  // this plane, and the edge must be crossed.
   std::uint32_t number_of(std::size_t sample, unsigned direction) const {
     const Sample& owner = samples_[sample - begin_];
     const unsigned before = owner.set & ((1U << direction) - 1);

@@ -29,9 +29,10 @@ struct Site {
   unsigned planes = 0;               // the faces of the volume that it stays in
 };
 
-// Its triangles are a vertex and two that follow each other in the loop around it. One that is
-// closed goes on from the last to the first; the first and the last edge of one that is open are
-// there already. Not thread safe.
+// The triangles around one vertex, which it forms with each two vertices that follow each other in
+// the loop around it. In a closed star the last vertex of the loop is followed by the first. In an
+// open star the edges to the first and the last vertex are edges that the surface already has. Not
+// thread safe.
 template <class Test>
 class Star {
  public:

@@ -42,7 +42,7 @@ class LabelIndex {
     }
   }
 
-  // The numbers of so many samples to `out`.
+  // Writes the part numbers of `count` samples to `out`.
   void translate(const T* samples, std::size_t count, PartNumber* out) const {
     for (std::size_t begin = 0; begin < count; begin += kRun) {
       translate_run(samples + begin, std::min(kRun, count - begin), out + begin);
@@ -59,7 +59,7 @@ class LabelIndex {
     PartNumber number;
   };
 
-  // Labels come in runs: most are told by one comparison for all.
+  // Neighbours mostly have the same label, so one comparison usually serves a whole run.
   void translate_run(const T* samples, std::size_t count, PartNumber* out) const {
     T value = samples[0];
     PartNumber number = number_of(value);
@@ -88,18 +88,18 @@ class LabelIndex {
   std::vector<Entry> entries_;     // where there are too many values for a table, ascending
 };
 
-// The numbers of the parts that a lattice's samples belong to, whatever their type: the walk over
-// labels is compiled once, and not once for each type. Safe to read from several threads.
+// The part number of each sample of a lattice, behind one interface for all sample types, so that
+// the walk over labels is compiled once. Immutable, so safe to read from several threads.
 class SampleParts {
  public:
   virtual ~SampleParts() = default;
 
   virtual const Dims& dims() const = 0;
-  // Those of the samples of a row to `out`.
+  // Writes the numbers of a row's samples to `out`, which has room for dims().x of them.
   virtual void copy_row(std::uint32_t y, std::uint32_t z, PartNumber* out) const = 0;
 };
 
-// `lattice` must outlive this.
+// The numbers that `parts` gives the values of `lattice`, which must outlive this.
 template <class T>
 class PartsOf final : public SampleParts {
  public:

@@ -151,10 +151,10 @@ std::size_t corner_on_edge(const LocalMesh& mesh, const Triangle& triangle) {
   return static_cast<std::size_t>(std::ranges::max_element(opposite) - opposite.begin());
 }
 
-// Collapses of vertices in one line leave triangles that are lines. Each becomes, with the one
-// beyond its longest edge, the two that this one is cut into by the corner on that edge: the same
-// surface, but for what is no area.
-// Those whose corners are all of `left` stay.
+// Removes triangles without area, which collapses along a straight line leave. The middle corner of
+// such a triangle lies on its longest edge. The triangle beyond that edge is cut in two at this
+// corner, and the flat triangle is dropped: the surface stays the same. Flat triangles whose three
+// corners are in `left` stay.
 void turn_flat_triangles(const LocalMesh& mesh, const Flags& left,
                          std::vector<Triangle>& triangles) {
   constexpr int kMostPasses = 8;
