@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/mesh/labels/label_surface.h"
-#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/label_voxels.h"
 #include "server/mesh/labels/separate.h"
 #include "server/mesh/smooth/smooth.h"
 #include "tests/bench/samples.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/label_voxels.h"
 #include "server/mesh/smooth/methods.h"
 #include "server/volume/names.h"
 

@@ -12,7 +12,7 @@
 #include "proto/types.h"
 #include "server/jobs/library/cache.h"
 #include "server/jobs/limits.h"
-#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/label_voxels.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 

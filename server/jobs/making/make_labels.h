@@ -7,7 +7,7 @@
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
-#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/label_voxels.h"
 #include "server/mesh/labels/separate.h"
 
 namespace isomesh::jobs {

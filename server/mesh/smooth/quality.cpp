@@ -11,7 +11,7 @@
 #include "server/mesh/measure/measure.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/points.h"
-#include "server/mesh/smooth/fans.h"
+#include "server/mesh/smooth/fan_moves.h"
 #include "server/mesh/smooth/rings.h"
 #include "server/mesh/smooth/sweep.h"
 

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/labels/label_surface.h"
-#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/label_voxels.h"
 #include "server/mesh/labels/separate.h"
 #include "tests/support/kernels.h"
 #include "tests/support/label_reference.h"

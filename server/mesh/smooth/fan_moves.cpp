@@ -1,9 +1,9 @@
 // Compiled once for each instruction set: this file includes itself through Highway's
 // foreach_target.h. The compiler makes wide registers of eight lanes.
-#include "server/mesh/smooth/fans.h"
+#include "server/mesh/smooth/fan_moves.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "server/mesh/smooth/fans.cpp"
+#define HWY_TARGET_INCLUDE "server/mesh/smooth/fan_moves.cpp"
 #include <algorithm>
 #include <array>
 #include <cmath>

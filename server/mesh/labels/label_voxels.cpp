@@ -1,4 +1,4 @@
-#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/label_voxels.h"
 
 #include <algorithm>
 #include <cmath>
