@@ -108,6 +108,71 @@ struct Landing {
   std::array<std::uint32_t, kLanes> home;
 };
 
+// The triangle of a ring that a way leads over.
+struct Wedge {
+  Mask is_found = {};
+  Mask side = {};    // the number of its first corner in the ring
+  Lanes first = {};  // shares of the way along the two sides from the ring's vertex
+  Lanes second = {};
+  Lanes3 down = {};  // where the way comes down on the triangle's plane
+};
+
+// The first triangle of the ring in whose angle `way` lies, seen along the fan's normal. A ring
+// that is no graph over the tangent plane may have none.
+HWY_INLINE Wedge find_wedge(const Fan& fan, std::span<const Lanes3> ring, const Lanes3& way) {
+  Wedge wedge;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Lanes3& a = ring[i];
+    const Lanes3& b = ring[i + 1 == ring.size() ? 0 : i + 1];
+    const Lanes area = dot(fan.normal, cross(a, b));
+    const Lanes along_a = dot(fan.normal, cross(way, b));
+    const Lanes along_b = dot(fan.normal, cross(a, way));
+    const Mask is_within = (area > 0) & (along_a >= 0) & (along_b >= 0) & ~wedge.is_found;
+    const Lanes s = along_a / area;
+    const Lanes t = along_b / area;
+    wedge.first = is_within ? s : wedge.first;
+    wedge.second = is_within ? t : wedge.second;
+    wedge.down = choose(is_within, s * a + t * b, wedge.down);
+    wedge.side = is_within ? splat_int(static_cast<int>(i)) : wedge.side;
+    wedge.is_found |= is_within;
+  }
+  return wedge;
+}
+
+// The next vertex of a lane's walk from `home`: the nearer corner of the wedge, or if there is none
+// the neighbour that is nearest to where the way leads. `home` if no neighbour is nearer.
+inline std::uint32_t next_home(std::span<const std::uint32_t> around, std::uint32_t home,
+                               std::span<const Lanes3> ring, const Wedge& wedge, const Lanes3& way,
+                               std::size_t lane) {
+  if (wedge.is_found[lane] != 0) {
+    const std::size_t side = static_cast<std::size_t>(wedge.side[lane]) % around.size();
+    return around[wedge.first[lane] > wedge.second[lane] ? side : (side + 1) % around.size()];
+  }
+  const auto square = [](float x, float y, float z) { return x * x + y * y + z * z; };
+  std::uint32_t next = home;
+  float nearest = square(way.x[lane], way.y[lane], way.z[lane]);
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    const float distance = square(way.x[lane] - ring[i].x[lane], way.y[lane] - ring[i].y[lane],
+                                  way.z[lane] - ring[i].z[lane]);
+    if (distance < nearest) next = around[i];
+    nearest = std::min(nearest, distance);
+  }
+  return next;
+}
+
+// Rounds a landing to the precision in which it will be stored. Rejects landings that are too far
+// from where the vertex was extracted.
+HWY_INLINE void finish(const FanMoves& moves, const Fan& fan, const Lanes3& target,
+                       Landing& landing) {
+  // A move in the tangent plane keeps the enclosed volume, and coming down would not.
+  const Lanes3 above = target - landing.at;
+  const Lanes near = kNearSurface * fan.mean_length;
+  landing.at = choose(dot(above, above) <= near * near, target, landing.at);
+  landing.at = (fan.at + landing.at) - fan.at;
+  const Lanes3 moved = landing.at + fan.at - gather(moves.extracted, fan.vertices);
+  landing.is_there &= dot(moved, moved) <= splat(moves.max_displacement * moves.max_displacement);
+}
+
 // Walks on the extracted surface towards `target`, from ring to ring, and comes down along the
 // fan's normal. A walk that reaches the boundary, or takes too long, ends within the last ring.
 HWY_INLINE Landing land(const FanMoves& moves, const Fan& fan, const Lanes3& target) {
@@ -116,57 +181,24 @@ HWY_INLINE Landing land(const FanMoves& moves, const Fan& fan, const Lanes3& tar
     landing.home[lane] = moves.home[fan.vertices[lane]];
   }
   Mask open = fan.live;
-  std::array<Lanes3, Rings::kMostNeighbors> ring;
+  std::array<Lanes3, Rings::kMostNeighbors> ring_room;
   for (int walk = 0; walk < kMostWalks && any(open); ++walk) {
     const Lanes3 home = gather(moves.extracted, landing.home) - fan.at;
     const std::size_t size = gather_ring(moves.rings, moves.extracted, landing.home, home + fan.at,
-                                         ring.data(), nullptr);
+                                         ring_room.data(), nullptr);
+    const auto ring = std::span<const Lanes3>(ring_room).first(size);
     const Lanes3 way = target - home;
-    Mask found = {};
-    Mask found_at = {};
-    Lanes first = {};  // shares of the way along the wedge's sides
-    Lanes second = {};
-    Lanes3 down = {};
-    for (std::size_t i = 0; i < size; ++i) {
-      const Lanes3& a = ring[i];
-      const Lanes3& b = ring[i + 1 == size ? 0 : i + 1];
-      const Lanes area = dot(fan.normal, cross(a, b));
-      const Lanes along_a = dot(fan.normal, cross(way, b));
-      const Lanes along_b = dot(fan.normal, cross(a, way));
-      const Mask is_within = (area > 0) & (along_a >= 0) & (along_b >= 0) & ~found;
-      const Lanes s = along_a / area;
-      const Lanes t = along_b / area;
-      first = is_within ? s : first;
-      second = is_within ? t : second;
-      down = choose(is_within, s * a + t * b, down);
-      found_at = is_within ? splat_int(static_cast<int>(i)) : found_at;
-      found |= is_within;
-    }
-    const Lanes length = first + second;
+    const Wedge wedge = find_wedge(fan, ring, way);
+    const Lanes length = wedge.first + wedge.second;
     const bool is_last = walk + 1 == kMostWalks;
-    Mask ends = open & found & (length <= 1);
+    Mask ends = open & wedge.is_found & (length <= 1);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (open[lane] == 0 || ends[lane] != 0) continue;
-      const auto around = moves.rings.around(landing.home[lane]);
-      std::uint32_t next = landing.home[lane];
-      if (found[lane] != 0) {
-        const std::size_t side = static_cast<std::size_t>(found_at[lane]) % around.size();
-        next = around[first[lane] > second[lane] ? side : (side + 1) % around.size()];
-      } else {
-        // The ring is no graph over the tangent plane: on to the vertex that is nearest.
-        const auto square = [&](float x, float y, float z) { return x * x + y * y + z * z; };
-        float nearest = square(way.x[lane], way.y[lane], way.z[lane]);
-        for (std::size_t i = 0; i < around.size(); ++i) {
-          const float distance =
-              square(way.x[lane] - ring[i].x[lane], way.y[lane] - ring[i].y[lane],
-                     way.z[lane] - ring[i].z[lane]);
-          if (distance < nearest) next = around[i];
-          nearest = std::min(nearest, distance);
-        }
-      }
-      if (!is_last && next != landing.home[lane] && moves.rings.has_ring(next)) {
+      const std::uint32_t from = landing.home[lane];
+      const std::uint32_t next = next_home(moves.rings.around(from), from, ring, wedge, way, lane);
+      if (!is_last && next != from && moves.rings.has_ring(next)) {
         landing.home[lane] = next;
-      } else if (found[lane] != 0) {
+      } else if (wedge.is_found[lane] != 0) {
         ends[lane] = -1;
       } else {
         open[lane] = 0;
@@ -174,18 +206,11 @@ HWY_INLINE Landing land(const FanMoves& moves, const Fan& fan, const Lanes3& tar
     }
     constexpr float kWithin = 0.9F;
     const Lanes shorter = length > 1 ? kWithin / length : splat(1);
-    landing.at = choose(ends, home + shorter * down, landing.at);
+    landing.at = choose(ends, home + shorter * wedge.down, landing.at);
     landing.is_there |= ends;
     open &= ~ends;
   }
-  // A move in the tangent plane keeps the enclosed volume, and coming down would not.
-  const Lanes3 above = target - landing.at;
-  const Lanes near = kNearSurface * fan.mean_length;
-  landing.at = choose(dot(above, above) <= near * near, target, landing.at);
-  // Rounds to the precision in which the position will be stored.
-  landing.at = (fan.at + landing.at) - fan.at;
-  const Lanes3 moved = landing.at + fan.at - gather(moves.extracted, fan.vertices);
-  landing.is_there &= dot(moved, moved) <= splat(moves.max_displacement * moves.max_displacement);
+  finish(moves, fan, target, landing);
   return landing;
 }
 
