@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/dicom_uid.h"
 #include "server/hospital/protocol/orders.h"
 #include "tests/support/errors.h"
 
