@@ -47,9 +47,9 @@ std::optional<double> place_of(const std::vector<Vector3>& indices, double spaci
   const auto [low, high] =
       std::ranges::minmax(indices, {}, [](const Vector3& index) { return index[2]; });
   constexpr double kFlat = 0.2;  // slices
-  constexpr double kFlat_mm = 0.1;
+  constexpr double kFlatMm = 0.1;
   const double extent = high[2] - low[2];
-  if (!(extent <= std::max(kFlat, kFlat_mm / spacing))) return std::nullopt;
+  if (!(extent <= std::max(kFlat, kFlatMm / spacing))) return std::nullopt;
   const double middle = (low[2] + high[2]) / 2;
   const double nearest = std::round(middle);
   return std::abs(middle - nearest) <= kSameSlice ? nearest : middle;

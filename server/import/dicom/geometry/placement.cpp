@@ -143,7 +143,7 @@ std::vector<Placed> placed_along_normal(std::span<const Slice> slices) {
 std::vector<std::size_t> position_starts(std::span<const Placed> placed) {
   std::vector<std::size_t> starts = {0};
   for (std::size_t i = 1; i < placed.size(); ++i) {
-    if (placed[i].along - placed[i - 1].along > kSamePlace_mm) starts.push_back(i);
+    if (placed[i].along - placed[i - 1].along > kSamePlaceMm) starts.push_back(i);
   }
   return starts;
 }

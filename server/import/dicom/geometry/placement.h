@@ -14,7 +14,7 @@ namespace isomesh::import::dicom {
 // Positions are often written with one or two decimals.
 inline constexpr double kPlaceTolerance = 0.05;
 // Slices within this distance are at one position.
-inline constexpr double kSamePlace_mm = 1e-3;
+inline constexpr double kSamePlaceMm = 1e-3;
 
 struct Placed {
   Slice slice;
