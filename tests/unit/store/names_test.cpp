@@ -10,8 +10,9 @@ namespace {
 TEST(NamesInSql, BecomeTheNumbersOfTheTables) {
   EXPECT_EQ(with_numbers("state = {job.queued} OR state < {job.final}"), "state = 0 OR state < 2");
   EXPECT_EQ(with_numbers("SELECT ?1"), "SELECT ?1");
-  EXPECT_EQ(with_numbers("{stage.done}"), "7");
-  EXPECT_EQ(with_numbers("record = '{}' AND stage = {stage.done}"), "record = '{}' AND stage = 7");
+  EXPECT_EQ(with_numbers("{stage.done}"), "'done'");
+  EXPECT_EQ(with_numbers("record = '{}' AND stage = {stage.done}"),
+            "record = '{}' AND stage = 'done'");
 }
 
 TEST(NamesInSql, AnUnknownOneIsAnError) {
