@@ -14,10 +14,9 @@
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
-#include "tests/support/regular_reference.h"
 #include "tests/support/shapes.h"
 #include "tests/support/step.h"
-#include "tests/unit/mesh/bcc_reference.h"
+#include "tests/unit/mesh/reference_surface.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -33,32 +32,8 @@ std::vector<ExtractOptions> bcc_options(double iso) {
 
 template <class T>
 void expect_bcc_surface(const SampleVolume<T>& volume, const ExtractOptions& options) {
-  SCOPED_TRACE(testing::Message() << volume.dims.x << "x" << volume.dims.y << "x" << volume.dims.z
-                                  << ", iso " << options.iso << ", close " << options.close << ", "
-                                  << to_string(options.interpolation));
-  const Lattice<T> lattice = volume.lattice();
-  const test::BccReference reference = test::bcc_reference(lattice, options);
-  const SurfaceCount count = count_surface(lattice, options, {});
-  ASSERT_EQ(count.vertices(), reference.vertices.size());
-  ASSERT_EQ(count.triangles(), reference.triangles());
-  Mesh mesh;
-  extract_surface(lattice, options, count, {}, mesh);
-  ASSERT_TRUE(test::matches(mesh, reference, lattice));
-  ExtractOptions regularized = options;
-  regularized.regularize = true;
-  const SurfaceCount fewer = count_surface(lattice, regularized, {});
-  Mesh regular;
-  extract_surface(lattice, regularized, fewer, {}, regular);
-  ASSERT_EQ(regular.layer_vertices, fewer.layer_vertices);
-  ASSERT_EQ(regular.layer_triangles, fewer.layer_triangles);
-  ASSERT_TRUE(test::is_joined(regular, mesh, test::bcc_clusters(lattice, options, reference)));
-  const test::Surface surface = test::surface_of(mesh);
-  ASSERT_TRUE(test::is_sound(surface));
-  if (options.close) {
-    ASSERT_TRUE(test::topology_of(surface).boundary_edges.empty());
-  } else {
-    ASSERT_TRUE(test::boundary_is_on_border(surface, volume.dims, lattice.to_space));
-  }
+  ASSERT_NO_FATAL_FAILURE(expect_reference_surface(volume, options));
+  expect_regular_surface(volume, options);
 }
 
 // All ways to extract. Stops at the first that fails.
@@ -147,7 +122,7 @@ TEST(BccFloats, TheSignIsTakenBeforeTheMeanIsRounded) {
   auto volume = test::constant<float>(1, {2, 2, 2});
   volume.samples[0] = 1 - 0x1p-23F;
   const ExtractOptions options = {.iso = 1, .scheme = Scheme::kBcc};
-  const test::BccReference reference = test::bcc_reference(volume.lattice(), options);
+  const auto reference = test::scalar_surface(test::in_doubles(volume).lattice(), options);
   const SurfaceCount count = count_surface(volume.lattice(), options, {});
   EXPECT_EQ(count.vertices(), reference.vertices.size());
   volume.samples[0] = 1;

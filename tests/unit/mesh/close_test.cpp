@@ -68,7 +68,7 @@ void expect_closed(const Mesh& mesh, const Dims& dims, const LatticeToSpace& map
 template <class T>
 void expect_closed_reference_surface(const SampleVolume<T>& volume, const ExtractOptions& options) {
   SCOPED_TRACE(describe(volume.dims, options));
-  test::ReferenceMesh reference;
+  test::ScalarSurface reference;
   Mesh mesh;
   ASSERT_NO_FATAL_FAILURE(extract_as_reference(volume, options, reference, mesh));
   expect_closed(mesh, volume.dims, volume.lattice().to_space);

@@ -9,14 +9,20 @@ std::vector<ExtractOptions> all_options(double iso, bool close) {
           {iso, Scheme::kSix, Interpolation::kMidpoint, close}};
 }
 
+ExtractOptions regularized(ExtractOptions options) {
+  options.regularize = true;
+  return options;
+}
+
 std::string describe(const Dims& dims, const ExtractOptions& options) {
   std::ostringstream text;
   text << dims.x << "x" << dims.y << "x" << dims.z << ", iso " << options.iso << ", scheme "
-       << static_cast<int>(options.scheme) << ", " << to_string(options.interpolation);
+       << to_string(options.scheme) << ", " << to_string(options.interpolation)
+       << (options.close ? ", closed" : "");
   return text.str();
 }
 
-void expect_extent(const test::Surface& surface, const test::ReferenceMesh& reference,
+void expect_extent(const test::Surface& surface, const test::ScalarSurface& reference,
                    const ExtractOptions& options) {
   const test::ExtentFacts expected =
       test::extent_of(reference.surface(), reference.to_space.origin);

@@ -1,4 +1,4 @@
-// That what the kernels extract is the surface of the brute-force reference.
+// That what the kernels extract is the scalar surface (tests/support/scalar_surface.h).
 #pragma once
 
 #include <algorithm>
@@ -10,9 +10,10 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/extract/extract.h"
+#include "tests/support/joined.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
-#include "tests/support/reference.h"
+#include "tests/support/scalar_surface.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::mesh {
@@ -23,35 +24,57 @@ std::vector<ExtractOptions> all_options(double iso, bool close = false);
 std::string describe(const Dims& dims, const ExtractOptions& options);
 
 // Area and volume as the reference has them, but for the small way that vertices may be moved.
-void expect_extent(const test::Surface& surface, const test::ReferenceMesh& reference,
+void expect_extent(const test::Surface& surface, const test::ScalarSurface& reference,
                    const ExtractOptions& options);
+
+ExtractOptions regularized(ExtractOptions options);
 
 // Extracts, and expects the reference's vertices and triangles in the layers that were counted.
 template <class T>
 void extract_as_reference(const test::SampleVolume<T>& volume, const ExtractOptions& options,
-                          test::ReferenceMesh& reference, Mesh& mesh) {
+                          test::ScalarSurface& reference, Mesh& mesh) {
+  reference = test::scalar_surface(test::in_doubles(volume).lattice(), options);
   const Lattice<T> lattice = volume.lattice();
-  reference = test::reference_surface(lattice, options);
   const SurfaceCount count = count_surface(lattice, options, {});
-  EXPECT_EQ(count.vertices(), reference.vertices.size());
-  EXPECT_EQ(count.triangles(), reference.triangles());
+  ASSERT_EQ(count.layer_vertices, reference.layer_vertices);
+  ASSERT_EQ(count.layer_triangles, reference.layer_triangles);
   extract_surface(lattice, options, count, {}, mesh);
   EXPECT_EQ(mesh.origin, lattice.to_space.origin);
-  EXPECT_EQ(mesh.layer_vertices, count.layer_vertices);
-  EXPECT_EQ(mesh.layer_triangles, count.layer_triangles);
   ASSERT_TRUE(test::matches(mesh, reference));
 }
 
 template <class T>
 void expect_reference_surface(const test::SampleVolume<T>& volume, const ExtractOptions& options) {
   SCOPED_TRACE(describe(volume.dims, options));
-  test::ReferenceMesh reference;
+  test::ScalarSurface reference;
   Mesh mesh;
   ASSERT_NO_FATAL_FAILURE(extract_as_reference(volume, options, reference, mesh));
   const test::Surface surface = test::surface_of(mesh);
   EXPECT_TRUE(test::is_sound(surface));
-  EXPECT_TRUE(test::boundary_is_on_border(surface, volume.dims, volume.lattice().to_space));
-  expect_extent(surface, reference, options);
+  if (options.close) {
+    EXPECT_TRUE(test::topology_of(surface).boundary_edges.empty());
+  } else {
+    EXPECT_TRUE(test::boundary_is_on_border(surface, volume.dims, volume.lattice().to_space));
+    expect_extent(surface, reference, options);
+  }
+}
+
+// Regularised, it is the reference's, too. Vertices that nothing joins stay where they were, and so
+// does the topology.
+template <class T>
+void expect_regular_surface(const test::SampleVolume<T>& volume, const ExtractOptions& options) {
+  SCOPED_TRACE(describe(volume.dims, options));
+  test::ScalarSurface reference;
+  Mesh regular;
+  ASSERT_NO_FATAL_FAILURE(extract_as_reference(volume, regularized(options), reference, regular));
+  const Mesh plain = test::extracted(volume, options);
+  const std::vector<std::uint32_t>& to = reference.becomes;
+  ASSERT_EQ(to.size(), plain.positions.size());
+  for (std::size_t v = 0; v < to.size(); ++v) {
+    if (reference.vertices[to[v]].crossings.size() > 1) continue;
+    ASSERT_EQ(plain.positions[v], regular.positions[to[v]]) << "vertex " << v << " has moved";
+  }
+  ASSERT_TRUE(test::has_topology(regular.triangles.span(), plain.triangles.span(), to));
 }
 
 // All four ways. Stops at the first that fails: one is enough to read.

@@ -10,7 +10,6 @@
 
 #include "server/mesh/extract/extract.h"
 #include "tests/support/any_threads.h"
-#include "tests/support/regular_reference.h"
 #include "tests/support/step.h"
 #include "tests/unit/mesh/reference_surface.h"
 
@@ -18,25 +17,6 @@ namespace isomesh::mesh {
 namespace {
 
 using test::SampleVolume;
-
-ExtractOptions regularized(ExtractOptions options) {
-  options.regularize = true;
-  return options;
-}
-
-template <class T>
-void expect_regular_surface(const SampleVolume<T>& volume, const ExtractOptions& options) {
-  SCOPED_TRACE(describe(volume.dims, options));
-  const Lattice<T> lattice = volume.lattice();
-  const auto clusters = test::regular_clusters(lattice, options);
-  const Mesh plain = test::extracted(volume, options);
-  const SurfaceCount count = count_surface(lattice, regularized(options), {});
-  Mesh regular;
-  extract_surface(lattice, regularized(options), count, {}, regular);
-  EXPECT_EQ(regular.layer_vertices, count.layer_vertices);
-  EXPECT_EQ(regular.layer_triangles, count.layer_triangles);
-  ASSERT_TRUE(test::is_joined(regular, plain, clusters));
-}
 
 std::vector<ExtractOptions> all_ways(double iso) {
   std::vector<ExtractOptions> ways = all_options(iso, false);
