@@ -79,6 +79,28 @@ struct BccFaceWords {
   Word faces = 0;                   // those that exist and have points on both sides
 };
 
+// The slots of 64 records whose edges have vertices of their own, kept from numbering a row for
+// writing triangles.
+struct BccCells {
+  // Returns the records that own some of `edges`, a word for each slot.
+  Word keep(const std::array<Word, kBccSlots>& edges) {
+    crossed = ~Word{0};
+    BitWords words;
+    Word owners = 0;
+    for (std::size_t half = 0; half < slots.size(); ++half) {
+      std::copy_n(edges.begin() + half * 8, 8, words.begin());
+      for (const Word word : words) owners |= word;
+      slots[half] = transpose(words);
+    }
+    last = edges[16];
+    return owners | last;
+  }
+
+  Word crossed = 0;  // not 0 if cells of the word may have triangles
+  std::array<BitBytes, 2> slots;
+  Word last = 0;  // slot 16
+};
+
 // One row of cells with the signs of its samples and of the centres that its edges lead to.
 class BccRow {
  public:
@@ -117,6 +139,23 @@ class BccRow {
   // Quick test on the signs alone: false when nothing of word w is crossed.
   HWY_INLINE bool may_cross(std::size_t w) const { return have_both_signs(looked_at_, w); }
 
+  // The records of word w that own a vertex.
+  Word describe(std::size_t w, BccCells& cells) const {
+    return cells.keep(crossed_edges(w, corners(w)));
+  }
+
+  // Lists the places of the vertices that the record at x owns, which is `bit` of the word that
+  // `cells` are of. Eight places more are written, and only those before what is returned are
+  // valid.
+  HWY_INLINE static std::uint32_t* list(std::size_t x, unsigned bit, const BccCells& cells,
+                                        std::uint32_t* next) {
+    const auto first = static_cast<std::uint32_t>(x * kBccPlaces);
+    next = list_members(first, cells.slots[0][bit], next);
+    next = list_members(first + 8, cells.slots[1][bit], next);
+    if ((cells.last >> bit & 1) != 0) *next++ = first + 16;
+    return next;
+  }
+
   HWY_INLINE CornerWords corners(std::size_t w) const {
     CornerWords corners;
     for (std::size_t r = 0; r < 4; ++r) {
@@ -132,11 +171,12 @@ class BccRow {
       for (const BccSide side : kBccSides) {
         const BccFaceWords words = faces(w, axis, side, corners);
         if (words.faces == 0) continue;
-        const bool inner = side == BccSide::kInner;
-        for (std::size_t t = 0; t < (inner ? 4 : 2); ++t) {
-          const auto& tetrahedron = (inner ? kBccInnerTetrahedra : kBccBorderTetrahedra)[t];
-          count += count_in_tetrahedron(words.points, tetrahedron, words.faces);
-        }
+        const auto count_all = [&](const auto& tetrahedra) {
+          for (const Tetrahedron& tetrahedron : tetrahedra) {
+            count += count_in_tetrahedron(words.points, tetrahedron, words.faces);
+          }
+        };
+        side == BccSide::kInner ? count_all(kBccInnerTetrahedra) : count_all(kBccBorderTetrahedra);
       }
     }
     if (const Word cells = split_in_six(w); cells != 0) {
@@ -256,92 +296,6 @@ class BccRow {
   bool has_next_z_;   // in the row above
   bool has_last_y_;
   bool has_last_z_;
-};
-
-// The signs of the planes around the one that is worked on, each found once as z rises.
-class BccField {
- public:
-  using Marched = Extraction;
-
-  BccField(const Extraction& extraction, std::uint32_t first)
-      : extraction_(extraction),
-        shape_(extraction),
-        words_(words_of(extraction.dims.x)),
-        uncertain_(words_),
-        next_samples_(first),
-        next_centres_(first) {
-    for (std::size_t n = 0; n < kSamplePlanes; ++n) samples_.emplace_back(extraction.dims);
-    for (std::size_t n = 0; n < kCentrePlanes; ++n) centres_.emplace_back(extraction.dims);
-  }
-
-  const BccShape& shape() const { return shape_; }
-
-  // Finds what rows of plane z need. Afterwards rows of z - 1 and z can be asked for.
-  void reach(std::uint32_t z) {
-    const std::uint32_t end = extraction_.dims.z;
-    for (; next_samples_ <= z + 2 && next_samples_ < end; ++next_samples_) {
-      classify(extraction_, next_samples_, samples_[next_samples_ % kSamplePlanes]);
-    }
-    for (; next_centres_ <= z + 1 && next_centres_ + 1 < end; ++next_centres_) {
-      if (shape_.has_plane(next_centres_)) find_centres(next_centres_);
-    }
-  }
-
-  BccRow row(std::uint32_t y, std::uint32_t z) const {
-    const std::uint32_t above = std::min(z + 1, extraction_.dims.z - 1);
-    const SignPlane& here = centres_[z % kCentrePlanes];
-    const SignPlane& next = centres_[(z + 1) % kCentrePlanes];
-    const std::uint32_t behind = std::min(y + 1, extraction_.dims.y - 1);
-    return {extraction_,
-            shape_,
-            samples_[z % kSamplePlanes],
-            samples_[above % kSamplePlanes],
-            {here.row(y), here.row(behind), next.row(y)},
-            y,
-            z};
-  }
-
- private:
-  static constexpr std::uint32_t kSamplePlanes = 4;
-  static constexpr std::uint32_t kCentrePlanes = 3;
-
-  // Rounding is monotone, so the mean of samples on one side is on that side. Only the other means
-  // are computed.
-  void find_centres(std::uint32_t z) {
-    const SignPlane& low = samples_[z % kSamplePlanes];
-    const SignPlane& high = samples_[(z + 1) % kSamplePlanes];
-    const std::uint32_t margin = extraction_.margin;
-    for (std::uint32_t y = 0; y + 1 < extraction_.dims.y; ++y) {
-      if (!shape_.has_row(y, z)) continue;
-      const std::array rows = {low.row(y), low.row(y + 1), high.row(y), high.row(y + 1)};
-      Word* out = centres_[z % kCentrePlanes].row(y);
-      Word mixed = 0;
-      for (std::size_t w = 0; w < words_; ++w) {
-        Word any = 0;
-        Word all = ~Word{0};
-        for (const Word* row : rows) {
-          const Word next = next_bits(row, w);
-          any |= row[w] | next;
-          all &= row[w] & next;
-        }
-        const Word cells = shape_.along_x(w).cells;
-        out[w] = all & cells;
-        uncertain_[w] = any & ~all & cells;
-        mixed |= uncertain_[w];
-      }
-      if (mixed != 0)
-        extraction_.samples->add_centres(y - margin, z - margin, margin, uncertain_, out);
-    }
-  }
-
-  const Extraction& extraction_;
-  const BccShape shape_;
-  const std::size_t words_;
-  std::vector<SignPlane> samples_;
-  std::vector<SignPlane> centres_;
-  std::vector<Word> uncertain_;
-  std::uint32_t next_samples_;
-  std::uint32_t next_centres_;
 };
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

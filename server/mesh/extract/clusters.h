@@ -37,7 +37,8 @@ struct JoinedPoints {
   std::uint64_t centres = 0;
 };
 
-// The joined crossings of one plane of samples. Empty if there are none.
+// The joined crossings of one plane of samples. Empty if there are none. On the body-centred
+// lattice a row of samples and a row of centres follow each other.
 struct ClusterLayer {
   std::vector<JoiningWord> words;        // row by row
   std::vector<std::uint32_t> row_begin;  // how many words are before each row, and all
@@ -51,9 +52,9 @@ struct ClusterLayer {
   std::uint64_t vertices_below = 0;
   std::uint64_t triangles_below = 0;
 
-  std::span<const JoiningWord> row(std::uint32_t y) const {
+  std::span<const JoiningWord> row(std::size_t row) const {
     if (words.empty()) return {};
-    return std::span(words).subspan(row_begin[y], row_begin[y + 1] - row_begin[y]);
+    return std::span(words).subspan(row_begin[row], row_begin[row + 1] - row_begin[row]);
   }
 };
 

@@ -10,6 +10,7 @@
 
 #include "proto/samples.h"
 #include "server/mesh/extract/slab_passes.h"
+#include "server/mesh/lattice/bcc_faces.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -28,11 +29,6 @@ std::optional<T> smallest_inside(double iso) {
                ? nearest
                : std::nextafter(nearest, std::numeric_limits<T>::infinity());
   }
-}
-
-std::size_t places_of(const ExtractOptions& options) {
-  if (options.scheme != Scheme::kBcc) return kEdgePlaces;
-  return options.regularize ? kRegularBccPlaces : kBccPlaces;
 }
 
 }  // namespace
@@ -106,7 +102,8 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
 
   Extraction extraction(lattice, options, *smallest);
   if (options.regularize) extraction.keep(count.clusters);
-  write_pass(extraction, places_of(options), context, mesh, mesh);
+  const std::size_t places = options.scheme == Scheme::kBcc ? kBccPlaces : kEdgePlaces;
+  write_pass(extraction, places, context, mesh, mesh);
 }
 
 #define ISOMESH_INSTANTIATE(T, name, kType)                                                      \

@@ -27,14 +27,19 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 
 // The edges that 64 samples own, by place: those whose crossing belongs to a cluster of the first
 // end, and of the second.
+template <std::size_t kPlaces>
 struct JoinedWords {
-  std::array<Word, kEdgePlaces> first = {};
-  std::array<Word, kEdgePlaces> second = {};
+  std::array<Word, kPlaces> first = {};
+  std::array<Word, kPlaces> second = {};
 };
 
+// `kKinds`: how many rows of points that join crossings belong to each row of samples.
+template <std::size_t kPlaces, std::size_t kKinds>
 class JoinedEdges {
  public:
-  JoinedEdges(const Dims& dims, std::uint32_t first, const Links& links)
+  using Words = JoinedWords<kPlaces>;
+
+  JoinedEdges(const Dims& dims, std::uint32_t first, const LinksOfKinds<kKinds>& links)
       : rows_in_plane_(dims.y),
         rows_(2 * std::size_t{dims.y} + 4),
         words_(words_of(dims.x)),
@@ -44,7 +49,7 @@ class JoinedEdges {
 
   // The words of a row and one more of zeros, valid when mark() has reached the next row of the
   // next plane, until the one after that.
-  const JoinedWords* row(std::uint32_t y, std::uint32_t z) const {
+  const Words* row(std::uint32_t y, std::uint32_t z) const {
     return at(std::size_t{z} * rows_in_plane_ + y);
   }
 
@@ -52,32 +57,36 @@ class JoinedEdges {
   void mark(std::span<const ClusterLayer> clusters, std::uint32_t y, std::uint32_t z) {
     const std::size_t last = std::size_t{z + 1} * rows_in_plane_ + y + 1;
     for (; next_row_ <= last; ++next_row_) {
-      std::fill_n(at(next_row_), words_, JoinedWords{});
+      std::fill_n(at(next_row_), words_, Words{});
       const std::size_t plane = next_row_ / rows_in_plane_;
       if (plane >= clusters.size()) continue;
-      const auto row = static_cast<std::uint32_t>(next_row_ % rows_in_plane_);
-      for (const JoiningWord& word : clusters[plane].row(row)) mark_word(clusters[plane], word);
+      const std::size_t row = next_row_ % rows_in_plane_ * kKinds;
+      for (std::size_t kind = 0; kind < kKinds; ++kind) {
+        for (const JoiningWord& word : clusters[plane].row(row + kind)) {
+          mark_word(clusters[plane], word, *links_[kind]);
+        }
+      }
     }
   }
 
  private:
   // Samples own some of the edges around the samples after them in each direction.
-  void mark_word(const ClusterLayer& layer, const JoiningWord& word) {
+  void mark_word(const ClusterLayer& layer, const JoiningWord& word, const Links& links) {
     std::array<BitBytes, (kMostDirections + 7) / 8> bytes = {};
     visit_joining(layer, word, [&](unsigned bit, const Joined& joined) {
       for (std::size_t i = 0; i < bytes.size(); ++i) {
         bytes[i][bit] = static_cast<std::uint8_t>(joined.directions() >> (8 * i));
       }
     });
-    const auto directions = links_.directions();
+    const auto directions = links.directions();
     const std::array rows = {at(next_row_), at(next_row_ - 1), at(next_row_ - rows_in_plane_),
                              at(next_row_ - rows_in_plane_ - 1)};
     for (std::size_t begin = 0; begin < directions.size(); begin += 8) {
       const BitWords words = transpose(bytes[begin / 8]);
       for (std::size_t d = begin; d < std::min(begin + 8, directions.size()); ++d) {
         const LinkDirection& direction = directions[d];
-        JoinedWords* owners = rows[direction.corner >> 1] + word.word;
-        const auto mark = [&](JoinedWords& edges, Word bits) {
+        Words* owners = rows[direction.corner >> 1] + word.word;
+        const auto mark = [&](Words& edges, Word bits) {
           (direction.is_end ? edges.second : edges.first)[direction.place] |= bits;
         };
         const Word bits = words[d - begin];
@@ -91,14 +100,14 @@ class JoinedEdges {
     }
   }
 
-  const JoinedWords* at(std::size_t row) const { return &edges_[row % rows_ * (words_ + 1)]; }
-  JoinedWords* at(std::size_t row) { return &edges_[row % rows_ * (words_ + 1)]; }
+  const Words* at(std::size_t row) const { return &edges_[row % rows_ * (words_ + 1)]; }
+  Words* at(std::size_t row) { return &edges_[row % rows_ * (words_ + 1)]; }
 
   const std::size_t rows_in_plane_;
   const std::size_t rows_;  // as many as are needed, from the cells' row to the last one marked
   const std::size_t words_;
-  const Links& links_;
-  std::vector<JoinedWords> edges_;
+  const LinksOfKinds<kKinds> links_;
+  std::vector<Words> edges_;
   std::size_t next_row_;  // the first that is not marked
 };
 

@@ -52,9 +52,8 @@ struct JoiningPlace {
   std::uint32_t z = 0;
 };
 
-// `Places`: an integer with a bit for each place of a sample. `kKinds`: how many rows of points
-// that join crossings belong to each row of samples.
-template <class Places, std::uint32_t kKinds = 1>
+// `Places`: an integer with a bit for each place of a sample.
+template <class Places>
 class JoinedRows {
  public:
   JoinedRows(const Dims& dims, std::uint32_t first)
@@ -81,15 +80,13 @@ class JoinedRows {
       const auto row_y = static_cast<std::uint32_t>(next_row_ % dims_.y);
       const std::array<Places*, 4> rows = {at(next_row_), at(next_row_ - 1),
                                            at(next_row_ - dims_.y), at(next_row_ - dims_.y - 1)};
-      for (std::uint32_t row = row_y * kKinds; row < (row_y + 1) * kKinds; ++row) {
-        visit_joining(clusters, row, row_z,
-                      [&](std::uint32_t x, const Joined& joined, const JoinedPoints* points) {
-                        visit_names({x, row, row_z}, joined, points, [&](const JoinedName& name) {
-                          Places& places = rows[name.row][x - name.before];
-                          places = static_cast<Places>(places | Places{1} << name.place);
-                        });
+      visit_joining(clusters, row_y, row_z,
+                    [&](std::uint32_t x, const Joined& joined, const JoinedPoints* points) {
+                      visit_names({x, row_y, row_z}, joined, points, [&](const JoinedName& name) {
+                        Places& places = rows[name.row][x - name.before];
+                        places = static_cast<Places>(places | Places{1} << name.place);
                       });
-      }
+                    });
     }
   }
 

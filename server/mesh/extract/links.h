@@ -215,4 +215,8 @@ class Links {
 const Links& links_of(Scheme scheme);
 const Links& links_of(BccPoint point);
 
+// Those of all points that have clusters: samples, and on the body-centred lattice centres.
+template <std::size_t kKinds>
+using LinksOfKinds = std::array<const Links*, kKinds>;
+
 }  // namespace isomesh::mesh

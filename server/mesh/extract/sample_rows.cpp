@@ -79,9 +79,6 @@ class RowsOf final : public SampleRows {
         placement_(options, lattice.dims, lattice.to_space),
         // An edge from a centre to a corner takes half a step along each axis.
         half_edges_(options, std::min(2 * placement_.nearest(), kMostNearest)) {
-    for (unsigned slot = 0; slot < kBccSlots; ++slot) {
-      bcc_ends_[slot] = sample_offset(lattice.dims, bcc_end_of(slot));
-    }
     if (options.close) border_.emplace(lattice, options, smallest, placement_);
   }
 
@@ -128,12 +125,13 @@ class RowsOf final : public SampleRows {
     const T* samples = row(edges.y, edges.z) - edges.margin;
     const std::uint32_t places = edges.places;
     const auto shift = static_cast<unsigned>(std::countr_zero(places));
-    for (const std::uint32_t edge : edges.edges) {
+    write_shares(edges.edges, out, [&](std::uint32_t edge) {
       const std::uint32_t x = edge >> shift;
       const unsigned odd = (x + edges.parity) & 1;
       const auto [from, to] = edges.ends[odd * places + (edge & (places - 1))];
-      *out++ = placement_.share(samples[x + from], samples[x + to]);
-    }
+      return EdgeValues{static_cast<double>(samples[x + from]),
+                        static_cast<double>(samples[x + to]), &placement_};
+    });
   }
 
   void add_centres(std::uint32_t y, std::uint32_t z, std::uint32_t margin,
@@ -153,24 +151,21 @@ class RowsOf final : public SampleRows {
 
   void bcc_shares(const BccRowEdges& edges, double* out) const override {
     const T* samples = row(edges.y, edges.z) - edges.margin;
-    const auto [next_row, next_plane] = steps();
-    std::uint32_t known = ~std::uint32_t{0};  // the cell whose mean is `centre`
+    const std::array<std::ptrdiff_t, 2> next = steps();  // as in centre_nearness
+    const T* known = nullptr;                            // the cell whose mean is `centre`
     double centre = 0;
-    for (const std::uint32_t edge : edges.edges) {
-      const std::uint32_t x = edge / kBccSlotRange;
-      const unsigned slot = edge % kBccSlotRange;
-      const T* at = samples + x;
-      const bool from_centre = is_from_centre(slot);
-      if (from_centre && std::exchange(known, x) != x) {
-        centre = mean_of_cell(at, next_row, next_plane);
+    write_shares(edges.edges, out, [&](std::uint32_t edge) {
+      const BccEdgeSamples& ends = edges.ends[edge % kBccPlaces];
+      const T* from = samples + edge / kBccPlaces + ends.from;
+      const T* to = samples + edge / kBccPlaces + ends.to;
+      if (ends.is_from_centre && std::exchange(known, from) != from) {
+        centre = mean_of_cell(from, next[0], next[1]);
       }
-      const double from = from_centre ? centre : static_cast<double>(*at);
-      const T* end = at + bcc_ends_[slot];
-      const double to = from_centre && slot >= kBccAxisSlot
-                            ? mean_of_cell(end, next_row, next_plane)
-                            : static_cast<double>(*end);
-      *out++ = (slot < kBccAxisSlot ? half_edges_ : placement_).share(from, to);
-    }
+      return EdgeValues{
+          ends.is_from_centre ? centre : static_cast<double>(*from),
+          ends.is_to_centre ? mean_of_cell(to, next[0], next[1]) : static_cast<double>(*to),
+          ends.is_from_centre == ends.is_to_centre ? &placement_ : &half_edges_};
+    });
   }
 
   BorderVertex place_at_border(const BorderSample& cell, const EdgeEnds& ends) const override {
@@ -179,6 +174,39 @@ class RowsOf final : public SampleRows {
 
  private:
   static constexpr double kMostNearest = 0.25;
+
+  struct EdgeValues {
+    double from;
+    double to;
+    const Placement* placement;
+  };
+
+  // Shares of edges with the values that values_of(edge) has. Values are gathered first, so that
+  // the compiler can divide several at once.
+  template <class ValuesOf>
+  HWY_INLINE void write_shares(std::span<const std::uint32_t> edges, double* out,
+                               ValuesOf values_of) const {
+    constexpr std::size_t kBlock = 64;
+    std::array<double, kBlock> from;
+    std::array<double, kBlock> to;
+    std::array<double, kBlock> nearest;
+    if (placement_.is_midpoint()) {
+      std::fill_n(out, edges.size(), 0.5);
+      return;
+    }
+    for (std::size_t begin = 0; begin < edges.size(); begin += kBlock) {
+      const std::size_t count = std::min(kBlock, edges.size() - begin);
+      for (std::size_t i = 0; i < count; ++i) {
+        const EdgeValues values = values_of(edges[begin + i]);
+        from[i] = values.from;
+        to[i] = values.to;
+        nearest[i] = values.placement->nearest();
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        out[begin + i] = Placement::share<T>(iso_, from[i], to[i], nearest[i]);
+      }
+    }
+  }
 
   // rank_at(x, a Rank) for each of the samples.
   template <class RankAt>
@@ -197,17 +225,6 @@ class RowsOf final : public SampleRows {
     }
   }
 
-  // As a corner of the sample's cell.
-  static unsigned bcc_end_of(unsigned slot) {
-    if (slot < kBccAxisSlot) return slot;
-    return slot >= kBccCentreSlot && slot < kBccDiagonalSlot ? 1U << (slot - kBccCentreSlot)
-                                                             : bcc_direction_of(slot);
-  }
-
-  static bool is_from_centre(unsigned slot) {
-    return slot < kBccAxisSlot || (slot >= kBccCentreSlot && slot < kBccDiagonalSlot);
-  }
-
   // From a sample to the next ones along y and z.
   std::array<std::ptrdiff_t, 2> steps() const {
     return {sample_offset(lattice_.dims, 2), sample_offset(lattice_.dims, 4)};
@@ -223,8 +240,6 @@ class RowsOf final : public SampleRows {
   const Nearness<T> nearness_;
   const Placement placement_;
   const Placement half_edges_;  // of the body-centred lattice
-  // From a sample to that, or to the cell, at the other end of the edge of each slot.
-  std::array<std::ptrdiff_t, kBccSlots> bcc_ends_ = {};
   std::optional<BorderPlacement<T>> border_;
 };
 

@@ -31,15 +31,22 @@ struct RowEdges {
   std::span<const std::uint32_t> edges;
 };
 
-// For each sample a place in such a list is this times x, plus its slot (bcc_faces.h).
-inline constexpr std::uint32_t kBccSlotRange = 32;
+// The same on the body-centred lattice (bcc_faces.h). An end may be a centre, whose cell begins at
+// the sample.
+struct BccEdgeSamples {
+  std::ptrdiff_t from = 0;
+  std::ptrdiff_t to = 0;
+  bool is_from_centre = false;
+  bool is_to_centre = false;
+};
 
-// Crossed edges of the body-centred lattice that samples of one row own. Those of one sample are
-// best together.
+// Crossed edges of the body-centred lattice. Each is a place as in RowEdges, of kBccPlaces a
+// sample. Those of one sample are best together.
 struct BccRowEdges {
   std::uint32_t y = 0;
   std::uint32_t z = 0;
-  std::uint32_t margin = 0;  // as in RowEdges
+  std::uint32_t margin = 0;
+  const BccEdgeSamples* ends = nullptr;  // of each number
   std::span<const std::uint32_t> edges;
 };
 
@@ -75,8 +82,7 @@ class SampleRows {
   virtual void add_centres(std::uint32_t y, std::uint32_t z, std::uint32_t margin,
                            std::span<const std::uint64_t> uncertain, std::uint64_t* out) const = 0;
 
-  // Like shares(), but on the body-centred lattice. Shares count from the centre or sample that
-  // names the edge.
+  // Like shares(), but on the body-centred lattice.
   virtual void bcc_shares(const BccRowEdges& row, double* out) const = 0;
 
   // Like BorderPlacement::place. Only for a closed surface.

@@ -108,22 +108,23 @@ HWY_INLINE Word less(const Rank* a, const Rank* b) {
 #endif
 }
 
-// True if the first of two samples is nearer. `bytes`: the size of a rank.
-HWY_INLINE bool is_less(std::size_t bytes, const std::byte* a, const std::byte* b) {
-  const auto less_as = [&](auto rank) {
-    auto other = rank;
-    std::memcpy(&rank, a, sizeof rank);
-    std::memcpy(&other, b, sizeof other);
-    return rank < other;
-  };
-  if (bytes == sizeof(std::int8_t)) return less_as(std::int8_t{});
-  if (bytes == sizeof(std::int16_t)) return less_as(std::int16_t{});
-  return less_as(std::int32_t{});
+// Calls visit(a rank) with the type of ranks that have so many bytes.
+template <class Visit>
+HWY_INLINE void with_rank(std::size_t bytes, Visit visit) {
+  if (bytes == sizeof(std::int8_t)) return visit(std::int8_t{});
+  if (bytes == sizeof(std::int16_t)) return visit(std::int16_t{});
+  visit(std::int32_t{});
 }
 
 class SignClusters {
  public:
   using Marched = Extraction;
+  static constexpr std::uint32_t kKinds = 1;
+  static constexpr std::size_t kPlaces = kEdgePlaces;
+
+  static LinksOfKinds<1> links(const Extraction& extraction) {
+    return SignField::links(extraction);
+  }
 
   SignClusters(const Extraction& extraction, std::uint32_t first)
       : extraction_(extraction),
@@ -137,7 +138,7 @@ class SignClusters {
   void reach(std::uint32_t z) { field_.reach(z); }
   void open(std::uint32_t z) { nearness_.open(z); }
 
-  WordCount split_edges(std::size_t w, std::uint32_t y, std::uint32_t z, EdgeWords& out) {
+  WordCount split_edges(std::size_t w, std::uint32_t y, std::uint32_t z, EdgeWords<kPlaces>& out) {
     out.any = 0;
     const SignRow row = field_.row(y, z);
     if (!row.may_cross(w)) return {};
@@ -194,24 +195,13 @@ class SignClusters {
     }
     std::array<const std::byte*, 4> near;  // from (y, z), (y + 1, z), ... on
     for (unsigned r = 0; r < 4; ++r) near[r] = nearness(w, y + (r & 1), z + (r >> 1));
-    const auto find_with = [&](auto rank) {
+    with_rank(nearness_.rank_bytes(), [&](auto rank) {
       using Rank = decltype(rank);
       const auto at = [&](unsigned corner) {
         return reinterpret_cast<const Rank*>(near[corner >> 1]) + (corner & 1);
       };
       find([&](unsigned a, unsigned b) { return less(at(a), at(b)); });
-    };
-    switch (nearness_.rank_bytes()) {
-      case sizeof(std::int8_t):
-        find_with(std::int8_t{});
-        break;
-      case sizeof(std::int16_t):
-        find_with(std::int16_t{});
-        break;
-      default:
-        find_with(std::int32_t{});
-        break;
-    }
+    });
     return first;
   }
 

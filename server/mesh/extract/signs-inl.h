@@ -19,6 +19,7 @@
 
 #include <hwy/highway.h>
 
+#include "server/mesh/extract/links.h"
 #include "server/mesh/extract/slabs.h"
 #include "server/mesh/lattice/rows-inl.h"
 
@@ -204,6 +205,13 @@ class SignCellWriter {
   const EdgeOffsets& offsets_;
 };
 
+// An edge of a cluster: its ends, and its place, as seen from the sample that joins it.
+template <class Ends>
+struct ClusterEdge {
+  Ends ends;
+  EdgeFrame frame;
+};
+
 // The signs that the walk reads: those of the planes around the current one. Each plane is
 // classified once, as z rises.
 class SignField {
@@ -216,6 +224,12 @@ class SignField {
   static constexpr bool kHasLines = false;
   static constexpr bool kHasClusters = false;
   static constexpr bool kPlacesVertices = true;
+  // For regular-inl.h: the kinds of points that have clusters, the places of edges that clusters
+  // may have, and the places for the directions of a point.
+  static constexpr std::size_t kKinds = 1;
+  static constexpr std::size_t kJoinedPlaces = kEdgePlaces;
+  static constexpr std::uint32_t kClusterPlaces = 32;
+  using Ends = EdgeSamples;
 
   SignField(const Extraction& extraction, std::uint32_t first)
       : extraction_(extraction),
@@ -264,6 +278,32 @@ class SignField {
                                  extraction_.parity(0, y, z), ends_.data(), vertices},
                                 shares_.data());
     return [shares = shares_.data()](std::size_t i) { return shares[i]; };
+  }
+
+  static LinksOfKinds<1> links(const Extraction& extraction) {
+    return {&links_of(extraction.scheme)};
+  }
+
+  // Placed by the edge's owner, so that positions are identical to the bit.
+  ClusterEdge<Ends> cluster_edge(unsigned parity, const LinkDirection& direction) const {
+    const unsigned owner = parity ^ (std::popcount(direction.corner) & 1U);
+    const EdgeEnds ends = extraction_.splits[owner].ends[direction.place];
+    const std::ptrdiff_t to_owner = -sample_offset(extraction_.inner, direction.corner);
+    ClusterEdge<Ends> edge = {{to_owner + sample_offset(extraction_.inner, ends.from),
+                               to_owner + sample_offset(extraction_.inner, ends.to)},
+                              frame(owner, direction.place)};
+    edge.frame.start -= space_offset(extraction_.to_space, direction.corner);
+    return edge;
+  }
+
+  // The shares of edges of clusters, each kClusterPlaces * x + direction. `ends`: of each
+  // direction, those of even samples first.
+  void cluster_shares(std::uint32_t y, std::uint32_t z, const Ends* ends,
+                      std::span<const std::uint32_t> edges, double* out) const {
+    const std::uint32_t margin = extraction_.margin;
+    extraction_.samples->shares(
+        {y - margin, z - margin, margin, kClusterPlaces, extraction_.parity(0, y, z), ends, edges},
+        out);
   }
 
   BorderVertex place_at_border(std::uint32_t x, std::uint32_t y, std::uint32_t z,

@@ -1,6 +1,6 @@
-// The walk over the rows of a slab that counts, numbers and writes: one for an iso-value's signs
-// and for labels, which are two kinds of Field (signs-inl.h, labels-inl.h). Compiled once for each
-// instruction set, see slabs.cpp.
+// The walk over the rows of a slab that counts, numbers and writes: one for an iso-value's signs on
+// all lattices and for labels, which are a Field each (signs-inl.h, bcc_field-inl.h, labels-inl.h).
+// Compiled once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_SLAB_WALK_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_SLAB_WALK_INL_H_
 #undef ISOMESH_SLAB_WALK_INL_H_
@@ -8,6 +8,7 @@
 #define ISOMESH_SLAB_WALK_INL_H_
 #endif
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -25,48 +26,40 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
 // The numbered rows that cells still need: the indices of the vertices that the rows' samples own,
-// valid where there is a vertex. Cells are walked row by row, and each needs the rows around it:
-// its own, the one behind, and both of the plane above. So one plane and two rows are kept, and
-// each row that is numbered takes the place of the oldest.
-template <std::size_t kPlaces>
-class IndexRing {
+// valid where there is a vertex, and what is known of the rows' cells. Cells are walked row by row,
+// and each needs the rows around it: its own, the one behind, and both of the plane above. So one
+// plane and two rows are kept, and each row that is numbered takes the place of the oldest.
+template <class Cells, std::size_t kPlaces>
+class RowRing {
  public:
-  IndexRing(const Dims& dims, IndexMemory& memory)
-      : dims_(dims), rows_(std::size_t{dims.y} + 2), memory_(memory), indices_(memory.take()) {}
-  ~IndexRing() { memory_.give_back(std::move(indices_)); }
-  IndexRing(const IndexRing&) = delete;
-  IndexRing& operator=(const IndexRing&) = delete;
+  RowRing(const Dims& dims, IndexMemory& memory)
+      : dims_(dims),
+        rows_(std::size_t{dims.y} + 2),
+        words_(words_of(dims.x)),
+        cells_(rows_ * words_),
+        memory_(memory),
+        indices_(memory.take()) {}
+  ~RowRing() { memory_.give_back(std::move(indices_)); }
+  RowRing(const RowRing&) = delete;
+  RowRing& operator=(const RowRing&) = delete;
 
   std::uint32_t* indices(std::uint32_t y, std::uint32_t z) {
     return indices_.get() + row(y, z) * dims_.x * kPlaces;
   }
+  Cells* cells(std::uint32_t y, std::uint32_t z) { return &cells_[row(y, z) * words_]; }
+  std::size_t words() const { return words_; }
 
- protected:
+ private:
   std::size_t row(std::uint32_t y, std::uint32_t z) const {
     return (std::size_t{z} * dims_.y + y) % rows_;
   }
 
   const Dims dims_;
   const std::size_t rows_;
-
- private:
-  IndexMemory& memory_;
-  IndexMemory::Block indices_;
-};
-
-// Also what is known of the rows' cells.
-template <class Cells, std::size_t kPlaces>
-class RowRing : public IndexRing<kPlaces> {
- public:
-  RowRing(const Dims& dims, IndexMemory& memory)
-      : IndexRing<kPlaces>(dims, memory), words_(words_of(dims.x)), cells_(this->rows_ * words_) {}
-
-  Cells* cells(std::uint32_t y, std::uint32_t z) { return &cells_[this->row(y, z) * words_]; }
-  std::size_t words() const { return words_; }
-
- private:
   const std::size_t words_;
   std::vector<Cells> cells_;
+  IndexMemory& memory_;
+  IndexMemory::Block indices_;
 };
 
 // True for edges that may lie in a face of the box of a closed volume or leave it: samples there
@@ -92,7 +85,7 @@ class SlabWriter {
         rows_(marched.dims, memory),
         vertices_((std::size_t{marched.dims.x} + 1) * kPlaces) {
     for (unsigned parity = 0; parity < 2; ++parity) {
-      for (std::size_t place = 1; place < kPlaces; ++place) {
+      for (std::size_t place = 0; place < kPlaces; ++place) {
         frames_[parity][place] = field_.frame(parity, place);
       }
     }
@@ -120,9 +113,12 @@ class SlabWriter {
   // Numbers the vertices of a row's samples from `vertex` on, and places those of the slab.
   void number_row(std::uint32_t y, std::uint32_t z, std::uint32_t& vertex) {
     if constexpr (Field::kHasClusters) {
-      // Some edges of a cluster belong to samples of the rows behind and below.
-      const std::array rows = {rows_.indices(y, z), rows_.indices(y - 1, z),
-                               rows_.indices(y, z - 1), rows_.indices(y - 1, z - 1)};
+      // Some edges of a cluster belong to samples of the rows before and below. Beside the first
+      // rows there are none, and no clusters that would ask for them.
+      const std::uint32_t before = y - std::min(y, 1U);
+      const std::uint32_t below = z - std::min(z, 1U);
+      const std::array rows = {rows_.indices(y, z), rows_.indices(before, z),
+                               rows_.indices(y, below), rows_.indices(before, below)};
       Output* output = z < slab_.end ? &output_ : nullptr;
       vertex = field_.number_clusters(y, z, rows, vertex, output);
     }

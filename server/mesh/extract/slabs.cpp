@@ -10,8 +10,7 @@
 #include <hwy/highway.h>
 
 #include "server/mesh/extract/bcc_clusters-inl.h"
-#include "server/mesh/extract/bcc_regular-inl.h"
-#include "server/mesh/extract/bcc_walk-inl.h"
+#include "server/mesh/extract/bcc_field-inl.h"
 #include "server/mesh/extract/regular-inl.h"
 #include "server/mesh/extract/sign_clusters-inl.h"
 #include "server/mesh/extract/signs-inl.h"
@@ -21,21 +20,23 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
 void count_signs(const Extraction& extraction, const Slab& slab, SurfaceCount& count) {
-  if (extraction.scheme == Scheme::kBcc) {
-    return extraction.regularize ? BccClusterWalk(extraction, slab, count).count()
-                                 : count_slab_of<BccField>(extraction, slab, count);
+  const bool is_bcc = extraction.scheme == Scheme::kBcc;
+  if (extraction.regularize) {
+    return is_bcc ? ClusterWalk<BccClusters>(extraction, slab, count).count()
+                  : ClusterWalk<SignClusters>(extraction, slab, count).count();
   }
-  if (extraction.regularize) return ClusterWalk<SignClusters>(extraction, slab, count).count();
-  count_slab_of<SignField>(extraction, slab, count);
+  is_bcc ? count_slab_of<BccField>(extraction, slab, count)
+         : count_slab_of<SignField>(extraction, slab, count);
 }
 
 void write_signs(const Extraction& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh) {
-  if (extraction.scheme == Scheme::kBcc) {
-    return extraction.regularize ? BccWriter<BccRegular>(extraction, slab, memory, mesh).write()
-                                 : BccWriter<BccPlain>(extraction, slab, memory, mesh).write();
+  const bool is_bcc = extraction.scheme == Scheme::kBcc;
+  if (extraction.regularize) {
+    return is_bcc ? write_slab_of<RegularBccField>(extraction, slab, memory, mesh)
+                  : write_slab_of<RegularField>(extraction, slab, memory, mesh);
   }
-  if (extraction.regularize) return write_slab_of<RegularField>(extraction, slab, memory, mesh);
-  write_slab_of<SignField>(extraction, slab, memory, mesh);
+  is_bcc ? write_slab_of<BccField>(extraction, slab, memory, mesh)
+         : write_slab_of<SignField>(extraction, slab, memory, mesh);
 }
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE

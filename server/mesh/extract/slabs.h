@@ -114,11 +114,6 @@ class IndexMemory {
 // Places a sample, by direction, for the indices of the vertices on the edges that it owns.
 inline constexpr std::size_t kEdgePlaces = 8;
 
-// The same for the body-centred lattice: the first index and a byte for each slot (bcc_faces.h), or
-// an index for each slot where some vertices are joined.
-inline constexpr std::size_t kBccPlaces = 6;
-inline constexpr std::size_t kRegularBccPlaces = 17;
-
 // How many indices a slab works with that marches over such samples: those of one plane and two
 // rows, of so many places a sample.
 inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {

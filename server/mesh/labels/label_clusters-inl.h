@@ -42,6 +42,12 @@ namespace isomesh::mesh::HWY_NAMESPACE {
 class LabelClusters {
  public:
   using Marched = Separation;
+  static constexpr std::uint32_t kKinds = 1;
+  static constexpr std::size_t kPlaces = kEdgePlaces;
+
+  static LinksOfKinds<1> links(const Separation& separation) {
+    return {&links_of(separation.scheme)};
+  }
 
   LabelClusters(const Separation& separation, std::uint32_t first)
       : separation_(separation),
@@ -55,7 +61,8 @@ class LabelClusters {
   void reach(std::uint32_t z) { field_.reach(z); }
   void open(std::uint32_t /*z*/) {}
 
-  WordCount split_edges(std::size_t w, std::uint32_t y, std::uint32_t z, EdgeWords& out) const {
+  WordCount split_edges(std::size_t w, std::uint32_t y, std::uint32_t z,
+                        EdgeWords<kPlaces>& out) const {
     out.any = 0;
     const LabelRow row = field_.row(y, z);
     if (!row.may_cross(w)) return {};

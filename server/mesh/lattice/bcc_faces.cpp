@@ -1,6 +1,5 @@
 #include "server/mesh/lattice/bcc_faces.h"
 
-#include <algorithm>
 #include <span>
 #include <utility>
 
@@ -9,9 +8,7 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr unsigned kPoints = 6;
 constexpr unsigned kFirstCorner = 2;
-constexpr std::uint8_t kNone = 0xFF;
 
 using Place = std::array<int, 3>;  // in half cells
 
@@ -19,25 +16,24 @@ using Place = std::array<int, 3>;  // in half cells
 class FaceBuilder {
  public:
   FaceBuilder(unsigned axis, BccSide side, bool left_handed)
-      : axis_(axis), side_(side), left_handed_(left_handed) {
-    for (auto& row : numbers_) row.fill(kNone);
-    number_edges();
-  }
+      : axis_(axis), side_(side), left_handed_(left_handed) {}
 
-  BccFace build() {
-    for (unsigned inside = 0; inside < face_.cases.size(); ++inside) {
-      for (const auto& tetrahedron : tetrahedra()) add(tetrahedron, inside);
+  BccFace build() const {
+    const bool is_inner = side_ == BccSide::kInner;
+    const auto tetrahedra = is_inner ? std::span<const Tetrahedron>(kBccInnerTetrahedra)
+                                     : std::span<const Tetrahedron>(kBccBorderTetrahedra);
+    BccFace face;
+    for (unsigned inside = 0; inside < face.triangles.size(); ++inside) {
+      for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        const unsigned added = add(tetrahedra[t], inside, &face.triangles[inside][2 * t]);
+        face.present[inside] |= static_cast<std::uint8_t>(((1U << added) - 1) << 2 * t);
+      }
     }
-    return face_;
+    return face;
   }
 
  private:
-  using Points = std::array<std::uint8_t, 4>;
-
-  std::span<const Points> tetrahedra() const {
-    if (side_ == BccSide::kInner) return kBccInnerTetrahedra;
-    return std::span(kBccBorderTetrahedra).first(2);
-  }
+  using Named = std::array<std::uint8_t, 4>;
 
   // The lattice point that a point of the tables stands for.
   unsigned real(unsigned point) const { return point == 0 && side_ == BccSide::kLow ? 1 : point; }
@@ -53,26 +49,8 @@ class FaceBuilder {
     return result;
   }
 
-  // In the order of bcc_face_edges.
-  void number_edges() {
-    auto number = [this, next = std::uint8_t{0}](unsigned a, unsigned b) mutable {
-      numbers_[a][b] = numbers_[b][a] = next++;
-    };
-    if (side_ == BccSide::kInner) {
-      number(0, 1);
-    } else {
-      number(2, 4);
-    }
-    for (unsigned centre = 0; centre < kFirstCorner; ++centre) {
-      for (unsigned corner = kFirstCorner; corner < kPoints; ++corner) number(centre, corner);
-    }
-    number(2, 3);
-    number(3, 4);
-    number(4, 5);
-    number(2, 5);
-  }
-
-  void add(const Points& tetrahedron, unsigned inside) {
+  // Writes the triangles of a tetrahedron, up to two, and returns how many.
+  unsigned add(const Tetrahedron& tetrahedron, unsigned inside, Named* next) const {
     std::array<unsigned, 4> in = {};
     std::array<unsigned, 4> out = {};
     std::size_t ins = 0;
@@ -81,18 +59,21 @@ class FaceBuilder {
       const unsigned point = real(listed);
       ((inside >> point & 1) != 0 ? in[ins++] : out[outs++]) = point;
     }
-    BccFaceCase& result = face_.cases[inside];
     if (ins == 1) {
       const bool turn = volume(in[0], out[0], out[1], out[2]) < 0;
-      add_triangle(result, {in[0], out[0]}, {in[0], out[1]}, {in[0], out[2]}, turn);
-    } else if (ins == 3) {
-      const bool turn = volume(out[0], in[0], in[1], in[2]) > 0;
-      add_triangle(result, {in[0], out[0]}, {in[1], out[0]}, {in[2], out[0]}, turn);
-    } else if (ins == 2) {
-      const bool turn = volume(in[0], in[1], out[0], out[1]) < 0;
-      add_triangle(result, {in[0], out[0]}, {in[0], out[1]}, {in[1], out[1]}, turn);
-      add_triangle(result, {in[0], out[0]}, {in[1], out[1]}, {in[1], out[0]}, turn);
+      next[0] = triangle({in[0], out[0]}, {in[0], out[1]}, {in[0], out[2]}, turn);
+      return 1;
     }
+    if (ins == 3) {
+      const bool turn = volume(out[0], in[0], in[1], in[2]) > 0;
+      next[0] = triangle({in[0], out[0]}, {in[1], out[0]}, {in[2], out[0]}, turn);
+      return 1;
+    }
+    if (ins != 2) return 0;
+    const bool turn = volume(in[0], in[1], out[0], out[1]) < 0;
+    next[0] = triangle({in[0], out[0]}, {in[0], out[1]}, {in[1], out[1]}, turn);
+    next[1] = triangle({in[0], out[0]}, {in[1], out[1]}, {in[1], out[0]}, turn);
+    return 2;
   }
 
   int volume(unsigned from, unsigned a, unsigned b, unsigned c) const {
@@ -102,18 +83,18 @@ class FaceBuilder {
 
   using Ends = std::array<unsigned, 2>;
 
-  void add_triangle(BccFaceCase& result, Ends a, Ends b, Ends c, bool turn) const {
+  Named triangle(Ends a, Ends b, Ends c, bool turn) const {
     if (turn != left_handed_) std::swap(b, c);
-    result.triangles[result.triangle_count++] = {named(a), named(b), named(c)};
+    return {named(a), named(b), named(c)};
   }
 
-  std::uint8_t named(const Ends& ends) const { return numbers_[ends[0]][ends[1]]; }
+  static std::uint8_t named(const Ends& ends) {
+    return static_cast<std::uint8_t>(bcc_edge_between(ends[0], ends[1]));
+  }
 
   const unsigned axis_;
   const BccSide side_;
   const bool left_handed_;
-  BccFace face_;
-  std::array<std::array<std::uint8_t, kPoints>, kPoints> numbers_ = {};
 };
 
 BccFaces make_faces(bool left_handed) {

@@ -20,9 +20,13 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "server/mesh/lattice/tetrahedra.h"
+
 namespace isomesh::mesh {
 
 inline constexpr unsigned kBccSlots = 17;
+// What slots are counted in, for each sample: a power of two, because places are split again.
+inline constexpr unsigned kBccPlaces = 32;
 inline constexpr unsigned kBccAxisSlot = 8;
 inline constexpr unsigned kBccCentreSlot = 11;
 inline constexpr unsigned kBccDiagonalSlot = 14;
@@ -49,20 +53,6 @@ struct BccEdge {
   std::uint8_t slot = 0;
 };
 
-// The triangles around a face in one case, whose corners are places in bcc_face_edges. They are
-// wound counter-clockwise seen from outside in a right-handed lattice, clockwise in a left-handed
-// one.
-struct BccFaceCase {
-  std::uint8_t triangle_count = 0;
-  std::array<std::array<std::uint8_t, 3>, 8> triangles = {};
-};
-
-// A case is a set of inside points: bit 0 the lower cell's centre, bit 1 the upper one's, bits 2-5
-// the face's corners in cyclic order. At the border the missing centre has no meaning.
-struct BccFace {
-  std::array<BccFaceCase, 64> cases = {};
-};
-
 enum class BccSide : std::uint8_t {
   kInner,  // between two cells
   kLow,    // at the lower border: the upper cell's alone
@@ -71,18 +61,55 @@ enum class BccSide : std::uint8_t {
 
 inline constexpr std::array kBccSides = {BccSide::kInner, BccSide::kLow, BccSide::kHigh};
 
+// The sample that has the record, as a corner of the cell that writes the face's triangles: the
+// lower one, or the upper one of a face at the lower border.
+constexpr unsigned bcc_corner_of(BccRecord record, unsigned axis, BccSide side) {
+  const unsigned plane = side == BccSide::kLow ? 0 : 1U << axis;
+  switch (record) {
+    case BccRecord::kLower:
+      return 0;
+    case BccRecord::kUpper:
+      return plane;
+    case BccRecord::kSecond:
+      return plane | 1U << (axis + 1) % 3;
+    case BccRecord::kThird:
+      return plane | 1U << (axis + 2) % 3;
+  }
+  return 0;
+}
+
+// The triangles around a face by case and tetrahedron, whose corners are places in bcc_face_edges:
+// places 2 t and 2 t + 1 are those of tetrahedron t, as far as there are so many. The last byte of
+// each is idle. They are wound counter-clockwise seen from outside in a right-handed lattice,
+// clockwise in a left-handed one.
+//
+// A case is a set of inside points: bit 0 the lower cell's centre, bit 1 the upper one's, bits 2-5
+// the face's corners in cyclic order. At the border the missing centre has no meaning.
+struct BccFace {
+  std::array<std::array<std::array<std::uint8_t, 4>, 8>, 64> triangles = {};
+  std::array<std::uint8_t, 64> present = {};  // for each case a bit for each place that has one
+};
+
 // The tetrahedra of a face by the points of a case.
-using BccTetrahedra = std::array<std::array<std::uint8_t, 4>, 4>;
-inline constexpr BccTetrahedra kBccInnerTetrahedra = {
+inline constexpr std::array<Tetrahedron, 4> kBccInnerTetrahedra = {
     {{0, 1, 2, 3}, {0, 1, 3, 4}, {0, 1, 4, 5}, {0, 1, 5, 2}}};
-// At the border only the first two are tetrahedra, and point 0 stands for the only centre.
-inline constexpr BccTetrahedra kBccBorderTetrahedra = {{{0, 2, 3, 4}, {0, 2, 4, 5}}};
+// At the border point 0 stands for the only centre.
+inline constexpr std::array<Tetrahedron, 2> kBccBorderTetrahedra = {{{0, 2, 3, 4}, {0, 2, 4, 5}}};
 
 // The offsets of a face's corners from its corner 0, as corners of a cell.
 constexpr std::array<unsigned, 4> bcc_corners(unsigned axis) {
   const unsigned second = 1U << (axis + 1) % 3;
   const unsigned third = 1U << (axis + 2) % 3;
   return {0, second, second | third, third};
+}
+
+// The place in bcc_face_edges of the edge between two points of a face.
+constexpr std::size_t bcc_edge_between(unsigned a, unsigned b) {
+  const unsigned low = a < b ? a : b;
+  const unsigned high = a < b ? b : a;
+  if (low < 2) return high == 1 ? 0 : low * 4 + high - 1;
+  if (high - low == 2) return 0;
+  return low == 2 && high == 5 ? 12 : low + 7;
 }
 
 // The edges of a face, by which the corners of its triangles are named: one between the centres

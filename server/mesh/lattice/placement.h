@@ -34,18 +34,23 @@ class Placement {
   // The fraction of the way from a sample of value `from` to one of value `to`. The iso-value lies
   // between them.
   template <class T>
-  double share(T from_sample, T to_sample) const {
-    if (midpoint_) return 0.5;
-    const auto from = static_cast<double>(from_sample);
-    const auto to = static_cast<double>(to_sample);
-    double f = (iso_ - from) / (to - from);
-    if constexpr (std::is_same_v<T, double>) {
-      // The difference of two doubles can overflow; that of their halves cannot.
-      if (std::isinf(to - from)) f = (iso_ / 2 - from / 2) / (to / 2 - from / 2);
-    }
-    return std::min(std::max(f, nearest_), 1 - nearest_);
+  double share(T from, T to) const {
+    return midpoint_ ? 0.5
+                     : share<T>(iso_, static_cast<double>(from), static_cast<double>(to), nearest_);
   }
 
+  // The same for values of samples of type T, unless all vertices are midpoints.
+  template <class T>
+  static double share(double iso, double from, double to, double nearest) {
+    double f = (iso - from) / (to - from);
+    if constexpr (std::is_same_v<T, double>) {
+      // The difference of two doubles can overflow; that of their halves cannot.
+      if (std::isinf(to - from)) f = (iso / 2 - from / 2) / (to / 2 - from / 2);
+    }
+    return std::min(std::max(f, nearest), 1 - nearest);
+  }
+
+  bool is_midpoint() const { return midpoint_; }
   double nearest() const { return nearest_; }
 
   // A vertex on a sample that equals the iso-value would coincide with those on the sample's other
