@@ -87,6 +87,7 @@ inline CLI::Option* add_repeated(CLI::App& app, const std::string& name, const s
   return app.add_option_function<std::vector<std::string>>(name, take, help + ". May be repeated")
       ->type_name(value)
       ->expected(1)
+      ->allow_extra_args(false)  // `-o OUT A B`: A and B are inputs
       ->take_all();
 }
 

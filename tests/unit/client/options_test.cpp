@@ -67,6 +67,12 @@ TEST_F(OptionsTest, AnIsoValueMayBeAPreset) {
   EXPECT_EQ(end_of({"submit", "abc", "--iso", "bones"}).first, kWrongUsage);
 }
 
+TEST_F(OptionsTest, WordsAfterAnOutputAreInputs) {
+  const Options options = options_from({"mesh", "--iso", "1", "-o", drc_, file_});
+  EXPECT_THAT(options.files, ElementsAre(file_));
+  EXPECT_EQ(options.outputs.size(), 1U);
+}
+
 TEST_F(OptionsTest, OutputsAreFilesFoldersNamesOrStandardOutput) {
   const std::vector<std::string> mesh = {"mesh", file_, "--iso", "1"};
   const auto outputs_of = [&](const std::vector<std::string>& more) {
