@@ -17,7 +17,7 @@ ExtractOptions regularized(ExtractOptions options) {
 std::string describe(const Dims& dims, const ExtractOptions& options) {
   std::ostringstream text;
   text << dims.x << "x" << dims.y << "x" << dims.z << ", iso " << options.iso << ", scheme "
-       << to_string(options.scheme) << ", " << to_string(options.interpolation)
+       << static_cast<int>(options.scheme) << ", " << to_string(options.interpolation)
        << (options.close ? ", closed" : "");
   return text.str();
 }
