@@ -125,7 +125,7 @@ Json measure_lattices(const Samples& samples, double iso) {
       Stages stages(samples, surface);
       for (const Way& way : kWays) {
         Json row = {
-            {"volume", samples.name}, {"scheme", to_string(scheme)}, {"regularised", regularize}};
+            {"volume", samples.name}, {"scheme", name_of(scheme)}, {"regularised", regularize}};
         row.update(row_of(way, step_mm, extracted, stages));
         rows.push_back(row);
       }

@@ -94,7 +94,7 @@ class StageTable {
 
  private:
   static std::string describe(const Surface& surface) {
-    std::string text(to_string(surface.scheme));
+    std::string text(name_of(surface.scheme));
     if (surface.regularize) text += ", regularised";
     return surface.interpolation == Interpolation::kMidpoint ? text + ", midpoint" : text;
   }

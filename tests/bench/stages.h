@@ -6,6 +6,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "proto/types.h"
 #include "server/jobs/making/make_mesh.h"
@@ -14,6 +15,10 @@
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {
+
+inline std::string_view name_of(Scheme scheme) {
+  return to_string(SchemeName{static_cast<int>(scheme)});
+}
 
 // The surface of a volume that is measured.
 struct Surface {

@@ -32,6 +32,8 @@ Code code_of(AuditEvent event) {
   return {"", ""};
 }
 
+}  // namespace
+
 std::string audit_record(const AuditEntry& entry) {
   const Code code = code_of(entry.event);
   JsonTree json;
@@ -68,6 +70,8 @@ std::string audit_line(std::uint64_t number, const std::string& at, const std::s
   text.back() = ',';
   return text.append(record, std::min<std::size_t>(1, record.size()));
 }
+
+namespace {
 
 struct Entry {
   std::uint64_t number = 0;

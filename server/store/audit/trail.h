@@ -39,6 +39,10 @@ struct AuditEntry {
   std::uint64_t unlisted = 0;  // rejected since the entry before, without entries of their own
 };
 
+// The stored form of an entry, and its form as a line.
+std::string audit_record(const AuditEntry& entry);
+std::string audit_line(std::uint64_t number, const std::string& at, const std::string& record);
+
 // The trail in a database, which must outlive this object. Triggers prevent changing, replacing or
 // removing rows; digests detect it if it happens nevertheless. Thread safe. All methods may throw
 // Error kOutOfSpace or kInternal.
