@@ -96,9 +96,10 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;
     row.job.created = timestamp();
-    const std::string latest = latest_like(change.connection(), row);
-    if (latest != (made ? made->job : "")) return std::nullopt;
     const auto mesh = made ? made->mesh : std::nullopt;
+    const bool is_current = mesh ? has_succeeded(change.connection(), made->job)
+                                 : latest_like(change.connection(), row) == (made ? made->job : "");
+    if (!is_current) return std::nullopt;
     if (refusing_ || (!mesh && is_full(change.connection()))) {
       return Submission{Submission::Kind::kBusy, {}};
     }
@@ -126,6 +127,11 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
   }
   if (!is_final(row.job.state)) wake_a_worker();
   return Submission{Submission::Kind::kNew, row.job};
+}
+
+bool SqliteJobStore::has_succeeded(Connection& connection, const std::string& id) {
+  return connection.query("SELECT 1 FROM jobs WHERE id = ?1 AND state = {job.succeeded}", id)
+      .next();
 }
 
 std::string SqliteJobStore::latest_like(Connection& connection, const Row& row) {

@@ -66,6 +66,8 @@ class SqliteJobStore : public SqlJobStore {
   // Ids of all jobs that are queued or running.
   std::vector<std::string> ids_in(JobState state) const;
   std::string unclaimable() const;
+  // Its mesh may be used: the blobs are kept as long as the row.
+  static bool has_succeeded(Connection& connection, const std::string& id);
   // The id of the latest succeeded job with the row's owner and result key; empty if there is none.
   static std::string latest_like(Connection& connection, const Row& row);
   // The run's job with its last progress. Empty if the lease is lost.

@@ -72,6 +72,23 @@ TEST_P(RaceConformance, WorkersSideBySideTakeTheOwnersByTurns) {
   EXPECT_EQ(of_other, 2 * kClaims);
 }
 
+// Each use of a mesh is one more job that has it, so the latest one changes all the time.
+TEST_P(RaceConformance, ManyMayUseAMeshAtTheSameTime) {
+  const JobParameters same = parameters();
+  submit(same);
+  const std::string blob = put_blob("a mesh");
+  ASSERT_TRUE(jobs().finish(claimed(), mesh_of({{blob, 6}})));
+  std::atomic<int> reused = 0;
+  std::vector<std::jthread> clients;
+  for (int client = 0; client < 16; ++client) {
+    clients.emplace_back([&] {
+      for (int n = 0; n < 30; ++n) reused += submit(same).reused ? 1 : 0;
+    });
+  }
+  clients.clear();
+  EXPECT_EQ(reused, 16 * 30);
+}
+
 TEST_P(RaceConformance, CancelAgainstFinishGivesOneEnd) {
   for (int round = 0; round < 100; ++round) {
     const std::string id = submit().id;
