@@ -32,7 +32,7 @@
 #include "server/configured_files.h"
 #include "server/ending.h"
 #include "server/http/app/outcomes.h"
-#include "server/http/guards/auth.h"
+#include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/server.h"
 #include "server/jobs/library/histograms.h"

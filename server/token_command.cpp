@@ -13,7 +13,7 @@
 
 #include "base/descriptor.h"
 #include "base/files.h"
-#include "server/http/guards/auth.h"
+#include "server/http/guards/tokens.h"
 
 namespace isomesh {
 namespace {

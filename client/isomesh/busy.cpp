@@ -12,9 +12,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Also for a pause of a second, whose quarter would spread few clients.
-constexpr milliseconds kLeastJitter{500};
-
 double random_share() {
   thread_local std::minstd_rand source(std::random_device{}());
   return std::uniform_real_distribution<double>(0, 1)(source);

@@ -42,6 +42,10 @@ inline constexpr Backoff kBroken{std::chrono::milliseconds{100}, std::chrono::se
 // After a refusal by a busy server that does not say how long to wait.
 inline constexpr Backoff kBusy{std::chrono::milliseconds{500}, std::chrono::seconds{15}};
 
+// Least random part of a pause that the server asks for: a quarter of a second would spread few
+// clients.
+inline constexpr std::chrono::milliseconds kLeastJitter{500};
+
 // Returns after `duration`. Throws Error kCancelled immediately on a stop request.
 void pause(std::chrono::milliseconds duration, const std::stop_token& stop);
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/sha256.h"
+#include "server/hospital/limits.h"
 #include "server/hospital/protocol/orders.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
@@ -45,7 +46,10 @@ void submit(App& app, Orders* orders, const Request& request, Response& response
     response.set_header("Location", kOrders + '/' + order.id);
     answer_json(response, is_new ? 202 : 200, to_json(order));
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kUnavailable) response.set_header("Retry-After", "30");
+    if (error.code() == ErrorCode::kUnavailable) {
+      response.set_header("Retry-After",
+                          std::to_string(hospital::limits::kRetryOrderAfter.count()));
+    }
     throw;
   }
 }

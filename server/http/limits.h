@@ -7,7 +7,7 @@
 
 namespace isomesh::http::limits {
 
-// Retry-After of every response 429 and 503.
+// Retry-After of responses 429 and 503, but for orders (server/hospital/limits.h).
 inline constexpr std::chrono::seconds kRetryAfter{1};
 
 // --- Requests, in bytes ---

@@ -8,7 +8,7 @@ namespace isomesh::import::limits {
 
 // Deflate compresses at most a thousandfold, and empty volumes come close to that. So archives that
 // unpack to less than a gigabyte are never rejected as bombs.
-inline constexpr std::uint64_t kMostUnpackedPerByte = 200;
+inline constexpr std::uint64_t kMostArchivePerByte = 200;
 inline constexpr std::uint64_t kNeverABomb = std::uint64_t{1} << 30;
 
 // The longest header of lines that name a field and its value.

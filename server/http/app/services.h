@@ -8,7 +8,7 @@
 
 #include "server/callbacks/callbacks.h"
 #include "server/http/app/wing.h"
-#include "server/http/guards/auth.h"
+#include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/requests/upload.h"
 #include "server/jobs/library/histograms.h"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "server/http/connections/connections.h"
-#include "server/http/guards/auth.h"
+#include "server/http/guards/tokens.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/requests/request.h"
 #include "server/http/requests/response.h"

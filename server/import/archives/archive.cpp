@@ -279,7 +279,7 @@ class Unpacker {
     }
     if (total_ + further > most_unpacked_bytes(file_.size())) {
       throw_unusable("The archive unpacks to more than " +
-                     std::to_string(limits::kMostUnpackedPerByte) +
+                     std::to_string(limits::kMostArchivePerByte) +
                      " times its size. Only decompression bombs do that.");
     }
   }
@@ -314,7 +314,7 @@ bool is_tar(std::string_view head) {
 }
 
 std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes) {
-  return std::max(limits::kNeverABomb, archive_bytes * limits::kMostUnpackedPerByte);
+  return std::max(limits::kNeverABomb, archive_bytes * limits::kMostArchivePerByte);
 }
 
 std::string_view folder_of(std::string_view name) {

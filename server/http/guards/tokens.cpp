@@ -1,4 +1,4 @@
-#include "server/http/guards/auth.h"
+#include "server/http/guards/tokens.h"
 
 #include <algorithm>
 #include <map>
