@@ -41,13 +41,17 @@ void check_configured_files(const Options& options, const ConfiguredFiles& other
   check.file("blob-credentials", options.blobs.credentials);
   check.file("callback-ca", options.callback_authorities);
   check.file("blob-ca", options.blobs.authorities);
-  if (!options.store.empty()) {
-    for (const auto& [keyword, file] : store::postgresql::files_of_url(options.store)) {
-      check.file("store: " + keyword, file);
-    }
-  }
   for (const auto& [name, file] : others) check.file(name, file);
   check.finish();
+}
+
+ConfiguredFiles files_of_store(const Options& options) {
+  ConfiguredFiles files;
+  if (options.store.empty()) return files;
+  for (const auto& [keyword, file] : store::postgresql::files_of_url(options.store)) {
+    files.emplace_back("store: " + keyword, file);
+  }
+  return files;
 }
 
 }  // namespace isomesh

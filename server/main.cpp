@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -168,8 +169,11 @@ void check_places(const Options& options) {
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
   if (!options.store.empty()) store::postgresql::check_url(options.store);
-  check_configured_files(
-      options, options.wing.empty() ? ConfiguredFiles() : wing_entry().check(options.wing));
+  ConfiguredFiles others = files_of_store(options);
+  if (!options.wing.empty()) {
+    std::ranges::move(wing_entry().check(options.wing), std::back_inserter(others));
+  }
+  check_configured_files(options, others);
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
   check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);

@@ -183,6 +183,10 @@ std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem
 
 std::string Client::Impl::begin_upload(const HttpRequest& request) const {
   std::string place = repeated(beginning_of(request)).header("location");
+  // A proxy may have made it absolute.
+  if (const std::size_t scheme = place.find("://"); scheme != std::string::npos) {
+    place.erase(0, place.find('/', scheme + 3));
+  }
   if (!place.starts_with(kPlaces)) throw other_api();
   return place;
 }

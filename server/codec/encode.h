@@ -54,6 +54,7 @@ struct LabelledSurface {
 struct FileContent {
   const mesh::Mesh& mesh;  // the walls of the labels, if there are any
   const Provenance& provenance;
+  MeshFormat format = MeshFormat::kDrc;  // named by errors
   // The space and the unit of the file's coordinates. Headers tell both.
   Space space = Space::kLps;
   LengthUnit unit = length_unit({});

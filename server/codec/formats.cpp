@@ -263,6 +263,7 @@ std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
   }
   return row.encode({.mesh = mesh,
                      .provenance = provenance,
+                     .format = format,
                      .space = space_of(format, provenance.parameters),
                      .unit = length_unit(provenance.notes),
                      .extracted = extracted},
@@ -276,6 +277,7 @@ void encode_labels(const LabelledSurface& surface, MeshFormat format, const Prov
   }
   describe(format).encode({.mesh = surface.walls.mesh,
                            .provenance = provenance,
+                           .format = format,
                            .space = space_of(format, provenance.parameters),
                            .unit = length_unit(provenance.notes),
                            .labels = &surface},

@@ -48,7 +48,7 @@ std::optional<mesh::Topology> encode_gii(const FileContent& content, const mesh:
   const mesh::Mesh& mesh = content.mesh;
   const std::size_t vertices = mesh.positions.size();
   const std::size_t triangles = mesh.triangles.size();
-  check_signed_indices(vertices, triangles, MeshFormat::kGii);
+  check_signed_indices(vertices, triangles, content.format);
   // Few readers accept empty arrays.
   const bool is_empty = triangles == 0;
   put_text(sink,

@@ -80,8 +80,9 @@ struct MeshPrim {
 
 class Stage {
  public:
-  Stage(const Provenance& provenance, const Sink& sink)
-      : has_normals_(provenance.parameters.normals), sink_(sink) {
+  Stage(const FileContent& content, const Sink& sink)
+      : format_(content.format), has_normals_(content.provenance.parameters.normals), sink_(sink) {
+    const Provenance& provenance = content.provenance;
     write("#usda 1.0\n(\n    customLayerData = {\n        string \"isomesh:provenance\" = " +
           usd_string(provenance_text(provenance)) +
           "\n    }\n    defaultPrim = \"isomesh\"\n    metersPerUnit = " +
@@ -91,7 +92,7 @@ class Stage {
   }
 
   void add(const MeshPrim& object, const mesh::Mesh& mesh, const mesh::Context& context) {
-    check_signed_indices(mesh.positions.size(), mesh.triangles.size(), MeshFormat::kUsda);
+    check_signed_indices(mesh.positions.size(), mesh.triangles.size(), format_);
     mesh::Buffer<mesh::Vec3> normals;
     if (has_normals_) vertex_normals(mesh, {context.stop, nullptr}, normals);
     std::array<float, 3> linear;
@@ -176,6 +177,7 @@ class Stage {
     write("]\n");
   }
 
+  const MeshFormat format_;
   const bool has_normals_;
   const Sink& sink_;
 };
@@ -205,7 +207,7 @@ void add_labels(const LabelledSurface& surface, bool has_normals, const mesh::Co
 std::optional<mesh::Topology> encode_usda(const FileContent& content, const mesh::Context& context,
                                           const Sink& sink) {
   context.throw_if_stopped();
-  Stage stage(content.provenance, sink);
+  Stage stage(content, sink);
   if (content.labels != nullptr) {
     add_labels(*content.labels, content.provenance.parameters.normals, context, stage);
   } else if (content.mesh.triangles.size() > 0) {

@@ -32,7 +32,7 @@ std::optional<mesh::Topology> encode_vtk(const FileContent& content, const mesh:
   const std::vector<FaceRun> runs = faces_of(content);
   const std::size_t vertices = mesh.positions.size();
   const std::size_t faces = count_of(runs);
-  check_signed_indices(vertices, faces, MeshFormat::kVtk);
+  check_signed_indices(vertices, faces, content.format);
   // 3D Slicer reads the space from the title in the second line.
   put_text(sink, "# vtk DataFile Version 3.0\nisomesh, " + std::string(content.unit.name) +
                      ", SPACE=" + std::string(letters_of(content.space)) +

@@ -48,7 +48,7 @@ std::optional<mesh::Topology> encode_vtp(const FileContent& content, const mesh:
   const std::vector<FaceRun> runs = faces_of(content);
   const std::size_t vertices = mesh.positions.size();
   const std::size_t faces = count_of(runs);
-  check_signed_indices(vertices, faces, MeshFormat::kVtp);
+  check_signed_indices(vertices, faces, content.format);
   const std::uint64_t point_bytes = vertices * sizeof(mesh::Vec3);
   const std::uint64_t corner_bytes = faces * sizeof(mesh::Triangle);
   const std::uint64_t face_bytes = faces * sizeof(std::uint32_t);

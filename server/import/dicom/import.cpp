@@ -143,7 +143,9 @@ void suggest(const Stack& stack, Volume& volume) {
   for (const PresetRow& row : kPresets) {
     if (row.hounsfield ? !is_ct : !is_fractional) continue;
     const double iso = row.hounsfield ? *row.hounsfield : half_of(stack);
-    if (iso <= volume.range[0] || iso > volume.range[1]) continue;
+    // Half of a share is inside of a part that was cut out, too.
+    if (row.hounsfield && iso <= volume.range[0]) continue;
+    if (iso > volume.range[1]) continue;
     volume.presets.push_back({std::string(row.name), iso});
   }
 }

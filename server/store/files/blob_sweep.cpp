@@ -25,7 +25,9 @@ std::shared_ptr<const void> FileBlobStore::hold_bytes(const std::string& key) co
   }
 }
 
+// A sweep that has just found no name still finds the blob recent.
 void FileBlobStore::mark_named(const std::string& key) {
+  const Lock lock(places_);
   const std::string hold = unnamed_.remove(key);
   if (!hold.empty()) holds_->let_go(hold);
 }

@@ -55,7 +55,12 @@ std::vector<Schema> with_service(std::string tables, std::vector<Schema> compone
 
 void check_versions(SqlConnection& connection, const std::string& place,
                     std::span<const Schema> schemas) {
-  for (const auto& [component, version] : versions_of(connection)) {
+  const auto versions = versions_of(connection);
+  if (versions.empty() && connection.has_table("volumes")) {
+    throw Error(ErrorCode::kUnavailable,
+                place + " has tables of another program, or of an isomeshd before 0.1.0");
+  }
+  for (const auto& [component, version] : versions) {
     const auto known = std::ranges::find(schemas, component, &Schema::component);
     if (known == schemas.end()) {
       throw Error(

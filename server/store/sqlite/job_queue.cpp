@@ -90,6 +90,7 @@ std::optional<Submission> SqliteJobStore::try_to_submit(const JobSpec& spec) {
     if (auto earlier = known(change.connection(), spec)) return *std::move(earlier);
     const auto asked = look_up(change.connection(), spec);
     if (!asked) throw_no_volume_of(change.connection(), spec);
+    if (!before || before->result_key != asked->result_key) return std::nullopt;  // other notes
     row.result_key = asked->result_key;
     row.cost_us = asked->cost_us;
     row.accepted = now_us();
@@ -318,14 +319,15 @@ std::size_t SqliteJobStore::reap() {
   std::size_t reaped = 0;
   for (const std::string& id : ids_in(JobState::kRunning)) {
     try {
-      if (reap(id)) ++reaped;
+      if (!reap(id)) continue;
+      ++reaped;
+      wake_all_workers();
     } catch (const Error& error) {
       // A job that is damaged itself stops no other.
       if (!is_of_damaged_database(error) || can_change(id)) throw;
       report_damaged("job", id);
     }
   }
-  if (reaped > 0) wake_all_workers();
   return reaped;
 }
 

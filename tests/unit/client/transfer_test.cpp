@@ -179,7 +179,8 @@ TEST_F(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) 
     if (head.starts_with("POST") && head.find("upload=") == std::string::npos) {
       EXPECT_THAT(head, HasSubstr("Upload-Length: 200000\r\n"));
       EXPECT_THAT(head, HasSubstr("Repr-Digest: sha-256=:"));
-      return test::answer(socket, "201 Created\r\nLocation: /v1/uploads/7");
+      // Absolute, as some proxies make it.
+      return test::answer(socket, "201 Created\r\nLocation: http://inside:8080/v1/uploads/7");
     }
     if (head.starts_with("POST")) return test::answer(socket, "200 OK", to_json(some_volume()));
     if (head.starts_with("HEAD")) {

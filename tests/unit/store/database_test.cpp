@@ -131,6 +131,16 @@ TEST_F(DatabaseTest, OfANewerVersionOrAnUnknownComponentIsRefused) {
   EXPECT_THAT(unknown.what(), testing::HasSubstr("was built without: trial"));
 }
 
+TEST_F(DatabaseTest, WithTablesOfAnotherProgramIsRefused) {
+  {
+    Connection connection(data_.records(), Connection::Mode::kWrite);
+    connection.run("CREATE TABLE volumes(title TEXT)");
+  }
+  const Error refused = test::error_of([&] { Database database(data_); });
+  EXPECT_EQ(refused.code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(refused.what(), testing::HasSubstr("has tables of another program"));
+}
+
 // An upgrade that fails changes nothing.
 TEST_F(DatabaseTest, ThatCannotBeUpgradedStaysAsItWas) {
   { const Database database(data_, {trial(1)}); }
