@@ -34,8 +34,9 @@ inline constexpr std::size_t kMostImportMessages = std::size_t{16} << 20;  // by
 // The triangles of 65 535 labels take about 3 MB.
 inline constexpr std::size_t kLongestJobMessage = std::size_t{16} << 20;
 
-// Processor time of an import, below --import-seconds (its default is in ImportBounds): small uploads take long only if they are
-// malicious. Honest uploads are read at many megabytes per second.
+// Processor time of an import, below --import-seconds (its default is in ImportBounds): small
+// uploads take long only if they are malicious. Honest uploads are read at many megabytes per
+// second.
 inline constexpr std::chrono::seconds kLeastImportTime{20};
 inline constexpr std::uint64_t kImportBytesPerSecond = 64 * 1024;
 
