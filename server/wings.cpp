@@ -9,7 +9,7 @@
 namespace isomesh {
 namespace {
 
-http::WingEntry entry() {
+http::WingEntry the_hospital() {
   http::WingEntry entry;
   entry.option = "hospital";
   entry.help =
@@ -34,8 +34,8 @@ http::WingEntry entry() {
 }  // namespace
 
 const http::WingEntry& wing_entry() {
-  static const http::WingEntry kEntry = entry();
-  return kEntry;
+  static const http::WingEntry entry = the_hospital();
+  return entry;
 }
 
 }  // namespace isomesh
