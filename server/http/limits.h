@@ -7,7 +7,7 @@
 
 namespace isomesh::http::limits {
 
-// Retry-After of responses 429 and 503, but for orders (server/hospital/limits.h).
+// Retry-After of responses 429 and 503; a wing may tell another one.
 inline constexpr std::chrono::seconds kRetryAfter{1};
 
 // --- Requests, in bytes ---
