@@ -277,7 +277,7 @@ describe('an upload of a page', () => {
     const told: number[] = [];
     const { volumes } = await client.upload(new Uint8Array(9), { onBusy: (seconds) => told.push(seconds) });
     expect(volumes[0]?.volume).toEqual({ id: 'abc' });
-    expect(told).toEqual(clock.pauses);
+    expect(told.map((pause, at) => pause - (clock.pauses[at] ?? NaN))).toEqual([expect.closeTo(0), expect.closeTo(0)]);
     expect(told).toHaveLength(2);
     Request.responses.push([429, busy]);
     const hasty = new Client({ server: daemon.address, retrySeconds: 0 });
