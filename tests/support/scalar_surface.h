@@ -71,7 +71,7 @@ SampleVolume<double> in_doubles(const SampleVolume<T>& volume) {
 
 // The largest distance that the kernels keep between a vertex and the ends of its edge, as a part
 // of the edge. Vertices farther from both ends must be exact up to float rounding.
-inline constexpr double kEndMargin = 1e-3;
+inline constexpr double kEndMargin = 2e-3;
 
 // True if the surfaces are equal: `mesh` has the reference's layers, its vertices in their order
 // and places, the same triangles in each layer with their winding, and the same marks of the
