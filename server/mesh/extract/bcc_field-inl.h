@@ -157,9 +157,9 @@ class BccCellWriter {
     for (Word rest = cells; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
       const CellCase& cell = six_.cases[cases[bit]];
+      const std::uint32_t* const first = places + bit * std::size_t{kBccPlaces};
       const auto at = [&](EdgeName name) {
-        return places[bit * std::size_t{kBccPlaces} + bcc_slot_of(name % 8U) +
-                      static_cast<std::size_t>(records_[name / 8U])];
+        return first[records_[name / 8U] + static_cast<std::ptrdiff_t>(bcc_slot_of(name % 8U))];
       };
       for (std::size_t t = 0; t < cell.triangles; ++t) {
         const auto& [a, b, c] = cell.edges[t];
