@@ -73,7 +73,7 @@ export function crossOf({ preview, cursor }: LiveScene): Float32Array<ArrayBuffe
   return points;
 }
 
-// What the shader takes of a scene: places in samples, directions as unit vectors in millimetres.
+// The scene as the shader takes it: places in samples, directions as unit vectors in millimetres.
 export function valuesOf({ preview, camera, target, iso, reach, kind, look, crop }: LiveScene): Record<SceneField, number | Vector3 | Matrix4> {
   const ofSamples = placeOfSamples(preview);
   const dims = new Vector3(...preview.dims);

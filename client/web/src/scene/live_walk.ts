@@ -70,7 +70,7 @@ fn blockAt(direction: vec3f, t: f32, stride: f32) -> vec3f {
   return vec3f(min(min(exits.x, exits.y), exits.z), rangeAt(block));
 }
 
-// Whether anything is seen of these values.
+// True if anything is seen of these values.
 fn hasAny(range: vec2f) -> bool {
   let ends: vec2i = vec2i(round(255.0 * range));
   return sumAt(ends.y + 1) > sumAt(ends.x);
@@ -83,7 +83,7 @@ fn seenAt(p: vec3f, stride: f32) -> vec4f {
   let slope: vec3f = 0.5 * slopeAt(p);
   let normal: vec3f = seenNormal(slope);
   let light: f32 = 0.35 + 0.7 * max(0.0, dot(normal, scene.towardsLight));
-  // What hardly changes has no border to be lit.
+  // Values that hardly change have no border to be lit.
   let isBorder: f32 = clamp(length(slope) * 24.0, 0.0, 1.0);
   let all: f32 = here.a * mix(1.0, isBorder, scene.edges);
   let opacity: f32 = 1.0 - pow(1.0 - min(all, 0.999), stride);
