@@ -77,6 +77,7 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning =
          "The DICOM image does not give the distance between its slices. The slice thickness "
          "was used.",
+     .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kOverlappingSegments,
      .name = "overlapping-segments",
@@ -99,6 +100,55 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning =
          "A DICOM segmentation holds fractions or probabilities. A sample belongs to a segment if "
          "its value is half of the maximum or more.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kPadding,
+     .name = "padding",
+     .meaning = "Some samples have the padding value of the file, which is not part of the image. "
+                "They are outside of any surface, and the range and the suggested iso-value leave "
+                "them out. With `accept=padding` they are samples like others.",
+     .is_acceptable = true,
+     .is_in_mesh = true},
+    {.code = NoteCode::kDuplicateSlice,
+     .name = "duplicate-slice",
+     .meaning = "Two slices lie at one position. One was used, and the other is listed as ignored.",
+     .is_acceptable = true,
+     .is_in_mesh = true},
+    {.code = NoteCode::kDirectionsCorrected,
+     .name = "directions-corrected",
+     .meaning = "The axes of rows and columns are not quite perpendicular. The nearest "
+                "perpendicular ones were used.",
+     .is_acceptable = true,
+     .is_in_mesh = true},
+    {.code = NoteCode::kPositionsRounded,
+     .name = "positions-rounded",
+     .meaning = "The positions of the slices are rounded. Evenly spaced slices that lie within the "
+                "rounding were used.",
+     .is_acceptable = true,
+     .is_in_mesh = true},
+    {.code = NoteCode::kFramesAsSlices,
+     .name = "frames-as-slices",
+     .meaning = "The file says that its frames follow each other in time or are a list. They were "
+                "read as the slices of a volume.",
+     .is_acceptable = true,
+     .is_in_mesh = true},
+    {.code = NoteCode::kHeaderCorrected,
+     .name = "header-corrected",
+     .meaning = "A field of the header contradicts the rest or has no meaning. It was read as "
+                "other programs read it. The detail says which field, and how.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kRescaleIgnored,
+     .name = "rescale-ignored",
+     .meaning = "The header has an offset of values that does not apply by the standard of the "
+                "format. Other programs add it.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kLabelsRounded,
+     .name = "labels-rounded",
+     .meaning = "Labels are stored as floats that are not quite whole numbers. They were rounded.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kLabelsRenumbered,
+     .name = "labels-renumbered",
+     .meaning = "The labels have more than 32 bits. The samples have other numbers; lists, names "
+                "and meshes have the file's.",
      .is_in_mesh = true},
 };
 

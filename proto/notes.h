@@ -28,6 +28,15 @@ enum class NoteCode {
   kContoursSkipped,      // DICOM: contours or structures of a structure set that were not drawn
   kContoursInterpolated,  // DICOM: shapes of structures in slices between their contours
   kFractionalSegments,    // DICOM: segments are fractions or probabilities; thresholded at one half
+  kPadding,               // samples of the file's padding value; they are outside of any surface
+  kDuplicateSlice,        // DICOM: two slices at one position; one is used
+  kDirectionsCorrected,   // axes that are not quite perpendicular; made so
+  kPositionsRounded,      // DICOM: positions of slices are rounded; evenly spaced ones fit
+  kFramesAsSlices,        // frames in time or of a list; read as slices
+  kHeaderCorrected,       // a field of the header that contradicts the rest; read as others do
+  kRescaleIgnored,        // an offset that does not apply by the standard; others add it
+  kLabelsRounded,         // labels as floats that are nearly whole; rounded
+  kLabelsRenumbered,      // labels of more than 32 bits; the samples have other numbers
 };
 
 struct NoteDescription {
