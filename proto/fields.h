@@ -101,6 +101,7 @@ void visit(Is<DicomIdentity> auto& self, auto&& field) {
 
 void visit(Is<Volume> auto& self, auto&& field) {
   field("id", self.id);
+  field("samples", self.samples);
   field("name", self.name);
   field("format", self.format);
   field("dims", self.dims);

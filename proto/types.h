@@ -140,7 +140,11 @@ struct DicomIdentity {
 enum class NiftiForm { kSform, kQform };
 
 struct Volume {
-  std::string id;  // hex SHA-256 of the canonical samples and geometry
+  // Hex digest of what the upload says, samples and all else. Its name counts only if the request
+  // gave it; a file's own name does not.
+  std::string id;
+  // Hex SHA-256 of samples and geometry. Volumes with the same ones share their bytes and meshes.
+  std::string samples;
   // Initially the name of the uploaded series or file; the owner may rename it. May name a patient,
   // so it is in no log. UTF-8; empty if unknown.
   std::optional<std::string> name = {};
@@ -155,8 +159,7 @@ struct Volume {
   std::optional<std::string> modality;   // DICOM's: "CT", "MR", ...; empty if unknown
   std::vector<Preset> presets;           // within `range`
   std::vector<IgnoredObject> ignored;
-  // Decisions, corrections and assumptions of the import, each code once. Like everything except
-  // samples and geometry, they are those of the first upload.
+  // Decisions, corrections and assumptions of the import, each code once.
   std::vector<Note> notes = {};
   std::optional<DicomIdentity> dicom;  // if it came as DICOM
   // The labels that the upload declares, ascending, at most kMostLabels. In records and import

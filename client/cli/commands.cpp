@@ -27,7 +27,7 @@ int upload(Client& client, const Options& options, const std::stop_token& stop) 
   ProgressBar bar(!options.quiet);
   UploadOptions how = options.upload;
   std::vector<std::filesystem::path> files = options.files;
-  const auto copy = standard_input_as_file(files, how, stop);
+  const auto copy = standard_input_as_file(files, stop);
   const std::vector<UploadedVolume> volumes = upload_all(client, options, files, how, bar);
   const bool is_one = volumes.size() == 1 && volumes.front().volume;
   if (options.json) {

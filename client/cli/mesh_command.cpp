@@ -155,7 +155,7 @@ int MeshRun::input(const Input& input) {
   seen_ = {};
   UploadOptions how = options_.upload;
   std::vector<std::filesystem::path> files = input.files;
-  const auto copy = standard_input_as_file(files, how, stop_);
+  const auto copy = standard_input_as_file(files, stop_);
   if (is_stored_volume(files.front())) return stored(files.front().string(), input);
   const Task task = task_of(input);
   const auto uploading = std::chrono::steady_clock::now();

@@ -75,12 +75,12 @@ void tell_folders(const std::vector<std::filesystem::path>& files) {
 }  // namespace
 
 std::unique_ptr<InputCopy> standard_input_as_file(std::vector<std::filesystem::path>& files,
-                                                  UploadOptions& how, const std::stop_token& stop) {
+                                                  const std::stop_token& stop) {
   for (std::filesystem::path& file : files) {
     if (file != "-") continue;
     auto copy = copied(stop);
-    file = copy->file.path();
-    if (how.name.empty()) how.name = "stdin";
+    file = copy->folder.path() / "stdin";
+    std::filesystem::rename(copy->file.path(), file);
     return copy;
   }
   return nullptr;

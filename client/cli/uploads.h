@@ -26,7 +26,7 @@ struct InputCopy {
 // the place of "-". A volume without a name is called "stdin". Null if "-" is not among the files.
 // Throws Error kCancelled on a stop request.
 std::unique_ptr<InputCopy> standard_input_as_file(std::vector<std::filesystem::path>& files,
-                                                  UploadOptions& how, const std::stop_token& stop);
+                                                  const std::stop_token& stop);
 
 // Uploads the files and reports the notes on the volumes. `subject` names the input if there are
 // several.

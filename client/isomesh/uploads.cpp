@@ -58,7 +58,8 @@ std::string upload_query(const UploadOptions& options) {
 // File names may name patients, so they are sent in a header: logs contain targets.
 std::string disposition_of(const std::filesystem::path& path, const std::string& name) {
   const auto file = (path.has_filename() ? path : path.parent_path()).filename();
-  return "attachment; filename*=UTF-8''" + percent_encode(name.empty() ? file.string() : name);
+  return name.empty() ? "attachment; filename*=UTF-8''" + percent_encode(file.string())
+                      : "attachment; name*=UTF-8''" + percent_encode(name);
 }
 
 std::string digest_of(const UploadBody& file) {

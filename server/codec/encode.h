@@ -33,7 +33,7 @@ inline void put_text(const Sink& sink, std::string_view text) {
 // The origin of a mesh: all parameters, beside the samples, that determine its bytes. No owner, no
 // host, nothing of the job.
 struct Provenance {
-  std::string volume;
+  std::string samples;  // Volume::samples
   MeshParameters parameters;
   double iso = 0;  // the value used, also for Otsu's threshold
   std::array<std::uint32_t, 3> dims = {0, 0, 0};

@@ -11,11 +11,10 @@ namespace isomesh::codec {
 using Json = nlohmann::ordered_json;
 
 Json provenance_json(const Provenance& provenance) {
-  Json parameters = {{"volume", provenance.volume}};
-  parameters.update(parse_json<Json>(to_json(provenance.parameters)));
+  Json parameters = parse_json<Json>(to_json(provenance.parameters));
   // A file does not depend on the job's other files.
   parameters.erase("formats");
-  Json json = {{"parameters", parameters}};
+  Json json = {{"samples", provenance.samples}, {"parameters", parameters}};
   if (!provenance.parameters.labels) json["iso"] = provenance.iso;
   json.update({{"dims", provenance.dims},
                {"spacing", provenance.geometry.spacing},

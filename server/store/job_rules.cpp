@@ -4,6 +4,7 @@
 
 #include "base/clock.h"
 #include "base/sha256.h"
+#include "base/text.h"
 #include "proto/error.h"
 #include "proto/json.h"
 #include "proto/json_values.h"
@@ -31,12 +32,14 @@ const Job& job_of(const Submission& submission) {
   return submission.job;
 }
 
-std::string result_key(const std::string& volume, const std::vector<Note>& notes,
-                       const JobParameters& parameters, const std::string& mesher_version) {
-  std::string text = mesher_version + '\n' + volume + '\n' +
+std::string result_key(const Volume& volume, const JobParameters& parameters,
+                       const std::string& mesher_version) {
+  std::string text = mesher_version + '\n' + volume.samples + '\n' +
                      to_json(static_cast<const MeshParameters&>(parameters));
+  if (!parameters.iso) text += "\niso " + to_text(volume.suggested_iso);
   if (parameters.certify) text += "\ncertified";
-  for (const Note& note : notes_in_mesh(notes)) text += '\n' + note.code + ": " + note.detail;
+  for (const Note& note : notes_in_mesh(volume.notes))
+    text += '\n' + note.code + ": " + note.detail;
   return sha256_of(text);
 }
 

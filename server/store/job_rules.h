@@ -13,10 +13,10 @@
 
 namespace isomesh::store {
 
-// Equal for all jobs whose results have the same bytes and properties. `notes` are the volume's; a
-// mesh carries some of them.
-std::string result_key(const std::string& volume, const std::vector<Note>& notes,
-                       const JobParameters& parameters, const std::string& mesher_version);
+// Equal for all jobs whose results have the same bytes and properties. A mesh depends on the
+// samples of its volume, on some of the notes, and on its usual iso-value.
+std::string result_key(const Volume& volume, const JobParameters& parameters,
+                       const std::string& mesher_version);
 
 // The columns of a job, which can be read without its record.
 struct JobColumns {

@@ -18,8 +18,8 @@ namespace isomesh::store {
 // Order of a list, by the time of storing.
 enum class ListOrder { kOldestFirst, kNewestFirst };
 
-// Records by owner and id. The same samples may belong to several owners, each with a record, and
-// share one blob. A record is added after its blob and erased before it, so it never names a
+// Records by owner and id. The same samples may belong to several records, of one owner or several,
+// which share one blob. A record is added after its blob and erased before it, so it never names a
 // missing blob. Thread safe; all methods may throw Error kOutOfSpace or kInternal.
 class VolumeStore {
  public:
@@ -35,7 +35,20 @@ class VolumeStore {
   virtual Volume rename(const std::string& owner, const std::string& id,
                         const std::optional<std::string>& name) = 0;
 
-  virtual bool contains(const Viewer& viewer, const std::string& id) const = 0;
+  // The key of the blob of a record's samples, also if the record is damaged. Empty if there is no
+  // such record.
+  virtual std::optional<std::string> samples_of(const Viewer& viewer,
+                                                const std::string& id) const = 0;
+  bool contains(const Viewer& viewer, const std::string& id) const {
+    return samples_of(viewer, id).has_value();
+  }
+
+  // True if a record of the owner names the blob of these samples.
+  virtual bool has_samples(const std::string& owner, const std::string& samples) const = 0;
+
+  // A secret of the database, in hex, for the part of ids that depends on persons. It never
+  // changes.
+  virtual std::string key() const = 0;
 
   // At most `limit` volumes, without their labels, after the one with the cursor `after`.
   virtual std::vector<Volume> list(const Viewer& viewer, const std::string& after = {},

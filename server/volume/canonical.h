@@ -2,8 +2,8 @@
 //
 // A canonical file has a header of kHeaderBytes bytes (one JSON object, padded with spaces, ending
 // in a newline), and then the samples, little-endian, x fastest. The header holds only properties
-// that identify the volume: version, dims, type, spacing, origin, direction. So the SHA-256 of the
-// file is the volume's id: equal samples and geometry have the same id, whatever their original
+// that identify the samples: version, dims, type, spacing, origin, direction. So the SHA-256 of the
+// file, Volume::samples, is the same for equal samples and geometry, whatever their original
 // format.
 #pragma once
 

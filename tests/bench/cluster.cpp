@@ -315,6 +315,7 @@ void measure_stores(Postgres& postgres, std::vector<Finding>& findings) {
   Node node(url, "one", blobs, kQueueConnections);
   Volume volume;
   volume.id = kVolume;
+  volume.samples = kVolume;
   volume.created = "2024-01-01T00:00:00.000Z";
   node.volumes.add("", volume);
   int submitted = 0;

@@ -118,7 +118,6 @@ void forget_images(store::OrderRecord& record) {
   record.order.results.clear();
   record.order.source.instances.reset();
   record.work.identity.reset();
-  record.work.labels.reset();
   record.work.blobs.clear();
   record.work.listed.clear();
   record.work.listed_since.reset();
@@ -259,19 +258,18 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
   try {
     const std::string type =
         this->source(source.pacs).fetch_series(source.study, source.series, file, stop);
-    auto [volume, identity] = services_.library.add_peers(record.owner, file,
-                                                          {.content_type = type,
-                                                           .study = source.study,
-                                                           .series = source.series,
-                                                           .instances = record.work.listed},
-                                                          {.cancelled = stop});
+    const Volume volume = services_.library.add_peers(record.owner, file,
+                                                      {.content_type = type,
+                                                       .study = source.study,
+                                                       .series = source.series,
+                                                       .instances = record.work.listed},
+                                                      {.cancelled = stop});
     entry.success = true;
-    entry.patient_id = identity.patient_id;
+    entry.patient_id = volume.dicom->patient_id;
     services_.audit.add(entry);
-    if (!record.order.send.empty()) check_identity(identity);
+    if (!record.order.send.empty()) check_identity(*volume.dicom);
     record.order.volume = volume.id;
-    record.work.identity = std::move(identity);
-    if (record.order.parameters.labels) record.work.labels = std::move(volume.labels);
+    record.work.identity = volume.dicom;
   } catch (const Error& error) {
     // Images that make no volume have crossed the network, too.
     if (!entry.success && has_bytes(file)) services_.audit.add(entry);
@@ -292,8 +290,7 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;
   if (parameters.labels) {
-    Volume volume = services_.volumes.get(viewer, parameters.volume);
-    if (record.work.labels) volume.labels = *record.work.labels;
+    const Volume volume = services_.volumes.get(viewer, parameters.volume);
     parameters = jobs::complete_labels(std::move(parameters), viewer, volume, services_.labels);
   }
   const store::Submission submission =
@@ -309,8 +306,9 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
 bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record,
                          const std::stop_token& stop) const {
   if (error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kGone) return true;
-  return error.code() == ErrorCode::kUnusableVolume &&
-         !store::is_there_and_intact(services_.blobs, *record.order.volume, stop);
+  if (error.code() != ErrorCode::kUnusableVolume) return false;
+  const auto samples = services_.volumes.samples_of(record.owner, *record.order.volume);
+  return !samples || !store::is_there_and_intact(services_.blobs, *samples, stop);
 }
 
 Time OrderSteps::mesh(store::OrderRecord& record, const std::stop_token& stop,

@@ -74,7 +74,6 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("looks", self.looks);
   field("begun", self.begun);
   field("identity", self.identity);
-  field("labels", self.labels);
   field("blobs", self.blobs);
   field("label", self.label);
   field("series_number", self.series_number);

@@ -96,11 +96,8 @@ struct OrderWork {
   std::uint32_t looks = 0;                // in a row, for a series that is missing
   std::string begun;                      // when the order was accepted or restarted
   std::optional<DicomIdentity> identity;  // of the images that were fetched
-  // The labels that those images declare, if the job is by labels. Another upload of the same
-  // samples may have named the labels of the volume's record.
-  std::optional<std::vector<LabelEntry>> labels = {};
-  std::vector<std::string> blobs;  // of the objects, in the order of the results
-  std::string label;               // the mesh's label
+  std::vector<std::string> blobs;         // of the objects, in the order of the results
+  std::string label;                      // the mesh's label
   std::optional<std::int64_t> series_number;
   std::optional<std::string> callback;  // a URL
   // The bound of simplification that fits the mesh into the PACS's size limit.

@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "server/http/limits.h"
 #include "server/http/requests/request_values.h"
+#include "server/volume/names.h"
 
 namespace isomesh::http {
 namespace {
@@ -179,9 +180,11 @@ std::optional<RawDescription> raw_description_of(const Request& request) {
   return raw;
 }
 
-std::string plain_file_name(std::string_view name) {
-  const std::size_t folder = name.find_last_of("/\\");
-  std::string plain(trimmed(folder == std::string_view::npos ? name : name.substr(folder + 1)));
+namespace {
+
+// On one line and within the limit.
+std::string plain_name(std::string_view name) {
+  std::string plain(trimmed(name));
   std::erase_if(plain, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
   if (plain.size() <= limits::kLongestFileName) return plain;
   std::size_t end = limits::kLongestFileName;
@@ -189,13 +192,27 @@ std::string plain_file_name(std::string_view name) {
   return plain.substr(0, end);
 }
 
-std::string file_name_of(std::string_view content_disposition) {
+// The extended form of a parameter precedes the plain one.
+std::string text_parameter(std::string_view header, const std::string& name) {
   constexpr std::string_view kUtf8 = "utf-8''";
-  const std::string extended = header_parameter(content_disposition, "filename*");
+  const std::string extended = header_parameter(header, name + '*');
   if (lower(extended).starts_with(kUtf8)) {
-    return plain_file_name(percent_decoded(std::string_view(extended).substr(kUtf8.size())));
+    return percent_decoded(std::string_view(extended).substr(kUtf8.size()));
   }
-  return plain_file_name(header_parameter(content_disposition, "filename"));
+  return header_parameter(header, name);
+}
+
+}  // namespace
+
+std::string plain_file_name(std::string_view name) {
+  const std::size_t folder = name.find_last_of("/\\");
+  return plain_name(folder == std::string_view::npos ? name : name.substr(folder + 1));
+}
+
+jobs::UploadName upload_name_of(std::string_view content_disposition) {
+  const std::string chosen = plain_name(text_parameter(content_disposition, "name"));
+  if (!chosen.empty()) return {volume::normalized(chosen), true};
+  return {plain_file_name(text_parameter(content_disposition, "filename"))};
 }
 
 }  // namespace isomesh::http

@@ -42,7 +42,8 @@ void visit(Is<StoredNote> auto& self, auto&& field) {
   field("boot", self.boot);
   field("owner", self.note.owner);
   field("query", self.query);
-  field("file_name", self.note.file_name);
+  field("name", self.note.upload_name.text);
+  field("name_is_chosen", self.note.upload_name.is_chosen);
   field("sha256", self.note.sha256);
   field("complete", self.note.is_complete);
   field("volume", self.note.volume);
@@ -94,7 +95,7 @@ PartialUpload::PartialUpload(const std::filesystem::path& folder, std::string na
       note_(std::move(note)) {
   const Lock lock(mutex_);
   write_note();
-  bytes_file_->body.name = note_.file_name;
+  bytes_file_->body.name = note_.upload_name;
   file_ = opened(path_, O_CREAT | O_EXCL);
 }
 
@@ -102,7 +103,7 @@ PartialUpload::PartialUpload(const std::filesystem::path& folder, std::string na
     : name_(std::move(name)), path_(folder / name_), note_path_(path_.string() + kNoteSuffix) {
   const Lock lock(mutex_);
   note_ = note_from(note_path_);
-  bytes_file_->body.name = note_.file_name;
+  bytes_file_->body.name = note_.upload_name;
   if (!note_.volume.empty()) {
     bytes_file_->goes = true;  // may remain after a kill
     bytes_file_.reset();

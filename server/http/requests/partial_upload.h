@@ -22,9 +22,9 @@ namespace isomesh::http {
 
 struct PartialNote {
   std::string owner;
-  Parameters query;       // of its first request
-  std::string file_name;  // see Upload
-  std::string sha256;     // expected hash of all bytes, in hex; empty if unknown
+  Parameters query;  // of its first request
+  jobs::UploadName upload_name;
+  std::string sha256;  // expected hash of all bytes, in hex; empty if unknown
   std::optional<std::uint64_t> length = {};
   bool is_complete = false;
   std::string volume = {};  // the resulting volume as JSON; then the bytes are deleted

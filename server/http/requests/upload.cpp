@@ -201,8 +201,8 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   for (const auto& [header, sha256] : expected) {
     if (digest != sha256) throw other_digest(header);
   }
-  body_ = {file_.path(),
-           is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"))};
+  body_ = {file_.path(), is_form ? jobs::UploadName{receiver.file_name()}
+                                 : upload_name_of(request.header("Content-Disposition"))};
 }
 
 void receive_part(PartialUpload& upload, const PartialLease& lease, const store::DataFolder& folder,

@@ -54,7 +54,7 @@ void slice(App& app, const Request& request, Response& response) {
                            to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag, kForever)) return;
   const auto canonical = std::make_shared<const volume::CanonicalFile>(
-      jobs::intact_volume(app.services.blobs, volume.id).path);
+      jobs::intact_volume(app.services.blobs, volume.samples).path);
   const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
   response.set_header("Accept-Ranges", "none");
   answer_pieces(request, response, "image/png",
@@ -72,7 +72,7 @@ void preview(App& app, const Request& request, Response& response) {
                            to_text(choice.window[0]) + '.' + to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag, kForever)) return;
   const auto canonical = std::make_shared<const volume::CanonicalFile>(
-      jobs::intact_volume(app.services.blobs, volume.id).path);
+      jobs::intact_volume(app.services.blobs, volume.samples).path);
   const auto reduced = std::make_shared<volume::PreviewNrrd>(canonical, choice);
   const auto next = [reduced] { return std::optional<std::string>(reduced->next()); };
   response.status = 200;

@@ -186,7 +186,7 @@ void begin_upload(App& app, const Request& request, Response& response) {
   const KeptUploads::Partial upload =
       app.kept.begin({.owner = owner_of(request),
                       .query = request.query,
-                      .file_name = file_name_of(request.header("Content-Disposition")),
+                      .upload_name = upload_name_of(request.header("Content-Disposition")),
                       .sha256 = sha256_of_digest(request, "Repr-Digest").value_or("")});
   try {
     receive(app, request, *upload, *upload->begin_lease(0));

@@ -46,8 +46,8 @@ volume::ValueCounts count_values(const volume::CanonicalFile& canonical, const V
 
 Histogram Histograms::of(const store::Viewer& viewer, const Volume& volume, std::size_t bins) {
   const auto values = counts_.get({viewer, volume.id}, [&] {
-    const store::LocalBlob file = intact_volume(blobs_, volume.id);
-    return make_from_volume(blobs_, volume.id, {},
+    const store::LocalBlob file = intact_volume(blobs_, volume.samples);
+    return make_from_volume(blobs_, volume.samples, {},
                             [&] { return count_values(volume::CanonicalFile(file.path), volume); });
   });
   return {volume.id, volume.range, volume::rebinned(*values, bins)};

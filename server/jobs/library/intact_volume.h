@@ -9,12 +9,12 @@
 
 namespace isomesh::jobs {
 
-// Returns a volume's file after verifying its bytes against the volume's id. A mesh made from
-// corrupted samples would not look wrong. Throws Error kUnusableVolume if the file is missing or
-// corrupt, kCancelled if `stop` is requested. Thread safe.
-inline store::LocalBlob intact_volume(const store::BlobStore& blobs, const std::string& volume,
+// Returns the file of samples with that digest (Volume::samples) after verifying its bytes. A mesh
+// made from corrupted samples would not look wrong. Throws Error kUnusableVolume if the file is
+// missing or corrupt, kCancelled if `stop` is requested. Thread safe.
+inline store::LocalBlob intact_volume(const store::BlobStore& blobs, const std::string& samples,
                                       const std::stop_token& stop = {}) {
-  if (store::is_there_and_intact(blobs, volume, stop)) return blobs.local(volume);
+  if (store::is_there_and_intact(blobs, samples, stop)) return blobs.local(samples);
   volume::throw_damaged();
 }
 
@@ -23,13 +23,13 @@ inline store::LocalBlob intact_volume(const store::BlobStore& blobs, const std::
 // file truncated meanwhile kills the process or is no canonical volume any more. A file that was
 // missing only for a moment is kUnavailable.
 template <class Make>
-auto make_from_volume(const store::BlobStore& blobs, const std::string& volume,
+auto make_from_volume(const store::BlobStore& blobs, const std::string& samples,
                       const std::stop_token& stop, const Make& make) {
   try {
     return make();
   } catch (const Error& error) {
     const bool was_missing = error.code() == ErrorCode::kNotFound;
-    if (was_missing || error.code() == ErrorCode::kInternal) intact_volume(blobs, volume, stop);
+    if (was_missing || error.code() == ErrorCode::kInternal) intact_volume(blobs, samples, stop);
     if (!was_missing) throw;
     throw Error(ErrorCode::kUnavailable, "the volume's file was missing for a moment: try again");
   }

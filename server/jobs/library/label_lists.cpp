@@ -190,8 +190,8 @@ LabelValues values_of(const Volume& volume) {
 std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::Viewer& viewer,
                                                                    const Volume& volume) {
   return counts_.get({viewer, volume.id}, [&] {
-    const store::LocalBlob file = intact_volume(blobs_, volume.id);
-    return make_from_volume(blobs_, volume.id, {},
+    const store::LocalBlob file = intact_volume(blobs_, volume.samples);
+    return make_from_volume(blobs_, volume.samples, {},
                             [&] { return count_labels(volume::CanonicalFile(file.path), volume); });
   });
 }

@@ -12,6 +12,7 @@
 #include "server/import/message/import_message.h"
 #include "server/jobs/library/blob_eraser.h"
 #include "server/jobs/library/import_runner.h"
+#include "server/jobs/library/upload_name.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
@@ -41,30 +42,25 @@ class VolumeLibrary {
         limits_(limits),
         runner_(runner) {}
 
-  // Imports an uploaded file in a process of its own. `name` is the client's name for the upload,
-  // used if the file contains no name; `party` takes turns with others (ImportPlaces). Second:
-  // false if the owner already had the same samples and geometry. Then the record stays unchanged,
-  // but the returned volume has the notes, ignored files and labels of this upload. Throws what
-  // ImportRunner::run throws, also while the bytes are stored, and kOutOfSpace. It stores nothing
-  // if it throws kCancelled.
+  // Imports an uploaded file in a process of its own. `party` takes turns with others
+  // (ImportPlaces). Second: false if the owner already had the volume: the same samples, and
+  // everything else that the upload says. Throws what ImportRunner::run throws, also while the
+  // bytes are stored, and kOutOfSpace. It stores nothing if it throws kCancelled.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
-                              const ImportOptions& options = {}, const std::string& name = {},
+                              const ImportOptions& options = {}, const UploadName& name = {},
                               const std::string& party = {}, const ImportControl& control = {});
 
-  // Imports a series from a PACS response. Second: the patient, study and series according to the
-  // images themselves; the record may be of an earlier upload of the same samples. The returned
-  // volume has the labels of this series, as with add(). It stores nothing if it throws kCancelled.
-  std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
-                                             const std::filesystem::path& response,
-                                             const PeersSeries& series,
-                                             const ImportControl& control = {});
+  // Imports a series from a PACS response; the volume has a DICOM identity. It stores nothing if it
+  // throws kCancelled.
+  Volume add_peers(const std::string& owner, const std::filesystem::path& response,
+                   const PeersSeries& series, const ImportControl& control = {});
 
   // Imports all volumes of an upload, each in a process of its own, one after the other. Each
   // element has a volume or its error, unless that is an internal one, which is thrown. If the
   // options choose a member or the upload has only one volume, there is one element with the chosen
   // member, and its error is thrown. A cancellation is thrown, too.
   std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
-                                      const ImportOptions& options, const std::string& name,
+                                      const ImportOptions& options, const UploadName& name,
                                       const std::string& party, const ImportControl& control = {});
 
   // Renames the owner's volume; an empty name removes it. Throws Error kNotFound, kGone.

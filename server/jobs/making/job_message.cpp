@@ -15,7 +15,7 @@ void visit(Is<JobSetup> auto& self, auto&& field) {
 
 void visit(Is<JobOrder> auto& self, auto&& field) {
   field("work", self.work);
-  field("volume", self.volume.id);
+  field("samples", self.volume.samples);
   field("notes", self.volume.notes);
   field("parameters", self.parameters);
   field("iso", self.iso);

@@ -35,7 +35,7 @@ struct JobOrder {
   // The volume's canonical file, found intact. The process receives it open, with the first bytes
   // of the line, and not its path.
   std::filesystem::path file;
-  Volume volume;  // its id and notes
+  Volume volume;  // its samples and notes
   MeshParameters parameters;
   double iso = 0;  // resolved; the parameters may name none
   bool certify = false;

@@ -69,7 +69,7 @@ struct Workspace {
 
 // The input of a mesh, and the resources it may use.
 struct MeshRequest {
-  const Volume& volume;  // its id and notes, for the files to name
+  const Volume& volume;  // its samples and notes, for the files to name
   const MeshParameters& parameters;
   double iso;  // resolved; the parameters may name none
   bool certify;

@@ -202,7 +202,7 @@ mesh::Context SharedProgress::context(std::size_t part) {
 }
 
 codec::Provenance provenance_of(const SampleArray& samples, const MeshRequest& request) {
-  return {.volume = request.volume.id,
+  return {.samples = request.volume.samples,
           .parameters = request.parameters,
           .iso = request.iso,
           .dims = samples.dims,

@@ -151,14 +151,14 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
                                 const MeshParameters& parameters, double iso) {
   const auto find = [&] {
     const std::stop_token stop = stop_.get_token();
-    const store::LocalBlob file = intact_volume(blobs_, volume.id, stop);
+    const store::LocalBlob file = intact_volume(blobs_, volume.samples, stop);
     const JobOrder order = {.work = JobOrder::Work::kCount,
                             .file = file.path,
                             .volume = volume,
                             .parameters = parameters,
                             .iso = iso,
                             .memory_bytes = limits_.memory_bytes};
-    return make_from_volume(blobs_, volume.id, stop, [&] {
+    return make_from_volume(blobs_, volume.samples, stop, [&] {
       const Lock lock(process_mutex_);
       return process_.count(order, stop);
     });

@@ -21,7 +21,7 @@ double milliseconds_since(Clock::time_point begin) {
 // Disk capacity for the files, excluding the volume's own bytes.
 std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume) {
   const std::uint64_t capacity = blobs.capacity();
-  return capacity - std::min(capacity, blobs.size(volume.id).value_or(0));
+  return capacity - std::min(capacity, blobs.size(volume.samples).value_or(0));
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                             const std::string& owner) {
   const auto began = Clock::now();
   report(Stage::kLoad, 0, {});
-  const store::LocalBlob file = intact_volume(blobs, volume.id, stop);
+  const store::LocalBlob file = intact_volume(blobs, volume.samples, stop);
   const double checking = milliseconds_since(began);
 
   // All are committed at the end, so an unfinished job leaves no files.
@@ -59,7 +59,7 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                           .memory_bytes = limits.memory_bytes,
                           .disk_bytes = disk_for_files(blobs, volume),
                           .expected = expected_times(volume, parameters, parameters.certify)};
-  MadeMesh made = make_from_volume(blobs, volume.id, stop,
+  MadeMesh made = make_from_volume(blobs, volume.samples, stop,
                                    [&] { return process.make(order, sinks, stop, pass_on); });
   const auto stored = Clock::now();
   PipelineResult result = {std::move(made.summary), with_checking(made.timing)};

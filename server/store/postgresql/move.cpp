@@ -34,8 +34,8 @@ struct Table {
 
 // Events are not copied: their numbers have another form, and nobody waits for them.
 const std::array kAsTheyAre = {
-    Table{"volumes(owner, id, created, used, bytes, record, labelled)",
-          "SELECT owner, id, created, used, bytes, record, labelled FROM volumes", 7},
+    Table{"volumes(owner, id, created, used, blob, bytes, record, labelled)",
+          "SELECT owner, id, created, used, blob, bytes, record, labelled FROM volumes", 8},
     Table{"meshes(job, blob, bytes)", "SELECT job, blob, bytes FROM meshes", 3},
     Table{"callbacks(job, receiver, url, body, attempts, created, next)",
           "SELECT job, receiver, url, body, attempts, created, next FROM callbacks", 7},
@@ -164,6 +164,11 @@ Moved copy_records(store::Database& source, const std::string& url, const std::s
       Rows row = reading->query("SELECT id FROM audit_sent");
       row.next();
       transaction->query("UPDATE audit_sent SET id = ?1", row.integer(0));
+    }
+    {
+      Rows row = reading->query("SELECT key FROM volume_key");
+      row.next();
+      transaction->query("UPDATE volume_key SET key = ?1", row.text(0));
     }
     transaction->query("DELETE FROM identity");
     transaction->query("INSERT INTO identity VALUES(?1, isomesh_now())", name);

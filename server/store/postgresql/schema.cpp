@@ -46,14 +46,21 @@ CREATE TABLE volumes(
   id text COLLATE "C" NOT NULL,
   created bigint NOT NULL,
   used bigint NOT NULL,                -- when it was created or a job that needed it ended, whichever is last
+  blob text COLLATE "C" NOT NULL,      -- of its samples, see Volume::samples
   bytes bigint NOT NULL,               -- of its blob
   record text NOT NULL,                -- without labels
   labelled text,                       -- with them, if there are any
   PRIMARY KEY(owner, id)
 );
-CREATE INDEX volumes_by_blob ON volumes(id);
+CREATE INDEX volumes_by_id ON volumes(id);
+CREATE INDEX volumes_by_blob ON volumes(blob);
 CREATE INDEX volumes_by_use ON volumes(used);
 CREATE INDEX volumes_by_time ON volumes(created, id);
+
+CREATE TABLE volume_key(               -- one row: see VolumeStore::key
+  key text NOT NULL
+);
+INSERT INTO volume_key SELECT replace(gen_random_uuid()::text || gen_random_uuid()::text, '-', '');
 
 CREATE SEQUENCE job_order CACHE 1;     -- age is one order for all nodes
 CREATE TABLE jobs(

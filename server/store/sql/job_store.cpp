@@ -226,8 +226,7 @@ std::optional<SqlJobStore::Asked> SqlJobStore::look_up(SqlConnection& connection
   if (!row.next()) return std::nullopt;
   const auto volume = readable_volume(row.text(0), spec.parameters.volume);
   if (!volume) throw_damaged_volume("volume");
-  return Asked{.result_key = result_key(spec.parameters.volume, volume->notes, spec.parameters,
-                                        options_.mesher_version),
+  return Asked{.result_key = result_key(*volume, spec.parameters, options_.mesher_version),
                .cost_us = turn_cost_us(options_.expected_ms(*volume, spec.parameters))};
 }
 
@@ -254,8 +253,10 @@ bool SqlJobStore::has_share(SqlConnection& connection, const JobSpec& spec) cons
 }
 
 bool SqlJobStore::is_repaired(const Job& job) const {
-  return job.error && to_error(*job.error).code() == ErrorCode::kUnusableVolume &&
-         is_there_and_intact(blobs_, job.parameters.volume, {});
+  if (!job.error || to_error(*job.error).code() != ErrorCode::kUnusableVolume) return false;
+  Rows row =
+      records_.query("SELECT blob FROM volumes WHERE id = ?1 LIMIT 1", job.parameters.volume);
+  return row.next() && is_there_and_intact(blobs_, row.text(0), {});
 }
 
 Job SqlJobStore::remake(const std::string& id) {

@@ -46,7 +46,7 @@ std::vector<Schema> with_service(std::string tables, std::vector<Schema> compone
   service.component = "service";
   service.steps.push_back(std::move(tables));
   service.named_blobs =
-      "SELECT id AS blob, 'the volume ' AS what, id AS name FROM volumes UNION ALL "
+      "SELECT blob, 'the volume ' AS what, id AS name FROM volumes UNION ALL "
       "SELECT blob, 'a mesh of the job ', job FROM meshes";
   service.kept_from = {{"volumes", "used"}, {"jobs", "finished"}};
   components.insert(components.begin(), std::move(service));

@@ -88,10 +88,10 @@ std::optional<Volume> readable_at(const VolumePlace& place, const std::string& r
 bool insert(SqlConnection& connection, const std::string& owner, const Volume& volume,
             const Records& records) {
   const std::size_t inserted = connection.run(
-      "INSERT INTO volumes(owner, id, created, used, bytes, record, labelled) VALUES(?1, ?2, ?3, "
-      "isomesh_kept(isomesh_now()), ?4, ?5, ?6) ON CONFLICT(owner, id) DO NOTHING",
-      owner, volume.id, us_of_timestamp(volume.created), volume.bytes, records.listed,
-      records.labelled);
+      "INSERT INTO volumes(owner, id, created, used, blob, bytes, record, labelled) VALUES(?1, ?2, "
+      "?3, isomesh_kept(isomesh_now()), ?4, ?5, ?6, ?7) ON CONFLICT(owner, id) DO NOTHING",
+      owner, volume.id, us_of_timestamp(volume.created), volume.samples, volume.bytes,
+      records.listed, records.labelled);
   if (inserted == 0) return false;
   connection.run("DELETE FROM expired WHERE id = ?1 AND owner = ?2", volume.id, owner);
   return true;
@@ -145,10 +145,23 @@ Volume SqlVolumeStore::rename(const std::string& owner, const std::string& id,
   });
 }
 
-bool SqlVolumeStore::contains(const Viewer& viewer, const std::string& id) const {
+std::optional<std::string> SqlVolumeStore::samples_of(const Viewer& viewer,
+                                                      const std::string& id) const {
+  Rows row = database_.query(
+      "SELECT blob FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2) LIMIT 1", id, viewer);
+  return row.next() ? std::optional(row.text(0)) : std::nullopt;
+}
+
+bool SqlVolumeStore::has_samples(const std::string& owner, const std::string& samples) const {
   return database_
-      .query("SELECT 1 FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id, viewer)
+      .query("SELECT 1 FROM volumes WHERE blob = ?1 AND owner = ?2 LIMIT 1", samples, owner)
       .next();
+}
+
+std::string SqlVolumeStore::key() const {
+  Rows row = database_.query("SELECT key FROM volume_key");
+  if (!row.next()) throw Error(ErrorCode::kInternal, "The database has lost the key of its ids.");
+  return row.text(0);
 }
 
 std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string& after,
@@ -240,8 +253,8 @@ Expired SqlVolumeStore::expire(std::span<const Expirable> volumes, std::uint64_t
   return expire_records(
       database_, volumes, enough, [&](SqlConnection& connection, const Expirable& volume) {
         std::vector<Blob> blobs = read_blobs(connection.query(
-            std::string("SELECT id, bytes FROM volumes WHERE owner = ?1 AND id = ?2 AND used = "
-                        "?3") +
+            std::string("SELECT blob, bytes FROM volumes WHERE owner = ?1 AND id = ?2 AND used "
+                        "= ?3") +
                 connection.for_update(),
             volume.owner, volume.id, database_.to_us(volume.last_used)));
         const std::size_t removed = connection.run(
@@ -253,11 +266,14 @@ Expired SqlVolumeStore::expire(std::span<const Expirable> volumes, std::uint64_t
 }
 
 std::uint64_t SqlVolumeStore::named_bytes() const {
-  return sum_of_blobs(database_, "volumes", "id");
+  return sum_of_blobs(database_, "volumes", "blob");
 }
 
 OwnedBytes SqlVolumeStore::owned_bytes() const {
-  return read_owned_bytes(database_.query("SELECT owner, sum(bytes) FROM volumes GROUP BY owner"));
+  return read_owned_bytes(
+      database_.query("SELECT owner, sum(bytes) FROM (SELECT owner, max(bytes) AS bytes FROM "
+                      "volumes GROUP BY owner, "
+                      "blob) AS each GROUP BY owner"));
 }
 
 std::string cursor_of(const Volume& volume) { return volume.created + ' ' + volume.id; }

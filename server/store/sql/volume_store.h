@@ -34,7 +34,9 @@ class SqlVolumeStore : public VolumeStore {
   Volume get(const Viewer& viewer, const std::string& id) const override;
   Volume rename(const std::string& owner, const std::string& id,
                 const std::optional<std::string>& name) override;
-  bool contains(const Viewer& viewer, const std::string& id) const override;
+  std::optional<std::string> samples_of(const Viewer& viewer, const std::string& id) const override;
+  bool has_samples(const std::string& owner, const std::string& samples) const override;
+  std::string key() const override;
   std::vector<Volume> list(const Viewer& viewer, const std::string& after, std::size_t limit,
                            ListOrder order) const override;
   void erase(const Viewer& viewer, const std::string& id) override;

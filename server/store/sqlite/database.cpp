@@ -20,12 +20,14 @@ CREATE TABLE volumes(
   id TEXT NOT NULL,
   created INTEGER NOT NULL,
   used INTEGER NOT NULL,      -- when it was created or a job that needed it ended, whichever is last
+  blob TEXT NOT NULL,         -- of its samples, see Volume::samples
   bytes INTEGER NOT NULL,     -- of its blob
   record TEXT NOT NULL,       -- without labels
   labelled TEXT,              -- with them, if there are any
   PRIMARY KEY(owner, id)
 ) WITHOUT ROWID;
-CREATE INDEX volumes_by_blob ON volumes(id);
+CREATE INDEX volumes_by_id ON volumes(id);
+CREATE INDEX volumes_by_blob ON volumes(blob);
 CREATE INDEX volumes_by_use ON volumes(used);
 CREATE INDEX volumes_by_time ON volumes(created, id);
 
@@ -105,6 +107,11 @@ CREATE TABLE callbacks(       -- of jobs that have ended, until they are deliver
   next INTEGER NOT NULL       -- when it is due
 ) WITHOUT ROWID;
 CREATE INDEX callbacks_by_time ON callbacks(next);
+
+CREATE TABLE volume_key(      -- one row: see VolumeStore::key
+  key TEXT NOT NULL
+);
+INSERT INTO volume_key VALUES(lower(hex(randomblob(32))));
 
 CREATE TABLE identity(        -- one row: see Identity
   id TEXT NOT NULL,

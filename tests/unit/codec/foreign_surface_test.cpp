@@ -41,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, PythonReader,
 
 Provenance known() {
   Provenance provenance;
-  provenance.volume = "abc";
+  provenance.samples = "abc";
   provenance.iso = 42;
   provenance.notes = {{"orientation", "a < b & c ]]> d"}};
   return provenance;

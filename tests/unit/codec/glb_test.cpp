@@ -114,7 +114,7 @@ TEST(Glb, ThePatientsHeadIsUpAndMetresAreTheUnit) {
 
 TEST(Glb, SaysWhereItComesFrom) {
   Provenance provenance;
-  provenance.volume = "abc";
+  provenance.samples = "abc";
   provenance.parameters.passes = 9;
   provenance.iso = 60.5;
   provenance.dims = {4, 5, 6};
@@ -122,7 +122,7 @@ TEST(Glb, SaysWhereItComesFrom) {
   const std::string glb = encoded(several_blocks(), MeshFormat::kGlb, provenance);
   const json extras = open_container(glb).document["asset"]["extras"];
   EXPECT_EQ(extras["parameters"]["passes"], 9);
-  EXPECT_EQ(extras["parameters"]["volume"], "abc");
+  EXPECT_EQ(extras["samples"], "abc");
   json all = json::parse(to_json(provenance.parameters));
   all["volume"] = "abc";
   all.erase("formats");

@@ -45,7 +45,7 @@ class LabelFilesTest : public testing::Test {
     }
     labels_[1].name = "Left ventr\u00edculo";
     labels_[1].color = "#ff8000";
-    provenance_.volume = "abc";
+    provenance_.samples = "abc";
     provenance_.parameters = label_parameters({});
   }
 

@@ -51,7 +51,7 @@ TEST(ThreeMf, TellsTheTopologyThatItMeasures) {
 
 TEST(ThreeMf, SaysWhereItComesFrom) {
   Provenance provenance;
-  provenance.volume = "abc";
+  provenance.samples = "abc";
   provenance.parameters.passes = 9;
   provenance.iso = 60.5;
   provenance.notes = {{"code", "Less than < & \"quotes\""}};

@@ -62,7 +62,7 @@ TEST(Usd, HasNormalsWhereTheyAreAskedFor) {
 
 TEST(Usd, SaysWhereItComesFrom) {
   Provenance provenance;
-  provenance.volume = "abc";
+  provenance.samples = "abc";
   provenance.iso = 60.5;
   provenance.notes = {{"code", "a \"quoted\" \\ and\na line"}};
   const UsdStage stage =

@@ -86,7 +86,8 @@ TEST_F(OrdersTest, WhoseVolumeIsDamagedFetchAgainAfterAPause) {
   const std::string id = submit();
   ASSERT_TRUE(until([&] { return get(id).job.has_value(); }));
   const std::string volume = *get(id).volume;
-  test::write_file(blobs_.path_of(volume), "spoilt");
+  const std::string samples = volumes_.samples_of(std::nullopt, volume).value();
+  test::write_file(blobs_.path_of(samples), "spoilt");
   const auto lease = jobs_.claim("test", minutes(1));
   ASSERT_TRUE(lease);
   store::Outcome outcome;
@@ -100,7 +101,7 @@ TEST_F(OrdersTest, WhoseVolumeIsDamagedFetchAgainAfterAPause) {
   ASSERT_TRUE(finish_job());
   ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
   EXPECT_EQ(get(id).volume, volume);
-  EXPECT_TRUE(blobs_.is_intact(volume, {}));
+  EXPECT_TRUE(blobs_.is_intact(samples, {}));
 }
 
 TEST_F(OrdersTest, WhoseObjectIsMissingMakeItAgainAfterAPause) {

@@ -44,7 +44,6 @@ OrderWork some_work() {
   work.looks = 1;
   work.begun = "2026-11-21T06:00:00.000Z";
   work.identity.emplace().patient_name = "M\xc3\xbcller^Eva";
-  work.labels = {{.label = 3, .name = "Liver", .color = "#ff8000", .values = {3, 4}}};
   work.blobs = {"ab"};
   work.label = "Bone";
   work.series_number = 9001;

@@ -134,7 +134,12 @@ TEST(ImportOptionsOf, RefusesOtherValues) {
   }
 }
 
-TEST(FileNameOf, IsWhatTheHeaderTells) {
+TEST(UploadNameOf, IsWhatTheHeaderTells) {
+  const auto file_name_of = [](std::string_view header) {
+    const jobs::UploadName name = upload_name_of(header);
+    EXPECT_FALSE(name.is_chosen) << header;
+    return name.text;
+  };
   EXPECT_EQ(file_name_of("attachment; filename=\"a b.nii.gz\""), "a b.nii.gz");
   EXPECT_EQ(file_name_of("attachment; filename=ct.nrrd; x=y"), "ct.nrrd");
   EXPECT_EQ(file_name_of("attachment; x=\"; filename=no\"; filename = b.nrrd"), "b.nrrd");
@@ -144,6 +149,14 @@ TEST(FileNameOf, IsWhatTheHeaderTells) {
   EXPECT_EQ(file_name_of("attachment; filename*=UTF-8''%2Fetc%2F%0A%zz%4"), "%zz%4");
   EXPECT_EQ(file_name_of("attachment"), "");
   EXPECT_EQ(file_name_of(""), "");
+  EXPECT_EQ(file_name_of("attachment; name=\" \"; filename=a"), "a");
+}
+
+TEST(UploadNameOf, IsTheOneThatAPersonChose) {
+  const auto chosen = [](const std::string& text) { return jobs::UploadName{text, true}; };
+  EXPECT_EQ(upload_name_of("attachment; filename=a.nii; name=\"left/right\""),
+            chosen("left/right"));
+  EXPECT_EQ(upload_name_of("attachment; name*=UTF-8''M%C3%BCller%0A"), chosen("M\xC3\xBCller"));
 }
 
 TEST(PlainFileName, IsCutBetweenCharacters) {

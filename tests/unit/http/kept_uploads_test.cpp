@@ -119,7 +119,7 @@ class KeptParts : public testing::Test {
   static KeptUploads::Partial begun(KeptUploads& kept, const std::string& owner,
                                     std::size_t bytes = 0) {
     KeptUploads::Partial upload =
-        kept.begin({.owner = owner, .query = {}, .file_name = "a.nii", .sha256 = {}});
+        kept.begin({.owner = owner, .query = {}, .upload_name = {"a.nii"}, .sha256 = {}});
     upload->write(*upload->begin_lease(0), std::vector<std::byte>(bytes));
     return upload;
   }

@@ -400,7 +400,7 @@ TEST_F(HistogramsTest, AreCountedForEachViewer) {
   const Volume volume = add_sphere();
   Histograms histograms(blobs_);
   histograms.of("one", volume, 2);
-  blobs_.erase(volume.id);
+  blobs_.erase(volume.samples);
   EXPECT_NO_THROW(histograms.of("one", volume, 3));
   EXPECT_TRUE(test::code_thrown_by([&] { histograms.of("other", volume, 2); }));
   EXPECT_TRUE(test::code_thrown_by([&] { histograms.of(std::nullopt, volume, 2); }));

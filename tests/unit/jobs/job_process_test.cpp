@@ -29,7 +29,7 @@ using testing::HasSubstr;
 class JobProcessTest : public test::JobsFixture {
  protected:
   JobOrder order_of(const Volume& volume, double iso, int passes = 5) const {
-    JobOrder order = {.file = blobs_.path_of(volume.id),
+    JobOrder order = {.file = blobs_.path_of(volume.samples),
                       .volume = volume,
                       .parameters = {},
                       .iso = iso,
@@ -237,7 +237,7 @@ TEST(JobMessage, ArrivesAsItWasSent) {
                     .iso = 0.1,
                     .memory_bytes = std::uint64_t{1} << 60,
                     .disk_bytes = ~std::uint64_t{0}};
-  order.volume.id = "id";
+  order.volume.samples = "samples";
   order.volume.notes = {{"code", "one\nand\tanother"}, {"other", ""}};
   order.parameters.passes = 17;
   order.parameters.lambda = 0.7;
@@ -247,7 +247,7 @@ TEST(JobMessage, ArrivesAsItWasSent) {
   const auto read = order_from(line.substr(0, line.size() - 1));
   ASSERT_TRUE(read);
   EXPECT_EQ(read->work, order.work);
-  EXPECT_EQ(read->volume.id, order.volume.id);
+  EXPECT_EQ(read->volume.samples, order.volume.samples);
   EXPECT_EQ(read->volume.notes, order.volume.notes);
   EXPECT_EQ(read->parameters, order.parameters);
   EXPECT_EQ(read->iso, order.iso);

@@ -184,7 +184,7 @@ TEST_F(LabelListsTest, SamplesThatAreCutMeanwhileAreDamaged) {
 TEST_F(LabelListsTest, AreCountedForEachViewer) {
   const Volume volume = add_three_voxels();
   lists_.page_of("one", volume, 0, {});
-  blobs_.erase(volume.id);
+  blobs_.erase(volume.samples);
   EXPECT_NO_THROW(lists_.page_of("one", volume, 1, {}));
   EXPECT_EQ(test::code_thrown_by([&] { lists_.page_of("two", volume, 0, {}); }),
             ErrorCode::kUnusableVolume);

@@ -341,7 +341,7 @@ TEST_F(PipelineTest, LeavesSmallPartsOutAndSaysSo) {
 
 TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsUnusable) {
   const Volume volume = add_sphere();
-  blobs_.erase(volume.id);
+  blobs_.erase(volume.samples);
   EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters_of(volume, 0)); }),
             ErrorCode::kUnusableVolume);
 }

@@ -39,7 +39,7 @@ class VolumeLibraryTest : public test::JobsFixture {
   void erase_after(const std::function<void(const Volume& volume)>& meanwhile) {
     const Volume volume = add_bytes(bytes_).first;
     BlobEraser eraser(blobs_, volumes_, data_.erasing());
-    eraser.erase(volume.id, [&] {
+    eraser.erase(volume.samples, [&] {
       volumes_.erase("", volume.id);
       meanwhile(volume);
     });
@@ -56,6 +56,46 @@ TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
   geometry.spacing = {1, 1, 2};
   EXPECT_NE(add_bytes(bytes_, geometry).first.id, id);
   EXPECT_EQ(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).size(), 3U);
+}
+
+// The same samples with exchanged names, as a correction makes them.
+TEST_F(VolumeLibraryTest, WhatAFileSaysIsOfItsVolumeAlone) {
+  const auto add = [&](const std::string& first, const std::string& second) {
+    test::write_file(folder_ / "upload",
+                     "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nspace: "
+                     "LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nSegment0_Name:=" +
+                         first + "\nSegment0_LabelValue:=1\nSegment1_Name:=" + second +
+                         "\nSegment1_LabelValue:=2\n\n" + std::string("\0\1\1\1\2\2\2\0", 8));
+    return library_.add("", folder_ / "upload").first;
+  };
+  const Volume wrong = add("left", "right");
+  const Volume right = add("right", "left");
+  EXPECT_NE(wrong.id, right.id);
+  EXPECT_EQ(wrong.samples, right.samples);
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_EQ(right.labels.front().name, "right");
+  EXPECT_EQ(volumes_.get("", right.id), right);
+  EXPECT_EQ(volumes_.get("", wrong.id), wrong);
+  EXPECT_EQ(add("left", "right"), wrong);
+  library_.erase("", wrong.id);
+  library_.finish_erasing();
+  EXPECT_EQ(blob_count(), 1U);
+  library_.erase("", right.id);
+  library_.finish_erasing();
+  EXPECT_EQ(blob_count(), 0U);
+}
+
+TEST_F(VolumeLibraryTest, ANameThatAPersonChoseIsTheVolumes) {
+  test::write_file(folder_ / "upload", bytes_);
+  const auto add = [&](const UploadName& name) {
+    return library_.add("", folder_ / "upload", raw(), name).first;
+  };
+  const Volume of_file = add({"a.raw"});
+  const Volume chosen = add({"left knee", true});
+  EXPECT_EQ(of_file.name, "a.raw");
+  EXPECT_EQ(chosen.name, "left knee");
+  EXPECT_NE(of_file.id, chosen.id);
+  EXPECT_EQ(add({"left knee", true}), chosen);
 }
 
 TEST_F(VolumeLibraryTest, ACancelledUploadLeavesNothing) {
@@ -133,14 +173,14 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
   const Volume erased = add_bytes(bytes_).first;
   const Volume kept = add_bytes(std::string(bytes_.rbegin(), bytes_.rend())).first;
   for (const Volume& volume : {erased, kept}) {
-    test::write_file(data_.erasing() / volume.id, "");
+    test::write_file(data_.erasing() / volume.samples, "");
   }
   volumes_.erase("", erased.id);
-  std::filesystem::rename(blobs_.path_of(erased.id), data_.quarantine() / erased.id);
+  std::filesystem::rename(blobs_.path_of(erased.samples), data_.quarantine() / erased.samples);
   BlobEraser next(blobs_, volumes_, data_.erasing());
   next.finish();
   EXPECT_EQ(blob_count(), 1U);
-  EXPECT_TRUE(std::filesystem::exists(blobs_.path_of(kept.id)));
+  EXPECT_TRUE(std::filesystem::exists(blobs_.path_of(kept.samples)));
   EXPECT_TRUE(std::filesystem::is_empty(data_.quarantine()));
   EXPECT_TRUE(std::filesystem::is_empty(data_.erasing()));
 }
@@ -148,11 +188,11 @@ TEST_F(VolumeLibraryTest, WhatADeadProcessWasToEraseIsErasedAfterTheNextStart) {
 TEST_F(VolumeLibraryTest, ADeletionIsNotedUntilTheSamplesAreErased) {
   const Volume volume = add_bytes(bytes_).first;
   BlobEraser eraser(blobs_, volumes_, data_.erasing());
-  eraser.erase(volume.id, [] {});
+  eraser.erase(volume.samples, [] {});
   // An earlier erasure of the same samples, which found them named, leaves the mark alone.
-  eraser.erase(volume.id, [&] {
+  eraser.erase(volume.samples, [&] {
     eraser.finish();
-    EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
+    EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.samples));
     EXPECT_EQ(blob_count(), 1U);
     volumes_.erase("", volume.id);
   });
@@ -264,10 +304,10 @@ TEST_F(VolumeLibraryTest, TheEndLeavesErasingToTheNextStart) {
   {
     BlobEraser eraser(blobs_, volumes_, data_.erasing());
     for (int n = 0; n < kMany; ++n) eraser.erase(std::to_string(n), [] {});
-    eraser.erase(volume.id, [&] { volumes_.erase("", volume.id); });
+    eraser.erase(volume.samples, [&] { volumes_.erase("", volume.id); });
   }
   EXPECT_EQ(blob_count(), 1U);
-  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.id));
+  EXPECT_TRUE(std::filesystem::exists(data_.erasing() / volume.samples));
   BlobEraser next(blobs_, volumes_, data_.erasing());
   next.finish();
   EXPECT_EQ(blob_count(), 0U);
@@ -310,7 +350,7 @@ TEST_F(VolumeLibraryTest, SamplesThatCameAgainMeanwhileStay) {
 TEST_F(VolumeLibraryTest, SamplesThatAreStoredAgainStayBeforeTheyAreNamed) {
   erase_after([this](const Volume& volume) {
     const std::filesystem::path again = data_.scratch() / "again";
-    std::filesystem::copy_file(blobs_.path_of(volume.id), again);
+    std::filesystem::copy_file(blobs_.path_of(volume.samples), again);
     blobs_.adopt(again, store::digest_of(again), "", {});
   });
   EXPECT_EQ(blob_count(), 1U);

@@ -125,9 +125,9 @@ TEST_F(WorkersTest, AVolumeThatIsDamagedOnDiskFailsItsJob) {
            [](std::string& bytes) { bytes.back() ^= 1; },
            [](std::string& bytes) { bytes.resize(bytes.size() / 2); },
            [](std::string& bytes) { bytes.clear(); }}) {
-    std::string bytes = blob(volume.id);
+    std::string bytes = blob(volume.samples);
     damage(bytes);
-    test::write_file(blobs_.path_of(volume.id), bytes);
+    test::write_file(blobs_.path_of(volume.samples), bytes);
     const Workers workers(threads(1), jobs_, volumes_, blobs_);
     const Job job = test::end_of(jobs_, "", submit(parameters_of(volume, 0)));
     EXPECT_EQ(job.state, JobState::kFailed);
@@ -201,7 +201,7 @@ TEST_F(WorkersTest, AJobWaitsUnchargedForAFolderThatIsMovedAway) {
   std::filesystem::create_directory(folder_ / "shared");
   LeavingBlobs shared(store::shared_blob_folders(folder_ / "shared"), data_.reserve());
   shared.set_mark("ours 1\n");
-  test::put(shared, blob(add_sphere().id));
+  test::put(shared, blob(add_sphere().samples));
   expect_to_wait(
       shared, [&] { std::filesystem::rename(folder_ / "shared", folder_ / "elsewhere"); },
       [&] { std::filesystem::rename(folder_ / "elsewhere", folder_ / "shared"); });

@@ -38,6 +38,7 @@ MeshSummary some_mesh() {
 
 Volume some_volume() {
   return {.id = "0123abcd",
+          .samples = "4567cdef",
           .format = "nifti",
           .dims = {181, 217, 4294967295},
           .type = SampleType::kFloat32,

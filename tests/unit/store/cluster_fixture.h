@@ -80,6 +80,7 @@ class ClusterTest : public testing::Test {
     two_.emplace(url_, "two", blobs_);
     Volume volume;
     volume.id = kVolume;
+    volume.samples = kVolume;
     volume.created = "2024-01-01T00:00:00.000Z";
     one_->volumes.add("", volume);
   }

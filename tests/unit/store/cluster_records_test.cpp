@@ -144,6 +144,7 @@ TEST_F(ClusterTest, WhatIsUsedIsNeverOlderThanTheNewestTimeThatIsKnown) {
   ask("UPDATE identity SET seen = isomesh_now() + 40 * 86400000000");
   Volume volume;
   volume.id = "another";
+  volume.samples = volume.id;
   volume.created = "2024-01-01T00:00:00.000Z";
   one().volumes.add("", volume);
   two().jobs.cancel("", submit());

@@ -93,11 +93,12 @@ TEST_P(OutboxConformance, OutlivesARestart) {
 }
 
 // Priority and callback change no byte of the mesh, so the key does not depend on them.
-TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
+TEST(ResultKey, KnowsSamplesParametersAndVersionAlone) {
   JobParameters parameters;
-  parameters.volume = "abc";
+  Volume volume;
+  volume.samples = "abc";
   const auto key = [&](const std::string& version) {
-    return result_key(parameters.volume, {}, parameters, version);
+    return result_key(volume, parameters, version);
   };
   const std::string first = key("1");
   parameters.priority = Priority::kStat;
@@ -107,13 +108,27 @@ TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
   parameters.normals = !parameters.normals;
   EXPECT_NE(key("1"), first);
   parameters.normals = !parameters.normals;
-  parameters.volume = "abd";
+  volume.samples = "abd";
   EXPECT_NE(key("1"), first);
+  volume.samples = "abc";
+  volume.id = "another patient's";
+  parameters.volume = volume.id;
+  EXPECT_EQ(key("1"), first);
+  volume.suggested_iso = 1;
+  EXPECT_NE(key("1"), first);
+  parameters.iso = 5;
+  const std::string by_value = key("1");
+  volume.suggested_iso = 0;
+  EXPECT_EQ(key("1"), by_value);
 }
 
 // Those that a mesh carries, and no others.
 TEST(ResultKey, KnowsTheNotesInMeshes) {
-  const auto key = [](const std::vector<Note>& notes) { return result_key("abc", notes, {}, "1"); };
+  const auto key = [](const std::vector<Note>& notes) {
+    Volume volume;
+    volume.notes = notes;
+    return result_key(volume, {}, "1");
+  };
   const Note in_mesh = note_of(NoteCode::kFormsDiffer, "by 3 mm");
   EXPECT_NE(key({in_mesh}), key({}));
   EXPECT_NE(key({in_mesh}), key({note_of(NoteCode::kFormsDiffer, "by 4 mm")}));

@@ -34,6 +34,7 @@ class RetentionConformance : public test::EngineTest {
   std::string add_volume(char letter, std::size_t bytes, const std::string& owner = "") {
     Volume volume;
     volume.id = put(std::string(bytes, letter)).key;
+    volume.samples = volume.id;
     volume.bytes = bytes;
     volume.created = timestamp();
     volumes().add(owner, volume);

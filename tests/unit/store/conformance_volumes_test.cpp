@@ -17,6 +17,7 @@ using test::code_thrown_by;
 Volume volume_of(const std::string& id, const std::string& created = "2024-01-01T00:00:00.000Z") {
   Volume volume;
   volume.id = id;
+  volume.samples = id;
   volume.format = "nrrd";
   volume.dims = {3, 4, 5};
   volume.type = SampleType::kInt16;
@@ -63,6 +64,36 @@ TEST_P(VolumeConformance, KeepsTheFirstOfTwoWithOneId) {
   EXPECT_EQ(volumes().add("", volume_of("aa", "2025-01-01T00:00:00.000Z")),
             std::pair(first, false));
   EXPECT_EQ(volumes().get("", "aa"), first);
+}
+
+// Samples are stored once, also for one owner, and stay until their last record goes.
+TEST_P(VolumeConformance, RecordsShareTheirSamples) {
+  const std::string samples = put_blob("abcd");
+  const auto shared = [&](const std::string& id) {
+    Volume volume = volume_of(id);
+    volume.samples = samples;
+    volume.bytes = 4;
+    return volume;
+  };
+  EXPECT_FALSE(volumes().has_samples("", samples));
+  for (const char* id : {"aa", "bb"}) EXPECT_TRUE(volumes().add("", shared(id)).second) << id;
+  EXPECT_TRUE(volumes().has_samples("", samples));
+  EXPECT_FALSE(volumes().has_samples("other", samples));
+  EXPECT_EQ(volumes().samples_of("", "bb"), samples);
+  EXPECT_EQ(volumes().samples_of("other", "bb"), std::nullopt);
+  EXPECT_EQ(volumes().named_bytes(), 4U);
+  EXPECT_EQ(volumes().owned_bytes(), (OwnedBytes{{"", 4}}));
+  volumes().erase("", "aa");
+  EXPECT_TRUE(volumes().names(samples));
+  volumes().erase("", "bb");
+  EXPECT_FALSE(volumes().names(samples));
+}
+
+TEST_P(VolumeConformance, TheKeyOfIdsStays) {
+  const std::string key = volumes().key();
+  EXPECT_EQ(key.size(), 64U);
+  restart();
+  EXPECT_EQ(volumes().key(), key);
 }
 
 TEST_P(VolumeConformance, ANameIsItsOwnersAlone) {

@@ -187,6 +187,7 @@ void EngineTest::make(const EngineOptions& options) {
 void EngineTest::add_volume(const std::string& owner, const std::string& id) {
   Volume volume;
   volume.id = id;
+  volume.samples = id;
   volume.format = "raw";
   volume.created = "2024-01-01T00:00:00.000Z";
   volumes().add(owner, volume);

@@ -27,6 +27,7 @@ class IdentityTest : public testing::Test {
     if (!bytes.empty()) {
       Volume volume;
       volume.id = test::put(blobs, bytes).key;
+      volume.samples = volume.id;
       volume.created = "2024-01-02T03:04:05.678Z";
       SqlVolumeStore(database).add("", volume);
     }

@@ -26,12 +26,19 @@ class Volume(TypedDict):
     """A stored volume. The sample (i,j,k) lies at origin + direction * diag(spacing) * (i,j,k),
     in millimetres, in DICOM's patient space (LPS)."""
 
-    #: The SHA-256 of the samples and their geometry.
+    #: A digest of all that the upload says: the samples and their geometry, and everything else
+    #: here but created. So the same upload is the same volume. The same samples with other names
+    #: of labels, or of another patient, are another volume.
     id: str
-    #: The volume's name: at first that of the series or file, until the volume is renamed. It is
-    #: not part of the id, of any mesh or of any log. Null if nothing gave a name.
+    #: The SHA-256 of the samples and their geometry, which a GLB repeats in asset.extras.samples.
+    #: Volumes of the same owner with the same samples share their bytes and, where nothing else
+    #: differs in them, their meshes.
+    samples: str
+    #: The volume's name: at first the one that its upload chose, or that of the series or file,
+    #: until the volume is renamed. It is not part of any mesh or of any log. Null if nothing gave
+    #: a name.
     name: Optional[str]
-    #: The format of the first upload.
+    #: The format of the upload.
     format: VolumeFormat
     #: The number of samples along x, y and z.
     dims: Sequence[int]
@@ -58,10 +65,9 @@ class Volume(TypedDict):
     presets: Sequence[Preset]
     #: Files of the upload that are not part of the volume, at most 100.
     ignored: Sequence[IgnoredObject]
-    #: Decisions, corrections and open points from reading the upload. The same samples with the
-    #: same geometry are one volume, whatever the format. Its notes, name, format and ignored are
-    #: those of the first upload. A GLB repeats the notes on samples and geometry in
-    #: asset.extras.notes. A job does not reuse a mesh that was made with other notes.
+    #: Decisions, corrections and open points from reading the upload. A GLB repeats the notes on
+    #: samples and geometry in asset.extras.notes. A job does not reuse a mesh that was made with
+    #: other ones of these.
     notes: Sequence[Note]
     dicom: NotRequired[DicomIdentity]
 

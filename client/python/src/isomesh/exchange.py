@@ -66,7 +66,8 @@ class Exchange:
         headers = {"Content-Type": "application/octet-stream"}
         if name or body.name:
             # A name may name a patient: it goes in a header, because logs hold the target.
-            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name or body.name, safe='')}"
+            kind, text = ("name", name) if name else ("filename", body.name)
+            headers["Content-Disposition"] = f"attachment; {kind}*=UTF-8''{quote(text, safe='')}"
         target = "/v1/volumes" + ("?" + urlencode(query) if query else "")
         if body.size >= resume.RESUMABLE_BYTES:
             answer = resume.send(self._transport, target, headers, body)
