@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "proto/json_text.h"
 
 namespace isomesh {
@@ -36,7 +37,11 @@ namespace json_values {
 
 void assign_null(Json& place) { place = nullptr; }
 void assign(Json& place, bool value) { place = value; }
-void assign(Json& place, std::int64_t value) { place = value; }
+void assign(Json& place, std::int64_t value) {
+  constexpr std::int64_t kMostExact = (std::int64_t{1} << 53) - 1;
+  const bool is_exact = value >= -kMostExact && value <= kMostExact;
+  place = is_exact ? Json(value) : Json(std::to_string(value));
+}
 void assign(Json& place, std::uint64_t value) { place = value; }
 void assign(Json& place, double value) { place = value; }
 void assign(Json& place, std::string_view value) { place = value; }
@@ -59,7 +64,13 @@ bool boolean(const Json& json) {
 }
 
 std::int64_t whole(const Json& json, std::int64_t least, std::int64_t most) {
-  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  using Limits = std::numeric_limits<std::int64_t>;
+  if (json.is_string() && least == Limits::min() && most == Limits::max()) {
+    const auto value = parse_int64(json.get_ref<const std::string&>());
+    if (!value) throw_wrong_kind();
+    return *value;
+  }
+  constexpr auto kMost = static_cast<std::uint64_t>(Limits::max());
   if (!json.is_number_integer()) throw_wrong_kind();
   if (json.is_number_unsigned() && json.get<std::uint64_t>() > kMost) throw_wrong_kind();
   const auto value = json.get<std::int64_t>();

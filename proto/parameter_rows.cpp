@@ -10,8 +10,8 @@ namespace isomesh::rows {
 namespace {
 
 constexpr double kMostUnsigned = std::numeric_limits<std::uint32_t>::max();
-constexpr double kLeastLabel = std::numeric_limits<std::int32_t>::min();
-constexpr double kMostLabel = kMostUnsigned;
+constexpr double kLeastSample = std::numeric_limits<std::int32_t>::min();
+constexpr double kMostSample = kMostUnsigned;
 
 // The sentences of all methods of smoothing, as one text.
 constexpr auto kMethods = [] {
@@ -133,21 +133,18 @@ constinit const Parameter kLabels = {
         "half-way between two samples. Some defaults differ from those of jobs with an "
         "iso-value. With another smoothing than `labels` no vertex moves farther than half the "
         "smallest spacing.",
-    .minimum = kLeastLabel,
-    .maximum = kMostLabel,
     .jobs = JobKind::kByLabels,
     .may_be_absent = true};
 
 constinit const Parameter kBackground = {.name = "background",
                                          .title = "Background value",
                                          .help = "The value of samples without a label.",
-                                         .minimum = kLeastLabel,
-                                         .maximum = kMostLabel,
+                                         .minimum = kLeastSample,
+                                         .maximum = kMostSample,
                                          .jobs = JobKind::kByLabels,
                                          .may_be_absent = true};
 
-constinit const Parameter kLabelName = {
-    .name = "label", .minimum = kLeastLabel, .maximum = kMostLabel};
+constinit const Parameter kLabelName = {.name = "label"};
 
 constinit const Parameter kLabelNames = {
     .name = "label_names",
@@ -180,8 +177,8 @@ constinit const Parameter kLabelValues = {
     .more =
         "A value may belong to several labels, which then overlap there. Labels "
         "that are not listed keep the values from the volume's file.",
-    .minimum = kLeastLabel,
-    .maximum = kMostLabel,
+    .minimum = kLeastSample,
+    .maximum = kMostSample,
     .jobs = JobKind::kByLabels,
     .may_be_absent = true,
     .in_query = false,

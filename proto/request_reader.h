@@ -83,6 +83,15 @@ class RequestReader {
            !(parameter.maximum && number > *parameter.maximum);
   }
 
+  // Exact up to 64 bits. Labels of so many come as strings, because many programs round numbers.
+  static std::optional<std::int64_t> long_number(const Json& json) {
+    if (json.is_string()) return parse_int64(json.get<std::string>());
+    const bool is_too_large =
+        json.is_number_unsigned() && !std::in_range<std::int64_t>(json.get<std::uint64_t>());
+    if (!json.is_number_integer() || is_too_large) return std::nullopt;
+    return json.get<std::int64_t>();
+  }
+
   // Reads 1 to `most` values; `kind` says in words what they are.
   template <class T>
   void read_list(const Json& json, const std::string& path, const Parameter& parameter,
@@ -135,6 +144,14 @@ class RequestReader {
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::integral auto& value) {
+    using Number = std::remove_reference_t<decltype(value)>;
+    if constexpr (std::is_same_v<Number, std::int64_t>) {
+      if (const auto whole = long_number(json);
+          whole && fits(parameter, static_cast<double>(*whole))) {
+        value = *whole;
+        return;
+      }
+    }
     const double number = json.is_number() ? json.get<double>() : std::nan("");
     if (std::floor(number) != number || !fits(parameter, number)) {
       return add(path, must_be(parameter, true));

@@ -3,6 +3,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -173,12 +174,12 @@ class ParameterOptions {
                              });
   }
 
-  CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, std::optional<LabelChoice>& value) {
     return isomesh::cli::add(app_, name, "all|N,N-N,..", help,
-                             [&value, name, range = range_of(parameter)](const std::string& text) {
+                             [&value, name](const std::string& text) {
                                value.emplace();
-                               if (text != "all") value->values = labels_from(name, text, range);
+                               if (text != "all") value->values = labels_from(name, text);
                              });
   }
 
@@ -215,12 +216,12 @@ class ParameterOptions {
 
   // `--label-name 3=Liver`, once per label.
   template <class T>
-  CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, std::map<std::int64_t, T>& value) {
     constexpr bool kIsList = std::is_same_v<T, std::vector<std::int64_t>>;
     return add_repeated(
         app_, name, kIsList ? "LABEL=N,.." : "LABEL=TEXT", help,
-        [&value, name, range = range_of(parameter)](const std::vector<std::string>& texts) {
+        [&value, name](const std::vector<std::string>& texts) {
           for (const std::string& text : texts) {
             const std::size_t sign = text.find('=');
             const auto label = number_from<std::int64_t>(std::string_view(text).substr(0, sign));
@@ -229,7 +230,7 @@ class ParameterOptions {
             }
             const std::string own = text.substr(sign + 1);
             if constexpr (kIsList) {
-              value[*label] = labels_from(name, own, range);
+              value[*label] = labels_from(name, own);
             } else {
               value[*label] = own;
             }
@@ -237,11 +238,8 @@ class ParameterOptions {
         });
   }
 
-  // "1,3-5": values and ranges of values. `range` says in words what a label may be.
-  static std::vector<std::int64_t> labels_from(const std::string& name, const std::string& text,
-                                               const std::string& range) {
-    constexpr std::int64_t kLeast = std::numeric_limits<std::int32_t>::min();
-    constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  // "1,3-5": values and ranges of values.
+  static std::vector<std::int64_t> labels_from(const std::string& name, const std::string& text) {
     std::vector<std::int64_t> labels;
     for (const std::string_view each : split(text, ',')) {
       const std::size_t dash = each.find('-', 1);  // a leading one is a sign
@@ -252,13 +250,13 @@ class ParameterOptions {
         refuse(name,
                "must be whole numbers or ascending ranges separated by commas, such as 1,3-5");
       }
-      if (*first < kLeast || *last > kMost) refuse(name, "must be whole numbers " + range);
-      for (std::int64_t label = *first; label <= *last; ++label) {
-        if (labels.size() == Volume::kMostLabels) {
-          refuse(name, "must be at most " + std::to_string(Volume::kMostLabels) + " labels");
-        }
-        labels.push_back(label);
+      const std::uint64_t others =
+          static_cast<std::uint64_t>(*last) - static_cast<std::uint64_t>(*first);
+      if (others >= Volume::kMostLabels - labels.size()) {
+        refuse(name, "must be at most " + std::to_string(Volume::kMostLabels) + " labels");
       }
+      labels.resize(labels.size() + others + 1);
+      std::iota(labels.end() - static_cast<std::ptrdiff_t>(others + 1), labels.end(), *first);
     }
     return labels;
   }

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "proto/error.h"
 
@@ -12,7 +13,7 @@ FaceRun::FaceRun(const LabelledSurface& surface, std::size_t number)
       surface_(&surface),
       own_(surface.triangles.of(number)),
       number_(number),
-      label_(static_cast<std::uint32_t>(surface.labels[number - 1].label)) {}
+      label_(surface.labels[number - 1].label) {}
 
 mesh::Triangle FaceRun::outward(std::uint32_t wall) const {
   const mesh::Triangle& triangle = mesh_.triangles[wall];
@@ -36,9 +37,13 @@ std::size_t count_of(const std::vector<FaceRun>& runs) {
   return faces;
 }
 
-bool has_wide_labels(const LabelledSurface& surface) {
-  return !surface.labels.empty() &&
-         surface.labels.back().label > std::numeric_limits<std::int32_t>::max();
+LabelType label_type(const LabelledSurface& surface) {
+  if (surface.labels.empty()) return LabelType::kInt32;
+  const std::int64_t low = surface.labels.front().label;
+  const std::int64_t high = surface.labels.back().label;
+  if (std::in_range<std::int32_t>(low) && std::in_range<std::int32_t>(high))
+    return LabelType::kInt32;
+  return low >= 0 && std::in_range<std::uint32_t>(high) ? LabelType::kUint32 : LabelType::kInt64;
 }
 
 void check_signed_indices(std::size_t vertices, std::size_t triangles, MeshFormat format) {

@@ -20,7 +20,7 @@ class FaceRun {
   FaceRun(const LabelledSurface& surface, std::size_t number);
 
   std::size_t count() const { return surface_ == nullptr ? mesh_.triangles.size() : own_.size(); }
-  std::uint32_t label() const { return label_; }  // for signed labels, its bits
+  std::int64_t label() const { return label_; }
 
   mesh::Triangle at(std::size_t index) const {
     return surface_ == nullptr ? mesh_.triangles[index] : outward(own_[index]);
@@ -33,7 +33,7 @@ class FaceRun {
   const LabelledSurface* surface_ = nullptr;
   std::span<const std::uint32_t> own_;
   std::size_t number_ = 0;
-  std::uint32_t label_ = 0;
+  std::int64_t label_ = 0;
 };
 
 // A run for each label, or one.
@@ -41,8 +41,9 @@ std::vector<FaceRun> faces_of(const FileContent& content);
 
 std::size_t count_of(const std::vector<FaceRun>& runs);
 
-// True if the labels exceed signed 32-bit numbers; then none is negative.
-bool has_wide_labels(const LabelledSurface& surface);
+// The integers that hold all labels of a surface.
+enum class LabelType { kInt32, kUint32, kInt64 };
+LabelType label_type(const LabelledSurface& surface);
 
 // Throws Error kTooLarge with the format's name if signed 32-bit numbers cannot count the vertices
 // or the triangles' corners.

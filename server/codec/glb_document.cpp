@@ -192,7 +192,9 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
 }
 
 Json extras_of(const LabelSummary& label) {
-  return {{"label", label.label},
+  Json number;
+  json_values::assign(number, label.label);
+  return {{"label", number},
           {"voxels", label.voxels},
           {"volume_mm3", label.volume_mm3},
           {"area_mm2", label.area_mm2}};

@@ -54,12 +54,20 @@ std::optional<mesh::Topology> encode_vtk(const FileContent& content, const mesh:
   }
   put_text(sink, "\n");
   if (content.labels == nullptr) return std::nullopt;
+  const LabelType type = label_type(*content.labels);
   put_text(sink, "CELL_DATA " + std::to_string(faces) + "\nSCALARS label " +
-                     (has_wide_labels(*content.labels) ? "unsigned_int" : "int") +
+                     (type == LabelType::kInt64    ? "vtktypeint64"
+                      : type == LabelType::kUint32 ? "unsigned_int"
+                                                   : "int") +
                      " 1\nLOOKUP_TABLE default\n");
   for (const FaceRun& run : runs) {
-    writer.write(run.count(), sizeof run.label(),
-                 [&](std::size_t, std::byte* out) { return write_turned(run.label(), out); });
+    const auto bits = static_cast<std::uint64_t>(run.label());
+    const std::size_t bytes = type == LabelType::kInt64 ? sizeof bits : sizeof bits / 2;
+    writer.write(run.count(), bytes, [&](std::size_t, std::byte* out) {
+      if (type == LabelType::kInt64)
+        out = write_turned(static_cast<std::uint32_t>(bits >> 32), out);
+      return write_turned(static_cast<std::uint32_t>(bits), out);
+    });
   }
   put_text(sink, "\n");
   return std::nullopt;

@@ -52,6 +52,9 @@ std::optional<mesh::Topology> encode_vtp(const FileContent& content, const mesh:
   const std::uint64_t point_bytes = vertices * sizeof(mesh::Vec3);
   const std::uint64_t corner_bytes = faces * sizeof(mesh::Triangle);
   const std::uint64_t face_bytes = faces * sizeof(std::uint32_t);
+  const bool has_long_labels =
+      content.labels != nullptr && label_type(*content.labels) == LabelType::kInt64;
+  const std::size_t label_bytes = has_long_labels ? sizeof(std::int64_t) : sizeof(std::int32_t);
   Appended appended;
   std::string header =
       "<?xml version=\"1.0\"?>\n"
@@ -69,9 +72,12 @@ std::optional<mesh::Topology> encode_vtp(const FileContent& content, const mesh:
   header += appended.element("Int32", "offsets", "", face_bytes);
   header += "</Polys>\n";
   if (content.labels != nullptr) {
-    const char* const type = has_wide_labels(*content.labels) ? "UInt32" : "Int32";
+    const LabelType type = label_type(*content.labels);
+    const char* const name = type == LabelType::kInt64    ? "Int64"
+                             : type == LabelType::kUint32 ? "UInt32"
+                                                          : "Int32";
     header += "<CellData Scalars=\"label\">\n";
-    header += appended.element(type, "label", "", face_bytes);
+    header += appended.element(name, "label", "", faces * label_bytes);
     header += "</CellData>\n";
   }
   put_text(sink, header + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
@@ -101,10 +107,13 @@ std::optional<mesh::Topology> encode_vtp(const FileContent& content, const mesh:
     return write_word(static_cast<std::uint32_t>(3 * (t + 1)), out);  // the end of the face
   });
   if (content.labels != nullptr) {
-    begin_array(face_bytes);
+    begin_array(faces * label_bytes);
     for (const FaceRun& run : runs) {
-      writer.write(run.count(), sizeof run.label(),
-                   [&](std::size_t, std::byte* out) { return write_word(run.label(), out); });
+      const std::int64_t label = run.label();  // little-endian: its low bytes come first
+      writer.write(run.count(), label_bytes, [&](std::size_t, std::byte* out) {
+        std::memcpy(out, &label, label_bytes);
+        return out + label_bytes;
+      });
     }
   }
   put_text(sink, "\n</AppendedData>\n</VTKFile>\n");

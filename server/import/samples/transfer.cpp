@@ -16,6 +16,7 @@
 #include "proto/samples.h"
 #include "server/import/labels/combinations.h"
 #include "server/import/samples/payload.h"
+#include "server/import/samples/wide_labels.h"
 #include "server/volume/labels.h"
 #include "server/volume/statistics.h"
 
@@ -303,6 +304,7 @@ void refuse_spacing(const ImportOptions& options) {
 
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target) {
+  if (auto labels = write_wide_labels(samples, volume, target)) return *std::move(labels);
   volume.type = canonical_type(samples.layout);
   CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
   read_samples(samples.file, samples.offset, samples.layout, writer.samples());

@@ -22,8 +22,9 @@ struct PlainSamples {
 // Writes the canonical file `target` of `volume`, whose dims and geometry are set and valid.
 // Returns it with type, range, suggested iso-value and bytes set. Floats that are labels, declared
 // in `volume`, by their header or as volume::label_count() finds them, become integers of the
-// smallest type, and so do 64-bit integers that fit into 32 bits. Other floats lose the volume's
-// labels. Throws Error kUnusableVolume if a sample is not finite, kOutOfSpace, kInternal.
+// smallest type, and so do 64-bit integers that fit into 32 bits or are labels (wide_labels.h).
+// Other floats lose the volume's labels. Throws Error kUnusableVolume if a sample is not finite,
+// kOutOfSpace, kInternal.
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target);
 

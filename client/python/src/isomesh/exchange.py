@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, cast
@@ -101,9 +102,17 @@ class Exchange:
             raise WrongAnswer("the downloaded mesh does not match the job's SHA-256")
 
 
+def _with_whole_label(members: Dict[str, Any]) -> Dict[str, Any]:
+    """Labels of 64 bits are strings in JSON, because other languages would round the number."""
+    if isinstance(members.get("label"), str):
+        with contextlib.suppress(ValueError):
+            members["label"] = int(members["label"])
+    return members
+
+
 def _parsed(body: bytes, members: Members) -> Dict[str, Any]:
     try:
-        value = json.loads(body)
+        value = json.loads(body, object_hook=_with_whole_label)
     except (ValueError, RecursionError) as error:
         raise WrongAnswer("the server's response is not JSON") from error
     return answers.checked(value, members)

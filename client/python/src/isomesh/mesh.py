@@ -23,7 +23,7 @@ class Mesh:
 
     vertices  float32, shape (n, 3)
     faces     uint32, shape (m, 3): indices of vertices, counter-clockwise seen from outside
-    labels    int32 or uint32, shape (m,): the label of each face; None unless the job had labels
+    labels    int32, uint32 or int64, shape (m,): the label of each face; None unless the job had labels
     normals   float32, shape (n, 3): the unit normal of each vertex
     bounds    float32, shape (2, 3): the smallest and the largest corner
     space     "lps" (DICOM's patient space), or "ras" (NIfTI's and nibabel's); see `in_space`

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import sys
 from array import array
-from typing import Any, Dict, Iterator, Optional, Tuple, Union
+from typing import Any, Dict, Iterator, List, Optional, Tuple, Union
 
 from .errors import WrongAnswer
 
 _HEADER_END = b"end_header\n"
-_LONGEST_HEADER = 4096
+_LONGEST_HEADER = 1 << 22  # with a comment for each of 65535 labels
 _COMMENT = "comment isomesh, millimetres, "
 
 
 def parse(source: Union[bytes, bytearray, memoryview]) -> Tuple[Any, Any, Any, str]:
     """Vertices, faces, labels or None, and the space. Raises WrongAnswer for a file of another form."""
     data = memoryview(source).cast("B")
-    elements = _header_of(bytes(data[:_LONGEST_HEADER]))
+    elements, long_labels = _header_of(bytes(data[:_LONGEST_HEADER]))
     label = elements.get("label", "")
     vertices, faces = int(elements["vertex"]), int(elements["face"])
     begin = int(elements["begin"])
@@ -26,10 +26,11 @@ def parse(source: Union[bytes, bytearray, memoryview]) -> Tuple[Any, Any, Any, s
     records = data[begin + vertex_bytes :]
     if bytes(records[:: 17 if label else 13]).strip(b"\x03"):
         raise WrongAnswer("the PLY file has a face that is not a triangle")
+    labels = shaped(_columns(records, faces, 13, 4), "i" if label == "int" else "I", faces) if label else None
     return (
         shaped(data[begin : begin + vertex_bytes], "f", vertices, 3),
         shaped(_columns(records, faces, 1, 12), "I", faces, 3),
-        shaped(_columns(records, faces, 13, 4), "i" if label == "int" else "I", faces) if label else None,
+        _long(labels, long_labels) if long_labels else labels,
         elements["space"],
     )
 
@@ -39,13 +40,14 @@ def pieces(vertices: Any, faces: Any, labels: Any, space: str) -> Iterator[bytes
     and for faces of vertices that do not exist."""
     points = _bytes_of("vertices", vertices, "f", 3)
     corners = _bytes_of("faces", faces, "I", 3, below=len(vertices))
+    labels, long_labels = _numbered(labels)
     kind = _kind_of(labels)
     values = b"" if labels is None else _bytes_of("labels", labels, kind)
     if labels is not None and len(labels) != len(faces):
         raise ValueError(f"there are {len(labels)} labels for {len(faces)} faces")
     of_label = "" if labels is None else f"property {'uint' if kind == 'I' else 'int'} label\n"
     yield (
-        f"ply\nformat binary_little_endian 1.0\n{_COMMENT}{space.upper()}\nelement vertex {len(vertices)}\n"
+        f"ply\nformat binary_little_endian 1.0\n{_COMMENT}{space.upper()}\n{long_labels}element vertex {len(vertices)}\n"
         "property float x\nproperty float y\nproperty float z\n"
         f"element face {len(faces)}\nproperty list uchar uint vertex_indices\n{of_label}end_header\n"
     ).encode()
@@ -77,8 +79,26 @@ def shaped(data: Any, kind: str, *shape: int) -> Any:
     return view.cast(kind, shape)
 
 
-def _header_of(text: bytes) -> Dict[str, str]:
-    """The counts of elements, the space, where the data begins, and the type of the labels."""
+def _long(numbers: Any, labels: List[int]) -> Any:
+    """Labels of 64 bits, which PLY cannot hold: its faces have numbers from 1, and comments tell the labels."""
+    if len(numbers) and not 1 <= min(numbers) <= max(numbers) <= len(labels):
+        raise WrongAnswer("the PLY file has a face of a label that it does not name")
+    return shaped(array("q", (labels[number - 1] for number in numbers)).tobytes(), "q", len(numbers))
+
+
+def _numbered(labels: Any) -> Tuple[Any, str]:
+    """The inverse of `_long`: numbers and comments for labels that need more than 32 bits, and others unchanged."""
+    if labels is None or not len(labels) or (min(labels) >= -(1 << 31) and max(labels) < 1 << 32):
+        return labels, ""
+    found = sorted({int(label) for label in labels})
+    number = {label: at for at, label in enumerate(found, 1)}
+    comments = "".join(f"comment label {at} is {label}\n" for label, at in number.items())
+    return memoryview(array("I", (number[int(label)] for label in labels))), comments
+
+
+def _header_of(text: bytes) -> Tuple[Dict[str, str], List[int]]:
+    """The counts of elements, the space, where the data begins, and the type of the labels; and the labels that
+    faces have by number."""
     end = text.find(_HEADER_END)
     lines = text[: max(end, 0)].decode("ascii", "replace").splitlines()
     if lines[:2] != ["ply", "format binary_little_endian 1.0"]:
@@ -91,7 +111,8 @@ def _header_of(text: bytes) -> Dict[str, str]:
         raise WrongAnswer("isomesh did not write this PLY file")
     space = "ras" if f"{_COMMENT}RAS" in lines else "lps"
     found = {**counts, "space": space, "begin": str(end + len(_HEADER_END))}
-    return {**found, "label": labels[0]} if labels else found
+    long_labels = [int(line.split()[4]) for line in lines if line.startswith("comment label ")]
+    return {**found, "label": labels[0]} if labels else found, long_labels
 
 
 def _columns(records: memoryview, count: int, begin: int, width: int) -> memoryview:
