@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/json_text.h"
+#include "proto/labels.h"
 
 namespace isomesh {
 
@@ -38,8 +39,7 @@ namespace json_values {
 void assign_null(Json& place) { place = nullptr; }
 void assign(Json& place, bool value) { place = value; }
 void assign(Json& place, std::int64_t value) {
-  constexpr std::int64_t kMostExact = (std::int64_t{1} << 53) - 1;
-  const bool is_exact = value >= -kMostExact && value <= kMostExact;
+  const bool is_exact = value >= -kMostExactNumber && value <= kMostExactNumber;
   place = is_exact ? Json(value) : Json(std::to_string(value));
 }
 void assign(Json& place, std::uint64_t value) { place = value; }

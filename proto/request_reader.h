@@ -83,9 +83,13 @@ class RequestReader {
            !(parameter.maximum && number > *parameter.maximum);
   }
 
-  // Exact up to 64 bits. Labels of so many come as strings, because many programs round numbers.
+  // Exact up to 64 bits. Numbers that are strings in responses may be strings here, too.
   static std::optional<std::int64_t> long_number(const Json& json) {
-    if (json.is_string()) return parse_int64(json.get<std::string>());
+    if (json.is_string()) {
+      const auto number = parse_int64(json.get<std::string>());
+      const bool is_long = number && (*number < -kMostExactNumber || *number > kMostExactNumber);
+      return is_long ? number : std::nullopt;
+    }
     const bool is_too_large =
         json.is_number_unsigned() && !std::in_range<std::int64_t>(json.get<std::uint64_t>());
     if (!json.is_number_integer() || is_too_large) return std::nullopt;

@@ -293,7 +293,7 @@ TEST_F(OptionsTest, RefusesWrongUsageAndNamesTheOptionAndItsRange) {
   expect_refused(with(raw, {"int12"}), "--type: must be ");
   expect_refused(with(raw, {"int16", "--byte-order", "middle"}), "--byte-order: must be little");
   for (const std::string labels : {"5-1", "1-", "1-2-3", "-", "", "1,,2", "1-4294967295",
-                                   "4294967296", "9223372036854775807", "a-b", "one"}) {
+                                   "0-9223372036854775807", "9223372036854775808", "a-b", "one"}) {
     expect_refused({"submit", "abc", "--labels", labels}, "--labels: must be ");
   }
 }
@@ -306,6 +306,8 @@ TEST_F(OptionsTest, LabelsMayBeRanges) {
   EXPECT_THAT(labels_of("1,3-5"), ElementsAre(1, 3, 4, 5));
   EXPECT_THAT(labels_of("-3--1,7"), ElementsAre(-3, -2, -1, 7));
   EXPECT_THAT(labels_of("4294967295"), ElementsAre(4294967295));
+  EXPECT_THAT(labels_of("9223372036854775806-9223372036854775807"),
+              ElementsAre(9223372036854775806, 9223372036854775807));
 }
 
 TEST_F(OptionsTest, TextsAreUtf8) {

@@ -231,6 +231,29 @@ TEST_F(LabelFilesTest, PlyHasEveryLabelsFacesWithItsValue) {
   }
 }
 
+// PLY has no such integers.
+TEST_F(LabelFilesTest, FacesHaveLabelsOf64Bits) {
+  constexpr std::int64_t kId = 720575940618780781;
+  labels_.back().label = kId;
+  const std::string ply = encoded(MeshFormat::kPly);
+  EXPECT_NE(ply.find("comment label 5 is 720575940618780781\n"), std::string::npos);
+  EXPECT_NE(ply.find("property uint label\nend_header\n"), std::string::npos);
+  std::uint32_t number = 0;
+  std::memcpy(&number, ply.data() + ply.size() - sizeof number, sizeof number);
+  EXPECT_EQ(number, 5U);
+  std::int64_t label = 0;
+  const std::string vtk = encoded(MeshFormat::kVtk);
+  EXPECT_NE(vtk.find("SCALARS label vtktypeint64 1\n"), std::string::npos);
+  std::memcpy(&label, vtk.data() + vtk.size() - 1 - sizeof label, sizeof label);
+  EXPECT_EQ(__builtin_bswap64(static_cast<std::uint64_t>(label)), std::uint64_t{kId});
+  const std::string vtp = encoded(MeshFormat::kVtp);
+  EXPECT_NE(vtp.find("type=\"Int64\" Name=\"label\""), std::string::npos);
+  const std::size_t end = vtp.rfind("\n</AppendedData>");
+  std::memcpy(&label, vtp.data() + end - sizeof label, sizeof label);
+  EXPECT_EQ(label, kId);
+  EXPECT_NE(encoded(MeshFormat::kGlb).find("\"label\":\"720575940618780781\""), std::string::npos);
+}
+
 TEST_F(LabelFilesTest, ObjHasAGroupForEachLabel) {
   const std::string obj = encoded(MeshFormat::kObj);
   std::istringstream lines(obj);

@@ -310,8 +310,37 @@ TEST(ForeignSamples, Of64BitsBecomeIntegersThatFit) {
   ASSERT_THAT(codes_of(mask), ElementsAre("looks-like-labels"));
   EXPECT_THAT(mask.volume.notes[0].detail, HasSubstr("each is 0 or 1."));
   EXPECT_THAT(mask.volume.notes[0].detail, HasSubstr("64-bit integers in the file"));
-  EXPECT_EQ(regions<std::uint64_t>({0, 0, 1, std::uint64_t{1} << 32}).volume.type,
-            SampleType::kFloat64);
+}
+
+// Segment ids of connectomics have more digits than a double.
+TEST(ForeignSamples, Of64BitsThatDoNotFitAreNumberedLabels) {
+  constexpr std::uint64_t kId = 720575940618780781;
+  const Outcome ids = regions<std::uint64_t>({0, kId + 1, 3, kId});
+  EXPECT_EQ(ids.volume.type, SampleType::kUint8);
+  EXPECT_EQ(samples_of<std::uint8_t>(ids)[24], 1);
+  EXPECT_EQ(samples_of<std::uint8_t>(ids)[12], 3);
+  EXPECT_EQ(samples_of<std::uint8_t>(ids)[47], 2);
+  EXPECT_THAT(codes_of(ids), ElementsAre("labels-renumbered", "looks-like-labels"));
+  const std::vector<LabelEntry> entries = {{.label = 3, .values = {1}},
+                                           {.label = std::int64_t{kId}, .values = {2}},
+                                           {.label = std::int64_t{kId + 1}, .values = {3}}};
+  EXPECT_EQ(ids.volume.labels, entries);
+
+  constexpr std::int64_t kLow = std::numeric_limits<std::int64_t>::min();
+  const Outcome negative = regions<std::int64_t>({0, kLow, 2, 1});
+  EXPECT_EQ(negative.volume.labels.front(), (LabelEntry{.label = kLow, .values = {1}}));
+  EXPECT_THAT(regions<std::uint64_t>({0, 1, 2, std::uint64_t{1} << 63}).error,
+              HasSubstr("9223372036854775808 is too large"));
+}
+
+TEST(ForeignSamples, Of64BitsWithoutFlatRegionsAreNoLabels) {
+  std::vector<std::int64_t> gradient(24);
+  for (std::size_t at = 0; at < gradient.size(); ++at) {
+    gradient[at] = std::int64_t{1} << (20 + at);
+  }
+  const Outcome outcome = import_bytes(nifti({.datatype = 1024, .bitpix = 64}, bytes_of(gradient)));
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat64);
+  EXPECT_EQ(samples_of<double>(outcome)[23], 0x1p43);
 }
 
 }  // namespace

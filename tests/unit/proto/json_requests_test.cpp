@@ -55,6 +55,9 @@ TEST(JobBody, MayNameLabelsInPlaceOfAnIso) {
   EXPECT_EQ(expected.smoothing, Smoothing::kLabels);
   EXPECT_TRUE(expected.regularize);
   EXPECT_EQ(of_labels("[7, 3, 7, -1]").labels->values, (std::vector<std::int64_t>{-1, 3, 7}));
+  // Labels of 64 bits are strings where a number would lose digits.
+  EXPECT_EQ(of_labels(R"(["720575940618780781", 4294967296, -720575940618780782])").labels->values,
+            (std::vector<std::int64_t>{-720575940618780782, 4294967296, 720575940618780781}));
   EXPECT_EQ(of_labels(R"("all", "passes": 2, "smoothing": "taubin")").passes, 2);
   EXPECT_EQ(of_labels(R"("all", "smoothing": "taubin")").lambda, row_of(Smoothing::kTaubin).lambda);
   EXPECT_EQ(of_labels(R"("all", "label_colors": {"3": "#AAbb00"})").label_colors.at(3), "#aabb00");
@@ -94,7 +97,10 @@ TEST(JobBody, RefusesWhatLabelsCannotHave) {
       {R"("labels": "all", "label_names": ["a"])", "label_names"},
       {R"("labels": "all", "label_names": {" 1": "a"})", "label_names. 1"},
       {R"("labels": "all", "label_names": {"1": 3})", "label_names.1"},
-      {R"("labels": "all", "label_names": {"4294967296": "a"})", "label_names.4294967296"},
+      {R"("labels": "all", "label_names": {"9223372036854775808": "a"})",
+       "label_names.9223372036854775808"},
+      {R"("labels": ["9223372036854775808"])", "labels"},
+      {R"("labels": [9223372036854775808])", "labels"},
       {R"("labels": "all", "label_colors": {"1": "red"})", "label_colors.1"},
       {R"("labels": "all", "label_values": {"3": []})", "label_values.3"},
       {R"("labels": "all", "label_values": {"3": [0]})", "label_values"},
