@@ -87,6 +87,7 @@ if(ISOMESH_DAEMON)
   isomesh_find_module(libseccomp-dev seccomp libseccomp)
   isomesh_find_module(libutf8proc-dev utf8proc libutf8proc)
   isomesh_find_module(libhwy-dev hwy libhwy)
+  isomesh_find_module(libjxl-dev jxl libjxl)
   isomesh_find_module(libtomlplusplus-dev tomlplusplus tomlplusplus)
   isomesh_find_module(prometheus-cpp-dev prometheus prometheus-cpp-core)
   # Its pkg-config flags change class layouts; building without them breaks the ABI silently.

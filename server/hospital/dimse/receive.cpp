@@ -34,17 +34,25 @@ using dimse::DimseReceiving;
 using dimse::DimseRefusal;
 
 // Transfer syntaxes that isomesh-import reads, in order of preference: objects are accepted as
-// stored, and uncompressed ones cost the sender no time.
+// stored, and uncompressed ones cost the sender no time. DCMTK 3.6.7 has no names for some.
 constexpr std::array kSyntaxes = {UID_LittleEndianExplicitTransferSyntax,
                                   UID_LittleEndianImplicitTransferSyntax,
                                   UID_BigEndianExplicitTransferSyntax,
+                                  "1.2.840.10008.1.2.1.98",  // encapsulated uncompressed
                                   UID_JPEGLSLosslessTransferSyntax,
                                   UID_JPEG2000LosslessOnlyTransferSyntax,
+                                  "1.2.840.10008.1.2.4.202",  // HTJ2K lossless, RPCL
+                                  "1.2.840.10008.1.2.4.201",  // HTJ2K lossless
+                                  "1.2.840.10008.1.2.4.110",  // JPEG XL lossless
                                   UID_JPEGProcess14SV1TransferSyntax,
                                   UID_JPEGProcess14TransferSyntax,
                                   UID_RLELosslessTransferSyntax,
                                   UID_DeflatedExplicitVRLittleEndianTransferSyntax,
+                                  "1.2.840.10008.1.2.8.1",  // deflated frames
                                   UID_JPEG2000TransferSyntax,
+                                  "1.2.840.10008.1.2.4.203",  // HTJ2K
+                                  "1.2.840.10008.1.2.4.112",  // JPEG XL
+                                  "1.2.840.10008.1.2.4.111",  // JPEG XL, recompressed JPEG
                                   UID_JPEGLSLossyTransferSyntax,
                                   UID_JPEGProcess2_4TransferSyntax,
                                   UID_JPEGProcess1TransferSyntax};

@@ -152,6 +152,7 @@ inline constexpr std::string_view kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 inline constexpr std::string_view kDeflated = "1.2.840.10008.1.2.1.99";
 inline constexpr std::string_view kExplicitBigEndian = "1.2.840.10008.1.2.2";
 inline constexpr std::string_view kRle = "1.2.840.10008.1.2.5";
+inline constexpr std::string_view kEncapsulatedUncompressed = "1.2.840.10008.1.2.1.98";
 inline constexpr std::string_view kDeflatedFrames = "1.2.840.10008.1.2.8.1";
 
 }  // namespace isomesh::import::dicom

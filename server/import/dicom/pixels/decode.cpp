@@ -18,13 +18,14 @@
 
 #include "base/text.h"
 #include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/pixels/jpeg_xl.h"
 #include "server/import/source/gzip.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
 namespace {
 
-enum class Family { kRle, kDeflate, kJpeg, kJpegLs, kJpeg2000 };
+enum class Family { kPlain, kRle, kDeflate, kJpeg, kJpegLs, kJpeg2000, kJpegXl };
 
 struct Syntax {
   std::string_view uid;
@@ -33,8 +34,8 @@ struct Syntax {
 };
 
 constexpr std::array kSyntaxes = {
-    Syntax{kRle, Family::kRle, "RLE"},
-    Syntax{kDeflatedFrames, Family::kDeflate, "deflate"},
+    Syntax{kRle, Family::kRle, "RLE"}, Syntax{kDeflatedFrames, Family::kDeflate, "deflate"},
+    Syntax{kEncapsulatedUncompressed, Family::kPlain, "uncompressed"},
     Syntax{"1.2.840.10008.1.2.4.50", Family::kJpeg, "JPEG baseline"},
     Syntax{"1.2.840.10008.1.2.4.51", Family::kJpeg, "JPEG extended"},
     Syntax{"1.2.840.10008.1.2.4.57", Family::kJpeg, "JPEG lossless"},
@@ -42,21 +43,20 @@ constexpr std::array kSyntaxes = {
     Syntax{"1.2.840.10008.1.2.4.80", Family::kJpegLs, "JPEG-LS lossless"},
     Syntax{"1.2.840.10008.1.2.4.81", Family::kJpegLs, "JPEG-LS"},
     Syntax{"1.2.840.10008.1.2.4.90", Family::kJpeg2000, "JPEG 2000 lossless"},
-    Syntax{"1.2.840.10008.1.2.4.91", Family::kJpeg2000, "JPEG 2000"}};
+    Syntax{"1.2.840.10008.1.2.4.91", Family::kJpeg2000, "JPEG 2000"},
+    // OpenJPEG, which GDCM uses, decodes the block coder of either part of the standard.
+    Syntax{"1.2.840.10008.1.2.4.201", Family::kJpeg2000, "HTJ2K lossless"},
+    Syntax{"1.2.840.10008.1.2.4.202", Family::kJpeg2000, "HTJ2K lossless"},
+    Syntax{"1.2.840.10008.1.2.4.203", Family::kJpeg2000, "HTJ2K"},
+    Syntax{"1.2.840.10008.1.2.4.110", Family::kJpegXl, "JPEG XL lossless"},
+    Syntax{"1.2.840.10008.1.2.4.111", Family::kJpegXl, "JPEG XL"},
+    Syntax{"1.2.840.10008.1.2.4.112", Family::kJpegXl, "JPEG XL"}};
 
 const Syntax* find_syntax(std::string_view uid) {
   const auto* found =
       std::ranges::find(kSyntaxes, uid, [](const Syntax& syntax) { return syntax.uid; });
   return found == kSyntaxes.end() ? nullptr : found;
 }
-
-struct StreamSize {
-  std::uint32_t columns = 0;
-  std::uint32_t rows = 0;
-  unsigned components = 0;
-  unsigned bits = 0;
-  bool is_signed = false;  // JPEG and JPEG-LS have no sign
-};
 
 std::uint32_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::size_t count) {
   std::uint32_t number = 0;
@@ -119,14 +119,22 @@ bool is_whole(std::span<const std::byte> stream) {
   return stream.size() >= 2 && big_endian(stream, stream.size() - 2, 2) == 0xFFD9;
 }
 
+std::optional<StreamSize> size_of(std::span<const std::byte> stream, Family family) {
+  if (family == Family::kJpegXl) return jpeg_xl_size(stream);
+  return family == Family::kJpeg2000 ? jpeg_2000_size(stream) : jpeg_size(stream);
+}
+
 // Returns the stream's size, in which samples of 16 bits may be only 8.
 StreamSize check_stream(std::span<const std::byte> stream, const Syntax& syntax,
                         const PixelLayout& layout) {
-  const auto size = syntax.family == Family::kJpeg2000 ? jpeg_2000_size(stream) : jpeg_size(stream);
+  const auto size = size_of(stream, syntax.family);
   if (!size) {
     throw_unusable("its compressed samples are not a " + std::string(syntax.name) + " stream");
   }
-  if (!is_whole(stream)) throw_unusable("its compressed samples are truncated");
+  // libjxl finds the end itself.
+  if (syntax.family != Family::kJpegXl && !is_whole(stream)) {
+    throw_unusable("its compressed samples are truncated");
+  }
   if (size->columns != layout.columns || size->rows != layout.rows || size->components != 1) {
     throw_unusable("its compressed samples are " + std::to_string(size->columns) + " x " +
                    std::to_string(size->rows) + " with " + std::to_string(size->components) +
@@ -222,6 +230,12 @@ void decode_deflate(std::span<const std::byte> stream, std::span<std::byte> targ
   }
 }
 
+// As for deflated frames.
+void copy_plain(std::span<const std::byte> stream, std::span<std::byte> target) {
+  if (stream.size() < target.size()) throw_unusable("its samples end before its size does");
+  std::ranges::copy(stream.first(target.size()), target.begin());
+}
+
 // GDCM writes warnings about files to standard error.
 void silence_gdcm() {
   static std::once_flag once;
@@ -255,8 +269,10 @@ bool decode_by(const gdcm::DataElement& input, const PixelLayout& layout,
 bool decode_by_gdcm(Family family, const gdcm::DataElement& input, const PixelLayout& layout,
                     gdcm::DataElement& output) {
   switch (family) {
+    case Family::kPlain:
     case Family::kRle:
     case Family::kDeflate:
+    case Family::kJpegXl:
       return false;
     case Family::kJpeg:
       return decode_by<gdcm::JPEGCodec>(input, layout, output);
@@ -306,6 +322,10 @@ void widen(std::span<std::byte> target, bool is_signed) {
 void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const PixelLayout& layout,
                  std::span<std::byte> target) {
   const StreamSize size = check_stream(stream, syntax, layout);
+  if (syntax.family == Family::kJpegXl) {
+    if (decode_jpeg_xl(stream, size, layout.bits_allocated / 8, target)) return;
+    throw_unusable("its JPEG XL stream is truncated or corrupt");
+  }
   if (size.bits > 8 || layout.bits_allocated == 8) {
     return decode_checked(stream, syntax, layout, target);
   }
@@ -338,17 +358,21 @@ void decode_frame(std::string_view transfer_syntax, std::span<const std::byte> c
   }
   if (syntax->family == Family::kRle) return decode_rle(compressed, layout, target);
   if (syntax->family == Family::kDeflate) return decode_deflate(compressed, target);
+  if (syntax->family == Family::kPlain) return copy_plain(compressed, target);
   decode_jpeg(compressed, *syntax, layout, target);
 }
 
 void decode_bits(std::string_view transfer_syntax, std::span<const std::byte> compressed,
                  const PixelLayout& layout, std::span<std::byte> target) {
   const Syntax* syntax = find_syntax(transfer_syntax);
-  const bool is_deflated = syntax != nullptr && syntax->family == Family::kDeflate;
+  const auto is_of = [&](Family family) { return syntax != nullptr && syntax->family == family; };
   std::size_t decoded = target.size();
-  if (is_deflated) {
+  if (is_of(Family::kDeflate)) {
     decoded = inflate_bytes(compressed, target);
-  } else if (syntax != nullptr && syntax->family == Family::kRle) {
+  } else if (is_of(Family::kPlain)) {
+    decoded = std::min(compressed.size(), target.size());
+    std::ranges::copy(compressed.first(decoded), target.begin());
+  } else if (is_of(Family::kRle)) {
     decoded = decode_rle_bytes(rle_segments(compressed, 1).front(), 0, 1, target);
   } else {
     PixelLayout bytes = layout;

@@ -21,9 +21,14 @@ void swap_pairs(std::span<std::byte> bytes) {
   for (std::size_t at = 0; at + 1 < bytes.size(); at += 2) std::swap(bytes[at], bytes[at + 1]);
 }
 
-// The start of a compressed frame in all supported syntaxes.
+// The start of a compressed frame in the supported syntaxes. The two bytes of a bare JPEG XL stream
+// are too few to be looked for in others.
 bool begins_frame(const DicomFile& file, const Extent& fragment) {
-  const std::string head = file.bytes().text(fragment.offset, 4);
+  constexpr std::string_view kJpegXls = "1.2.840.10008.1.2.4.11";
+  const std::string head = file.bytes().text(fragment.offset, 8);
+  if (file.transfer_syntax().starts_with(kJpegXls)) {
+    return head.starts_with("\xFF\x0A") || head == std::string_view("\0\0\0\x0CJXL ", 8);
+  }
   return head.starts_with("\xFF\xD8\xFF") || head.starts_with("\xFF\x4F\xFF\x51");
 }
 
