@@ -11,6 +11,7 @@
 #include "base/files.h"
 #include "proto/error.h"
 #include "proto/volume_formats.h"
+#include "server/import/archives/archive.h"
 #include "server/import/peers/series.h"
 #include "server/import/readers.h"
 #include "server/import/source/gzip.h"
@@ -71,16 +72,21 @@ std::optional<std::string_view> name_of_other_format(std::string_view head) {
   return found->name;
 }
 
+// More than an empty TAR.
+constexpr std::size_t kHeadBytes = 16384;
+
 // Inflated if it is compressed. Throws if that fails: a damaged file may be of a known format.
 std::string beginning_of(const InputFile& file) {
-  std::string head = file.text(0, kSniffBytes);
+  std::string head = file.text(0, kHeadBytes);
   if (!is_gzip(head)) return head;
   inflate_range(file, {0, file.size()}, kSniffBytes, [](std::span<const std::byte>) {});
-  return inflate_head(head, kSniffBytes);
+  return inflate_head(head, kHeadBytes);
 }
 
 [[noreturn]] void throw_unknown_format(const InputFile& file) {
-  if (const auto name = name_of_other_format(beginning_of(file))) {
+  const std::string beginning = beginning_of(file);
+  if (is_empty_tar(beginning)) throw_empty_archive();
+  if (const auto name = name_of_other_format(beginning)) {
     throw Error(ErrorCode::kUnsupportedMedia,
                 "This is " + std::string(*name) +
                     ", which cannot be read. Formats that can be read: " + volume_format_titles() +

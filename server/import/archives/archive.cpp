@@ -25,6 +25,7 @@ namespace isomesh::import {
 namespace {
 
 constexpr std::size_t kTarBlock = 512;
+constexpr std::size_t kTarRecord = 20 * kTarBlock;
 
 [[noreturn]] void throw_archive_error(archive* source) {
   const char* reason = ::archive_error_string(source);
@@ -87,6 +88,8 @@ class OpenArchive {
   explicit OpenArchive(const InputFile& file)
       : file_(file), archive_(::archive_read_new()), is_zip_(is_zip(file.text(0, 4))) {
     if (!archive_) throw Error(ErrorCode::kInternal, "archive_read_new failed.");
+    // The end of a ZIP alone; the library takes it for damaged.
+    if (file.text(0, 4) == "PK\x05\x06") throw_empty_archive();
     // Read a ZIP by its central directory, which shows whether members are missing.
     ::archive_read_support_format_zip_seekable(archive_.get());
     ::archive_read_support_format_tar(archive_.get());
@@ -196,6 +199,7 @@ class Unpacker {
       }
     });
     reader_.require_end();
+    if (names.empty()) throw_empty_archive();
     return members;
   }
 
@@ -295,6 +299,15 @@ class Unpacker {
 }  // namespace
 
 void load_name_encoding() { utf8_locale(); }
+
+void throw_empty_archive() {
+  throw_unusable("The archive holds no file. Pack the files of the volume again.");
+}
+
+bool is_empty_tar(std::string_view file) {
+  return (file.size() == 2 * kTarBlock || file.size() == kTarRecord) &&
+         file.find_first_not_of('\0') == file.npos;
+}
 
 bool is_zip(std::string_view head) {
   return head.starts_with("PK\x03\x04") || head.starts_with("PK\x05\x06");

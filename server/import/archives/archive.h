@@ -19,6 +19,11 @@ void load_name_encoding();
 
 bool is_zip(std::string_view head);
 bool is_tar(std::string_view head);
+// True for a whole file that consists of the zeros which end a TAR.
+bool is_empty_tar(std::string_view file);
+
+// Throws Error kUnusableVolume.
+[[noreturn]] void throw_empty_archive();
 
 // The largest unpacked size of an archive of this size; larger ones are rejected as bombs.
 std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes);
@@ -42,9 +47,9 @@ using MemberBound = std::function<std::optional<std::uint64_t>(const std::filesy
 // Unpacks the regular files of a ZIP or a plain TAR, large ones as far as `bound` permits. Each
 // gets its own folder below `folder`, which must exist and be empty. Skips links, devices, empty
 // files, hidden files and files in hidden folders. Throws Error kUnusableVolume if the archive is
-// damaged, truncated or encrypted, if bytes follow its end, if two members have one name, if a
-// member exceeds its bound, or if all together exceed most_unpacked_bytes; kTooLarge beyond the
-// limits.
+// damaged, truncated or encrypted, if it has no such file, if bytes follow its end, if two members
+// have one name, if a member exceeds its bound, or if all together exceed most_unpacked_bytes;
+// kTooLarge beyond the limits.
 std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
                                   const std::filesystem::path& folder, const ArchiveLimits& limits,
                                   const MemberBound& bound);

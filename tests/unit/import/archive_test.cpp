@@ -51,6 +51,15 @@ void expect_refused(const std::vector<Member>& members, const Matcher& matcher,
   }
 }
 
+TEST(Archive, WithoutFilesSaysSo) {
+  for (const std::vector<Member>& members :
+       {std::vector<Member>{}, {{"folder", "", Kind::kFolder}}, {{".git/head.nii", "junk"}}}) {
+    expect_refused(members, HasSubstr("holds no file"));
+  }
+  // A file of zeros may be samples.
+  EXPECT_EQ(import_bytes(std::string(10241, '\0')).code, ErrorCode::kUnsupportedMedia);
+}
+
 TEST(Archive, HoldsOneVolumeOfAnyFormat) {
   expect_read({{"head.nii", nifti({}, kSamples)}}, "nifti");
   expect_read({{"folder", "", Kind::kFolder}, {"folder/head.nii.gz", gzip(nifti({}, kSamples))}},
@@ -357,7 +366,7 @@ TEST(Archive, MoreVolumesThanOneUploadMayHaveAreRefused) {
 TEST(Archive, WithoutAVolumeItIsUnsupported) {
   expect_refused({{"a.txt", "text"}, {"b.txt", "more"}}, HasSubstr("2 files"),
                  ErrorCode::kUnsupportedMedia);
-  expect_refused({{"a", "", Kind::kFolder}}, HasSubstr("0 files"), ErrorCode::kUnsupportedMedia);
+  expect_refused({{"a", ""}}, HasSubstr("0 files"), ErrorCode::kUnsupportedMedia);
 }
 
 TEST(Archive, WithinAnArchiveIsRefused) {
