@@ -75,8 +75,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kDistanceAssumed,
      .name = "distance-assumed",
      .meaning =
-         "The DICOM image does not give the distance between its slices. The slice thickness "
-         "was used.",
+         "The DICOM image does not give the distance between its slices, so the slice thickness "
+         "was used. Or its frames have no positions, and the request places them along the normal.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kOverlappingSegments,
@@ -110,19 +110,20 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .is_in_mesh = true},
     {.code = NoteCode::kDuplicateSlice,
      .name = "duplicate-slice",
-     .meaning = "Two slices lie at one position. One was used, and the other is listed as ignored.",
+     .meaning = "Several slices lie at one position. One was used, and the files of the others are "
+                "listed as ignored. If their samples differ, the request accepts it.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kDirectionsCorrected,
      .name = "directions-corrected",
-     .meaning = "The axes of rows and columns are not quite perpendicular. The nearest "
-                "perpendicular ones were used.",
+     .meaning = "The directions of rows and columns are not quite perpendicular, or not quite unit "
+                "vectors. The nearest perpendicular ones were used.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kPositionsRounded,
      .name = "positions-rounded",
-     .meaning = "The positions of the slices are rounded. Evenly spaced slices that lie within the "
-                "rounding were used.",
+     .meaning = "The positions of the slices are not evenly spaced. Evenly spaced ones were used "
+                "that lie within the rounding of the positions, or that the request accepts.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kFramesAsSlices,

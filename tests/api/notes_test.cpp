@@ -63,16 +63,30 @@ std::string not_finite() {
 }
 
 // One slice of a CT of 4 x 4 samples, 1 mm apart.
+import::test::DicomObject slice_object(std::uint32_t number){
+    const DicomSeries series = {.columns = 4,
+                                .rows = 4,
+                                .slices = 4,
+                                .origin = {0, 0, 0},
+                                .step = {0, 0, 1},
+                                .between_rows = 1,
+                                .between_columns = 1};
+return series.slice(number);
+}  // namespace
+
 std::string slice(std::uint32_t number, const std::string& frame_of_reference) {
-  const DicomSeries series = {.columns = 4,
-                              .rows = 4,
-                              .slices = 4,
-                              .origin = {0, 0, 0},
-                              .step = {0, 0, 1},
-                              .between_rows = 1,
-                              .between_columns = 1};
-  return series.slice(number)
+  return slice_object(number)
       .text(import::dicom::kFrameOfReferenceUid, "UI", frame_of_reference)
+      .file();
+}
+
+std::string slice_at(std::uint32_t number, const std::string& position) {
+  return slice_object(number).text(import::dicom::kImagePosition, "DS", position).file();
+}
+
+std::string skewed_slice(std::uint32_t number) {
+  return slice_object(number)
+      .text(import::dicom::kImageOrientation, "DS", "1\\0\\0\\0.005\\0.9999875\\0")
       .file();
 }
 
@@ -163,6 +177,16 @@ const std::map<std::string, Shown>& shown() {
       {"contours-interpolated", {structures_and_images(), {"--series", "1.2.9"}}},
       {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
       {"distance-assumed", {{{"a.dcm", mosaic()}}}},
+      {"duplicate-slice",
+       {{{"0", slice_object(0).file()},
+         {"1", slice_object(1).file()},
+         {"again", slice_object(1).text(import::dicom::kContentTime, "TM", "12").file()}}}},
+      {"directions-corrected", {{{"0", skewed_slice(0)}, {"1", skewed_slice(1)}}}},
+      {"positions-rounded",
+       {{{"0", slice_at(0, "0\\0\\0")},
+         {"1", slice_at(1, "0\\0\\1.2")},
+         {"2", slice_at(2, "0\\0\\2.5")},
+         {"3", slice_at(3, "0\\0\\3.8")}}}},
       {"frame-of-reference",
        {{{"1", slice(1, "1.9.1")}, {"2", slice(2, "1.9.2")}, {"3", slice(3, "1.9.3")}}}},
   };
@@ -363,5 +387,5 @@ TEST_F(NotesTest, OneFileTwiceInAnArchiveIsOneVolume) {
   EXPECT_THAT(volume.ignored, ElementsAre(Field(&IgnoredObject::name, "copy of a.nrrd")));
 }
 
-}  // namespace
+}  // namespace isomesh::test
 }  // namespace isomesh::test

@@ -6,12 +6,14 @@
 #include <utility>
 #include <vector>
 
+#include "base/text.h"
 #include "proto/error.h"
 #include "proto/presets.h"
 #include "server/import/dicom/choosing/choice.h"
 #include "server/import/dicom/choosing/series.h"
 #include "server/import/dicom/elements/dataset.h"
 #include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/kinds/segmentation.h"
 #include "server/import/dicom/pixels/pixels.h"
 #include "server/import/dicom/pixels/values.h"
@@ -62,15 +64,52 @@ std::vector<Slice> slices_of(std::span<const Source> sources) {
 
 bool are_labels(const Stack& stack) { return stack.plane_count > 0; }
 
-void read_slice(const Stack& stack, std::size_t place, OpenFile& file,
+// `name` is the slice's in messages.
+void read_slice(const Slice& slice, const std::string& name, OpenFile& file,
                 std::span<std::byte> stored) {
-  const Slice& slice = stack.slices[place];
   try {
     file.reader(slice.file).read(slice.frame->number, stored);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
-    throw_unusable("The DICOM image cannot be read: " + stack.name(place) + ": " + error.what() +
-                   '.');
+    throw_unusable("The DICOM image cannot be read: " + name + ": " + error.what() + '.');
+  }
+}
+
+void read_slice(const Stack& stack, std::size_t place, OpenFile& file,
+                std::span<std::byte> stored) {
+  const Slice& slice = stack.slices[place];
+  const std::string& name = slice.image->file_name;
+  read_slice(slice, stack.name(place) + (name.empty() ? "" : " (" + in_quotes(name) + ')'), file,
+             stored);
+}
+
+bool have_same_samples(const Slice& one, const Slice& other, OpenFile& file) {
+  const Rescale& rescale = one.frame->rescale;
+  const Rescale& its = other.frame->rescale;
+  if (one.image->layout != other.image->layout || rescale.slope != its.slope ||
+      rescale.intercept != its.intercept) {
+    return false;
+  }
+  std::vector<std::byte> samples(one.image->layout.frame_bytes());
+  std::vector<std::byte> others(samples.size());
+  read_slice(one, place_of(one), file, samples);
+  read_slice(other, place_of(other), file, others);
+  return samples == others;
+}
+
+Stack stack_of(std::span<const Source> sources, OpenFile& file, const ImportOptions& options,
+               std::vector<Note>& notes) {
+  const auto same_samples = [&](const Slice& one, const Slice& other) {
+    return have_same_samples(one, other, file);
+  };
+  return choose_stack(slices_of(sources), same_samples, options, notes);
+}
+
+// The files of which no slice is used.
+void ignore_left_out(const Stack& stack, std::span<const Source> sources, Upload& upload) {
+  for (const Slice& slice : stack.left_out) {
+    if (slice.image->frames.size() > 1) continue;
+    ignore(upload, sources[slice.file].file, "its slice lies at the position of another one");
   }
 }
 
@@ -166,23 +205,25 @@ DicomIdentity identify(const Stack& stack, std::span<const Source> sources, cons
 
 // The grid of the images that a structure set belongs to; empty if there are none.
 std::optional<ContourGrid> grid_beside(const StructureFile& structures,
-                                       const std::vector<Source>& all, ImportOptions options) {
+                                       const std::vector<Source>& all, const ImportTask& task) {
+  ImportOptions options = task.options;
   const std::vector<Source> sources = images_of(structures, all);
   if (sources.empty() || options.spacing) return std::nullopt;
   // Several volumes of one series have the same grid, and `volume` selects a structure here.
   options.volume.reset();
   std::vector<Note> notes;
-  const auto stack_of = [&] { return choose_stack(slices_of(sources), options, notes); };
+  OpenFile file(sources, task.scratch, task.limits.max_sample_bytes);
+
   const auto grid_of = [](const Stack& stack) {
     const PixelLayout& layout = stack.slices.front().image->layout;
     return ContourGrid{{layout.columns, layout.rows, stack.depth()}, stack.geometry};
   };
   try {
-    return grid_of(stack_of());
+    return grid_of(stack_of(sources, file, options, notes));
   } catch (const Error& error) {
     if (error.remedy().choices.empty()) throw;
     options.volume = 0;
-    return grid_of(stack_of());
+    return grid_of(stack_of(sources, file, options, notes));
   }
 }
 
@@ -195,8 +236,8 @@ Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;
   dicom::Upload upload = dicom::read_headers(files, task.scratch, most_sample_bytes);
   if (const auto* structures = chosen_structures(upload, task.options.series)) {
-    Volume volume = import_structures(
-        structures->file.path, dicom::grid_beside(*structures, upload.sources, task.options), task);
+    Volume volume = import_structures(structures->file.path,
+                                      dicom::grid_beside(*structures, upload.sources, task), task);
     volume.ignored = std::move(upload.ignored);
     return volume;
   }
@@ -204,8 +245,9 @@ Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   const std::vector<dicom::Source> sources =
       choose_series(std::move(upload.sources), task.options.series);
   std::vector<Note> notes = std::move(upload.notes);
-  const dicom::Stack stack = dicom::choose_stack(dicom::slices_of(sources), task.options, notes);
   dicom::OpenFile file(sources, task.scratch, most_sample_bytes);
+  const dicom::Stack stack = dicom::stack_of(sources, file, task.options, notes);
+  dicom::ignore_left_out(stack, sources, upload);
   Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
   dicom::suggest(stack, volume);
   volume.ignored = std::move(upload.ignored);

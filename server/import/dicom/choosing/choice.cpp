@@ -1,6 +1,7 @@
 #include "server/import/dicom/choosing/choice.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <span>
@@ -11,8 +12,10 @@
 #include "base/text.h"
 #include "proto/notes.h"
 #include "server/import/dicom/choosing/volumes.h"
+#include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/stack.h"
+#include "server/import/dicom/geometry/vectors.h"
 #include "server/import/dicom/kinds/segmentation.h"
 #include "server/import/source/source.h"
 
@@ -139,11 +142,78 @@ SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   return all;
 }
 
-void note_distance(const Stack& stack, std::vector<Note>& notes) {
+// "(0, 0, 1)", with three decimals.
+std::string in_words(const Vector3& direction) {
+  std::string text;
+  for (const double part : direction) {
+    text += (text.empty() ? "(" : ", ") + to_text(std::round(part * 1000) / 1000 + 0.0);
+  }
+  return text + ')';
+}
+
+// Throws unless the options accept that frames without positions follow along the normal.
+void note_distance(const Stack& stack, const ImportOptions& options, std::vector<Note>& notes) {
+  const Image& image = *stack.slices.front().image;
+  if (image.has_one_position) {
+    const Plane& plane = image.frames.front().plane;
+    const Vector3 normal = cross(plane.along_row, plane.along_column);
+    const Vector3 step =
+        difference(image.frames.back().plane.position, image.frames.front().plane.position);
+    const bool is_backwards = dot(step, normal) < 0;
+    const std::string found = "The DICOM image has " + std::to_string(image.frames.size()) +
+                              " frames, but no position for each of them.";
+    const std::string how =
+        in_mm(stack.geometry.spacing[2]) + " apart, as the " +
+        (image.is_distance_assumed ? "slice thickness " + tag_name(kSliceThickness)
+                                   : "spacing between slices " + tag_name(kSpacingBetweenSlices)) +
+        " says, by ascending frame number along " +
+        in_words(is_backwards ? moved({}, normal, -1) : normal) + '.';
+    if (!options.accepts(NoteCode::kDistanceAssumed)) {
+      throw_overridable(NoteCode::kDistanceAssumed,
+                        found + begin_remedy(options, "Add") +
+                            "accept=distance-assumed to place the frames " + how);
+    }
+    notes.push_back(note_of(NoteCode::kDistanceAssumed, found + " The request places them " + how));
+    return;
+  }
   if (!stack.is_distance_assumed) return;
   notes.push_back(note_of(NoteCode::kDistanceAssumed,
                           "The distance between the slices is unknown. The slice thickness, " +
                               in_mm(stack.geometry.spacing[2]) + ", was used."));
+}
+
+// Throws if the directions of rows and columns had to be corrected by more than rounding explains,
+// unless the options accept it.
+void note_directions(const Stack& stack, const ImportOptions& options, std::vector<Note>& notes) {
+  constexpr double kSmallSkew = 1;  // degrees
+  constexpr double kSmallStretch = 0.02;
+  double skew = 0;
+  double stretch = 0;
+  for (const Slice& slice : stack.slices) {
+    skew = std::max(skew, slice.frame->plane.skew);
+    stretch = std::max(stretch, slice.frame->plane.stretch);
+  }
+  if (skew == 0 && stretch == 0) return;
+  std::string found;
+  if (skew > 0) {
+    found = "The directions of rows and columns are " + to_text(std::round(skew * 100) / 100) +
+            " degrees away from perpendicular.";
+  }
+  if (stretch > 0) {
+    found += (found.empty() ? "" : " ") +
+             std::string(
+                 "The lengths of the directions of rows and "
+                 "columns differ from 1 by up to ") +
+             to_text(std::round(stretch * 1000) / 1000) + '.';
+  }
+  if ((skew > kSmallSkew || stretch > kSmallStretch) &&
+      !options.accepts(NoteCode::kDirectionsCorrected)) {
+    throw_overridable(NoteCode::kDirectionsCorrected,
+                      found + begin_remedy(options, "Add") +
+                          "accept=directions-corrected to use the nearest perpendicular ones.");
+  }
+  notes.push_back(note_of(NoteCode::kDirectionsCorrected,
+                          found + " The nearest perpendicular unit vectors were used."));
 }
 
 // Planes without a frame have no label.
@@ -174,7 +244,8 @@ std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOp
 Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
                     std::vector<Note>& notes) {
   Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes));
-  note_distance(stack, notes);
+  note_distance(stack, options, notes);
+  note_directions(stack, options, notes);
   note_empty_planes(stack, notes);
   return stack;
 }
@@ -227,16 +298,20 @@ void note_place(const Stack& stack, const ImportOptions& options, std::vector<No
 
 }  // namespace
 
-Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
-                   std::vector<Note>& notes) {
+Stack choose_stack(std::vector<Slice> slices, const SameSamples& same_samples,
+                   const ImportOptions& options, std::vector<Note>& notes) {
   if (std::ranges::all_of(slices, is_label_slice)) {
     return choose_labels(std::move(slices), options, notes);
   }
   if (std::ranges::any_of(slices, is_label_slice)) {
     throw_unusable("The series is not a single volume: it mixes images and segmentations.");
   }
-  Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
-  note_distance(stack, notes);
+  DistinctSlices distinct = without_duplicates(
+      chosen_of(split_volumes(std::move(slices)), options, notes), same_samples, options, notes);
+  Stack stack = make_stack(std::move(distinct.slices), options, notes);
+  stack.left_out = std::move(distinct.left_out);
+  note_distance(stack, options, notes);
+  note_directions(stack, options, notes);
   note_mappings(stack, notes);
   note_place(stack, options, notes);
   if (auto note = note_on_frames_of_reference(stack.slices, options)) {

@@ -18,12 +18,6 @@
 namespace isomesh::import::dicom {
 namespace {
 
-constexpr std::size_t kMostNamedObjects = 100;
-
-void ignore(Upload& upload, const NamedFile& file, const std::string& reason) {
-  if (upload.ignored.size() < kMostNamedObjects) upload.ignored.push_back({file.name, reason});
-}
-
 // Some anonymisers keep identifiers only in the meta information, which is the fallback.
 DicomInstance instance_of(const DicomFile& file) {
   DicomInstance instance = {utf8(file.data(), kSopClassUid), utf8(file.data(), kSopInstanceUid)};
@@ -190,6 +184,11 @@ std::vector<DicomSegment> segments_of(const DataSet& data) {
 }
 
 }  // namespace
+
+void ignore(Upload& upload, const NamedFile& file, const std::string& reason) {
+  constexpr std::size_t kMostNamedObjects = 100;
+  if (upload.ignored.size() < kMostNamedObjects) upload.ignored.push_back({file.name, reason});
+}
 
 void rethrow_for(const NamedFile& file, const Error& error) {
   throw Error(error.code(), file.title + ": " + error.what());

@@ -41,6 +41,9 @@ struct Upload {
   std::vector<Note> notes;
 };
 
+// Adds a file to those that the upload ignores, up to a limit. `reason` is a clause: "it is ...".
+void ignore(Upload& upload, const NamedFile& file, const std::string& reason);
+
 // Throws the error of one of several files, with the file's title.
 [[noreturn]] void rethrow_for(const NamedFile& file, const Error& error);
 

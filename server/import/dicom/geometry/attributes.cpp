@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,6 +20,9 @@ namespace {
 
 // For direction cosines, often written with only four decimals.
 constexpr double kCosineTolerance = 1e-3;
+// Cosines that are farther away from perpendicular unit vectors are damaged.
+constexpr double kMostSkew = 5;  // degrees
+constexpr double kMostStretch = 0.05;
 
 enum class Kind { kText, kReal, kWord };
 
@@ -138,6 +142,41 @@ std::optional<double> factor(const DataSet& data, Tag tag) {
                  " do not define the values of its samples.");
 }
 
+Vector3 unit_vector(const double* parts, double tolerance) {
+  Vector3 vector = {parts[0], parts[1], parts[2]};
+  const double size = std::sqrt(dot(vector, vector));
+  if (!(std::abs(size - 1) <= tolerance)) {
+    throw_unusable("The DICOM image's orientation " + tag_name(kImageOrientation) +
+                   " does not consist of unit vectors.");
+  }
+  for (double& part : vector) part /= size;
+  return vector;
+}
+
+// Turns both directions by the same angle. The sum and the difference of two unit vectors are
+// always perpendicular.
+void make_perpendicular(Plane& plane) {
+  const double cosine = dot(plane.along_row, plane.along_column);
+  if (std::abs(cosine) <= kCosineTolerance) return;
+  const double angle = std::asin(std::min(std::abs(cosine), 1.0)) * 180 / std::numbers::pi;
+  if (angle > kMostSkew) {
+    throw_unusable("The DICOM image's rows and columns are not perpendicular: their directions " +
+                   tag_name(kImageOrientation) + " are " + to_text(std::round(angle * 10) / 10) +
+                   " degrees away from it.");
+  }
+  plane.skew = angle;
+  Vector3 sum = moved(plane.along_row, plane.along_column, 1);
+  Vector3 rest = difference(plane.along_row, plane.along_column);
+  const double sum_size = length(sum) * std::numbers::sqrt2;
+  const double rest_size = length(rest) * std::numbers::sqrt2;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double half = sum[axis] / sum_size;
+    const double other = rest[axis] / rest_size;
+    plane.along_row[axis] = half + other;
+    plane.along_column[axis] = half - other;
+  }
+}
+
 // Ultrasound volumes are placed in their own space (PS3.3, C.7.6.16.2.21), with binary numbers.
 std::vector<double> volume_numbers(const Attributes& attributes, Tag group, Tag tag) {
   const DataSet* place = attributes.group(group);
@@ -211,15 +250,7 @@ std::vector<double> required_numbers(const DataSet& data, Tag tag, std::size_t c
                  in_quotes(text) + ", not " + std::to_string(count) + " numbers.");
 }
 
-Vector3 unit_vector(const double* parts) {
-  Vector3 vector = {parts[0], parts[1], parts[2]};
-  const double size = std::sqrt(dot(vector, vector));
-  if (!(std::abs(size - 1) <= kCosineTolerance)) {
-    throw_unusable("The DICOM image's orientation does not consist of unit vectors.");
-  }
-  for (double& part : vector) part /= size;
-  return vector;
-}
+Vector3 unit_vector(const double* parts) { return unit_vector(parts, kCosineTolerance); }
 
 Plane plane_of(const Attributes& attributes) {
   const auto position = position_of(attributes);
@@ -235,11 +266,13 @@ Plane placeless_plane_of(const Attributes& attributes) {
 
 Plane plane_of(const std::vector<double>& cosines, const std::vector<double>& spacing) {
   Plane plane;
-  plane.along_row = unit_vector(cosines.data());
-  plane.along_column = unit_vector(cosines.data() + 3);
-  if (std::abs(dot(plane.along_row, plane.along_column)) > kCosineTolerance) {
-    throw_unusable("The DICOM image's rows and columns are not perpendicular.");
+  plane.along_row = unit_vector(cosines.data(), kMostStretch);
+  plane.along_column = unit_vector(cosines.data() + 3, kMostStretch);
+  for (const std::size_t at : {0U, 3U}) {
+    const double off = std::abs(std::hypot(cosines[at], cosines[at + 1], cosines[at + 2]) - 1);
+    if (off > kCosineTolerance) plane.stretch = std::max(plane.stretch, off);
   }
+  make_perpendicular(plane);
   // The file has the distance between rows first, then that between columns.
   plane.spacing = {spacing[1], spacing[0]};
   if (!(spacing[0] > 0 && spacing[1] > 0)) {

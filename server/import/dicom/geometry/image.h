@@ -39,6 +39,10 @@ struct Plane {
   Vector3 along_row = {};              // unit vector from a sample to the next in the row
   Vector3 along_column = {};           // unit vector from a row to the next
   std::array<double, 2> spacing = {};  // mm, along the row and along the column
+  // How the directions of the file differ from perpendicular unit vectors: in degrees, and as a
+  // share of the length. 0 if they are used as they are.
+  double skew = 0;
+  double stretch = 0;
 };
 
 // The value of an attribute in which frames at one position may differ.
@@ -110,6 +114,8 @@ struct Image {
   // If nonzero, the file has one frame, with `frames` as tiles in rows of this length.
   std::uint32_t tiles_per_row = 0;
   bool is_distance_assumed = false;  // the frames' distance is their slice thickness
+  // The object has one position for all frames. The others follow along the normal.
+  bool has_one_position = false;
   PlaceKind place = PlaceKind::kPatient;
   // The most mappings to different real world values that a frame of a parametric map has.
   std::uint32_t value_mappings = 0;

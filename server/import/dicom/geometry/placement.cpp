@@ -29,15 +29,6 @@ bool nearly_same(const std::array<double, 2>& a, const std::array<double, 2>& b)
   return true;
 }
 
-// Names a slice whose position in the stack is unknown.
-std::string place_of(const Slice& slice) {
-  const std::string& file = slice.image->file_name;
-  std::string text;
-  if (slice.image->frames.size() > 1) text = "frame " + std::to_string(slice.frame->number + 1);
-  if (!file.empty()) text += (text.empty() ? "" : " of ") + in_quotes(file);
-  return text;
-}
-
 // A slice equal to the majority if there is one, otherwise any slice.
 template <class IsSame>
 const Slice& usual_slice(std::span<const Slice> slices, const IsSame& is_same) {
@@ -81,6 +72,14 @@ void refuse_assumed(std::span<const Slice> slices, const std::string& what, doub
 
 std::string count_of(std::size_t count, const std::string& what) {
   return std::to_string(count) + ' ' + what + (count == 1 ? "" : "s");
+}
+
+std::string place_of(const Slice& slice) {
+  const std::string& file = slice.image->file_name;
+  std::string text;
+  if (slice.image->frames.size() > 1) text = "frame " + std::to_string(slice.frame->number + 1);
+  if (!file.empty()) text += (text.empty() ? "" : " of ") + in_quotes(file);
+  return text;
 }
 
 std::optional<double> usual_gap(const std::vector<double>& ascending) {

@@ -32,6 +32,10 @@ std::vector<std::size_t> position_starts(std::span<const Placed> placed);
 // The usual (median) difference of ascending numbers; empty for fewer than two.
 std::optional<double> usual_gap(const std::vector<double>& ascending);
 
+// Names a slice whose position in the stack is unknown, by its file and frame. Empty for the only
+// slice of a single uploaded file.
+std::string place_of(const Slice& slice);
+
 std::string in_mm(double value);
 std::string count_of(std::size_t count, const std::string& what);
 

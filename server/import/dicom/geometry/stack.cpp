@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "base/text.h"
+#include "server/import/dicom/geometry/even_line.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/vectors.h"
 #include "server/import/source/source.h"
@@ -26,6 +28,11 @@ bool falls(std::span<const Placed> placed) {
   return true;
 }
 
+// Empty for nothing.
+std::string in_brackets(const std::string& text) {
+  return text.empty() || text == ", " ? "" : " (" + text + ')';
+}
+
 std::string number_of(std::size_t place, std::size_t count, bool from_end) {
   return std::to_string(from_end ? count - place : place + 1);
 }
@@ -44,8 +51,10 @@ void refuse_shared_positions(std::span<const Placed> placed, bool from_end) {
                                    : "each of its " + std::to_string(positions) + " positions") +
                    ". Nothing shows which slices belong to the same volume.");
   }
+  const std::size_t first = first_of_position[place];
   throw_unusable("Slice " + number_of(place, positions, from_end) + " of " +
-                 std::to_string(positions) + " occurs more than once.");
+                 std::to_string(positions) + " occurs more than once: " +
+                 place_of(placed[first].slice) + " and " + place_of(placed[first + 1].slice) + ".");
 }
 
 // "slice 41 of 93", "slices 41 and 42 of 93", "slices 3, 9 and 10 of 20", ...
@@ -65,51 +74,121 @@ std::string missing_slices(const std::vector<std::size_t>& places, std::size_t c
          " missing";
 }
 
-void refuse_gaps(std::span<const Placed> placed, bool from_end) {
-  std::vector<double> places;
-  for (const Placed& each : placed) places.push_back(each.along);
-  const double usual = usual_gap(places).value();
-  std::vector<std::size_t> missing;
-  std::size_t place = 0;
-  std::size_t uneven = 0;
+// What the distances between neighbours along the normal show.
+struct Gaps {
+  double usual = 0;
+  std::vector<double> steps;         // each slice's number of usual gaps from the first, whole
+  std::vector<std::size_t> missing;  // places without a slice, among all places
+  std::size_t uneven = 0;            // the first slice that is no whole number of usual gaps away
+};
+
+Gaps gaps_of(std::span<const Placed> placed) {
+  // Gaps of more slices than any series has are uneven instead.
+  constexpr double kMostMissing = 1e6;
+  std::vector<double> along;
+  for (const Placed& each : placed) along.push_back(each.along);
+  Gaps gaps;
+  gaps.usual = usual_gap(along).value();
+  gaps.steps.push_back(0);
   for (std::size_t i = 1; i < placed.size(); ++i) {
-    const double steps = (placed[i].along - placed[i - 1].along) / usual;
-    const double whole = std::round(steps);
-    if (whole < 1 || std::abs(steps - whole) > kPlaceTolerance || whole > 1e6) {
-      if (uneven == 0) uneven = i;
-      ++place;
-      continue;
+    const double steps = (along[i] - along[i - 1]) / gaps.usual;
+    const double whole = std::max(std::round(steps), 1.0);
+    const double before = gaps.steps.back();
+    const bool is_plausible = static_cast<double>(gaps.missing.size()) + whole <= kMostMissing;
+    const bool is_even = is_plausible && std::abs(steps - whole) <= kPlaceTolerance;
+    if (!is_even && gaps.uneven == 0) gaps.uneven = i;
+    for (double skipped = 1; is_plausible && skipped < whole; ++skipped) {
+      gaps.missing.push_back(static_cast<std::size_t>(before + skipped));
     }
-    for (double skipped = 1; skipped < whole; ++skipped) missing.push_back(++place);
-    ++place;
+    gaps.steps.push_back(before + whole);
   }
-  const std::size_t count = placed.size();
-  if (uneven != 0) {
-    const std::size_t one = from_end ? count - uneven : uneven;
-    const std::size_t other = from_end ? one + 1 : uneven + 1;
-    throw_unusable("The slices are unevenly spaced: slices " + std::to_string(one) + " and " +
-                   std::to_string(other) + " of " + std::to_string(count) + " are " +
-                   in_mm(placed[uneven].along - placed[uneven - 1].along) +
-                   " apart, but others are " + in_mm(usual) + " apart.");
-  }
-  if (!missing.empty()) {
-    throw_unusable("The series is incomplete: " +
-                   missing_slices(missing, count + missing.size(), from_end) + '.');
-  }
+  return gaps;
 }
 
-// Every slice must lie at equal steps along one line. This also finds slices that are shifted
-// within their planes.
-void refuse_crooked(std::span<const Placed> placed, const Vector3& step, bool from_end) {
+[[noreturn]] void throw_incomplete(std::span<const Placed> placed, const Gaps& gaps,
+                                   bool from_end) {
+  throw_unusable("The series is incomplete: " +
+                 missing_slices(gaps.missing, placed.size() + gaps.missing.size(), from_end) + '.');
+}
+
+std::string uneven_reason(std::span<const Placed> placed, const Gaps& gaps, bool from_end) {
+  const std::size_t count = placed.size();
+  const std::size_t one = from_end ? count - gaps.uneven : gaps.uneven;
+  const std::size_t other = from_end ? one + 1 : gaps.uneven + 1;
+  const Placed& before = placed[gaps.uneven - 1];
+  const Placed& behind = placed[gaps.uneven];
+  const std::string names =
+      in_brackets(from_end ? place_of(behind.slice) + ", " + place_of(before.slice)
+                           : place_of(before.slice) + ", " + place_of(behind.slice));
+  return "The slices are unevenly spaced: slices " + std::to_string(one) + " and " +
+         std::to_string(other) + " of " + std::to_string(count) + names + " are " +
+         in_mm(behind.along - before.along) + " apart, but others are " + in_mm(gaps.usual) +
+         " apart.";
+}
+
+// The first slice that does not lie at equal steps along one line; empty if all do. This also finds
+// slices that are shifted within their planes.
+std::optional<std::string> crooked_reason(std::span<const Placed> placed, const Vector3& step,
+                                          bool from_end) {
   const double tolerance = kPlaceTolerance * length(step);
   for (std::size_t i = 0; i < placed.size(); ++i) {
-    Vector3 off = difference(placed[i].position(), placed.front().position());
-    for (std::size_t axis = 0; axis < 3; ++axis) off[axis] -= step[axis] * static_cast<double>(i);
-    if (length(off) <= tolerance) continue;
-    throw_unusable("Slice " + number_of(i, placed.size(), from_end) + " of " +
-                   std::to_string(placed.size()) + " lies " + in_mm(length(off)) +
-                   " away from its place in a line of evenly spaced slices.");
+    const Vector3 place = moved(placed.front().position(), step, static_cast<double>(i));
+    const double off = length(difference(placed[i].position(), place));
+    if (off <= tolerance) continue;
+    return "Slice " + number_of(i, placed.size(), from_end) + " of " +
+           std::to_string(placed.size()) + in_brackets(place_of(placed[i].slice)) + " lies " +
+           in_mm(off) + " away from its place in a line of evenly spaced slices.";
   }
+  return std::nullopt;
+}
+
+// True if rounding could hide that a slice is missing: the widest gap may be two steps of a line
+// that has one step more.
+bool may_hide_a_slice(std::span<const Placed> placed, const Vector3& rounding) {
+  const Plane& plane = placed.front().slice.frame->plane;
+  const Vector3 normal = cross(plane.along_row, plane.along_column);
+  double along_normal = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    along_normal += std::abs(normal[axis]) * rounding[axis];
+  }
+  double widest = 0;
+  for (std::size_t i = 1; i < placed.size(); ++i) {
+    widest = std::max(widest, placed[i].along - placed[i - 1].along);
+  }
+  const double span = placed.back().along - placed.front().along;
+  return widest + along_normal >= 2 * span / static_cast<double>(placed.size());
+}
+
+// The line of slices that are not evenly spaced, if they are so by rounding, or if the options
+// accept it. `reason` says how they are not even.
+EvenLine evened_line(std::span<const Placed> placed, const Gaps& gaps, const std::string& reason,
+                     bool from_end, const ImportOptions& options, std::vector<Note>& notes) {
+  std::vector<Vector3> places;
+  for (const Placed& each : placed) places.push_back(each.position());
+  const EvenLine line = nearest_line(places, gaps.steps);
+  const double distance = length(line.step);
+  const bool is_whole = gaps.steps.back() == static_cast<double>(placed.size() - 1);
+  if (!is_whole && line.explains_places()) throw_incomplete(placed, gaps, from_end);
+  if (!is_whole || line.farthest >= distance / 2) throw_unusable(reason);
+  const std::string evenly = "evenly spaced slices, " + in_mm(distance) + " apart";
+  if (line.explains_places() && !may_hide_a_slice(placed, line.rounding)) {
+    notes.push_back(note_of(NoteCode::kPositionsRounded,
+                            "The positions of the slices are rounded to " +
+                                in_mm(std::ranges::max(line.rounding)) + ". They are those of " +
+                                evenly + ", which were used."));
+    return line;
+  }
+  if (!options.accepts(NoteCode::kPositionsRounded)) {
+    throw_overridable(NoteCode::kPositionsRounded,
+                      reason + begin_remedy(options, "Add") + "accept=positions-rounded to read " +
+                          evenly + ": they lie up to " + in_mm(line.farthest) +
+                          " away from the positions of the file.");
+  }
+  notes.push_back(
+      note_of(NoteCode::kPositionsRounded, "The slices are unevenly spaced. The request accepts " +
+                                               evenly + ": they lie up to " + in_mm(line.farthest) +
+                                               " away from the positions of the file."));
+  return line;
 }
 
 }  // namespace
@@ -119,7 +198,8 @@ std::string Stack::name(std::size_t place) const {
          std::to_string(slices.size());
 }
 
-Stack make_stack(std::vector<Slice> slices) {
+Stack make_stack(std::vector<Slice> slices, const ImportOptions& options,
+                 std::vector<Note>& notes) {
   const PixelLayout& layout = slices.front().image->layout;
   if (slices.size() == 1) refuse_flat("The series", {layout.columns, layout.rows, 1});
   refuse_mixtures(slices);
@@ -127,12 +207,24 @@ Stack make_stack(std::vector<Slice> slices) {
   Stack stack;
   stack.numbered_from_end = falls(placed);
   refuse_shared_positions(placed, stack.numbered_from_end);
-  refuse_gaps(placed, stack.numbered_from_end);
+  const Gaps gaps = gaps_of(placed);
+  if (gaps.uneven == 0 && !gaps.missing.empty()) {
+    throw_incomplete(placed, gaps, stack.numbered_from_end);
+  }
+  Plane first = placed.front().slice.frame->plane;
   Vector3 step = difference(placed.back().position(), placed.front().position());
   for (double& part : step) part /= static_cast<double>(placed.size() - 1);
-  refuse_crooked(placed, step, stack.numbered_from_end);
+  const auto reason = gaps.uneven != 0
+                          ? std::optional(uneven_reason(placed, gaps, stack.numbered_from_end))
+                          : crooked_reason(placed, step, stack.numbered_from_end);
+  if (reason) {
+    const EvenLine line =
+        evened_line(placed, gaps, *reason, stack.numbered_from_end, options, notes);
+    first.position = line.origin;
+    step = line.step;
+  }
 
-  stack.geometry = lattice(placed.front().slice.frame->plane, step);
+  stack.geometry = lattice(first, step);
   for (const Placed& each : placed) stack.slices.push_back(each.slice);
   stack.is_distance_assumed = stack.slices.front().image->is_distance_assumed;
   return stack;

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "proto/notes.h"
 #include "server/import/dicom/geometry/image.h"
+#include "server/import/source/names.h"
 
 namespace isomesh::import::dicom {
 
@@ -26,6 +28,7 @@ struct Stack {
   std::vector<std::uint32_t> planes = {};
   std::uint32_t plane_count = 0;
   bool is_distance_assumed = false;  // the distance between slices is their thickness
+  std::vector<Slice> left_out = {};  // other slices at positions that `slices` have
 
   std::uint32_t depth() const {
     return plane_count > 0 ? plane_count : static_cast<std::uint32_t>(slices.size());
@@ -39,10 +42,14 @@ struct Stack {
 // gives a sheared lattice: the third axis runs from slice to slice. Does not check frames of
 // reference (choosing/choice.cpp).
 //
+// Positions that are not even, but are even ones that were rounded to 1, 0.1 or 0.01 mm, give the
+// even ones, with a note; so do those that `options` accept because they lie less than half a slice
+// distance from even ones.
+//
 // Throws Error kUnusableVolume, naming slices, if there are fewer than two; if their sizes,
 // spacings or orientations (a component by more than 5e-4) differ; if several are at one position;
 // if one is missing; or if one deviates from its lattice position by more than a twentieth of the
-// slice distance.
-Stack make_stack(std::vector<Slice> slices);
+// slice distance for any other reason.
+Stack make_stack(std::vector<Slice> slices, const ImportOptions& options, std::vector<Note>& notes);
 
 }  // namespace isomesh::import::dicom

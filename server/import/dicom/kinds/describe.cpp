@@ -33,8 +33,15 @@ std::uint32_t frame_count(const DataSet& data) {
                  ", not a number from 1 to " + std::to_string(kMostFrames) + ".");
 }
 
+// True for several frames with the position of the first alone.
+bool has_one_position(const DataSet& data, std::uint32_t frames) {
+  return frames > 1 && !has_functional_groups(data) && !is_dose(data) &&
+         data.text(kSegmentationType).empty() && !data.text(kImagePosition).empty() &&
+         !data.text(kImageOrientation).empty();
+}
+
 void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {
-  if (frames == 1) return;
+  if (frames == 1 || has_one_position(data, frames)) return;
   if (!has_functional_groups(data)) {
     throw_unusable("The DICOM image has " + std::to_string(frames) +
                    " frames, but no position for each of them.");
@@ -249,6 +256,7 @@ Image describe_image(const DicomFile& file) {
     image.frames.push_back(describe_frame(data, number, image));
   }
   if (is_dose(data)) place_dose(data, image.frames);
+  if (has_one_position(data, frames)) place_along_normal(data, image);
   if (frames == 1 && is_mosaic(data)) unfold_mosaic(data, image);
   if (is_in_volume_space(Attributes(data, 0))) image.place = PlaceKind::kVolume;
   return image;

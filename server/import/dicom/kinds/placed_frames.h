@@ -15,6 +15,17 @@ bool is_dose(const DataSet& data);
 // plane. Throws Error kUnusableVolume if the object does not define them.
 void place_dose(const DataSet& data, std::span<Frame> frames);
 
+// The distance of neighbouring frames; negative if they follow one another against the normal.
+// Without it the slice thickness, and sets the image's `is_distance_assumed`. 0 if neither is
+// known.
+double frame_distance(const DataSet& data, Image& image);
+
+// Frames of an object that has one position, such as those of some cone-beam scanners: all have the
+// plane of the first on entry. Each follows along the normal in the order of their numbers. Sets
+// the image's `has_one_position`, which users have to accept. Throws Error kUnusableVolume if their
+// distance is unknown.
+void place_along_normal(const DataSet& data, Image& image);
+
 // Reconstructed tomograms of nuclear medicine (PS3.3, C.8.4.15): all slices in one object, with the
 // position of the first in the sequence of detectors. True for multi-frame objects.
 bool is_tomogram(const DataSet& data);

@@ -26,13 +26,9 @@ void refuse_projections(const DataSet& data) {
                  "tomograms (RECON TOMO) are volumes.");
 }
 
-// The distance of neighbouring slices; negative if they follow one another against the normal.
 double slice_step(const DataSet& data, Image& image) {
-  const auto told = data.numbers(kSpacingBetweenSlices);
-  if (!told.empty() && told.front() != 0) return told.front();
-  image.is_distance_assumed = true;
-  const auto thickness = data.numbers(kSliceThickness);
-  if (!thickness.empty() && thickness.front() > 0) return thickness.front();
+  const double step = frame_distance(data, image);
+  if (step != 0) return step;
   throw_unusable("The DICOM tomogram does not declare the distance between its slices " +
                  tag_name(kSpacingBetweenSlices) + ".");
 }
@@ -86,6 +82,30 @@ void add_phases(const DataSet& data, std::span<Frame> frames) {
 }
 
 }  // namespace
+
+double frame_distance(const DataSet& data, Image& image) {
+  const auto told = data.numbers(kSpacingBetweenSlices);
+  if (!told.empty() && told.front() != 0) return told.front();
+  image.is_distance_assumed = true;
+  const auto thickness = data.numbers(kSliceThickness);
+  return !thickness.empty() && thickness.front() > 0 ? thickness.front() : 0;
+}
+
+void place_along_normal(const DataSet& data, Image& image) {
+  const double step = frame_distance(data, image);
+  if (step == 0) {
+    throw_unusable("The DICOM image has " + std::to_string(image.frames.size()) +
+                   " frames, but no position for each of them, and no distance between them " +
+                   tag_name(kSpacingBetweenSlices) + " or thickness " + tag_name(kSliceThickness) +
+                   ".");
+  }
+  const Plane first = image.frames.front().plane;
+  const Vector3 normal = cross(first.along_row, first.along_column);
+  for (Frame& frame : image.frames) {
+    frame.plane.position = moved(first.position, normal, step * frame.number);
+  }
+  image.has_one_position = true;
+}
 
 bool is_tomogram(const DataSet& data) { return data.text(kSopClassUid) == kNuclearMedicine; }
 

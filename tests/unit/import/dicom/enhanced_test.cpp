@@ -9,6 +9,7 @@ namespace isomesh::import::test {
 namespace {
 
 using namespace dicom;
+using testing::AllOf;
 using testing::HasSubstr;
 
 const std::vector<std::uint32_t> kShuffled = {4, 0, 5, 2, 1, 3};
@@ -50,6 +51,15 @@ TEST(DicomFrames, HaveTheirOwnScales) {
   }
 }
 
+// Of seven frames, the last of which has other samples than the fifth.
+std::string doubled_frames(const DicomSeries& series) {
+  std::string pixels;
+  for (const std::uint32_t slice : {0U, 1U, 2U, 3U, 4U, 5U, 0U}) {
+    pixels += series.native_bytes(slice);
+  }
+  return pixels;
+}
+
 TEST(DicomFrames, ThatAreMissingOrDoubledAreNamed) {
   const DicomSeries series;
   const auto error_of = [&](const std::vector<std::uint32_t>& order) {
@@ -57,7 +67,14 @@ TEST(DicomFrames, ThatAreMissingOrDoubledAreNamed) {
   };
   EXPECT_THAT(error_of({0, 1, 2, 4, 5}), HasSubstr("slice 4 of 6 is missing"));
   EXPECT_THAT(error_of({5, 4, 2, 1, 0}), HasSubstr("slice 3 of 6 is missing"));
-  EXPECT_THAT(error_of({0, 1, 2, 3, 3, 4, 5}), HasSubstr("Slice 4 of 6 occurs more than once"));
+  // The samples of frame 5 are those of another slice.
+  EXPECT_THAT(
+      import_objects(
+          {{"one",
+            series.enhanced({0, 1, 2, 3, 4, 5, 4}).pixels(doubled_frames(series), 2).file()}})
+          .error,
+      AllOf(HasSubstr("frame 5 and frame 7 lie at one position"),
+            HasSubstr("accept=duplicate-slice to use frame 5")));
   EXPECT_THAT(error_of({0, 1, 0, 2, 1, 2}), HasSubstr("2 slices at each of its 3 positions"));
   EXPECT_THAT(error_of({3}), HasSubstr("1 slice of"));
 }

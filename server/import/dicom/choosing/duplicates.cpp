@@ -1,0 +1,106 @@
+#include "server/import/dicom/choosing/duplicates.h"
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <string>
+#include <tuple>
+
+#include "server/import/dicom/geometry/placement.h"
+#include "server/import/dicom/geometry/vectors.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+bool is_before(const Placed& a, const Placed& b) {
+  const auto key = [](const Slice& slice) {
+    constexpr std::int64_t kLast = std::numeric_limits<std::int64_t>::max();
+    return std::tuple(slice.image->instance_number.value_or(kLast), slice.image->file_name,
+                      slice.file, slice.frame->number);
+  };
+  return key(a.slice) < key(b.slice);
+}
+
+// The slices of one position after another, by the indices of their first.
+std::vector<std::span<Placed>> positions_of(std::span<Placed> placed) {
+  const std::vector<std::size_t> starts = position_starts(placed);
+  std::vector<std::span<Placed>> positions;
+  for (std::size_t at = 0; at < starts.size(); ++at) {
+    const std::size_t end = at + 1 < starts.size() ? starts[at + 1] : placed.size();
+    positions.push_back(placed.subspan(starts[at], end - starts[at]));
+  }
+  return positions;
+}
+
+struct Duplicates {
+  std::size_t same = 0;
+  std::size_t different = 0;
+  const Placed* first = nullptr;  // of those that differ
+  const Placed* second = nullptr;
+};
+
+[[noreturn]] void throw_different(const Duplicates& found, const ImportOptions& options) {
+  const std::string first = place_of(found.first->slice);
+  throw_overridable(NoteCode::kDuplicateSlice,
+                    "A slice occurs more than once, with other samples: " + first + " and " +
+                        place_of(found.second->slice) + " lie at one position" +
+                        (found.different > 1 ? ", and there are more such slices." : ".") +
+                        begin_remedy(options, "Add") + "accept=duplicate-slice to use " + first +
+                        '.');
+}
+
+Note note_on(const Duplicates& found) {
+  std::string detail;
+  if (found.same > 0) {
+    detail = count_of(found.same, "slice") + (found.same == 1 ? " was" : " were") +
+             " left out, with the position and the samples of another one.";
+  }
+  if (found.different > 0) {
+    detail += (detail.empty() ? "" : " ") + count_of(found.different, "slice") +
+              (found.different == 1 ? " was" : " were") +
+              " left out, with the position of another one and other samples. The request accepts "
+              "that: the lowest instance number was used, or else the first name.";
+  }
+  return note_of(NoteCode::kDuplicateSlice, std::move(detail));
+}
+
+}  // namespace
+
+DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& same_samples,
+                                  const ImportOptions& options, std::vector<Note>& notes) {
+  refuse_mixtures(slices);
+  std::vector<Placed> placed = placed_along_normal(slices);
+  const std::vector<std::span<Placed>> positions = positions_of(placed);
+  const bool are_alike = std::ranges::all_of(
+      positions, [&](const auto& each) { return each.size() == positions.front().size(); });
+  if (are_alike) return {std::move(slices), {}};
+  DistinctSlices distinct;
+  Duplicates found;
+  for (const std::span<Placed> position : positions) {
+    std::ranges::sort(position, is_before);
+    const Placed& first = position.front();
+    distinct.slices.push_back(first.slice);
+    for (const Placed& other : position.subspan(1)) {
+      // Beside the first one in its plane; make_stack refuses it.
+      if (length(difference(other.position(), first.position())) > kSamePlaceMm) {
+        distinct.slices.push_back(other.slice);
+        continue;
+      }
+      distinct.left_out.push_back(other.slice);
+      if (same_samples(first.slice, other.slice)) {
+        ++found.same;
+      } else if (++found.different == 1) {
+        found.first = &first;
+        found.second = &other;
+      }
+    }
+  }
+  if (found.different > 0 && !options.accepts(NoteCode::kDuplicateSlice)) {
+    throw_different(found, options);
+  }
+  if (!distinct.left_out.empty()) notes.push_back(note_on(found));
+  return distinct;
+}
+
+}  // namespace isomesh::import::dicom

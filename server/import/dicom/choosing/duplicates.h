@@ -1,0 +1,28 @@
+// Slices that occur more than once at one place -> one of them.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "proto/notes.h"
+#include "server/import/dicom/geometry/stack.h"
+
+namespace isomesh::import::dicom {
+
+// True if two slices have the same values.
+using SameSamples = std::function<bool(const Slice& one, const Slice& other)>;
+
+struct DistinctSlices {
+  std::vector<Slice> slices;
+  std::vector<Slice> left_out;
+};
+
+// Of slices at one place, keeps the one with the lowest instance number, then the first by name.
+// Adds a note. Changes nothing if each position has as many slices: they are several volumes.
+//
+// Throws Error kUnusableVolume as refuse_mixtures does, and, overridable, if slices at one place
+// have different values.
+DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& same_samples,
+                                  const ImportOptions& options, std::vector<Note>& notes);
+
+}  // namespace isomesh::import::dicom
