@@ -29,6 +29,20 @@ def file_of(sop_class, sop_instance, elements):
     return bytes(128) + b"DICM" + length + meta + data
 
 
+ENCAPSULATED = "1.2.840.10008.1.2.1.98"
+
+
+def encapsulated(file):
+    """A file of one frame that `file_of` made, with its samples in a fragment, not compressed."""
+    at = file.index(struct.pack("<HH", 0x7FE0, 0x0010) + b"OW")
+    samples = file[at + 12:]
+    item = struct.pack("<HHI", 0xFFFE, 0xE000, len(samples)) + samples
+    pixels = (file[at:at + 4] + b"OB" + struct.pack("<HI", 0, 0xFFFFFFFF)
+              + struct.pack("<HHI", 0xFFFE, 0xE000, 0) + item
+              + struct.pack("<HHI", 0xFFFE, 0xE0DD, 0))
+    return file[:at] + pixels
+
+
 class Series:
     """A ball of 1000 in air of 0, in `slices` slices of `size` x `size` samples of 2 mm."""
 

@@ -20,20 +20,33 @@ def pdu(kind, body):
     return struct.pack(">BxI", kind, len(body)) + body
 
 
-def associate_request(called="BONE", calling="CT1"):
+def associate_request(called="BONE", calling="CT1", syntax=dicom.EXPLICIT_LITTLE_ENDIAN):
     context = b"\1\0\0\0" + item(0x30, dicom.CT_IMAGE_STORAGE.encode())
-    context += item(0x40, dicom.EXPLICIT_LITTLE_ENDIAN.encode())
+    context += item(0x40, syntax.encode())
     user = item(0x51, struct.pack(">I", 16384)) + item(0x52, b"1.2.3.4")
     body = struct.pack(">HH16s16s32x", 1, 0, called.ljust(16).encode(), calling.ljust(16).encode())
     body += item(0x10, b"1.2.840.10008.3.1.1.1") + item(0x20, context) + item(0x50, user)
     return pdu(1, body)
 
 
+def context_is_accepted(response):
+    """Of the only presentation context, in the content of an A-ASSOCIATE-AC."""
+    at = 68
+    while at < len(response):
+        kind, length = struct.unpack(">BxH", response[at:at + 4])
+        if kind == 0x21:
+            return response[at + 6] == 0
+        at += 4 + length
+    return False
+
+
 class Scu:
-    def __init__(self, port, called="BONE", calling="CT1"):
+    def __init__(self, port, called="BONE", calling="CT1", syntax=dicom.EXPLICIT_LITTLE_ENDIAN):
         self.connection = socket.create_connection(("127.0.0.1", port), timeout=60)
-        self.connection.sendall(associate_request(called, calling))
-        self.accepted = self.receive()[0] == 2
+        self.connection.sendall(associate_request(called, calling, syntax))
+        kind, response = self.receive()
+        self.accepted = kind == 2
+        self.has_context = self.accepted and context_is_accepted(response)
 
     def send(self, kind, body):
         self.connection.sendall(pdu(kind, body))

@@ -120,6 +120,26 @@ class Receiving(Loop):
         for secret in (series.study, series.uid, series.instances[0], "PAT-4711"):
             self.assertNotIn(secret, daemon.logged())
 
+    def test_syntaxes(self):
+        """Whatever can be read is accepted, also what DCMTK has no name for."""
+        daemon = self.receiver()
+        for syntax, accepted in [
+                ("1.2.840.10008.1.2.4.201", True), ("1.2.840.10008.1.2.4.202", True),
+                ("1.2.840.10008.1.2.4.203", True), ("1.2.840.10008.1.2.4.110", True),
+                ("1.2.840.10008.1.2.4.111", True), ("1.2.840.10008.1.2.4.112", True),
+                ("1.2.840.10008.1.2.8.1", True), ("1.2.840.10008.1.2.4.102", False)]:
+            peer = scu.Scu(daemon.dimse_port, syntax=syntax)
+            self.assertEqual(peer.has_context, accepted, syntax)
+            self.assertTrue(peer.release())
+        series, _ = self.made()
+        self.pacs.upload(series.files.values())
+        peer = scu.Scu(daemon.dimse_port, syntax=dicom.ENCAPSULATED)
+        for instance, file in series.files.items():
+            self.assertEqual(peer.store(instance, dicom.encapsulated(file)), 0)
+        self.assertTrue(peer.release())
+        order = self.succeeded(daemon, self.only_order(daemon, series))
+        self.assert_one_mesh(order, series)
+
     def test_replaced(self):
         """An image that is sent again with other contents leaves no former file."""
         _, folder = self.made()

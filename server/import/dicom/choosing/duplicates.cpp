@@ -74,7 +74,9 @@ DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& 
   const std::vector<std::span<Placed>> positions = positions_of(placed);
   const bool are_alike = std::ranges::all_of(
       positions, [&](const auto& each) { return each.size() == positions.front().size(); });
-  if (are_alike) return {std::move(slices), {}};
+  if (are_alike && (positions.size() == 1 || positions.front().size() == 1)) {
+    return {std::move(slices), {}};
+  }
   DistinctSlices distinct;
   Duplicates found;
   for (const std::span<Placed> position : positions) {
@@ -90,6 +92,8 @@ DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& 
       distinct.left_out.push_back(other.slice);
       if (same_samples(first.slice, other.slice)) {
         ++found.same;
+      } else if (are_alike) {
+        return {std::move(slices), {}};
       } else if (++found.different == 1) {
         found.first = &first;
         found.second = &other;

@@ -77,17 +77,14 @@ unsigned required(const DataSet& data, Tag tag, std::string_view name) {
 void refuse_colours(const DataSet& data) {
   const auto samples = data.unsigned_number(kSamplesPerPixel).value_or(1);
   const std::string_view photometric = data.text(kPhotometricInterpretation);
-  if (samples == 1 && photometric.starts_with("MONOCHROME")) return;
+  // Grey samples have the same values with any interpretation.
+  if (samples == 1 && (photometric.starts_with("MONOCHROME") || photometric.empty())) return;
   if (samples == 1 && photometric == "PALETTE COLOR") {
     // A segmentation's labels do not depend on its palette.
     if (!data.text(kSegmentationType).empty()) return;
     throw_unusable(
         "The DICOM image is in colour: its samples are indices into a palette. Only grey images "
         "are read.");
-  }
-  if (photometric.empty()) {
-    throw_unusable("The DICOM image does not declare its photometric interpretation " +
-                   tag_name(kPhotometricInterpretation) + ".");
   }
   throw_unusable("The DICOM image is in colour: " + in_quotes(photometric) + " with " +
                  std::to_string(samples) + (samples == 1 ? " sample" : " samples") +

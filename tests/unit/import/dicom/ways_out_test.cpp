@@ -181,6 +181,20 @@ TEST(DicomDuplicates, AtEachPositionAreSeveralVolumes) {
   EXPECT_EQ(outcome.remedy.choices.size(), 2);
 }
 
+// A series that was stored twice, with new UIDs.
+TEST(DicomDuplicates, OfAWholeSeriesAreLeftOut) {
+  NamedFiles files = DicomSeries{}.files();
+  const auto again = [](std::uint32_t k) {
+    return DicomSeries{}.slice(k).text(kSopInstanceUid, "UI", "1.2.3.99." + std::to_string(k));
+  };
+  for (std::uint32_t k = 0; k < 6; ++k) files.emplace_back("B" + to_text(k), again(k).file());
+  const Outcome outcome = imported(import_objects(files));
+  EXPECT_EQ(outcome.canonical, import_objects(DicomSeries{}.files()).canonical);
+  EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateSlice), HasSubstr("6 slices were left out"));
+  files.back().second = again(5).pixels(std::string(40, '\1'), 2).file();
+  EXPECT_THAT(import_objects(files).error, HasSubstr("2 slices at each of its 6 positions"));
+}
+
 TEST(DicomDuplicates, AmongFramesAreLeftOut) {
   const DicomSeries series;
   const Outcome outcome =
@@ -277,6 +291,23 @@ TEST(DicomDirections, WithTwoDecimalsAreUnitVectorsAgain) {
   EXPECT_THAT(note_detail(outcome, NoteCode::kDirectionsCorrected), HasSubstr("0.004"));
   EXPECT_EQ(import_objects(directed("1.03\\0\\0\\0\\1\\0")).remedy.overridable,
             "directions-corrected");
+}
+
+// --- Headers -------------------------------------------------------------------------------------
+
+// No value depends on it.
+TEST(DicomHeader, MayLackThePhotometricInterpretationOfGreySamples) {
+  const NamedFiles files =
+      changed(DicomSeries{}, [](DicomObject& object) { object.erase(kPhotometricInterpretation); });
+  EXPECT_EQ(imported(import_objects(files)).canonical,
+            import_objects(DicomSeries{}.files()).canonical);
+  EXPECT_THAT(
+      import_objects(changed(DicomSeries{},
+                             [](DicomObject& object) {
+                               object.erase(kPhotometricInterpretation).number(kSamplesPerPixel, 3);
+                             }))
+          .error,
+      HasSubstr("in colour"));
 }
 
 }  // namespace
