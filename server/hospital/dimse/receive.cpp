@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcistrmf.h>
 #include <dcmtk/dcmdata/dcostrma.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/dcmtrans.h>
@@ -170,11 +172,13 @@ class Association {
 
  private:
   DimseRefusal accept();
+  void rename_syntaxes();
   DimseRefusal reject(DimseRefusal why, T_ASC_RejectParametersReason reason);
   void answer_messages();
   OFCondition store(T_ASC_PresentationContextID context_id, const T_DIMSE_C_StoreRQ& request);
-  // The status of an object that was written to its file.
-  DIC_US status_of(const T_DIMSE_C_StoreRQ& request);
+  // The status of an object that was written to its file, behind a head.
+  DIC_US status_of(const T_DIMSE_C_StoreRQ& request, const std::string& syntax,
+                   std::size_t head_bytes);
   std::filesystem::path file() const { return order_.folder / std::to_string(count_); }
   int idle() const { return static_cast<int>(order_.idle.count()); }
 
@@ -183,6 +187,7 @@ class Association {
   T_ASC_Association* association_ = nullptr;
   std::string called_;
   std::string calling_;
+  std::map<T_ASC_PresentationContextID, std::string> syntaxes_;
   std::size_t count_ = 0;  // objects started so far
 };
 
@@ -218,7 +223,22 @@ DimseRefusal Association::accept() {
   }
   done = answer_proposals(association_->params);
   if (done.good()) done = ASC_acknowledgeAssociation(association_);
+  rename_syntaxes();
   return done.good() ? DimseRefusal::kNone : DimseRefusal::kOther;
+}
+
+// DCMTK ends associations for transfer syntaxes that it has no name for, though it only copies the
+// bytes of data sets. So it gets the name of another one, in the list where it looks.
+void Association::rename_syntaxes() {
+  LST_HEAD** contexts = &association_->params->DULparams.requestedPresentationContext;
+  auto* context = static_cast<DUL_PRESENTATIONCONTEXT*>(LST_Head(contexts));
+  if (context != nullptr) LST_Position(contexts, context);
+  while (context != nullptr) {
+    syntaxes_[context->presentationContextID] = context->acceptedTransferSyntax;
+    OFStandard::strlcpy(context->acceptedTransferSyntax, UID_LittleEndianExplicitTransferSyntax,
+                        sizeof(context->acceptedTransferSyntax));
+    context = static_cast<DUL_PRESENTATIONCONTEXT*>(LST_Next(contexts));
+  }
 }
 
 void Association::answer_messages() {
@@ -259,8 +279,9 @@ OFCondition Association::store(T_ASC_PresentationContextID context_id,
   ++count_;
   FileSink sink(file(), order_.max_object_bytes);
   FileStream stream(sink);
-  const std::string head = dicom::file_head(
-      request.AffectedSOPClassUID, request.AffectedSOPInstanceUID, context.acceptedTransferSyntax);
+  const std::string& syntax = syntaxes_.at(context_id);
+  const std::string head =
+      dicom::file_head(request.AffectedSOPClassUID, request.AffectedSOPInstanceUID, syntax);
   sink.write(head.data(), static_cast<offile_off_t>(head.size()));
   T_ASC_PresentationContextID data_context = context_id;
   done = DIMSE_receiveDataSetInFile(association_, DIMSE_NONBLOCKING, idle(), &data_context, &stream,
@@ -269,8 +290,8 @@ OFCondition Association::store(T_ASC_PresentationContextID context_id,
   T_DIMSE_C_StoreRSP response = {};
   response.MessageIDBeingRespondedTo = request.MessageID;
   response.DataSetType = DIMSE_DATASET_NULL;
-  response.DimseStatus =
-      sink.has_failed() ? STATUS_STORE_Refused_OutOfResources : status_of(request);
+  response.DimseStatus = sink.has_failed() ? STATUS_STORE_Refused_OutOfResources
+                                           : status_of(request, syntax, head.size());
   std::snprintf(response.AffectedSOPClassUID, sizeof(response.AffectedSOPClassUID), "%s",
                 request.AffectedSOPClassUID);
   std::snprintf(response.AffectedSOPInstanceUID, sizeof(response.AffectedSOPInstanceUID), "%s",
@@ -281,14 +302,21 @@ OFCondition Association::store(T_ASC_PresentationContextID context_id,
   return DIMSE_sendStoreResponse(association_, context_id, &request, &response, nullptr);
 }
 
-DIC_US Association::status_of(const T_DIMSE_C_StoreRQ& request) {
-  DcmFileFormat object;
-  const OFCondition done = object.loadFileUntilTag(file().c_str(), EXS_Unknown, EGL_noChange,
-                                                   DCM_MaxReadLength, ERM_fileOnly, DCM_StudyID);
+DIC_US Association::status_of(const T_DIMSE_C_StoreRQ& request, const std::string& syntax,
+                              std::size_t head_bytes) {
+  // All that DCMTK has no name for are explicit and little-endian (PS3.5, A.4).
+  const E_TransferSyntax known = DcmXfer(syntax.c_str()).getXfer();
+  DcmInputFileStream stream(file().c_str(), static_cast<offile_off_t>(head_bytes));
+  DcmDataset object;
+  object.transferInit();
+  const OFCondition done =
+      object.readUntilTag(stream, known == EXS_Unknown ? EXS_LittleEndianExplicit : known,
+                          EGL_noChange, DCM_MaxReadLength, DCM_StudyID);
+  object.transferEnd();
   if (done.bad()) return STATUS_STORE_Error_CannotUnderstand;
   const auto uid_of = [&](const DcmTagKey& tag) {
     OFString uid;
-    object.getDataset()->findAndGetOFString(tag, uid);
+    object.findAndGetOFString(tag, uid);
     return std::string(trimmed(uid.c_str()));
   };
   const DimseObject told = {.file = file().filename(),
