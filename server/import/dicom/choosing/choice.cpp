@@ -54,10 +54,15 @@ std::optional<Note> note_on_frames_of_reference(std::span<const Slice> slices,
     return note_of(NoteCode::kFrameOfReference,
                    "The request accepts several frames of reference: " + found + even_line);
   }
+  const auto other = std::ranges::find_if(slices, [&](const Slice& slice) {
+    return slice.image->frame_of_reference_uid != slices.front().image->frame_of_reference_uid;
+  });
   throw_overridable(
       NoteCode::kFrameOfReference,
       "The series is not a single volume: " + found +
-          " Slices with different frames of reference may not share one coordinate system." +
+          " Slices with different frames of reference may not share one coordinate system. For "
+          "example, " +
+          place_of(slices.front()) + " differs from " + place_of(*other) + "." +
           begin_remedy(options, "Add") + "accept=frame-of-reference to read them as one volume.");
 }
 
@@ -169,9 +174,10 @@ void note_distance(const Stack& stack, const ImportOptions& options, std::vector
         " says, by ascending frame number along " +
         in_words(is_backwards ? moved({}, normal, -1) : normal) + '.';
     if (!options.accepts(NoteCode::kDistanceAssumed)) {
-      throw_overridable(NoteCode::kDistanceAssumed,
-                        found + begin_remedy(options, "Add") +
-                            "accept=distance-assumed to place the frames " + how);
+      throw_overridable(
+          NoteCode::kDistanceAssumed,
+          (image.file_name.empty() ? "" : "File " + in_quotes(image.file_name) + ": ") + found +
+              begin_remedy(options, "Add") + "accept=distance-assumed to place the frames " + how);
     }
     notes.push_back(note_of(NoteCode::kDistanceAssumed, found + " The request places them " + how));
     return;
@@ -189,9 +195,12 @@ void note_directions(const Stack& stack, const ImportOptions& options, std::vect
   constexpr double kSmallStretch = 0.02;
   double skew = 0;
   double stretch = 0;
+  const Slice* worst = &stack.slices.front();
   for (const Slice& slice : stack.slices) {
-    skew = std::max(skew, slice.frame->plane.skew);
-    stretch = std::max(stretch, slice.frame->plane.stretch);
+    const Plane& plane = slice.frame->plane;
+    if (plane.skew > skew || plane.stretch > stretch) worst = &slice;
+    skew = std::max(skew, plane.skew);
+    stretch = std::max(stretch, plane.stretch);
   }
   if (skew == 0 && stretch == 0) return;
   std::string found;
@@ -208,9 +217,11 @@ void note_directions(const Stack& stack, const ImportOptions& options, std::vect
   }
   if ((skew > kSmallSkew || stretch > kSmallStretch) &&
       !options.accepts(NoteCode::kDirectionsCorrected)) {
-    throw_overridable(NoteCode::kDirectionsCorrected,
-                      found + begin_remedy(options, "Add") +
-                          "accept=directions-corrected to use the nearest perpendicular ones.");
+    throw_overridable(
+        NoteCode::kDirectionsCorrected,
+        found + (place_of(*worst).empty() ? "" : " So it is in " + place_of(*worst) + ".") +
+            begin_remedy(options, "Add") +
+            "accept=directions-corrected to use the nearest perpendicular ones.");
   }
   notes.push_back(note_of(NoteCode::kDirectionsCorrected,
                           found + " The nearest perpendicular unit vectors were used."));

@@ -49,7 +49,9 @@ void refuse_shared_positions(std::span<const Placed> placed, bool from_end) {
     throw_unusable("The series holds " + std::to_string(placed.size() / positions) + " slices at " +
                    (positions == 1 ? "its only position"
                                    : "each of its " + std::to_string(positions) + " positions") +
-                   ". Nothing shows which slices belong to the same volume.");
+                   ". Nothing shows which slices belong to the same volume. For example, " +
+                   place_of(placed[0].slice) + " and " + place_of(placed[1].slice) +
+                   " lie at one position.");
   }
   const std::size_t first = first_of_position[place];
   throw_unusable("Slice " + number_of(place, positions, from_end) + " of " +
@@ -107,8 +109,13 @@ Gaps gaps_of(std::span<const Placed> placed) {
 
 [[noreturn]] void throw_incomplete(std::span<const Placed> placed, const Gaps& gaps,
                                    bool from_end) {
+  std::size_t behind = 1;
+  while (gaps.steps[behind] - gaps.steps[behind - 1] < 2) ++behind;
+  const std::string one = place_of(placed[behind - 1].slice);
+  const std::string other = place_of(placed[behind].slice);
   throw_unusable("The series is incomplete: " +
-                 missing_slices(gaps.missing, placed.size() + gaps.missing.size(), from_end) + '.');
+                 missing_slices(gaps.missing, placed.size() + gaps.missing.size(), from_end) +
+                 (one.empty() ? "." : ". There is a gap between " + one + " and " + other + "."));
 }
 
 std::string uneven_reason(std::span<const Placed> placed, const Gaps& gaps, bool from_end) {

@@ -54,7 +54,8 @@ const DicomSeries kLong = {.slices = 93};
 TEST(DicomRefusal, NamesMissingSlices) {
   const Outcome outcome = import_objects(without(in_order(kLong), {40}));
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("slice 41 of 93 is missing"));
+  EXPECT_THAT(outcome.error, AllOf(HasSubstr("slice 41 of 93 is missing"),
+                                   HasSubstr("between \"IM40\" and \"IM42\"")));
   const DicomSeries downward = {.slices = 93, .step = {0, 0, -2.5}};
   EXPECT_THAT(import_objects(without(in_order(downward), {40})).error,
               HasSubstr("slice 41 of 93 is missing"));

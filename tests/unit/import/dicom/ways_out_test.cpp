@@ -192,7 +192,8 @@ TEST(DicomDuplicates, OfAWholeSeriesAreLeftOut) {
   EXPECT_EQ(outcome.canonical, import_objects(DicomSeries{}.files()).canonical);
   EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateSlice), HasSubstr("6 slices were left out"));
   files.back().second = again(5).pixels(std::string(40, '\1'), 2).file();
-  EXPECT_THAT(import_objects(files).error, HasSubstr("2 slices at each of its 6 positions"));
+  EXPECT_THAT(import_objects(files).error,
+              AllOf(HasSubstr("2 slices at each of its 6 positions"), HasSubstr("\"B0\"")));
 }
 
 TEST(DicomDuplicates, AmongFramesAreLeftOut) {
@@ -276,7 +277,9 @@ TEST(DicomDirections, ThatAreNearlyPerpendicularAreCorrected) {
 }
 
 TEST(DicomDirections, ThatAreFartherOffCanBeAccepted) {
-  EXPECT_EQ(import_objects(skewed(2)).remedy.overridable, "directions-corrected");
+  const Outcome refused = import_objects(skewed(2));
+  EXPECT_EQ(refused.remedy.overridable, "directions-corrected");
+  EXPECT_THAT(refused.error, HasSubstr("\"IM1\""));
   const ImportOptions accepting = {.accept = {"directions-corrected"}};
   EXPECT_NE(
       note_detail(imported(import_objects(skewed(2), accepting)), NoteCode::kDirectionsCorrected),
