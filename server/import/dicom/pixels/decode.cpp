@@ -141,6 +141,11 @@ StreamSize check_stream(std::span<const std::byte> stream, const Syntax& syntax,
                    " components, but its header declares " + std::to_string(layout.columns) +
                    " x " + std::to_string(layout.rows) + " with 1");
   }
+  if (syntax.family == Family::kJpegXl && layout.samples() > kMostJpegXlSamples) {
+    throw_unusable("its JPEG XL stream has " + std::to_string(layout.samples()) +
+                   " samples, more than the " + std::to_string(kMostJpegXlSamples) +
+                   " that can be decoded");
+  }
   const unsigned bytes = (size->bits + 7) / 8;
   if (bytes > 2 && syntax.family != Family::kJpeg2000) {  // GDCM would end the process
     throw_unusable("its " + std::string(syntax.name) + " stream has " + std::to_string(size->bits) +

@@ -2,12 +2,16 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 
 #include "server/import/dicom/pixels/stream_size.h"
 
 namespace isomesh::import::dicom {
+
+// libjxl needs up to 20 bytes for each sample, and ends the process if it gets no memory.
+inline constexpr std::uint64_t kMostJpegXlSamples = std::uint64_t{1} << 26;
 
 // The size that the stream's header declares, without decoding its samples; empty if it is no such
 // stream, or if its samples are floating-point numbers. A stream of several pictures that follow

@@ -267,6 +267,13 @@ TEST(DicomJpegXlStream, OfAnotherSizeIsRefusedBeforeItIsDecoded) {
               HasSubstr("not a JPEG XL lossless stream"));
 }
 
+// The beginning of a black image of 9000 x 9000 samples that cjxl 0.7.0 wrote.
+TEST(DicomJpegXlStream, ThatNeedsTooMuchMemoryIsRefused) {
+  const std::string stream = from_hex("ff0a3c192120282e04080201001c00000000000000000000").value();
+  EXPECT_THAT(error_of(stream, {9000, 9000, 8, 8, 7, false}),
+              HasSubstr("81000000 samples, more than the 67108864"));
+}
+
 // --- Fragments -----------------------------------------------------------------------------------
 
 // All frames in one object, in two fragments each, without a table of their beginnings.
