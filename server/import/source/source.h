@@ -146,6 +146,7 @@ struct SourceVolume {
   std::vector<Note> notes;
   std::vector<LabelEntry> labels;       // see label_table()
   bool are_labels = false;              // by the header, even without a table
+  bool is_segmentation = false;         // whole numbers; nothing lies beyond its ends
   std::optional<SegmentLayers> layers;  // then all volumes are read, and `chosen` is the first
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }

@@ -14,6 +14,7 @@
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/stack.h"
 #include "server/import/dicom/kinds/segmentation.h"
+#include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {
@@ -173,7 +174,7 @@ std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOp
 
 Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
                     std::vector<Note>& notes) {
-  Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes));
+  Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes), options);
   note_distance(stack, notes);
   note_empty_planes(stack, notes);
   return stack;
@@ -235,6 +236,7 @@ Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
   if (std::ranges::any_of(slices, is_label_slice)) {
     throw_unusable("The series is not a single volume: it mixes images and segmentations.");
   }
+  refuse_spacing(options);
   Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
   note_distance(stack, notes);
   note_mappings(stack, notes);
