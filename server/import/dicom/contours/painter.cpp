@@ -13,8 +13,6 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// Contours within this distance of a slice are in it. Positions are written with a few decimals.
-constexpr double kSameSlice = 0.1;
 // Limits the rows that all edges of a structure cross: minutes of work, far more than a person
 // draws.
 constexpr std::uint64_t kMostCrossings = std::uint64_t{1} << 34;

@@ -49,8 +49,8 @@ std::optional<PaddingRange> padding_range(const DataSet& data, const PixelLayout
   const Ends ends = ends_of(data, stored);
   if (!ends.value) return std::nullopt;
   // The limit may be on either side of the value.
-  const auto [first, last] = std::minmax(*ends.value, ends.limit.value_or(*ends.value));
-  return PaddingRange{first, last};
+  const double limit = ends.limit.value_or(*ends.value);
+  return PaddingRange{std::min(*ends.value, limit), std::max(*ends.value, limit)};
 }
 
 void find_padding(const PaddingRange& padding, const PixelLayout& layout,
