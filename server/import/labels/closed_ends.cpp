@@ -25,13 +25,16 @@ Sides touched_sides(std::span<const std::byte> samples, const Dims& dims, std::s
   for (std::uint32_t k = 0; k < dims[2]; ++k) {
     for (std::uint32_t j = 0; j < dims[1]; ++j) {
       const auto row = samples.subspan((std::size_t{k} * dims[1] + j) * row_bytes, row_bytes);
-      if (is_zero(row)) continue;
       touched[0][0] = touched[0][0] || !is_zero(row.first(sample));
       touched[0][1] = touched[0][1] || !is_zero(row.last(sample));
-      touched[1][0] = touched[1][0] || j == 0;
-      touched[1][1] = touched[1][1] || j + 1 == dims[1];
-      touched[2][0] = touched[2][0] || k == 0;
-      touched[2][1] = touched[2][1] || k + 1 == dims[2];
+      const std::array<std::array<bool, 2>, 2> is_at = {
+          {{j == 0, j + 1 == dims[1]}, {k == 0, k + 1 == dims[2]}}};
+      for (const std::size_t axis : {1, 2}) {
+        for (const std::size_t side : {0, 1}) {
+          if (!is_at[axis - 1][side] || touched[axis][side]) continue;
+          touched[axis][side] = !is_zero(row);
+        }
+      }
     }
   }
   return touched;

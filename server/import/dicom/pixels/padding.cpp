@@ -1,6 +1,7 @@
 #include "server/import/dicom/pixels/padding.h"
 
 #include <algorithm>
+#include <cmath>
 #include <type_traits>
 
 #include "server/import/dicom/elements/tags.h"
@@ -43,6 +44,17 @@ Ends ends_of(const DataSet& data, const PixelLayout& stored) {
           integer_of(data, kPixelPaddingRangeLimit, stored.is_signed)};
 }
 
+// Some programs mark padding with bits above those of the samples. Then the whole words are equal.
+PixelLayout comparable(const PaddingRange& padding, PixelLayout layout) {
+  if (layout.is_float) return layout;
+  const double count = std::pow(2, layout.bits_stored);
+  const double least = layout.is_signed ? -count / 2 : 0;
+  if (padding.last >= least && padding.first < least + count) return layout;
+  layout.bits_stored = layout.bits_allocated;
+  layout.high_bit = layout.bits_stored - 1;
+  return layout;
+}
+
 }  // namespace
 
 std::optional<PaddingRange> padding_range(const DataSet& data, const PixelLayout& stored) {
@@ -58,7 +70,7 @@ void find_padding(const PaddingRange& padding, const PixelLayout& layout,
                   std::vector<bool>& found) {
   // Doubles represent all stored values.
   std::vector<double> values(layout.samples());
-  convert_frame(stored, layout, {}, SampleType::kFloat64,
+  convert_frame(stored, comparable(padding, layout), {}, SampleType::kFloat64,
                 std::as_writable_bytes(std::span(values)));
   for (std::size_t at = 0; at < values.size(); ++at) {
     if (!(values[at] >= padding.first && values[at] <= padding.last)) continue;

@@ -147,6 +147,23 @@ TEST(DicomPadding, HasTheSignOfTheSamples) {
   EXPECT_EQ(outcome.volume.suggested_iso, -475);
 }
 
+// Twelve bits, and a value of 16 that would be 2096 in twelve.
+TEST(DicomPadding, MayHaveMoreBitsThanSamples) {
+  DicomSeries series = kSeries;
+  series.is_signed = false;
+  series.bits_stored = 12;
+  series.high_bit = 11;
+  const auto stored = [](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+    return is_padded(i) ? -2000 : i == 7 ? 2096 : image_value(i, j, k) + 1024;
+  };
+  const Outcome outcome = imported(import_objects(files_of(stored, with_padding(-2000), series)));
+  const auto samples = samples_of<std::uint16_t>(outcome);
+  EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{24, 2096}));
+  EXPECT_EQ(samples[0], 24);
+  EXPECT_EQ(samples[7], 2096);
+  EXPECT_THAT(note_detail(outcome, NoteCode::kPadding), HasSubstr("48 of the 192"));
+}
+
 TEST(DicomPadding, MayBeARange) {
   for (const auto& [value, limit] : {std::pair(-3024, -2000), std::pair(-2000, -3024)}) {
     const auto stored = [](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
