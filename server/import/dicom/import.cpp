@@ -76,10 +76,9 @@ void read_slice(const Stack& stack, std::size_t place, OpenFile& file, std::span
   }
 }
 
-// Returns false if a sample does not fit into the type. Sets `padding` as find_padding does.
+// Returns false if a sample does not fit into the type.
 bool write_samples(const Stack& stack, SampleType type, OpenFile& file, std::span<std::byte> target,
-                   std::vector<bool>& padding) {
-  const std::uint64_t total = target.size() / bytes_per_sample(type);
+                   SampleSet& padding) {
   std::uint64_t first = 0;
   std::vector<std::byte> stored;
   for (std::size_t place = 0; place < stack.slices.size(); ++place) {
@@ -88,7 +87,7 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file, std::spa
     stored.resize(layout.frame_bytes());
     const auto see = [&](std::span<const std::byte> values, const PixelLayout& of_values) {
       const auto& range = slice.image->padding;
-      if (range) find_padding(*range, of_values, values, first, total, padding);
+      if (range) find_padding(*range, of_values, values, first, padding);
     };
     read_slice(stack, place, file, stored, see);
     first += layout.samples();
@@ -103,10 +102,10 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file, std::spa
 std::optional<Volume> write_image(const Stack& stack, Volume volume, OpenFile& file,
                                   const ImportTask& task) {
   CanonicalWriter writer(task.target, {volume.dims, volume.type, volume.geometry});
-  std::vector<bool> padding;
+  SampleSet padding(volume.sample_count());
   if (!write_samples(stack, volume.type, file, writer.samples(), padding)) return std::nullopt;
   const std::uint64_t left_out =
-      padding.empty() ? 0 : leave_out_padding(padding, task.options, writer.samples(), volume);
+      padding.is_empty() ? 0 : leave_out_padding(padding, task.options, writer.samples(), volume);
   return finish(writer, std::move(volume), left_out);
 }
 

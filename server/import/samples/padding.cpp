@@ -1,9 +1,11 @@
 #include "server/import/samples/padding.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <optional>
+#include <limits>
 #include <string>
+#include <type_traits>
 
 #include "proto/samples.h"
 #include "server/import/source/source.h"
@@ -15,31 +17,52 @@ namespace {
 
 // The finite samples of the image.
 struct ImageSamples {
-  bool is_empty = true;
-  double smallest = 0;
-  bool is_padding_zero = true;  // all padding has the value 0
+  double smallest = std::numeric_limits<double>::infinity();  // if there is none
+  bool is_padding_zero = true;                                // all padding has the value 0
 };
 
 template <class Sample>
-ImageSamples scan(const std::vector<bool>& padding, std::span<const Sample> samples) {
-  ImageSamples found;
+void scan(std::span<const Sample> samples, std::uint64_t padding, ImageSamples& found) {
   for (std::size_t at = 0; at < samples.size(); ++at) {
     const auto value = static_cast<double>(samples[at]);
-    if (padding[at]) {
+    if ((padding >> at & 1U) != 0) {
       found.is_padding_zero = found.is_padding_zero && value == 0;
-    } else if (std::isfinite(value) && (found.is_empty || value < found.smallest)) {
-      found.is_empty = false;
+    } else if (std::isfinite(value) && value < found.smallest) {
       found.smallest = value;
     }
   }
+}
+
+// Calls `use` for each block of samples, with the bits of its padding.
+template <class Sample, class Use>
+void for_blocks(const SampleSet& padding, std::span<Sample> samples, const Use& use) {
+  for (std::size_t begin = 0; begin < samples.size(); begin += SampleSet::kBlock) {
+    use(samples.subspan(begin, std::min(SampleSet::kBlock, samples.size() - begin)),
+        padding.block(begin / SampleSet::kBlock));
+  }
+}
+
+template <class Sample>
+ImageSamples scan(const SampleSet& padding, std::span<Sample> samples) {
+  ImageSamples found;
+  for_blocks(padding, samples, [&](std::span<const Sample> block, std::uint64_t bits) {
+    if (bits != 0) return scan(block, bits, found);
+    if constexpr (std::is_integral_v<Sample>) {
+      found.smallest = std::min(found.smallest, static_cast<double>(std::ranges::min(block)));
+    } else {
+      scan(block, 0, found);
+    }
+  });
   return found;
 }
 
 template <class Sample>
-void replace(const std::vector<bool>& padding, double value, std::span<Sample> samples) {
-  for (std::size_t at = 0; at < samples.size(); ++at) {
-    if (padding[at]) samples[at] = static_cast<Sample>(value);
-  }
+void replace(const SampleSet& padding, double value, std::span<Sample> samples) {
+  for_blocks(padding, samples, [&](std::span<Sample> block, std::uint64_t bits) {
+    for (; bits != 0; bits &= bits - 1) {
+      block[static_cast<std::size_t>(std::countr_zero(bits))] = static_cast<Sample>(value);
+    }
+  });
 }
 
 template <class Use>
@@ -57,9 +80,15 @@ bool look_like_labels(std::span<const std::byte> samples, const Volume& volume) 
 
 }  // namespace
 
-std::uint64_t leave_out_padding(const std::vector<bool>& padding, const ImportOptions& options,
+std::uint64_t SampleSet::count() const {
+  std::uint64_t sum = 0;
+  for (const std::uint64_t word : words_) sum += static_cast<std::uint64_t>(std::popcount(word));
+  return sum;
+}
+
+std::uint64_t leave_out_padding(const SampleSet& padding, const ImportOptions& options,
                                 std::span<std::byte> samples, Volume& volume) {
-  const auto count = static_cast<std::uint64_t>(std::ranges::count(padding, true));
+  const std::uint64_t count = padding.count();
   const std::string what = std::to_string(count) + " of the " +
                            std::to_string(volume.sample_count()) +
                            " samples have the padding value of the file";
@@ -69,10 +98,9 @@ std::uint64_t leave_out_padding(const std::vector<bool>& padding, const ImportOp
                 what + ". The request accepts padding, so they are samples like others."));
     return 0;
   }
-  const ImageSamples image = with_samples(samples, volume.type, [&](auto typed) {
-    return scan<typename decltype(typed)::value_type>(padding, typed);
-  });
-  if (image.is_empty) {
+  const ImageSamples image =
+      with_samples(samples, volume.type, [&](auto typed) { return scan(padding, typed); });
+  if (!std::isfinite(image.smallest)) {
     throw_overridable(NoteCode::kPadding,
                       "All samples have the padding value of the file, so it holds no image." +
                           begin_remedy(options, "Add") +

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
+#include <vector>
 
+#include "proto/samples.h"
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/pixels/values.h"
 #include "server/import/source/header_fields.h"
@@ -55,6 +56,20 @@ PixelLayout comparable(const PaddingRange& padding, PixelLayout layout) {
   return layout;
 }
 
+// The values are of a type that holds all stored ones.
+template <class Value>
+void find_values(const PaddingRange& padding, const PixelLayout& layout,
+                 std::span<const std::byte> stored, std::uint64_t first, SampleSet& found) {
+  std::vector<Value> values(layout.samples());
+  convert_frame(stored, layout, {}, sample_type<Value>(),
+                std::as_writable_bytes(std::span(values)));
+  const auto low = static_cast<Value>(padding.first);
+  const auto high = static_cast<Value>(padding.last);
+  for (std::size_t at = 0; at < values.size(); ++at) {
+    if (values[at] >= low && values[at] <= high) found.add(first + at);
+  }
+}
+
 }  // namespace
 
 std::optional<PaddingRange> padding_range(const DataSet& data, const PixelLayout& stored) {
@@ -66,17 +81,13 @@ std::optional<PaddingRange> padding_range(const DataSet& data, const PixelLayout
 }
 
 void find_padding(const PaddingRange& padding, const PixelLayout& layout,
-                  std::span<const std::byte> stored, std::uint64_t first, std::uint64_t total,
-                  std::vector<bool>& found) {
-  // Doubles represent all stored values.
-  std::vector<double> values(layout.samples());
-  convert_frame(stored, comparable(padding, layout), {}, SampleType::kFloat64,
-                std::as_writable_bytes(std::span(values)));
-  for (std::size_t at = 0; at < values.size(); ++at) {
-    if (!(values[at] >= padding.first && values[at] <= padding.last)) continue;
-    if (found.empty()) found.resize(total);
-    found[first + at] = true;
-  }
+                  std::span<const std::byte> stored, std::uint64_t first, SampleSet& found) {
+  const PixelLayout compared = comparable(padding, layout);
+  // A value of 32 bits would not fit into an integer, and may be the padding of samples of 16.
+  const bool is_short = !layout.is_float && layout.bits_allocated <= 16 &&
+                        std::max(std::abs(padding.first), std::abs(padding.last)) <= 0x1p30;
+  if (is_short) return find_values<std::int32_t>(padding, compared, stored, first, found);
+  find_values<double>(padding, compared, stored, first, found);
 }
 
 }  // namespace isomesh::import::dicom

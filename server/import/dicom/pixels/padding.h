@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "server/import/dicom/geometry/image.h"
+#include "server/import/samples/padding.h"
 
 namespace isomesh::import::dicom {
 
@@ -17,10 +17,8 @@ namespace isomesh::import::dicom {
 // its value representation: programs confuse US and SS.
 std::optional<PaddingRange> padding_range(const DataSet& data, const PixelLayout& stored);
 
-// Sets the padding among a frame's stored values in `found`, which has an element for each of the
-// volume's `total` samples, or none before the first padding. The frame begins at sample `first`.
+// Adds the padding among a frame's stored values to `found`. The frame begins at sample `first`.
 void find_padding(const PaddingRange& padding, const PixelLayout& layout,
-                  std::span<const std::byte> stored, std::uint64_t first, std::uint64_t total,
-                  std::vector<bool>& found);
+                  std::span<const std::byte> stored, std::uint64_t first, SampleSet& found);
 
 }  // namespace isomesh::import::dicom
