@@ -80,12 +80,6 @@ bool look_like_labels(std::span<const std::byte> samples, const Volume& volume) 
 
 }  // namespace
 
-std::uint64_t SampleSet::count() const {
-  std::uint64_t sum = 0;
-  for (const std::uint64_t word : words_) sum += static_cast<std::uint64_t>(std::popcount(word));
-  return sum;
-}
-
 std::uint64_t leave_out_padding(const SampleSet& padding, const ImportOptions& options,
                                 std::span<std::byte> samples, Volume& volume) {
   const std::uint64_t count = padding.count();

@@ -295,12 +295,6 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
 
 }  // namespace
 
-void refuse_spacing(const ImportOptions& options) {
-  if (!options.spacing) return;
-  throw invalid_parameter("spacing",
-                          "applies to files without a spacing, but this file has its own");
-}
-
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target) {
   volume.type = canonical_type(samples.layout);

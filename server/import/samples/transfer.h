@@ -35,9 +35,6 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 // task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
-// Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
-void refuse_spacing(const ImportOptions& options);
-
 // Completes a canonical file: measures and flushes the samples. `volume` has dims, type and
 // geometry; returns it with range, suggested iso-value and bytes set. Samples that are not finite
 // get the smallest sample's value. So do `left_out` samples, which the caller has given it because

@@ -163,6 +163,9 @@ CompressedRange range_from(const InputFile& file, std::uint64_t offset);
 // Throws Error kTooLarge if the volume's canonical samples would exceed the limits.
 void check_limits(const SourceVolume& volume, const SizeLimits& limits);
 
+// Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
+void refuse_spacing(const ImportOptions& options);
+
 // Throws Error kUnusableVolume if `what`, as in "The file", has only one sample along an axis. Such
 // an image has no cells, so no surface at any iso-value.
 void refuse_flat(std::string_view what, const std::array<std::uint32_t, 3>& dims);

@@ -14,7 +14,6 @@
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/stack.h"
 #include "server/import/dicom/kinds/segmentation.h"
-#include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {

@@ -22,7 +22,6 @@
 #include "server/import/dicom/pixels/values.h"
 #include "server/import/labels/combinations.h"
 #include "server/import/labels/label_table.h"
-#include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
 
 namespace isomesh::import::dicom {

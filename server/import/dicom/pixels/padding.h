@@ -8,7 +8,7 @@
 #include <span>
 
 #include "server/import/dicom/geometry/image.h"
-#include "server/import/samples/padding.h"
+#include "server/import/source/sample_set.h"
 
 namespace isomesh::import::dicom {
 
