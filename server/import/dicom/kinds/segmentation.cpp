@@ -333,11 +333,13 @@ std::vector<Segment> segments_in(const Stack& stack) {
   return segments;
 }
 
-// Without the background, which some programs describe as a segment.
+// Without the background, which some programs describe as a segment, also where it is 0 and the
+// padding is another value.
 std::vector<Segment> segments_of_map(const Stack& stack) {
   const auto background = background_of(*stack.slices.front().image).value_or(0);
   std::vector<Segment> segments = segmentation_of(stack).segments;
-  std::erase_if(segments, [&](const Segment& each) { return each.number == background; });
+  std::erase_if(segments,
+                [&](const Segment& each) { return each.number == 0 || each.number == background; });
   return segments;
 }
 
