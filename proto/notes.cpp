@@ -41,7 +41,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
      .meaning = "Some samples are infinite or not a number. They got the smallest sample's value, "
-                "so they lie outside the surface at any larger iso-value.",
+                "so they lie outside the surface at any larger iso-value. The suggested iso-value "
+                "leaves them out.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",
@@ -70,7 +71,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .is_in_mesh = true},
     {.code = NoteCode::kEmptyPlanes,
      .name = "empty-planes",
-     .meaning = "A DICOM segmentation leaves out empty frames. They became planes of zeros.",
+     .meaning = "A segmentation leaves out empty frames, or its labels reach its end. Planes of "
+                "zeros were added there, so surfaces are closed.",
      .is_in_mesh = true},
     {.code = NoteCode::kDistanceAssumed,
      .name = "distance-assumed",
@@ -104,8 +106,9 @@ constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kPadding,
      .name = "padding",
      .meaning = "Some samples have the padding value of the file, which is not part of the image. "
-                "They are outside of any surface, and the range and the suggested iso-value leave "
-                "them out. With `accept=padding` they are samples like others.",
+                "They got the smallest other sample's value, so they lie outside the surface at "
+                "any larger iso-value. The range and the suggested iso-value leave them out. With "
+                "`accept=padding` they are samples like others.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kDuplicateSlice,

@@ -22,7 +22,7 @@ enum class NoteCode {
   kDuplicateFile,        // a file occurs twice and was used once
   kLooksLikeLabels,      // declared, few whole values in flat regions, or a mask: `labels` suits it
   kFrameOfReference,     // DICOM: slices do not share one frame of reference
-  kEmptyPlanes,          // DICOM: frames missing from a segmentation; filled with zeros
+  kEmptyPlanes,          // planes of zeros in a segmentation, between its frames or at its ends
   kDistanceAssumed,      // DICOM: no distance between slices; taken from the thickness
   kOverlappingSegments,  // segments overlap; values number their combinations
   kContoursSkipped,      // DICOM: contours or structures of a structure set that were not drawn

@@ -68,7 +68,13 @@ std::vector<std::uint64_t> count_values(std::span<const Sample> samples, std::in
   return counts;
 }
 
-Statistics from_value_counts(std::span<const std::uint64_t> counts, std::int64_t lowest) {
+// One sample of that value remains at least, because the value is in the range.
+void leave_out(std::uint64_t samples, std::uint64_t& count) {
+  if (count > 0) count -= std::min(samples, count - 1);
+}
+
+Statistics from_value_counts(std::span<std::uint64_t> counts, std::int64_t lowest,
+                             std::uint64_t left_out) {
   const auto is_hit = [](std::uint64_t count) { return count > 0; };
   const auto first = std::find_if(counts.begin(), counts.end(), is_hit) - counts.begin();
   const auto beyond = counts.rend() - std::find_if(counts.rbegin(), counts.rend(), is_hit);
@@ -76,6 +82,7 @@ Statistics from_value_counts(std::span<const std::uint64_t> counts, std::int64_t
   if (first == std::ssize(counts)) return statistics;
   statistics.range = {static_cast<double>(lowest + first),
                       static_cast<double>(lowest + beyond - 1)};
+  leave_out(left_out, counts[static_cast<std::size_t>(first)]);
   statistics.otsu = otsu_threshold(
       counts.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(beyond - first)),
       {statistics.range[0] - 0.5, statistics.range[1] + 0.5});
@@ -99,44 +106,47 @@ Statistics range_of(std::span<const Sample> samples) {
 }
 
 template <class Sample>
-Statistics measure_wide(std::span<const Sample> samples) {
+Statistics measure_wide(std::span<const Sample> samples, std::uint64_t left_out) {
   Statistics statistics = range_of(samples);
   const auto [low, high] = statistics.range;
   if constexpr (std::is_integral_v<Sample>) {
     if (high - low < static_cast<double>(kMostExactBins)) {
       const auto lowest = static_cast<std::int64_t>(low);
       const auto bins = static_cast<std::size_t>(high - low) + 1;
-      return from_value_counts(count_values(samples, lowest, bins), lowest);
+      std::vector<std::uint64_t> counts = count_values(samples, lowest, bins);
+      return from_value_counts(counts, lowest, left_out);
     }
   }
   if (statistics.non_finite == samples.size() || low == high) {
     statistics.otsu = low;
   } else {
-    statistics.otsu =
-        otsu_threshold(count_samples(samples, {statistics.range, kBins}), statistics.range);
+    std::vector<std::uint64_t> counts = count_samples(samples, {statistics.range, kBins});
+    leave_out(left_out, counts.front());
+    statistics.otsu = otsu_threshold(counts, statistics.range);
   }
   return statistics;
 }
 
 template <class Sample>
-Statistics measure_samples(std::span<const Sample> samples) {
+Statistics measure_samples(std::span<const Sample> samples, std::uint64_t left_out) {
   if constexpr (sizeof(Sample) <= 2) {
     // One count per possible value fits into memory, so the range is not needed first.
     constexpr std::size_t kValues = std::size_t{1} << (8 * sizeof(Sample));
     if (samples.size() < kValues)
-      return measure_wide(samples);  // a second walk takes less time than zeroing
+      return measure_wide(samples, left_out);  // a second walk takes less time than zeroing
     constexpr std::int64_t kLowest = std::is_signed_v<Sample> ? -std::int64_t{kValues / 2} : 0;
-    return from_value_counts(count_values(samples, kLowest, kValues), kLowest);
+    std::vector<std::uint64_t> counts = count_values(samples, kLowest, kValues);
+    return from_value_counts(counts, kLowest, left_out);
   } else {
-    return measure_wide(samples);
+    return measure_wide(samples, left_out);
   }
 }
 
 }  // namespace
 
-Statistics measure(std::span<const std::byte> samples, SampleType type) {
-  return with_sample(type,
-                     [&](auto sample) { return measure_samples(as<decltype(sample)>(samples)); });
+Statistics measure(std::span<const std::byte> samples, SampleType type, std::uint64_t left_out) {
+  return with_sample(
+      type, [&](auto sample) { return measure_samples(as<decltype(sample)>(samples), left_out); });
 }
 
 std::vector<std::uint64_t> histogram(std::span<const std::byte> samples, SampleType type,

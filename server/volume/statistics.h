@@ -29,8 +29,9 @@ struct Bins {
 //
 // Otsu's threshold is exact for integers that span fewer than 65536 values; otherwise it follows
 // from 1024 bins between the smallest and the largest sample. It is midway between the two classes,
-// so no integer sample equals it unless the volume is constant.
-Statistics measure(std::span<const std::byte> samples, SampleType type);
+// so no integer sample equals it unless the volume is constant. It leaves out as many of the
+// smallest samples as `left_out` says; these are copies of that sample which stand for others.
+Statistics measure(std::span<const std::byte> samples, SampleType type, std::uint64_t left_out = 0);
 
 std::vector<std::uint64_t> histogram(std::span<const std::byte> samples, SampleType type,
                                      const Bins& bins);

@@ -62,17 +62,24 @@ std::string not_finite() {
   return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(samples));
 }
 
-// One slice of a CT of 4 x 4 samples, 1 mm apart.
-import::test::DicomObject slice_object(std::uint32_t number){
-    const DicomSeries series = {.columns = 4,
-                                .rows = 4,
-                                .slices = 4,
-                                .origin = {0, 0, 0},
-                                .step = {0, 0, 1},
-                                .between_rows = 1,
-                                .between_columns = 1};
-return series.slice(number);
+// A CT of 4 x 4 samples, 1 mm apart.
+const DicomSeries kCt = {.columns = 4,
+                         .rows = 4,
+                         .slices = 4,
+                         .origin = {0, 0, 0},
+                         .step = {0, 0, 1},
+                         .between_rows = 1,
+                         .between_columns = 1};
+
+import::test::DicomObject slice_object(std::uint32_t number){return kCt.slice(number);
 }  // namespace
+
+// A slice whose first sample is padding.
+std::string padded_slice(std::uint32_t number) {
+  return kCt.slice(number)
+      .number(import::dicom::kPixelPaddingValue, static_cast<unsigned>(kCt.stored(0, 0, number)))
+      .file();
+}
 
 std::string slice(std::uint32_t number, const std::string& frame_of_reference) {
   return slice_object(number)
@@ -176,6 +183,7 @@ const std::map<std::string, Shown>& shown() {
       {"contours-skipped", {structures_and_images(), {"--series", "1.2.9"}}},
       {"contours-interpolated", {structures_and_images(), {"--series", "1.2.9"}}},
       {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
+      {"padding", {{{"1", padded_slice(1)}, {"2", padded_slice(2)}}}},
       {"distance-assumed", {{{"a.dcm", mosaic()}}}},
       {"duplicate-slice",
        {{{"0", slice_object(0).file()},

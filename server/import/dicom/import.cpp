@@ -1,7 +1,6 @@
 #include "server/import/dicom/import.h"
 
 #include <algorithm>
-#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -15,9 +14,12 @@
 #include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/kinds/segmentation.h"
+#include "server/import/dicom/pixels/padding.h"
 #include "server/import/dicom/pixels/pixels.h"
 #include "server/import/dicom/pixels/values.h"
 #include "server/import/dicom/structures.h"
+#include "server/import/labels/closed_ends.h"
+#include "server/import/samples/padding.h"
 #include "server/import/samples/transfer.h"
 #include "server/import/source/source.h"
 
@@ -66,21 +68,21 @@ bool are_labels(const Stack& stack) { return stack.plane_count > 0; }
 
 // `name` is the slice's in messages.
 void read_slice(const Slice& slice, const std::string& name, OpenFile& file,
-                std::span<std::byte> stored) {
+                std::span<std::byte> stored, const SeeStored& see = {}) {
   try {
-    file.reader(slice.file).read(slice.frame->number, stored);
+    file.reader(slice.file).read(slice.frame->number, stored, see);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
     throw_unusable("The DICOM image cannot be read: " + name + ": " + error.what() + '.');
   }
 }
 
-void read_slice(const Stack& stack, std::size_t place, OpenFile& file,
-                std::span<std::byte> stored) {
+void read_slice(const Stack& stack, std::size_t place, OpenFile& file, std::span<std::byte> stored,
+                const SeeStored& see = {}) {
   const Slice& slice = stack.slices[place];
   const std::string& name = slice.image->file_name;
   read_slice(slice, stack.name(place) + (name.empty() ? "" : " (" + in_quotes(name) + ')'), file,
-             stored);
+             stored, see);
 }
 
 bool have_same_samples(const Slice& one, const Slice& other, OpenFile& file) {
@@ -114,14 +116,20 @@ void ignore_left_out(const Stack& stack, std::span<const Source> sources, Upload
 }
 
 // Returns false if a sample does not fit into the type.
-bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
-                   std::span<std::byte> target) {
+bool write_samples(const Stack& stack, SampleType type, OpenFile& file, std::span<std::byte> target,
+                   SampleSet& padding) {
+  std::uint64_t first = 0;
   std::vector<std::byte> stored;
   for (std::size_t place = 0; place < stack.slices.size(); ++place) {
     const Slice& slice = stack.slices[place];
     const PixelLayout& layout = slice.image->layout;
     stored.resize(layout.frame_bytes());
-    read_slice(stack, place, file, stored);
+    const auto see = [&](std::span<const std::byte> values, const PixelLayout& of_values) {
+      const auto& range = slice.image->padding;
+      if (range) find_padding(*range, of_values, values, first, padding);
+    };
+    read_slice(stack, place, file, stored, see);
+    first += layout.samples();
     const std::span<std::byte> plane = target.first(layout.samples() * bytes_per_sample(type));
     if (!convert_frame(stored, layout, slice.frame->rescale, type, plane)) return false;
     target = target.subspan(plane.size());
@@ -129,19 +137,33 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
   return true;
 }
 
-// Adds the labels found in the samples to the volume.
-bool write_stack(const Stack& stack, OpenFile& file, std::span<std::byte> target, Volume& volume) {
-  if (!are_labels(stack)) return write_samples(stack, volume.type, file, target);
-  return write_labels(
-      stack, volume.type,
-      [&](std::size_t place, std::span<std::byte> stored) {
-        read_slice(stack, place, file, stored);
-      },
-      target, volume);
+// Returns empty if a value does not fit into the type.
+std::optional<Volume> write_image(const Stack& stack, Volume volume, OpenFile& file,
+                                  const ImportTask& task) {
+  CanonicalWriter writer(task.target, {volume.dims, volume.type, volume.geometry});
+  SampleSet padding(volume.sample_count());
+  if (!write_samples(stack, volume.type, file, writer.samples(), padding)) return std::nullopt;
+  const std::uint64_t left_out =
+      padding.is_empty() ? 0 : leave_out_padding(padding, task.options, writer.samples(), volume);
+  return finish(writer, std::move(volume), left_out);
+}
+
+// As write_image, with the labels found in the samples.
+std::optional<Volume> write_segments(const Stack& stack, Volume volume, OpenFile& file,
+                                     const ImportTask& task) {
+  const auto read = [&](std::size_t place, std::span<std::byte> stored) {
+    read_slice(stack, place, file, stored);
+  };
+  CanonicalWriter writer(task.target, {with_room(volume.dims), volume.type, volume.geometry});
+  const std::span<std::byte> samples =
+      writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
+  if (!write_labels(stack, volume.type, read, samples, volume)) return std::nullopt;
+  close_ends(writer, volume);
+  return finish(writer, std::move(volume));
 }
 
 Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const ImportTask& task) {
-  refuse_flat("The series", volume.dims);
+  if (!are_labels(stack)) refuse_flat("The series", volume.dims);
   // Decode one slice before the disk space is allocated: a small stream may declare any number of
   // rows.
   std::vector<std::byte> first(stack.slices.front().image->layout.frame_bytes());
@@ -151,8 +173,9 @@ Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const Imp
   for (const SampleType type : types) {
     check_limits(volume.sample_count(), type, task.limits);
     volume.type = type;
-    CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
-    if (write_stack(stack, file, writer.samples(), volume)) return finish(writer, volume);
+    auto written = are_labels(stack) ? write_segments(stack, volume, file, task)
+                                     : write_image(stack, volume, file, task);
+    if (written) return std::move(*written);
   }
   throw Error(ErrorCode::kInternal, "No sample type can hold the samples of a DICOM volume.");
 }
@@ -186,6 +209,16 @@ void suggest(const Stack& stack, Volume& volume) {
     if (row.hounsfield && iso <= volume.range[0]) continue;
     if (iso > volume.range[1]) continue;
     volume.presets.push_back({std::string(row.name), iso});
+  }
+}
+
+// Notes of one code are one note.
+void add_note(Note note, Volume& volume) {
+  const auto known = std::ranges::find(volume.notes, note.code, &Note::code);
+  if (known == volume.notes.end()) {
+    volume.notes.push_back(std::move(note));
+  } else {
+    known->detail = note.detail + ' ' + known->detail;
   }
 }
 
@@ -241,7 +274,6 @@ Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
     volume.ignored = std::move(upload.ignored);
     return volume;
   }
-  refuse_spacing(task.options);
   const std::vector<dicom::Source> sources =
       choose_series(std::move(upload.sources), task.options.series);
   std::vector<Note> notes = std::move(upload.notes);
@@ -251,7 +283,7 @@ Volume import_dicom(std::span<const NamedFile> files, const ImportTask& task) {
   Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
   dicom::suggest(stack, volume);
   volume.ignored = std::move(upload.ignored);
-  std::ranges::move(notes, std::back_inserter(volume.notes));
+  for (Note& note : notes) dicom::add_note(std::move(note), volume);
   if (dicom::are_labels(stack)) {
     if (auto note = dicom::note_on_shares(stack)) volume.notes.push_back(std::move(*note));
   }

@@ -18,8 +18,9 @@ bool is_dicom(std::string_view head);
 // source is not used. Other files and localisers are skipped and listed in the volume's `ignored`.
 // With several files, messages have their names.
 //
-// Samples are modality values: rescaled by slope and intercept. MONOCHROME1 is not inverted, and
-// padding is included. Integers stay integers if slopes and intercepts are integers.
+// Samples are modality values: rescaled by slope and intercept. MONOCHROME1 is not inverted.
+// Padding is outside (samples/padding.h). A segmentation is closed at its ends
+// (labels/closed_ends.h). Integers stay integers if slopes and intercepts are integers.
 //
 // Throws Error kUnusableVolume with the reason, naming slices, if the images are not one consistent
 // volume, with choices if there are several and none was selected; kTooLarge, kOutOfSpace,

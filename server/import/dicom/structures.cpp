@@ -77,7 +77,7 @@ ContourGrid grid_of(const StructureSet& set, const std::optional<ContourGrid>& i
     return grid_around(set, *options.spacing);
   }
   if (!images) throw_no_grid(set);
-  return *images;
+  return grid_of_images(set, *images);
 }
 
 // Draws all structures of a set, slice by slice.

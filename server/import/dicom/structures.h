@@ -12,7 +12,8 @@
 
 namespace isomesh::import::dicom {
 
-// Draws the structures of the file at `path` on `images`, the grid of their series, or, if that is
+// Draws the structures of the file at `path` on `images`, the grid of their series
+// (grid_of_images), or, if that is
 // empty or the options give a spacing, on a grid around them. The options select one structure.
 // Structures that overlap are combined as segments are (combinations.h).
 //

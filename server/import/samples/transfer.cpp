@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "proto/samples.h"
+#include "server/import/labels/closed_ends.h"
 #include "server/import/labels/combinations.h"
 #include "server/import/samples/payload.h"
 #include "server/import/samples/wide_labels.h"
@@ -97,9 +98,8 @@ bool is_wide_integer(const SampleLayout& layout) {
 
 // Labels are integers: labels of floats become some, and so do 64-bit integers that fit. Returns
 // true if the samples were converted.
-bool store_whole_numbers(const PlainSamples& plain, CanonicalWriter& writer, Volume& volume) {
+bool store_whole_numbers(const PlainSamples& plain, std::span<std::byte> samples, Volume& volume) {
   if (is_integer(volume.type)) return false;
-  const std::span<std::byte> samples = writer.samples();
   const auto type = volume::whole_type(samples, volume.type);
   if (!type) return false;
   if (!is_wide_integer(plain.layout) && !plain.are_labels && volume.labels.empty() &&
@@ -108,7 +108,6 @@ bool store_whole_numbers(const PlainSamples& plain, CanonicalWriter& writer, Vol
   }
   convert_whole(samples, volume.type, *type);
   volume.type = *type;
-  writer.shorten({volume.dims, volume.type, volume.geometry});
   return true;
 }
 
@@ -275,7 +274,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
                     const std::filesystem::path& target) {
   for (const SampleType type : {SampleType::kUint8, SampleType::kUint16}) {
     volume.type = type;
-    CanonicalWriter writer(target, {volume.dims, type, volume.geometry});
+    CanonicalWriter writer(target, {with_room(volume.dims), type, volume.geometry});
     const auto combinations = with_sample(
         canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
           using Sample = decltype(sample);
@@ -289,6 +288,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
     if (!combinations) continue;
     volume.labels = combinations->entries(source.labels);
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
+    close_ends(writer, volume);
     return finish(writer, std::move(volume));
   }
   throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a segmentation.");
@@ -296,19 +296,21 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
 
 }  // namespace
 
-void refuse_spacing(const ImportOptions& options) {
-  if (!options.spacing) return;
-  throw invalid_parameter("spacing",
-                          "applies to files without a spacing, but this file has its own");
-}
-
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target) {
   if (auto labels = write_wide_labels(samples, volume, target)) return *std::move(labels);
   volume.type = canonical_type(samples.layout);
-  CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
-  read_samples(samples.file, samples.offset, samples.layout, writer.samples());
-  const bool is_converted = store_whole_numbers(samples, writer, volume);
+  const auto dims = samples.is_segmentation ? with_room(volume.dims) : volume.dims;
+  CanonicalWriter writer(target, {dims, volume.type, volume.geometry});
+  const std::span<std::byte> stored =
+      writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
+  read_samples(samples.file, samples.offset, samples.layout, stored);
+  const bool is_converted = store_whole_numbers(samples, stored, volume);
+  if (samples.is_segmentation) {
+    close_ends(writer, volume);
+  } else if (is_converted) {
+    writer.shorten({volume.dims, volume.type, volume.geometry});
+  }
   if (!is_integer(volume.type)) volume.labels.clear();
   volume = finish(writer, std::move(volume));
   if (samples.are_labels) note_declared_labels(volume);
@@ -317,7 +319,7 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 }
 
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task) {
-  refuse_flat("The file", source.dims);
+  if (!source.is_segmentation) refuse_flat("The file", source.dims);
   Volume volume;
   volume.dims = source.dims;
   volume.geometry = usable_geometry(source, task.options);
@@ -333,19 +335,21 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task.target);
   volume.labels = source.labels;
-  return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels},
+  return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels,
+                          source.is_segmentation},
                          std::move(volume), task.target);
 }
 
-Volume finish(CanonicalWriter& writer, Volume volume) {
-  volume::Statistics statistics = volume::measure(writer.samples(), volume.type);
+Volume finish(CanonicalWriter& writer, Volume volume, std::uint64_t left_out) {
+  volume::Statistics statistics = volume::measure(writer.samples(), volume.type, left_out);
   if (statistics.non_finite > 0) {
     const std::string count = std::to_string(statistics.non_finite) + " of the " +
                               std::to_string(volume.sample_count()) +
                               " samples are not finite numbers";
     if (statistics.non_finite == volume.sample_count()) throw_unusable(count + ".");
     replace_non_finite(writer.samples(), volume.type, statistics.range[0]);
-    statistics = volume::measure(writer.samples(), volume.type);
+    left_out += statistics.non_finite;
+    statistics = volume::measure(writer.samples(), volume.type, left_out);
     volume.notes.push_back(
         note_of(NoteCode::kNonFiniteSamples,
                 count + ". At iso-values above the smallest sample they lie outside the surface."));

@@ -16,7 +16,8 @@ struct PlainSamples {
   const InputFile& file;
   std::uint64_t offset = 0;
   SampleLayout layout;
-  bool are_labels = false;  // by their header
+  bool are_labels = false;       // by their header
+  bool is_segmentation = false;  // see SourceVolume
 };
 
 // Writes the canonical file `target` of `volume`, whose dims and geometry are set and valid.
@@ -30,16 +31,16 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 
 // Writes the canonical file of the volume `source`, whose samples are in `file` or in the data
 // files of `source`. Throws Error kInvalidParameter for the option `spacing` if the file has its
-// own, kUnusableVolume with a choice if neither has one, also for a flat image, if its geometry
-// is invalid or its samples cannot be decoded, kTooLarge beyond the task's limits.
+// own, kUnusableVolume with a choice if neither has one, also for a flat image that is no
+// segmentation, if its geometry is invalid or its samples cannot be decoded, kTooLarge beyond the
+// task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
-// Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
-void refuse_spacing(const ImportOptions& options);
-
 // Completes a canonical file: measures and flushes the samples. `volume` has dims, type and
-// geometry; returns it with range, suggested iso-value and bytes set. Throws Error kUnusableVolume
-// if a sample is not finite, kOutOfSpace, kInternal.
-Volume finish(CanonicalWriter& writer, Volume volume);
+// geometry; returns it with range, suggested iso-value and bytes set. Samples that are not finite
+// get the smallest sample's value. So do `left_out` samples, which the caller has given it because
+// they are not part of the image. The suggested iso-value leaves both out. Throws Error
+// kUnusableVolume if no sample is finite, kOutOfSpace, kInternal.
+Volume finish(CanonicalWriter& writer, Volume volume, std::uint64_t left_out = 0);
 
 }  // namespace isomesh::import

@@ -79,6 +79,12 @@ void check_limits(const SourceVolume& volume, const SizeLimits& limits) {
   check_limits(volume.sample_count(), canonical_type(volume.layout), limits);
 }
 
+void refuse_spacing(const ImportOptions& options) {
+  if (!options.spacing) return;
+  throw invalid_parameter("spacing",
+                          "applies to files without a spacing, but this file has its own");
+}
+
 void refuse_flat(std::string_view what, const std::array<std::uint32_t, 3>& dims) {
   for (const std::size_t axis : {2, 1, 0}) {
     if (dims[axis] != 1) continue;

@@ -146,6 +146,7 @@ struct SourceVolume {
   std::vector<Note> notes;
   std::vector<LabelEntry> labels;       // see label_table()
   bool are_labels = false;              // by the header, even without a table
+  bool is_segmentation = false;         // whole numbers; nothing lies beyond its ends
   std::optional<SegmentLayers> layers;  // then all volumes are read, and `chosen` is the first
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
@@ -161,6 +162,9 @@ CompressedRange range_from(const InputFile& file, std::uint64_t offset);
 
 // Throws Error kTooLarge if the volume's canonical samples would exceed the limits.
 void check_limits(const SourceVolume& volume, const SizeLimits& limits);
+
+// Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
+void refuse_spacing(const ImportOptions& options);
 
 // Throws Error kUnusableVolume if `what`, as in "The file", has only one sample along an axis. Such
 // an image has no cells, so no surface at any iso-value.

@@ -1,7 +1,9 @@
 #include "tests/unit/import/files.h"
 
+#include <cmath>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 namespace isomesh::import::test {
 
@@ -47,6 +49,42 @@ Outcome import_bytes(std::string_view bytes, const SizeLimits& limits,
 
 Outcome imported(Outcome outcome) {
   if (!outcome.imported()) throw std::runtime_error(outcome.error);
+  return outcome;
+}
+
+Outcome without_ends(Outcome outcome, const std::array<double, 3>& first,
+                     const std::array<std::uint32_t, 3>& dims) {
+  const Volume& volume = outcome.volume;
+  std::array<std::size_t, 3> begin = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double along = 0;
+    for (std::size_t row = 0; row < 3; ++row) {
+      along +=
+          (first[row] - volume.geometry.origin[row]) * volume.geometry.direction[row * 3 + axis];
+    }
+    begin[axis] = static_cast<std::size_t>(std::lround(along / volume.geometry.spacing[axis]));
+  }
+  const auto is_within = [&](std::size_t axis, std::size_t at) {
+    return at >= begin[axis] && at < begin[axis] + dims[axis];
+  };
+  const std::size_t sample = bytes_per_sample(volume.type);
+  std::string kept = outcome.canonical.substr(0, kHeaderBytes);
+  std::size_t at = kHeaderBytes;
+  for (std::size_t k = 0; k < volume.dims[2]; ++k) {
+    for (std::size_t j = 0; j < volume.dims[1]; ++j) {
+      for (std::size_t i = 0; i < volume.dims[0]; ++i, at += sample) {
+        const std::string bytes = outcome.canonical.substr(at, sample);
+        if (is_within(0, i) && is_within(1, j) && is_within(2, k)) {
+          kept += bytes;
+        } else if (bytes != std::string(sample, '\0')) {
+          throw std::runtime_error("a plane that was added is not empty");
+        }
+      }
+    }
+  }
+  outcome.canonical = std::move(kept);
+  outcome.volume.dims = dims;
+  outcome.volume.geometry.origin = first;
   return outcome;
 }
 

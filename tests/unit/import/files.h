@@ -54,6 +54,10 @@ Outcome import_bytes(std::string_view bytes, const SizeLimits& limits = {},
                      const ImportOptions& options = {});
 // The same of an import that must succeed. Throws std::runtime_error with its error.
 Outcome imported(Outcome outcome);
+// The samples of a segmentation from the one at `first` (LPS, mm) on, as many as `dims`: without
+// planes that were added at its ends. Throws std::runtime_error if another sample is not zero.
+Outcome without_ends(Outcome outcome, const std::array<double, 3>& first,
+                     const std::array<std::uint32_t, 3>& dims);
 // The codes of the volume's notes, in their order.
 std::vector<std::string> codes_of(const Outcome& outcome);
 inline Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,

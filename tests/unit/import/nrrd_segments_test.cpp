@@ -40,6 +40,10 @@ LabelEntry entry(std::int64_t label, const std::string& name,
   return {.label = label, .name = name, .color = {}, .values = std::move(values)};
 }
 
+Outcome described(const Outcome& outcome, const std::array<std::uint32_t, 3>& dims = {2, 2, 2}) {
+  return without_ends(imported(outcome), {0, 0, 0}, dims);
+}
+
 // Each sample is one of both segments in its layer.
 const std::vector<Key> kTwoLayers = {{"0_Name", "liver"},  {"0_LabelValue", "1"}, {"0_Layer", "0"},
                                      {"1_Name", "tumour"}, {"1_LabelValue", "1"}, {"1_Layer", "1"}};
@@ -56,7 +60,7 @@ TEST(NrrdSegments, HaveNamesAndColors) {
                                                                {"1_LabelValue", "3"},
                                                                {"1_Color", "red"}},
                                                               samples)));
-  EXPECT_EQ(outcome.sample_bytes(), samples);
+  EXPECT_EQ(described(outcome, {4, 3, 2}).sample_bytes(), samples);
   EXPECT_THAT(outcome.volume.labels,
               ElementsAre(entry(3, "spleen"), LabelEntry{.label = 7,
                                                          .name = "M\xc3\xbcller \xef\xbf\xbd",
@@ -83,13 +87,13 @@ TEST(NrrdSegments, InLayersMayOverlap) {
   for (std::size_t at = 0; at < 8; ++at) interleaved += std::string{first[at], second[at]};
   const Outcome outcome =
       imported(import_bytes(with_segments(layers_first(), kTwoLayers, interleaved)));
-  EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{2, 2, 2}));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
   // The tumour's value is the liver's in another layer, so that it gets another number.
-  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(1, 2, 3, 0, 0, 0, 0, 0));
+  EXPECT_THAT(samples_of<std::uint8_t>(described(outcome)), ElementsAre(1, 2, 3, 0, 0, 0, 0, 0));
   EXPECT_THAT(outcome.volume.labels,
               ElementsAre(entry(1, "liver", {1, 3}), entry(2, "tumour", {2, 3})));
-  ASSERT_THAT(codes_of(outcome), ElementsAre("overlapping-segments", "looks-like-labels"));
+  ASSERT_THAT(codes_of(outcome),
+              ElementsAre("overlapping-segments", "empty-planes", "looks-like-labels"));
   EXPECT_EQ(outcome.volume.notes[0].detail,
             "1 sample belongs to several segments. 1 value stands for their combinations.");
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 3}));
@@ -105,7 +109,7 @@ TEST(NrrdSegments, InLayersMayOverlap) {
 
   const Outcome chosen = imported(
       import_bytes(with_segments(layers_first(), kTwoLayers, interleaved), {}, {.volume = 1}));
-  EXPECT_EQ(chosen.sample_bytes(), second);
+  EXPECT_EQ(described(chosen).sample_bytes(), second);
   EXPECT_THAT(chosen.volume.labels, ElementsAre(entry(1, "tumour")));
 }
 
@@ -117,9 +121,9 @@ TEST(NrrdSegments, ThatDoNotOverlapKeepTheirNumbers) {
   keys[1].second = "7";
   keys[4].second = "2";
   const Outcome outcome = imported(import_bytes(with_segments(layers_first(), keys, samples)));
-  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(7, 2, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(samples_of<std::uint8_t>(described(outcome)), ElementsAre(7, 2, 0, 0, 0, 0, 0, 0));
   EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(2, "tumour"), entry(7, "liver")));
-  EXPECT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(codes_of(outcome), ElementsAre("empty-planes", "looks-like-labels"));
 }
 
 // Versions before 5.0 have a layer for each segment, and do not say so.
@@ -137,7 +141,7 @@ TEST(NrrdSegments, ValuesOfNoSegmentAreLabelsWithoutAName) {
   samples[2] = '\5';
   const Outcome outcome =
       imported(import_bytes(with_segments(layers_first(), kTwoLayers, samples)));
-  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(1, 3, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(samples_of<std::uint8_t>(described(outcome)), ElementsAre(1, 3, 0, 0, 0, 0, 0, 0));
   EXPECT_THAT(outcome.volume.labels,
               ElementsAre(entry(1, "liver"), entry(2, "tumour"), entry(3, "")));
 }
@@ -157,7 +161,7 @@ TEST(NrrdSegments, WithManyCombinationsHaveWiderValues) {
   const Outcome outcome =
       imported(import_bytes(with_segments(layers_first("9 8 8 8"), keys, samples)));
   EXPECT_EQ(outcome.volume.type, SampleType::kUint16);
-  const auto values = samples_of<std::uint16_t>(outcome);
+  const auto values = samples_of<std::uint16_t>(described(outcome, {8, 8, 8}));
   ASSERT_EQ(outcome.volume.labels.size(), 9U);
   for (std::size_t at = 0; at < values.size(); ++at) {
     for (std::size_t layer = 0; layer < 9; ++layer) {
@@ -167,6 +171,59 @@ TEST(NrrdSegments, WithManyCombinationsHaveWiderValues) {
           << at << ' ' << layer;
     }
   }
+}
+
+// The first and the last sample of each axis belong to the segment, or none does.
+TEST(NrrdSegments, AreClosedWhereTheyTouchTheEnd) {
+  const std::vector<Key> keys = {{"0_Name", "liver"}, {"0_LabelValue", "1"}, {"0_Layer", "0"}};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const std::size_t side : {0, 1}) {
+      // 5 x 5 x 5 samples with one label, at the middle of a side.
+      std::array<std::size_t, 3> place = {2, 2, 2};
+      place[axis] = side * 4;
+      std::string samples(125, '\0');
+      samples[place[0] + 5 * place[1] + 25 * place[2]] = '\1';
+      const std::string file = with_segments(with(small_nrrd(), "sizes", "5 5 5"), keys, samples);
+      const Outcome outcome = imported(import_bytes(file));
+      std::array<std::uint32_t, 3> dims = {5, 5, 5};
+      dims[axis] = 6;
+      EXPECT_EQ(outcome.volume.dims, dims);
+      std::array<double, 3> origin = {};
+      if (side == 0) origin[axis] = -1;
+      EXPECT_EQ(outcome.volume.geometry.origin, origin);
+      EXPECT_EQ(described(outcome, {5, 5, 5}).sample_bytes(), samples);
+      EXPECT_THAT(codes_of(outcome), Contains("empty-planes"));
+      // Without segments it is a scan, whose border shows nothing of what lies beyond.
+      const Outcome scan =
+          imported(import_bytes(nrrd(with(small_nrrd(), "sizes", "5 5 5"), samples)));
+      EXPECT_EQ(scan.sample_bytes(), samples);
+    }
+  }
+  std::string samples(125, '\0');
+  samples[62] = '\1';
+  const Outcome inside =
+      imported(import_bytes(with_segments(with(small_nrrd(), "sizes", "5 5 5"), keys, samples)));
+  EXPECT_EQ(inside.sample_bytes(), samples);
+  EXPECT_THAT(codes_of(inside), Not(Contains("empty-planes")));
+}
+
+TEST(NrrdSegments, MayHaveOneSlice) {
+  const std::vector<Key> keys = {{"0_Name", "liver"}, {"0_LabelValue", "1"}, {"0_Layer", "0"}};
+  std::string samples(12, '\0');
+  samples[5] = '\1';
+  Lines lines = with(small_nrrd(), "sizes", "4 3 1");
+  lines = with(lines, "space directions", "(1,0,0) (0,1,0) (0,0,2.5)");
+  const Outcome outcome = imported(import_bytes(with_segments(lines, keys, samples)));
+  EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 3}));
+  EXPECT_EQ(outcome.volume.geometry.origin, (std::array<double, 3>{0, 0, -2.5}));
+  EXPECT_EQ(outcome.volume.geometry.spacing[2], 2.5);
+  EXPECT_EQ(described(outcome, {4, 3, 1}).sample_bytes(), samples);
+  EXPECT_THAT(import_bytes(nrrd(lines, samples)).error, HasSubstr("1 slice"));
+  // The same in two layers.
+  const Outcome two = imported(import_bytes(with_segments(
+      layered("2 4 3 1", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,2.5)"), kTwoLayers,
+      std::string(10, '\0') + '\1' + std::string(13, '\0'))));
+  EXPECT_EQ(two.canonical, outcome.canonical);
 }
 
 // Seventeen independent segments are more than 16 bits tell apart.

@@ -41,6 +41,25 @@ TEST(Statistics, LiesMidwayBetweenTwoValues) {
   EXPECT_EQ(measured(std::vector<std::int16_t>{-1000, -999}, SampleType::kInt16).otsu, -999.5);
 }
 
+// Copies of the smallest sample that stand for others have no weight.
+template <class Sample>
+double threshold_without(std::uint64_t left_out, SampleType type) {
+  std::vector<Sample> samples(100 + left_out, Sample{10});
+  for (std::size_t at = 0; at < 50; ++at) samples[at] = Sample{20};
+  samples[60] = samples[61] = Sample{90};
+  const Statistics statistics = measure(std::as_bytes(std::span(samples)), type, left_out);
+  EXPECT_EQ(statistics.range, (std::array<double, 2>{10, 90}));
+  return statistics.otsu;
+}
+
+TEST(Statistics, LeaveSamplesOutOfTheThreshold) {
+  EXPECT_EQ(threshold_without<std::int16_t>(100'000, SampleType::kInt16), 55);
+  EXPECT_EQ(threshold_without<std::int16_t>(0, SampleType::kInt16), 55);
+  EXPECT_EQ(threshold_without<std::int32_t>(100'000, SampleType::kInt32), 55);
+  EXPECT_EQ(threshold_without<float>(100'000, SampleType::kFloat32),
+            threshold_without<float>(0, SampleType::kFloat32));
+}
+
 TEST(Statistics, OfIntegersIsExact) {
   std::vector<std::int16_t> samples;
   std::vector<double> values;

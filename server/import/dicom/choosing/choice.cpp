@@ -254,7 +254,7 @@ std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOp
 
 Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
                     std::vector<Note>& notes) {
-  Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes));
+  Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes), options);
   note_distance(stack, options, notes);
   note_directions(stack, options, notes);
   note_empty_planes(stack, notes);
@@ -317,6 +317,7 @@ Stack choose_stack(std::vector<Slice> slices, const SameSamples& same_samples,
   if (std::ranges::any_of(slices, is_label_slice)) {
     throw_unusable("The series is not a single volume: it mixes images and segmentations.");
   }
+  refuse_spacing(options);
   DistinctSlices distinct = without_duplicates(
       chosen_of(split_volumes(std::move(slices)), options, notes), same_samples, options, notes);
   Stack stack = make_stack(std::move(distinct.slices), options, notes);

@@ -89,7 +89,50 @@ Extents extents_of(const StructureSet& set, const std::array<Vector3, 3>& axes) 
   return extents;
 }
 
+// The places of contours along the third axis of a grid, in slices. Contours that are not parallel
+// to the slices have none.
+std::vector<double> places_of(const StructureSet& set, const Geometry& grid) {
+  constexpr double kFlat = 0.2;
+  const Vector3 across = cross(step_of(grid, 0), step_of(grid, 1));
+  const double slice = dot(across, step_of(grid, 2));
+  const auto place_of = [&](const Vector3& point) {
+    return dot(across, difference(point, grid.origin)) / slice;
+  };
+  std::vector<double> places;
+  for (const Structure& structure : set.structures) {
+    for (const auto& contour : structure.contours) {
+      const auto [low, high] = std::ranges::minmax(contour, {}, place_of);
+      const double middle = (place_of(low) + place_of(high)) / 2;
+      if (place_of(high) - place_of(low) <= kFlat) places.push_back(middle);
+    }
+  }
+  return places;
+}
+
+// The distance of all places from the slices before them, 0..1. Empty if they differ.
+std::optional<double> shared_offset(const std::vector<double>& places) {
+  if (places.empty()) return std::nullopt;
+  const double first = places.front() - std::floor(places.front());
+  double sum = 0;
+  for (const double place : places) {
+    const double off = place - first - std::round(place - first);
+    if (!(std::abs(off) <= kSameSlice)) return std::nullopt;
+    sum += off;
+  }
+  const double mean = first + sum / static_cast<double>(places.size());
+  return mean - std::floor(mean);
+}
+
 }  // namespace
+
+ContourGrid grid_of_images(const StructureSet& set, const ContourGrid& images) {
+  const auto offset = shared_offset(places_of(set, images.geometry));
+  if (!offset || *offset <= kSameSlice || *offset >= 1 - kSameSlice) return images;
+  ContourGrid grid = images;
+  grid.geometry.origin = moved(grid.geometry.origin, step_of(grid.geometry, 2), *offset - 1);
+  ++grid.dims[2];
+  return grid;
+}
 
 std::optional<double> usual_distance(const StructureSet& set) {
   const Vector3 normal = normal_of(set);

@@ -13,8 +13,6 @@
 namespace isomesh::import::dicom {
 namespace {
 
-// Contours within this distance of a slice are in it. Positions are written with a few decimals.
-constexpr double kSameSlice = 0.1;
 // Limits the rows that all edges of a structure cross: minutes of work, far more than a person
 // draws.
 constexpr std::uint64_t kMostCrossings = std::uint64_t{1} << 34;
@@ -136,7 +134,11 @@ std::optional<Patch> Painter::slice(std::uint32_t number) {
     const std::vector<float>& from = distances(above - 1);
     return patch(between(from, distances(above), down / (up + down), width_, height_));
   }
-  if (std::min(up, down) * 2 < usual_) return patch(draw(up < down ? above : above - 1));
+  // The slice at one end of a plane's thickness belongs to it, and the one at the other end does
+  // not. Rounded positions may not change that.
+  const double half = usual_ / 2;
+  if (up <= half + kPlaceTolerance) return patch(draw(above));
+  if (down < half - kPlaceTolerance) return patch(draw(above - 1));
   return std::nullopt;
 }
 

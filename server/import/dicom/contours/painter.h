@@ -22,8 +22,9 @@ struct Patch {
 // Draws one structure on a grid. In a slice with contours, their inside by the even-odd rule; each
 // contour counts once, though some files repeat it. Between two planes of contours, the shape
 // interpolated by signed distances, unless they are more than kMostGaps usual distances apart: then
-// they are ends of separate parts. Beyond an end, the end's shape for half a usual distance. The
-// usual distance is the median one of the structure, or of the whole set for a single plane.
+// they are ends of separate parts. Beyond an end, the end's shape for half a usual distance, so
+// that a plane is as thick as the distance: of two slices that are just as far, it has the first.
+// The usual distance is the median one of the structure, or of the whole set for a single plane.
 //
 // Not thread safe.
 class Painter {

@@ -103,11 +103,16 @@ std::array<LengthPlace, 3> possible_places(std::string_view vr) {
   return {kShortPlace, kImplicitPlace, kLongPlace};
 }
 
+bool is_palette_data(Tag tag) {
+  return (tag >= kRedPaletteData && tag <= kBluePaletteData) ||
+         (tag >= kSegmentedRedPaletteData && tag <= kSegmentedBluePaletteData);
+}
+
 // Few values are longer than kLongestValue but needed: tables of values and contours.
 std::uint64_t longest_value(Tag tag) {
   constexpr std::uint64_t kLongestTable = std::uint64_t{2} << 16;
   constexpr std::uint64_t kLongestContour = std::uint64_t{1} << 26;
-  if (tag == kLutData) return kLongestTable;
+  if (tag == kLutData || is_palette_data(tag)) return kLongestTable;
   return tag == kContourData ? kLongestContour : kLongestValue;
 }
 

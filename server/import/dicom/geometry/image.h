@@ -102,6 +102,12 @@ struct ValueTable {
   std::vector<std::uint16_t> values;
 };
 
+// Stored values that are not part of the image, from the first to the last.
+struct PaddingRange {
+  double first = 0;
+  double last = 0;
+};
+
 struct Image {
   std::string file_name;  // without folders; empty for a single uploaded file
   std::string frame_of_reference_uid;
@@ -119,6 +125,7 @@ struct Image {
   PlaceKind place = PlaceKind::kPatient;
   // The most mappings to different real world values that a frame of a parametric map has.
   std::uint32_t value_mappings = 0;
+  std::optional<PaddingRange> padding;
   std::optional<ValueTable> table;  // then `layout` has 16 unsigned bits
   std::vector<Frame> frames;
   std::vector<Phase> phases;  // of the whole object

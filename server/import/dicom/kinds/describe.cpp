@@ -15,6 +15,7 @@
 #include "server/import/dicom/geometry/attributes.h"
 #include "server/import/dicom/kinds/placed_frames.h"
 #include "server/import/dicom/kinds/segmentation.h"
+#include "server/import/dicom/pixels/padding.h"
 #include "server/import/dicom/pixels/pixels.h"
 #include "server/import/dicom/pixels/values.h"
 #include "server/import/source/source.h"
@@ -242,6 +243,7 @@ Image describe_image(const DicomFile& file) {
   Image image = describe_object(data);
   const std::uint32_t frames = frame_count(data);
   image.stored = pixel_layout(file);
+  image.padding = padding_range(data, image.stored);
   image.table = value_table(data, image.stored);
   image.layout = decoded_layout(image);
   if (image.segmentation) check_label_layout(*image.segmentation, image.stored);

@@ -18,6 +18,7 @@
 #include "server/import/dicom/geometry/attributes.h"
 #include "server/import/dicom/geometry/placement.h"
 #include "server/import/dicom/geometry/vectors.h"
+#include "server/import/dicom/kinds/palette.h"
 #include "server/import/dicom/pixels/values.h"
 #include "server/import/labels/combinations.h"
 #include "server/import/labels/label_table.h"
@@ -73,11 +74,18 @@ constexpr double kMostPlanes = 65535;
 // A gap of more thicknesses says that the thickness is wrong.
 constexpr double kMostThicknesses = 20;
 
+// A palette (PS3.3, C.7.6.3.1.5) is for the display of the samples, and may say only that labels
+// differ. The value of a segment is a recommendation for that segment in any display, and does not
+// depend on the device. So it wins.
 std::vector<Segment> described_segments(const DataSet& data) {
+  const auto palette = read_palette(data);
   std::vector<Segment> segments;
   for (const DataSet& item : data.items(kSegmentSequence)) {
     const auto number = item.unsigned_number(kSegmentNumber);
-    if (number) segments.push_back({*number, utf8(item, kSegmentLabel), display_color(item)});
+    if (!number) continue;
+    auto color = display_color(item);
+    if (!color && palette) color = palette->color(*number);
+    segments.push_back({*number, utf8(item, kSegmentLabel), std::move(color)});
   }
   std::ranges::sort(segments, {}, &Segment::number);
   return segments;
@@ -125,14 +133,32 @@ PlaneDistance plane_distance(const std::vector<double>& gaps, const Segmentation
                  " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
-void set_planes(std::span<const Placed> placed, Stack& stack) {
+// The thickness of a segmentation's only plane.
+PlaneDistance plane_thickness(const Slice& slice, const ImportOptions& options) {
+  const Segmentation& told = *slice.image->segmentation;
+  if (told.slice_distance || told.thickness) refuse_spacing(options);
+  if (told.slice_distance) return {*told.slice_distance};
+  if (told.thickness) return {*told.thickness, true};
+  if (options.spacing) return {(*options.spacing)[2]};
+  const auto& [across, down] = slice.frame->plane.spacing;
+  throw_choice(
+      "The segmentation has one plane, and does not say how thick it is: it has neither a spacing "
+      "between slices " +
+          tag_name(kSpacingBetweenSlices) + " nor a slice thickness " + tag_name(kSliceThickness) +
+          "." + begin_remedy(options, "Add") +
+          "spacing=X,Y,Z (mm); Z is the thickness, and X and Y are not used.",
+      {{"spacing", to_text(across) + ',' + to_text(down) + ",1", "a thickness of 1 mm"}});
+}
+
+// Sets the stack's planes. Returns their distance.
+double set_planes(std::span<const Placed> placed, const ImportOptions& options, Stack& stack) {
   const std::vector<std::size_t> starts = position_starts(placed);
-  const Image& image = *placed.front().slice.image;
-  if (starts.size() == 1) {
-    refuse_flat("The segmentation", {image.layout.columns, image.layout.rows, 1});
-  }
+  const Slice& first = placed.front().slice;
+  const bool is_single = starts.size() == 1;
   const std::vector<double> gaps = gaps_of(placed, starts);
-  const PlaneDistance distance = plane_distance(gaps, *image.segmentation);
+  if (!is_single) refuse_spacing(options);
+  const PlaneDistance distance = is_single ? plane_thickness(first, options)
+                                           : plane_distance(gaps, *first.image->segmentation);
   stack.is_distance_assumed = distance.is_thickness;
   double plane = 0;
   for (std::size_t position = 0; position < starts.size(); ++position) {
@@ -145,6 +171,18 @@ void set_planes(std::span<const Placed> placed, Stack& stack) {
     stack.planes.resize(end, static_cast<std::uint32_t>(plane));
   }
   stack.plane_count = stack.planes.back() + 1;
+  return distance.mm;
+}
+
+// The step from a plane to the next. The positions are more exact than the distance.
+Vector3 step_between(std::span<const Placed> placed, const Stack& stack, double distance) {
+  if (stack.plane_count == 1) {
+    const Plane& plane = placed.front().slice.frame->plane;
+    return moved({}, cross(plane.along_row, plane.along_column), distance);
+  }
+  Vector3 step = difference(placed.back().position(), placed.front().position());
+  for (double& part : step) part /= stack.planes.back();
+  return step;
 }
 
 void refuse_crooked(std::span<const Placed> placed, const Stack& stack, const Vector3& step) {
@@ -203,6 +241,24 @@ std::uint32_t highest_segment(const Stack& stack) {
   return segment(std::ranges::max(stack.slices, {}, segment));
 }
 
+// The padding of a label map is its background (PS3.3, C.8.20.2), which is 0 in ours.
+std::optional<std::int64_t> background_of(const Image& image) {
+  if (!image.padding || image.padding->first == 0) return std::nullopt;
+  if (image.padding->first >= std::pow(2, image.layout.bits_stored)) return std::nullopt;
+  return static_cast<std::int64_t>(image.padding->first);
+}
+
+void clear_background(const Image& image, SampleType type, std::span<std::byte> samples) {
+  const auto background = background_of(image);
+  if (!background) return;
+  with_sample(type, [&](auto sample) {
+    using Sample = decltype(sample);
+    const std::span labels(reinterpret_cast<Sample*>(samples.data()),
+                           samples.size() / sizeof(Sample));
+    std::ranges::replace(labels, static_cast<Sample>(*background), Sample{0});
+  });
+}
+
 void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
                  std::span<std::byte> target) {
   std::vector<std::byte> stored;
@@ -211,7 +267,9 @@ void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
     stored.resize(layout.frame_bytes());
     read(i, stored);
     const std::size_t bytes = layout.samples() * bytes_per_sample(type);
-    convert_frame(stored, layout, {}, type, target.subspan(stack.planes[i] * bytes, bytes));
+    const std::span<std::byte> plane = target.subspan(stack.planes[i] * bytes, bytes);
+    convert_frame(stored, layout, {}, type, plane);
+    if (is_label_map(stack)) clear_background(*stack.slices[i].image, type, plane);
   }
 }
 
@@ -275,6 +333,16 @@ std::vector<Segment> segments_in(const Stack& stack) {
   return segments;
 }
 
+// Without the background, which some programs describe as a segment, also where it is 0 and the
+// padding is another value.
+std::vector<Segment> segments_of_map(const Stack& stack) {
+  const auto background = background_of(*stack.slices.front().image).value_or(0);
+  std::vector<Segment> segments = segmentation_of(stack).segments;
+  std::erase_if(segments,
+                [&](const Segment& each) { return each.number == 0 || each.number == background; });
+  return segments;
+}
+
 }  // namespace
 
 bool is_segmentation(const DataSet& data) { return !data.text(kSegmentationType).empty(); }
@@ -306,13 +374,12 @@ std::string segment_name(const Image& image, std::uint64_t number) {
              : text + " (" + in_quotes(found->label) + ')';
 }
 
-Stack make_label_stack(std::vector<Slice> slices) {
+Stack make_label_stack(std::vector<Slice> slices, const ImportOptions& options) {
   refuse_mixtures(slices);
   const std::vector<Placed> placed = placed_along_normal(slices);
   Stack stack;
-  set_planes(placed, stack);
-  Vector3 step = difference(placed.back().position(), placed.front().position());
-  for (double& part : step) part /= stack.planes.back();
+  const double distance = set_planes(placed, options, stack);
+  const Vector3 step = step_between(placed, stack, distance);
   refuse_crooked(placed, stack, step);
   stack.geometry = lattice(placed.front().slice.frame->plane, step);
   for (const Placed& each : placed) stack.slices.push_back(each.slice);
@@ -342,7 +409,7 @@ bool write_labels(const Stack& stack, SampleType type, const ReadSlice& read,
   std::ranges::fill(target, std::byte{0});
   if (are_shares(stack) || is_label_map(stack)) {
     copy_frames(stack, type, read, target);
-    if (is_label_map(stack)) volume.labels = entries_of(segmentation_of(stack).segments);
+    if (is_label_map(stack)) volume.labels = entries_of(segments_of_map(stack));
     return true;
   }
   Combinations combinations(highest_segment(stack));

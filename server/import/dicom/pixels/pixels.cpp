@@ -145,16 +145,23 @@ FrameReader::FrameReader(const DicomFile& file, const Image& image)
   first_fragments_ = first_fragments(file, image.tiles_per_row > 0 ? 1 : image.frames.size());
 }
 
-void FrameReader::read(std::uint32_t frame, std::span<std::byte> target) {
-  if (image_.tiles_per_row > 0) return read_tile(frame, target);
-  if (stored_.bits_allocated == 1) return read_bits(frame, target);
-  if (image_.table) return read_by_table(frame, target);
-  read_stored(frame, target);
+void FrameReader::read(std::uint32_t frame, std::span<std::byte> target, const SeeStored& see) {
+  if (image_.tiles_per_row == 0 && image_.table) return read_by_table(frame, target, see);
+  if (image_.tiles_per_row > 0) {
+    read_tile(frame, target);
+  } else if (stored_.bits_allocated == 1) {
+    read_bits(frame, target);
+  } else {
+    read_stored(frame, target);
+  }
+  if (see) see(target, image_.layout);
 }
 
-void FrameReader::read_by_table(std::uint32_t frame, std::span<std::byte> target) const {
+void FrameReader::read_by_table(std::uint32_t frame, std::span<std::byte> target,
+                                const SeeStored& see) const {
   std::vector<std::byte> stored(stored_.frame_bytes());
   read_stored(frame, stored);
+  if (see) see(stored, stored_);
   apply_table(*image_.table, stored_, stored, target);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,9 @@ PixelLayout pixel_layout(const DicomFile& file);
 // unsupported transfer syntax.
 void require_pixels(const DicomFile& file, const PixelLayout& layout, std::uint32_t frames);
 
+// Gets a frame's stored values and their layout.
+using SeeStored = std::function<void(std::span<const std::byte> stored, const PixelLayout& layout)>;
+
 // Reads the frames of one file. The file and its description must outlive the reader. Not thread
 // safe.
 class FrameReader {
@@ -28,10 +32,11 @@ class FrameReader {
   // Reads one frame of the image into `target`, which has layout.frame_bytes() bytes: little-endian
   // stored values, or those of the image's table; single bits as bytes. Throws Error
   // kUnusableVolume if the frame cannot be decoded or its size differs from the declared one.
-  void read(std::uint32_t frame, std::span<std::byte> target);
+  // `see`, if given, gets the stored values, also of an image with a table.
+  void read(std::uint32_t frame, std::span<std::byte> target, const SeeStored& see = {});
 
  private:
-  void read_by_table(std::uint32_t frame, std::span<std::byte> target) const;
+  void read_by_table(std::uint32_t frame, std::span<std::byte> target, const SeeStored& see) const;
   void read_stored(std::uint32_t frame, std::span<std::byte> target) const;
   void read_bits(std::uint32_t frame, std::span<std::byte> target) const;
   void read_tile(std::uint32_t tile, std::span<std::byte> target);

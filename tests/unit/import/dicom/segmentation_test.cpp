@@ -1,4 +1,6 @@
 // Segmentations of single bits, and label maps.
+#include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include <gmock/gmock.h>
@@ -14,9 +16,24 @@ namespace {
 using namespace dicom;
 using testing::HasSubstr;
 
+// The planes from the first frame's to the last one's, without those that close the ends.
+Outcome described(Outcome outcome, SegmentObject object, const ImportOptions& options = {}) {
+  if (!outcome.imported()) return outcome;
+  if (options.volume) {
+    std::erase_if(object.frames,
+                  [&](const SegmentFrame& frame) { return frame.segment != *options.volume + 1; });
+  }
+  const auto [first, last] = std::ranges::minmax(object.frames, {}, &SegmentFrame::z);
+  const double planes = (last.z - first.z) / outcome.volume.geometry.spacing[2];
+  return without_ends(
+      std::move(outcome), {0, 0, first.z},
+      {kSegmentColumns, kSegmentRows, static_cast<std::uint32_t>(std::lround(planes)) + 1});
+}
+
 Outcome import_labels(const SegmentObject& object, const ImportOptions& options = {},
                       std::string_view syntax = kExplicit) {
-  return import_objects({{"seg", segmentation(object).file(syntax)}}, options);
+  return described(import_objects({{"seg", segmentation(object).file(syntax)}}, options), object,
+                   options);
 }
 
 unsigned label_at(const Outcome& outcome, unsigned place, unsigned plane) {
@@ -203,7 +220,7 @@ Outcome import_frames(std::string_view syntax,
   for (const SegmentFrame& frame : what.frames) fragments.push_back(compress(frame));
   DicomObject object = segmentation(what);
   object.fragments(fragments, {});
-  return import_objects({{"seg", object.file(syntax)}});
+  return described(import_objects({{"seg", object.file(syntax)}}), what);
 }
 
 // Each frame begins at a byte when it is compressed, though it has 15 bits.
@@ -244,7 +261,7 @@ TEST(DicomSegmentation, OfUnevenFramesIsRefused) {
   object.frames[3].z = 5;
   EXPECT_THAT(import_labels(object).error, HasSubstr("unevenly spaced"));
   object.frames = {{.z = 3, .segment = 1, .labels = {1}}, {.z = 3, .segment = 2, .labels = {2}}};
-  EXPECT_THAT(import_labels(object).error, HasSubstr("1 slice of 5 x 3 samples"));
+  EXPECT_THAT(import_labels(object).error, HasSubstr("one plane, and does not say how thick"));
   object.frames = {{.z = 3, .segment = 1, .labels = {1}},
                    {.z = 3, .segment = 1, .labels = {2}},
                    {.z = 4, .segment = 1, .labels = {2}}};
@@ -319,7 +336,80 @@ TEST(DicomSegmentation, OfLabelsKeepsThem) {
   const Outcome coloured = import_objects(
       {{"seg",
         segmentation(object).text(kPhotometricInterpretation, "CS", "PALETTE COLOR").file()}});
-  EXPECT_EQ(coloured.canonical, outcome.canonical);
+  EXPECT_EQ(described(coloured, object).canonical, outcome.canonical);
+  EXPECT_EQ(coloured.volume.labels, outcome.volume.labels);
+}
+
+// What a program writes of them differs, and their surfaces do not.
+TEST(DicomSegmentation, IsClosedWhereFramesAreLeftOut) {
+  const SegmentObject sparse = {
+      .frames = {{.z = 2, .segment = 1, .labels = {7}}, {.z = 4, .segment = 1, .labels = {7}}},
+      .segments = {"liver"}};
+  SegmentObject whole = sparse;
+  whole.frames.insert(whole.frames.begin(), {.z = 0, .segment = 1, .labels = {}});
+  whole.frames.push_back({.z = 6, .segment = 1, .labels = {}});
+  const Outcome closed = imported(import_objects({{"seg", segmentation(sparse).file()}}));
+  const Outcome told = imported(import_objects({{"seg", segmentation(whole).file()}}));
+  EXPECT_EQ(closed.canonical, told.canonical);
+  EXPECT_EQ(
+      note_detail(closed, NoteCode::kEmptyPlanes),
+      "Labels reach the end of the segmentation at 2 sides. A plane of zeros was added there.");
+  EXPECT_EQ(note_detail(told, NoteCode::kEmptyPlanes), "");
+}
+
+TEST(DicomSegmentation, OfOnePlaneIsAsThickAsItsSlice) {
+  SegmentObject object = {.frames = {{.z = 3, .segment = 1, .labels = {7}}}, .segments = {"liver"}};
+  const auto import = [&](const ImportOptions& options = {}) {
+    return import_objects({{"seg", segmentation(object).file()}}, options);
+  };
+  const Outcome unknown = import();
+  EXPECT_THAT(unknown.error, HasSubstr("does not say how thick it is"));
+  ASSERT_EQ(unknown.remedy.choices.size(), 1U);
+  EXPECT_EQ(unknown.remedy.choices[0].parameter, "spacing");
+  EXPECT_EQ(unknown.remedy.choices[0].value, "0.75,0.5,1");
+  EXPECT_EQ(imported(import({.spacing = {{1, 1, 4}}})).volume.geometry.spacing,
+            (std::array<double, 3>{0.75, 0.5, 4}));
+  object.thickness = "2.5";
+  const Outcome thick = imported(import());
+  EXPECT_EQ(thick.volume.dims, (std::array<std::uint32_t, 3>{kSegmentColumns, kSegmentRows, 3}));
+  EXPECT_EQ(thick.volume.geometry.spacing[2], 2.5);
+  EXPECT_EQ(thick.volume.geometry.origin, (std::array<double, 3>{0, 0, 0.5}));
+  EXPECT_EQ(label_at(thick, 7, 1), 1);
+  EXPECT_THAT(note_detail(thick, NoteCode::kDistanceAssumed), HasSubstr("2.5 mm"));
+  object.slice_distance = "2";
+  EXPECT_EQ(imported(import()).volume.geometry.spacing[2], 2);
+  EXPECT_EQ(note_detail(import(), NoteCode::kDistanceAssumed), "");
+  EXPECT_EQ(import({.spacing = {{1, 1, 4}}}).code, ErrorCode::kInvalidParameter);
+  object = two_segments();
+  EXPECT_EQ(import({.spacing = {{1, 1, 4}}}).code, ErrorCode::kInvalidParameter);
+}
+
+// PS3.3, C.8.20.2: samples of no segment have the padding value.
+TEST(DicomSegmentation, OfLabelsHasABackgroundOfAnyValue) {
+  const SegmentObject object = {
+      .frames = {{.z = 0, .labels = {2}, .value = 1}, {.z = 1, .labels = {3}, .value = 2}},
+      .type = "LABELMAP"};
+  const Outcome plain = imported(import_labels(object));
+  std::string samples(2 * kSegmentSamples, '\xFF');
+  samples[2] = '\1';
+  samples[kSegmentSamples + 3] = '\2';
+  const auto import = [&](unsigned padding) {
+    return described(imported(import_objects({{"seg", segmentation(object)
+                                                          .number(kPixelPaddingValue, padding)
+                                                          .pixels(samples, 1)
+                                                          .file()}})),
+                     object);
+  };
+  EXPECT_EQ(import(255).canonical, plain.canonical);
+  EXPECT_EQ(import(255).volume.labels, plain.volume.labels);
+  // No sample of eight bits has this value.
+  EXPECT_EQ(import(65535).sample_bytes(), samples);
+  // The other segment's number.
+  samples.assign(2 * kSegmentSamples, '\2');
+  samples[2] = '\1';
+  const Outcome second = import(2);
+  EXPECT_EQ(second.volume.range, (std::array<double, 2>{0, 1}));
+  EXPECT_THAT(second.volume.labels, testing::ElementsAre(entry(1, "liver")));
 }
 
 // Frames are left out of segmentations and nowhere else.
@@ -344,7 +434,9 @@ TEST(DicomSegmentation, IsAVolumeOfItsSeries) {
   const Outcome outcome = import_objects(files);
   EXPECT_THAT(outcome.error, HasSubstr("2 volumes"));
   EXPECT_EQ(outcome.remedy.choices.at(1).title, "\"two\", 2 segments");
-  EXPECT_EQ(import_objects(files, {.volume = 1}).volume.dims[2], 3);
+  const Outcome second = import_objects(files, {.volume = 1});
+  EXPECT_EQ(described(second, two_segments()).sample_bytes(),
+            import_labels(two_segments()).sample_bytes());
 }
 
 }  // namespace

@@ -147,10 +147,33 @@ TEST(DicomStructures, AreInterpolatedBetweenTheirContours) {
     EXPECT_EQ(sample(outcome, i, 7, 3), i >= 5 && i <= 8) << i;
     EXPECT_EQ(sample(outcome, i, 7, 5), i >= 5 && i <= 10) << i;
   }
-  // Half of the distance from slice to slice does not reach the next one.
-  EXPECT_EQ(sample(outcome, 6, 6, 1), 0);
+  // Three planes 4 mm apart are six slices of 2 mm thick.
+  EXPECT_EQ(sample(outcome, 6, 6, 0), 0);
+  EXPECT_EQ(sample(outcome, 6, 6, 1), 1);
   EXPECT_EQ(sample(outcome, 6, 6, 7), 0);
   EXPECT_THAT(note_detail(outcome, NoteCode::kContoursInterpolated), HasSubstr("2 times"));
+}
+
+// 4 x 6 samples of a contour in each of four planes, between the slices at 4 mm and 12 mm.
+TEST(DicomStructures, BetweenTheSlicesKeepTheirThickness) {
+  std::vector<TestContour> contours;
+  for (const double z : {5.0, 7.0, 9.0, 11.0}) contours.push_back({box(4.5, 4.5, 8.5, 10.5, z)});
+  const Outcome between = imported(draw({{.name = "box", .contours = contours}}));
+  EXPECT_EQ(between.volume.dims, (std::array<std::uint32_t, 3>{20, 16, 9}));
+  EXPECT_EQ(between.volume.geometry.origin, (Vector3{0, 0, -1}));
+  EXPECT_EQ(std::ranges::count(between.sample_bytes(), '\1'), 4 * 4 * 6);
+  EXPECT_EQ(sample(between, 6, 6, 2), 0);
+  EXPECT_EQ(sample(between, 6, 6, 3), 1);  // at 5 mm
+  EXPECT_EQ(note_detail(between, NoteCode::kContoursInterpolated), "");
+  // Beside contours in slices, they are drawn in slices, as many as they are.
+  contours = {
+      {box(4.5, 4.5, 8.5, 10.5, 5)}, {box(4.5, 4.5, 8.5, 10.5, 7)}, {box(4.5, 4.5, 8.5, 10.5, 9)}};
+  const Outcome mixed =
+      imported(draw({{.number = 1, .name = "between", .contours = contours},
+                     {.number = 2, .name = "in", .contours = {{box(10.5, 4.5, 12.5, 6.5, 4)}}}}));
+  EXPECT_EQ(mixed.volume.dims[2], 8U);
+  EXPECT_EQ(std::ranges::count(mixed.sample_bytes(), '\1'), 3 * 4 * 6);
+  EXPECT_EQ(std::ranges::count(mixed.sample_bytes(), '\2'), 2 * 2);
 }
 
 TEST(DicomStructures, OfSeparatePartsAreNotJoined) {
