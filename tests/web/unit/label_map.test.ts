@@ -25,6 +25,13 @@ describe('labels in pictures of eight bits', () => {
     expect([...numbers].map((number) => map.at(number)?.label ?? 0)).toEqual([0, -3, 7, 0, 251, 252, 1000, 0, 14_175, 0, 0]);
   });
 
+  // The samples of a volume with labels of 64 bits have other numbers.
+  it('are not told where labels have more bits than samples', () => {
+    const map = new LabelMap([{ label: 3 }, { label: '720575940618780781' }]);
+    expect(map.windows).toEqual([]);
+    expect(map.at(2)?.label).toBe('720575940618780781');
+  });
+
   it('have the colours of the surfaces that the daemon makes', () => {
     // As server/codec/encode_labels.cpp writes them.
     expect(seriesColour(0)).toBe('#e67373');
@@ -34,7 +41,7 @@ describe('labels in pictures of eight bits', () => {
 });
 
 describe('slices of labels', () => {
-  const look: LabelLook = { map: named(1, 2, 3), colourOf: (label) => ['', '#ff0000', '#00ff00', '#0000ff'][label] ?? '', isShown: (label) => label !== 3 };
+  const look: LabelLook = { map: named(1, 2, 3), colourOf: (label) => ['', '#ff0000', '#00ff00', '#0000ff'][Number(label)] ?? '', isShown: (label) => label !== 3 };
 
   it('are painted in their colours: borders wholly, what is within with an opacity, what is hidden not at all', () => {
     const labels = Uint16Array.from([1, 1, 1, 0, 1, 1, 1, 2, 1, 1, 1, 3]);

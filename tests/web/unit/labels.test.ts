@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import type { JobParameters, LabelSummary } from '@/api/types';
+import type { JobParameters, LabelSummary, Label } from '@/api/types';
 import { LabelState, labelTitle, matching } from '@/job/labels';
 import {
   changed,
@@ -100,7 +100,7 @@ const summaries = [
 
 describe('labels in a list', () => {
   it('are found by all words of their name, or by their value', () => {
-    const found = (text: string): number[] => matching(summaries, text).map(({ label }) => label);
+    const found = (text: string): Label[] => matching(summaries, text).map(({ label }) => label);
     expect(found('')).toEqual([1, 2, 12]);
     expect(found('KIDNEY right')).toEqual([2]);
     expect(found('label')).toEqual([12]);
@@ -111,7 +111,7 @@ describe('labels in a list', () => {
 });
 
 describe('which labels are seen', () => {
-  const hidden = (state: LabelState): number[] => [...state.hidden.value].sort((a, b) => a - b);
+  const hidden = (state: LabelState): Label[] => [...state.hidden.value].sort((a, b) => Number(a) - Number(b));
 
   it('is changed one by one, all at once, and by isolating one', () => {
     const state = new LabelState(summaries);

@@ -25,6 +25,8 @@ export interface ClientOptions {
 export type Vec3 = Schemas['Vector'];
 export type SampleType = Schemas['SampleType'];
 export type Volume = Schemas['Volume'];
+// A string if it has too many digits for a number.
+export type Label = Schemas['Label'];
 export type VolumeList = Schemas['VolumeList'];
 export type Histogram = Schemas['Histogram'];
 export type Axis = NonNullable<NonNullable<operations['getSlice']['parameters']['query']>['axis']>;

@@ -1,11 +1,11 @@
 // The labels of a job's mesh as a person looks at them: which are shown, and in which colours.
 import { client } from '../client';
-import type { Estimate, Job, LabelSummary } from '../api/types';
+import type { Estimate, Job, LabelSummary, Label } from '../api/types';
 import { Signal } from '../ui/signal';
 import { LabelMap, seriesColour, type LabelLook } from '../volume/label_map';
 
 export interface Named {
-  label: number;
+  label: Label;
   name?: string | null;
 }
 
@@ -33,17 +33,17 @@ export function labelCount({ mesh }: Job): number {
 }
 
 // The triangles of each label's surface.
-export function trianglesOf(estimate: Estimate): ReadonlyMap<number, number> {
+export function trianglesOf(estimate: Estimate): ReadonlyMap<Label, number> {
   return new Map((estimate.labels ?? []).map(({ label, triangles }) => [label, triangles]));
 }
 
 export class LabelState {
-  readonly hidden = new Signal<ReadonlySet<number>>(new Set());
+  readonly hidden = new Signal<ReadonlySet<Label>>(new Set());
   // The colours that a person chose or the file has; the others' are known once their surfaces come.
-  readonly colours = new Signal<ReadonlyMap<number, string>>(new Map());
+  readonly colours = new Signal<ReadonlyMap<Label, string>>(new Map());
   readonly picked = new Signal<LabelSummary | null>(null);
   private map: LabelMap | null = null;
-  private readonly byLabel: ReadonlyMap<number, LabelSummary>;
+  private readonly byLabel: ReadonlyMap<Label, LabelSummary>;
 
   constructor(readonly labels: readonly LabelSummary[]) {
     this.byLabel = new Map(labels.map((one) => [one.label, one]));
@@ -58,23 +58,23 @@ export class LabelState {
     return { map: this.map, colourOf: (label) => colours.get(label) ?? seriesColour(label), isShown: (label) => this.isShown(label) };
   }
 
-  isShown(label: number): boolean {
+  isShown(label: Label): boolean {
     return !this.hidden.value.has(label);
   }
 
-  show(label: number, isShown: boolean): void {
+  show(label: Label, isShown: boolean): void {
     const hidden = new Set(this.hidden.value);
     if (isShown) hidden.delete(label);
     else hidden.add(label);
     this.hidden.value = hidden;
   }
 
-  isAlone(label: number): boolean {
+  isAlone(label: Label): boolean {
     return this.isShown(label) && this.hidden.value.size === this.labels.length - 1;
   }
 
   // Hides all others; all are shown again when they are hidden already.
-  isolate(label: number): void {
+  isolate(label: Label): void {
     if (this.isAlone(label) && this.labels.length > 1) this.showAll();
     else this.hidden.value = new Set(this.labels.map((one) => one.label).filter((other) => other !== label));
   }
@@ -87,16 +87,16 @@ export class LabelState {
     this.hidden.value = new Set(this.labels.map(({ label }) => label));
   }
 
-  setColour(label: number, colour: string): void {
+  setColour(label: Label, colour: string): void {
     this.colours.value = new Map(this.colours.value).set(label, colour);
   }
 
   // The colour of a surface that has come, where nothing else says one.
-  learnColour(label: number, colour: string): void {
+  learnColour(label: Label, colour: string): void {
     if (!this.colours.value.has(label)) this.setColour(label, colour);
   }
 
-  pick(label: number | null): void {
+  pick(label: Label | null): void {
     this.picked.value = label === null ? null : (this.byLabel.get(label) ?? null);
   }
 }

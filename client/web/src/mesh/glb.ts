@@ -1,6 +1,7 @@
 // A GLB file (glTF 2.0) read while it arrives: the description first, then each Draco stream of it as
 // soon as its bytes are there.
 
+import type { Label } from '../api/types';
 const magic = 0x46546c67;
 const jsonChunk = 0x4e4f534a;
 const binaryChunk = 0x004e4942;
@@ -26,7 +27,7 @@ export interface DracoPrimitive {
 
 // A label's own surface, in a node of its own.
 export interface Part {
-  label: number;
+  label: Label;
   colour: string; // #rrggbb
 }
 
@@ -69,12 +70,16 @@ function screenColour([red = 1, green = 1, blue = 1]: readonly number[]): string
 
 // A mesh's place: whose it is, and its level of detail: 0 is the finest, of `levels`.
 interface Place {
-  label: number | undefined;
+  label: Label | undefined;
   level: number;
   levels: number;
 }
 
 // By the meshes' numbers.
+function isLabel(value: unknown): value is Label {
+  return Number.isInteger(value) || (typeof value === 'string' && /^-?\d+$/.test(value));
+}
+
 function placesOf({ nodes = [] }: Gltf): Map<number, Place> {
   const places = new Map<number, Place>();
   const put = (mesh: number | undefined, place: Place): void => {
@@ -84,7 +89,7 @@ function placesOf({ nodes = [] }: Gltf): Map<number, Place> {
   const areNamed = new Set(coarser.flat());
   nodes.forEach(({ mesh, extras }, number) => {
     if (areNamed.has(number)) return;
-    const label = Number.isInteger(extras?.label) ? (extras?.label as number) : undefined;
+    const label = isLabel(extras?.label) ? extras.label : undefined;
     const ids = coarser[number] ?? [];
     [mesh, ...ids.map((id) => nodes[id]?.mesh)].forEach((one, level) =>
       put(one, { label, level, levels: ids.length + 1 }),

@@ -1,4 +1,5 @@
 // The blocks of triangles in a scene: of one surface, or of one for each label with a colour of its own.
+import type { Label } from '../api/types';
 import {
   BackSide,
   Box3,
@@ -27,7 +28,7 @@ import type { Uploading } from './uploading';
 
 export interface Hit {
   at: number; // along the ray
-  label: number | null;
+  label: Label | null;
   distance?: number; // where the surface has distances
   // Which of the finest blocks, and the first corner of the triangle in its index; of a coarse level, -1.
   block: number;
@@ -54,7 +55,7 @@ interface DrawnBlock {
   meshes: Drawn[];
   geometry: BufferGeometry;
   look: Look;
-  label: number | null;
+  label: Label | null;
   isLevel: boolean;
   member: number; // of its look's blocks, or of their level's
   made: Block;
@@ -93,10 +94,10 @@ function labelMaterials(colour: string): MeshPhongMaterial[] {
 
 export class Parts {
   private readonly blocks: DrawnBlock[] = [];
-  private readonly looks = new Map<number | null, Look>();
-  private readonly colours = new Map<number, string>();
-  private readonly opacities = new Map<number, number>();
-  private hidden: ReadonlySet<number> = new Set();
+  private readonly looks = new Map<Label | null, Look>();
+  private readonly colours = new Map<Label, string>();
+  private readonly opacities = new Map<Label, number>();
+  private hidden: ReadonlySet<Label> = new Set();
   private style = defaultStyle;
   private planes: Plane[] | null = null;
   // Coarse copies of all looks, for each level; and the level that is drawn.
@@ -201,19 +202,19 @@ export class Parts {
     return this.planes?.[0] ?? null;
   }
 
-  setHidden(labels: ReadonlySet<number>): void {
+  setHidden(labels: ReadonlySet<Label>): void {
     this.hidden = labels;
     for (const [label, look] of this.looks) look.isShown = label === null || !labels.has(label);
     this.showAll();
   }
 
-  setColour(label: number, colour: string): void {
+  setColour(label: Label, colour: string): void {
     this.colours.set(label, colour);
     for (const made of this.looks.get(label)?.materials ?? []) made.color.set(colour);
   }
 
   // Whether it takes another shader.
-  setOpacity(label: number, opacity: number): boolean {
+  setOpacity(label: Label, opacity: number): boolean {
     this.opacities.set(label, opacity);
     const look = this.looks.get(label);
     if (!look) return false;
@@ -224,7 +225,7 @@ export class Parts {
   }
 
   // The number of that label's surface, of which there is a block.
-  numberOf(label: number | null): number {
+  numberOf(label: Label | null): number {
     return [...this.looks.keys()].indexOf(label);
   }
 

@@ -1,6 +1,6 @@
 // What of a surface and of the slice on its cut is seen at a point of the picture.
 import { Raycaster, Vector2, Vector3, type Camera } from 'three';
-import type { Vec3 } from '../api/types';
+import type { Vec3, Label } from '../api/types';
 import type { Cut } from './cut';
 import type { Parts } from './parts';
 import { keptBy, wholeRay } from './pick';
@@ -8,7 +8,7 @@ import { keptBy, wholeRay } from './pick';
 // A point of the surface, and whose it is; null: of the only surface, or of the slice on the cut.
 export interface Picked {
   point: Vec3;
-  label: number | null;
+  label: Label | null;
   distance?: number; // of a surface that has distances, there
   // The triangle, as PartFinder.partOf takes it; none of a slice.
   triangle: [block: number, corner: number] | null;

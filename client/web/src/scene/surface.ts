@@ -1,7 +1,7 @@
 // A surface in a canvas: blocks of triangles that come one by one, a camera, and what is drawn over them. Draws when something changed.
 import { type Object3D, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import type { Vec3, Volume } from '../api/types';
+import type { Vec3, Volume, Label } from '../api/types';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
 import type { PartFinder } from '../mesh/part_finder';
@@ -233,18 +233,18 @@ export class Surface {
     this.draw();
   }
 
-  setHidden(labels: ReadonlySet<number>): void {
+  setHidden(labels: ReadonlySet<Label>): void {
     this.parts.setHidden(labels);
     this.draw();
   }
 
-  setColour(label: number, colour: string): void {
+  setColour(label: Label, colour: string): void {
     this.parts.setColour(label, colour);
     this.draw();
   }
 
   // Of one label beside others; times the opacity of all.
-  setOpacity(label: number, opacity: number): void {
+  setOpacity(label: Label, opacity: number): void {
     this.changed(this.parts.setOpacity(label, opacity));
   }
 

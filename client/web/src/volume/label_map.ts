@@ -1,9 +1,10 @@
 // Labels in pictures of eight bits: which windows tell their values exactly, and what is drawn of them.
+import type { Label } from '../api/types';
 import { rgbOf } from './looks';
 import type { Window } from './slices';
 
 export interface MappedLabel {
-  label: number;
+  label: Label;
   name?: string | null;
   color?: string | null;
 }
@@ -12,6 +13,7 @@ export interface MappedLabel {
 const exactValues = 254;
 // Each is a request for each slice.
 const mostWindows = 8;
+const mostSample = 2 ** 32 - 1;
 
 let lastKey = 0;
 
@@ -25,8 +27,11 @@ export class LabelMap {
   constructor(readonly labels: readonly MappedLabel[]) {
     lastKey += 1;
     this.key = `labels-${lastKey}`;
-    this.numbers = new Map(labels.map(({ label }, at) => [label, at + 1]));
-    this.windows = windowsOf(labels.map(({ label }) => label));
+    const samples = labels.flatMap(({ label }) => (typeof label === 'number' && label <= mostSample ? [label] : []));
+    // Labels of more bits than samples: these have other numbers, which say nothing here.
+    const areSamples = samples.length === labels.length;
+    this.numbers = new Map(areSamples ? samples.map((sample, at) => [sample, at + 1]) : []);
+    this.windows = windowsOf(areSamples ? samples : []);
   }
 
   // Writes the numbers of the labels that a picture over that window shows.
@@ -58,8 +63,8 @@ export function windowsOf(labels: readonly number[]): Window[] {
 }
 
 // A golden section of the circle of hues from one label to the next: the series of the surfaces' files.
-export function seriesColour(label: number): string {
-  const turns = label * 0.6180339887498949;
+export function seriesColour(label: Label): string {
+  const turns = Number(label) * 0.6180339887498949;
   const hue = 6 * (turns - Math.floor(turns));
   const digits = [0, 1, 2].map((channel) => {
     const k = (5 - 2 * channel + hue) % 6;
@@ -76,8 +81,8 @@ export function colourOf({ label, color }: MappedLabel): string {
 // How labels are seen.
 export interface LabelLook {
   map: LabelMap;
-  colourOf: (label: number) => string;
-  isShown: (label: number) => boolean;
+  colourOf: (label: Label) => string;
+  isShown: (label: Label) => boolean;
 }
 
 // Red, green, blue and opacity of each number; nothing is seen of 0 and of what is hidden.

@@ -1,7 +1,7 @@
 // Several surfaces in one scene, each with its colour and opacity: #/together?jobs=A,B
 import { client } from '../../client';
 import { ApiError } from '../../api/problem';
-import type { Job, Vec3 } from '../../api/types';
+import type { Job, Vec3, Label } from '../../api/types';
 import { titlesOf } from '../../job/differences';
 import { labelCount } from '../../job/labels';
 import type { Part } from '../../mesh/glb';
@@ -38,7 +38,7 @@ class Together {
   private readonly status = h('p.hint', { role: 'status' });
   private readonly looks: SurfaceLook[];
   // Of which job and label, and the number and colour of that in the scene.
-  private readonly parts: { at: number; label: number | undefined; id: number; colour: string }[] = [];
+  private readonly parts: { at: number; label: Label | undefined; id: number; colour: string }[] = [];
   private surface: Surface | null = null;
 
   constructor(

@@ -1,7 +1,7 @@
 // The choice of labels to mesh: all labels of a volume, or some of a list.
 import { client } from '../../client';
 import { asApiError } from '../../api/problem';
-import type { JobParameters, VolumeLabel } from '../../api/types';
+import type { JobParameters, VolumeLabel, Label } from '../../api/types';
 import { labelTitle } from '../../job/labels';
 import { button, checkbox, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
@@ -27,9 +27,9 @@ export class LabelChoice {
   private background: number;
   private asking: AbortController | null = null;
   private labels: readonly VolumeLabel[] = [];
-  private readonly chosen = new Set<number>();
-  private readonly boxes = new Map<number, Box>();
-  private triangles: ReadonlyMap<number, number> = new Map();
+  private readonly chosen = new Set<Label>();
+  private readonly boxes = new Map<Label, Box>();
+  private triangles: ReadonlyMap<Label, number> = new Map();
   private search: LabelSearch<VolumeLabel> | null = null;
   // What `look` gives, made once for all labels.
   private shown: LabelLook | null = null;
@@ -120,7 +120,7 @@ export class LabelChoice {
   }
 
   // The triangles of each label's surface, from the estimate.
-  showTriangles(triangles: ReadonlyMap<number, number>): void {
+  showTriangles(triangles: ReadonlyMap<Label, number>): void {
     this.triangles = triangles;
     this.update();
   }
@@ -159,7 +159,7 @@ export class LabelChoice {
     this.search?.recount();
   }
 
-  private updateBox(label: number, { input, size, voxels }: Box): void {
+  private updateBox(label: Label, { input, size, voxels }: Box): void {
     input.checked = this.chosen.has(label);
     const triangles = input.checked ? this.triangles.get(label) : undefined;
     size.textContent =

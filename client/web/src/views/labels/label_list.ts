@@ -1,5 +1,5 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
-import type { Job, LabelSummary, Volume } from '../../api/types';
+import type { Job, LabelSummary, Volume, Label } from '../../api/types';
 import { labelTitle, type LabelState } from '../../job/labels';
 import { fileNameOf } from '../../job/variants';
 import { button, checkbox, h } from '../../ui/dom';
@@ -27,7 +27,7 @@ interface Row {
 
 export class LabelList {
   readonly element: HTMLElement;
-  private readonly rows = new Map<number, Row>();
+  private readonly rows = new Map<Label, Row>();
 
   constructor(
     scope: Scope,
@@ -112,7 +112,7 @@ export class LabelList {
     for (const [label, row] of this.rows) this.updateRow(label, row);
   }
 
-  private updateRow(label: number, { shown, colour, alone }: Row): void {
+  private updateRow(label: Label, { shown, colour, alone }: Row): void {
     shown.checked = this.state.isShown(label);
     alone.setAttribute('aria-pressed', String(this.state.isAlone(label)));
     const now = this.state.colours.value.get(label);

@@ -1,5 +1,5 @@
 // How a surface is looked at, as texts for the address: its style, what is measured, which labels are hidden.
-import type { Vec3 } from '../../api/types';
+import type { Vec3, Label } from '../../api/types';
 import { defaultStyle, type Ruler, type SurfaceStyle } from '../../scene/style';
 
 const mostRulers = 32;
@@ -44,6 +44,6 @@ export function rulersOfText(text: string): Ruler[] {
     });
 }
 
-export function labelsOfText(text: string): Set<number> {
-  return new Set(text.split(',').filter((one) => /^-?\d+$/.test(one)).map(Number));
+export function labelsOfText(text: string): Set<Label> {
+  return new Set(text.split(',').filter((one) => /^-?\d+$/.test(one)).map((one) => (Number.isSafeInteger(Number(one)) ? Number(one) : one)));
 }
