@@ -84,13 +84,29 @@ struct Gaps {
   std::size_t uneven = 0;            // the first slice that is no whole number of usual gaps away
 };
 
+// The median, or the smallest gap if all others are a few times that: most slices may be missing.
+double distance_of(const std::vector<double>& along) {
+  constexpr double kMostTimes = 8;
+  double smallest = along[1] - along[0];
+  for (std::size_t i = 2; i < along.size(); ++i) {
+    smallest = std::min(smallest, along[i] - along[i - 1]);
+  }
+  for (std::size_t i = 1; i < along.size(); ++i) {
+    const double times = (along[i] - along[i - 1]) / smallest;
+    if (std::abs(times - std::round(times)) > kPlaceTolerance || times > kMostTimes) {
+      return usual_gap(along).value();
+    }
+  }
+  return smallest;
+}
+
 Gaps gaps_of(std::span<const Placed> placed) {
   // Gaps of more slices than any series has are uneven instead.
   constexpr double kMostMissing = 1e6;
   std::vector<double> along;
   for (const Placed& each : placed) along.push_back(each.along);
   Gaps gaps;
-  gaps.usual = usual_gap(along).value();
+  gaps.usual = distance_of(along);
   gaps.steps.push_back(0);
   for (std::size_t i = 1; i < placed.size(); ++i) {
     const double steps = (along[i] - along[i - 1]) / gaps.usual;

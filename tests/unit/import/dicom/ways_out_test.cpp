@@ -97,6 +97,10 @@ TEST(DicomPositions, StillShowThatASliceIsMissing) {
       EXPECT_EQ(outcome.remedy.overridable, "");
     }
   }
+  // Even if most gaps are wide.
+  EXPECT_THAT(import_objects(at_heights({0, 2, 3})).error, HasSubstr("slice 2 of 4 is missing"));
+  EXPECT_THAT(import_objects(at_heights({0, 5, 7.5, 12.5, 20})).error,
+              HasSubstr("slices 2, 5, 7 and 8 of 9 are missing"));
   // Whole millimetres may stand for steps of 2.5 mm with all slices, or of 2 mm without one.
   const Outcome doubtful = import_objects(at_heights({0, 2, 5}));
   EXPECT_EQ(doubtful.remedy.overridable, "positions-rounded");
