@@ -34,11 +34,18 @@ std::uint32_t frame_count(const DataSet& data) {
                  ", not a number from 1 to " + std::to_string(kMostFrames) + ".");
 }
 
-// True for several frames with the position of the first alone.
+// True for several frames with the position of the first alone: in the object, or in the functional
+// groups that all frames share.
 bool has_one_position(const DataSet& data, std::uint32_t frames) {
-  return frames > 1 && !has_functional_groups(data) && !is_dose(data) &&
-         data.text(kSegmentationType).empty() && !data.text(kImagePosition).empty() &&
-         !data.text(kImageOrientation).empty();
+  if (frames == 1 || is_dose(data) || !data.text(kSegmentationType).empty()) return false;
+  for (const DataSet& groups : data.items(kPerFrameFunctionalGroups)) {
+    if (groups.item(kPlanePositionSequence) || groups.item(kPlanePositionVolumeSequence)) {
+      return false;
+    }
+  }
+  const Attributes shared(data, frames);
+  return !shared.place(kPlanePositionSequence).text(kImagePosition).empty() &&
+         !shared.place(kPlaneOrientationSequence).text(kImageOrientation).empty();
 }
 
 void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {

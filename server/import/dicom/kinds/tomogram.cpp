@@ -84,11 +84,17 @@ void add_phases(const DataSet& data, std::span<Frame> frames) {
 }  // namespace
 
 double frame_distance(const DataSet& data, Image& image) {
-  const auto told = data.numbers(kSpacingBetweenSlices);
-  if (!told.empty() && told.front() != 0) return told.front();
+  const DataSet& measures = Attributes(data, 0).place(kPixelMeasuresSequence);
+  for (const DataSet* place : {&measures, &data}) {
+    const auto told = place->numbers(kSpacingBetweenSlices);
+    if (!told.empty() && told.front() != 0) return told.front();
+  }
   image.is_distance_assumed = true;
-  const auto thickness = data.numbers(kSliceThickness);
-  return !thickness.empty() && thickness.front() > 0 ? thickness.front() : 0;
+  for (const DataSet* place : {&measures, &data}) {
+    const auto thickness = place->numbers(kSliceThickness);
+    if (!thickness.empty() && thickness.front() > 0) return thickness.front();
+  }
+  return 0;
 }
 
 void place_along_normal(const DataSet& data, Image& image) {

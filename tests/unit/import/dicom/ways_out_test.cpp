@@ -252,6 +252,26 @@ TEST(DicomFrames, WithOnePositionCanBeAccepted) {
               HasSubstr("no position for each of them"));
 }
 
+// Enhanced objects may share a position, too.
+TEST(DicomFrames, ThatShareAPositionCanBeAccepted) {
+  const DicomSeries series = {.step = {0, 0, 2}};
+  DicomObject shared = shared_groups().items(
+      kPlanePositionSequence, {DicomObject().text(kImagePosition, "DS", "-10\\20\\30")});
+  shared.items(kPixelMeasuresSequence, {DicomObject()
+                                            .text(kPixelSpacing, "DS", "0.5\\0.75")
+                                            .text(kSpacingBetweenSlices, "DS", "2")});
+  for (const std::size_t described : {0U, 6U}) {
+    const std::string file =
+        series.enhanced({0, 1, 2, 3, 4, 5})
+            .items(kSharedFunctionalGroups, {shared})
+            .items(kPerFrameFunctionalGroups, std::vector<DicomObject>(described))
+            .file();
+    EXPECT_EQ(import_objects({{"one", file}}).remedy.overridable, "distance-assumed");
+    EXPECT_EQ(import_objects({{"one", file}}, {.accept = {"distance-assumed"}}).canonical,
+              import_objects(series.files()).canonical);
+  }
+}
+
 // --- Directions ----------------------------------------------------------------------------------
 
 NamedFiles directed(const std::string& cosines) {
