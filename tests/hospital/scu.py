@@ -30,7 +30,7 @@ def associate_request(called="BONE", calling="CT1", syntax=dicom.EXPLICIT_LITTLE
 
 
 def context_is_accepted(response):
-    """Of the only presentation context, in the content of an A-ASSOCIATE-AC."""
+    """True if the content of an A-ASSOCIATE-AC accepts its only presentation context."""
     at = 68
     while at < len(response):
         kind, length = struct.unpack(">BxH", response[at:at + 4])

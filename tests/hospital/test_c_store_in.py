@@ -121,7 +121,7 @@ class Receiving(Loop):
             self.assertNotIn(secret, daemon.logged())
 
     def test_syntaxes(self):
-        """Whatever can be read is accepted, also what DCMTK has no name for."""
+        """All syntaxes that can be read are accepted, with those that DCMTK has no name for."""
         daemon = self.receiver()
         for syntax, accepted in [
                 ("1.2.840.10008.1.2.4.201", True), ("1.2.840.10008.1.2.4.202", True),

@@ -17,9 +17,9 @@ struct DistinctSlices {
   std::vector<Slice> left_out;
 };
 
-// Of slices at one place, keeps the one with the lowest instance number, then the first by name.
-// Adds a note. Changes nothing if each position has as many slices, unless all of them have the
-// same samples: others are several volumes.
+// Keeps one of the slices at each place: the one with the lowest instance number, then the first by
+// name. Adds a note. Changes nothing if each position has as many slices, unless all of them have
+// the same samples: others are several volumes.
 //
 // Throws Error kUnusableVolume as refuse_mixtures does, and, overridable, if slices at one place
 // have different values.

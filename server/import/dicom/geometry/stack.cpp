@@ -76,7 +76,7 @@ std::string missing_slices(const std::vector<std::size_t>& places, std::size_t c
          " missing";
 }
 
-// What the distances between neighbours along the normal show.
+// The distances between neighbours along the normal, and missing slices.
 struct Gaps {
   double usual = 0;
   std::vector<double> steps;         // each slice's number of usual gaps from the first, whole
