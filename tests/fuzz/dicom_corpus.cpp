@@ -10,6 +10,29 @@ namespace isomesh::fuzz {
 
 using namespace import::test;
 
+// Padding as a range around the first sample.
+DicomObject padded() {
+  const DicomSeries series;
+  return series.enhanced({0, 1, 2})
+      .number(import::dicom::kPixelPaddingValue, static_cast<unsigned>(series.stored(0, 0, 0)))
+      .number(import::dicom::kPixelPaddingRangeLimit, 7);
+}
+
+// Labels with colours in a plain table, and in a table of segments of all kinds.
+DicomObject coloured(const SegmentObject& labels, bool is_segmented) {
+  const std::string plain("\0\1\2\3\4\5\6\7", 8);
+  const std::string segments("\0\2\0\x40\1\4\xFF\2\1\0\0\0\0\0", 14);
+  DicomObject object = segmentation(labels);
+  object.text(import::dicom::kPhotometricInterpretation, "CS", "PALETTE COLOR");
+  const auto first =
+      is_segmented ? import::dicom::kSegmentedRedPaletteData : import::dicom::kRedPaletteData;
+  for (unsigned color = 0; color < 3; ++color) {
+    object.numbers(import::dicom::kRedPaletteDescriptor + color, {8, 0, 8})
+        .bytes(first + color, "OW", is_segmented ? segments : plain);
+  }
+  return object;
+}
+
 constexpr std::size_t kPreambleBytes = 132;  // with "DICM"
 
 std::vector<std::string> dicom_objects() {
@@ -26,8 +49,9 @@ std::vector<std::string> dicom_objects() {
   for (const DicomObject& object :
        {siemens_mosaic(), siemens_mosaic(csa_fields({"0", "0", "-1"}), false),
         protocol_mosaic(true), united_imaging_grid(), segmentation(two_segments()),
-        segmentation(labels), segmentation(overlapping), segmentation(fractional),
-        DicomSeries{}.enhanced({0, 1, 2}), DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
+        segmentation(labels), segmentation(overlapping), segmentation(fractional), padded(),
+        coloured(labels, false), coloured(labels, true), DicomSeries{}.enhanced({0, 1, 2}),
+        DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
     for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
       files.push_back(object.file(syntax));
     }

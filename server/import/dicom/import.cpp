@@ -154,7 +154,8 @@ std::optional<Volume> write_segments(const Stack& stack, Volume volume, OpenFile
   const auto read = [&](std::size_t place, std::span<std::byte> stored) {
     read_slice(stack, place, file, stored);
   };
-  CanonicalWriter writer(task.target, {with_room(volume.dims), volume.type, volume.geometry});
+  CanonicalWriter writer(task.target, {with_room(volume.dims, volume.type, task.limits),
+                                       volume.type, volume.geometry});
   const std::span<std::byte> samples =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   if (!write_labels(stack, volume.type, read, samples, volume)) return std::nullopt;

@@ -29,7 +29,7 @@ Volume parse_raw(const Input& input) {
   check_size(file, description, volume.sample_count());
   return write_canonical(
       {file, 0, {stored_type(description.type), description.big_endian, std::nullopt}}, volume,
-      input.task.target);
+      input.task);
 }
 
 }  // namespace

@@ -78,9 +78,13 @@ void add_note(std::size_t planes, Volume& volume) {
 
 }  // namespace
 
-std::array<std::uint32_t, 3> with_room(std::array<std::uint32_t, 3> dims) {
-  for (std::uint32_t& size : dims) size += 2;
-  return dims;
+std::array<std::uint32_t, 3> with_room(const std::array<std::uint32_t, 3>& dims, SampleType type,
+                                       const SizeLimits& limits) {
+  std::array<std::uint64_t, 3> sizes = {dims[0], dims[1], dims[2]};
+  for (std::uint64_t& size : sizes) size += 2;
+  const Dims room = volume_dims(sizes);
+  check_limits(sizes[0] * sizes[1] * sizes[2], type, limits);
+  return room;
 }
 
 void close_ends(CanonicalWriter& writer, Volume& volume) {

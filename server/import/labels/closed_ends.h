@@ -9,14 +9,16 @@
 
 namespace isomesh::import {
 
-// The sizes with room for a plane on each side.
-std::array<std::uint32_t, 3> with_room(std::array<std::uint32_t, 3> dims);
+// The sizes with room for a plane on each side. Throws Error kTooLarge if samples of `type` would
+// exceed the limits then, kUnusableVolume if a size is not plausible.
+std::array<std::uint32_t, 3> with_room(const std::array<std::uint32_t, 3>& dims, SampleType type,
+                                       const SizeLimits& limits);
 
 // Adds a plane of zeros at each side of a segmentation that a nonzero sample touches: programs
 // leave empty planes out, and nothing is beyond the last. So the surfaces of labels are closed
 // there. An axis of one sample gets planes at both sides. Sides without labels stay as they are.
 //
-// `writer` was made for with_room(volume.dims), and begins with the samples of `volume.dims`. Sets
+// `writer` was made for with_room(), and begins with the samples of `volume.dims`. Sets
 // dims and origin of `volume`, shortens the file to them, and adds to the note on empty planes.
 // Throws Error kInternal.
 void close_ends(CanonicalWriter& writer, Volume& volume);

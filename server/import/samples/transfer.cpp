@@ -271,10 +271,11 @@ std::optional<Combinations> write_states(const PlainSamples& samples, const Sour
 // `samples` are those of all layers. Values without a segment become labels without a name. Throws
 // Error kUnusableVolume also if there are too many combinations.
 Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Volume volume,
-                    const std::filesystem::path& target) {
+                    const ImportTask& task) {
   for (const SampleType type : {SampleType::kUint8, SampleType::kUint16}) {
     volume.type = type;
-    CanonicalWriter writer(target, {with_room(volume.dims), type, volume.geometry});
+    const auto room = with_room(volume.dims, type, task.limits);
+    CanonicalWriter writer(task.target, {room, type, volume.geometry});
     const auto combinations = with_sample(
         canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
           using Sample = decltype(sample);
@@ -296,12 +297,12 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
 
 }  // namespace
 
-Volume write_canonical(const PlainSamples& samples, Volume volume,
-                       const std::filesystem::path& target) {
-  if (auto labels = write_wide_labels(samples, volume, target)) return *std::move(labels);
+Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task) {
+  if (auto labels = write_wide_labels(samples, volume, task.target)) return *std::move(labels);
   volume.type = canonical_type(samples.layout);
-  const auto dims = samples.is_segmentation ? with_room(volume.dims) : volume.dims;
-  CanonicalWriter writer(target, {dims, volume.type, volume.geometry});
+  const auto dims =
+      samples.is_segmentation ? with_room(volume.dims, volume.type, task.limits) : volume.dims;
+  CanonicalWriter writer(task.target, {dims, volume.type, volume.geometry});
   const std::span<std::byte> stored =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   read_samples(samples.file, samples.offset, samples.layout, stored);
@@ -333,11 +334,11 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
   if (source.layers)
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
-                        std::move(volume), task.target);
+                        std::move(volume), task);
   volume.labels = source.labels;
   return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels,
                           source.is_segmentation},
-                         std::move(volume), task.target);
+                         std::move(volume), task);
 }
 
 Volume finish(CanonicalWriter& writer, Volume volume, std::uint64_t left_out) {

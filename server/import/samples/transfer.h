@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 
 #include "base/files.h"
 #include "proto/types.h"
@@ -20,14 +19,14 @@ struct PlainSamples {
   bool is_segmentation = false;  // see SourceVolume
 };
 
-// Writes the canonical file `target` of `volume`, whose dims and geometry are set and valid.
+// Writes the canonical file of `volume`, whose dims and geometry are set and valid, to the task's
+// target. Closes the ends of a segmentation (labels/closed_ends.h).
 // Returns it with type, range, suggested iso-value and bytes set. Floats that are labels, declared
 // in `volume`, by their header or as volume::label_count() finds them, become integers of the
 // smallest type, and so do 64-bit integers that fit into 32 bits or are labels (wide_labels.h).
-// Other floats lose the volume's labels. Throws Error kUnusableVolume if a sample is not finite,
-// kOutOfSpace, kInternal.
-Volume write_canonical(const PlainSamples& samples, Volume volume,
-                       const std::filesystem::path& target);
+// Other floats lose the volume's labels. Throws Error kUnusableVolume if no sample is finite,
+// kTooLarge if there is no room for the ends, kOutOfSpace, kInternal.
+Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task);
 
 // Writes the canonical file of the volume `source`, whose samples are in `file` or in the data
 // files of `source`. Throws Error kInvalidParameter for the option `spacing` if the file has its

@@ -226,6 +226,20 @@ TEST(NrrdSegments, MayHaveOneSlice) {
   EXPECT_EQ(two.canonical, outcome.canonical);
 }
 
+// Room for the planes is taken before it is known which are needed. A flat file would take thrice
+// its size.
+TEST(NrrdSegments, AreLimitedWithTheirEnds) {
+  const std::vector<Key> keys = {{"0_Name", "liver"}, {"0_LabelValue", "1"}, {"0_Layer", "0"}};
+  const std::string file = with_segments(small_nrrd(), keys, std::string(24, '\1'));
+  EXPECT_EQ(import_bytes(file, {.max_sample_bytes = 6 * 5 * 4}).error, "");
+  EXPECT_EQ(import_bytes(file, {.max_sample_bytes = 6 * 5 * 4 - 1}).code, ErrorCode::kTooLarge);
+  // Larger than any number of samples along an axis.
+  const Outcome endless = import_bytes(
+      with_segments(with(with(small_nrrd(), "sizes", "4294967295 1 1"), "encoding", "gzip"), keys,
+                    gzip(std::string(10, '\0'))));
+  EXPECT_FALSE(endless.imported());
+}
+
 // Seventeen independent segments are more than 16 bits tell apart.
 TEST(NrrdSegments, WithTooManyCombinationsAreRefused) {
   std::string samples(std::size_t{17} << 17, '\0');
