@@ -20,10 +20,9 @@ struct PlainSamples {
 };
 
 // Writes the canonical file `target` of `volume`, whose dims and geometry are set and valid.
-// Returns it with type, range, suggested iso-value and bytes set. Floats that are labels, declared
-// in `volume`, by their header or as volume::label_count() finds them, become integers of the
-// smallest type, and so do 64-bit integers that fit into 32 bits. Other floats lose the volume's
-// labels. Throws Error kUnusableVolume if a sample is not finite, kOutOfSpace, kInternal.
+// Returns it with type, range, suggested iso-value and bytes set, as finish() does. Floats that are
+// no labels lose the volume's labels. Throws Error kUnusableVolume if no sample is finite,
+// kOutOfSpace, kInternal.
 Volume write_canonical(const PlainSamples& samples, Volume volume,
                        const std::filesystem::path& target);
 
@@ -33,12 +32,23 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 // is invalid or its samples cannot be decoded, kTooLarge beyond the task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
+// For labels that were stored as this type and are not quite whole.
+Note rounded_note(SampleType stored);
+
 // Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
 void refuse_spacing(const ImportOptions& options);
 
+struct SampleKind {
+  bool are_labels = false;  // by their header
+  bool are_wide = false;    // stored as integers of 64 bits
+};
+
 // Completes a canonical file: measures and flushes the samples. `volume` has dims, type and
-// geometry; returns it with range, suggested iso-value and bytes set. Throws Error kUnusableVolume
-// if a sample is not finite, kOutOfSpace, kInternal.
-Volume finish(CanonicalWriter& writer, Volume volume);
+// geometry; returns it with range, suggested iso-value and bytes set. Floats that are labels become
+// integers of the smallest type: those that `volume` or `kind` declares, and those that
+// volume::mask_value() or label_count() recognises, if all are nearly whole. So do wide integers
+// that fit into 32 bits. Throws Error kUnusableVolume if no sample is finite, kOutOfSpace,
+// kInternal.
+Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind = {});
 
 }  // namespace isomesh::import

@@ -195,9 +195,10 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
   MadeMesh made;
-  const MeshRequest request = request_of(order);
+  MeshRequest request = request_of(order);
   const CroppedSamples cropped(array_of(canonical), order.parameters);
   const SampleArray& samples = cropped.array();
+  request.memory_bytes -= std::min(request.memory_bytes, cropped.rounded_bytes());
   made.summary = order.parameters.labels
                      ? make_labels(samples, request, sinks, progress, workspace.walls)
                      : make_mesh(samples, request, sinks, progress, workspace.mesh);

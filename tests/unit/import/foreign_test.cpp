@@ -243,15 +243,27 @@ TEST(ForeignSamples, OfAMaskLookLikeOneLabel) {
   EXPECT_THAT(codes_of(outcome({'\0', '\xff'}, {.datatype = 256})), IsEmpty());
 }
 
-// Labels need integers, and the note must not advise what is rejected.
-TEST(ForeignSamples, OfAMaskOfFloatsStayFloats) {
+// As nibabel and MONAI write masks.
+TEST(ForeignSamples, OfAMaskOfFloatsBecomeIntegers) {
   std::vector<float> samples(24, 0);
   samples[7] = samples[8] = 1;
   const Outcome mask = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)));
-  EXPECT_EQ(mask.volume.type, SampleType::kFloat32);
+  EXPECT_EQ(mask.volume.type, SampleType::kUint8);
+  EXPECT_EQ(samples_of<std::uint8_t>(mask),
+            std::vector<std::uint8_t>(samples.begin(), samples.end()));
+  EXPECT_EQ(mask.volume.range, (std::array<double, 2>{0, 1}));
   ASSERT_THAT(codes_of(mask), ElementsAre("looks-like-labels"));
   EXPECT_THAT(mask.volume.notes[0].detail,
-              HasSubstr("but the samples are float32. Labels need a file of whole numbers."));
+              HasSubstr("The whole numbers, float32 in the file, are now uint8."));
+  const std::vector<double> wide(samples.begin(), samples.end());
+  EXPECT_EQ(import_bytes(nifti({.datatype = 64, .bitpix = 64}, bytes_of(wide))).canonical,
+            mask.canonical);
+  // A sample that is not a number is outside of the mask.
+  samples[3] = std::numeric_limits<float>::quiet_NaN();
+  const Outcome gap = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)));
+  EXPECT_EQ(gap.canonical, mask.canonical);
+  EXPECT_THAT(codes_of(gap), ElementsAre("non-finite-samples", "looks-like-labels"));
+  samples[3] = 0;
   samples[9] = 0.5;
   EXPECT_THAT(codes_of(import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)))),
               IsEmpty());
@@ -290,13 +302,26 @@ TEST(ForeignSamples, ThatAreLabelsBecomeIntegers) {
 
 TEST(ForeignSamples, ThatAreNoLabelsStayFloats) {
   for (const std::vector<float>& values : std::vector<std::vector<float>>{
-           {0, 1, 2, 2.5F}, {0, 1, 2, 1e10F}, {0, 0, 1, 1}, {-1, 0, 1, 3e9F}}) {
+           {0, 1, 2, 2.5F}, {0, 1, 2, 1e10F}, {0, 1, 2, 1.002F}, {-1, 0, 1, 3e9F}}) {
     EXPECT_EQ(regions(values).volume.type, SampleType::kFloat32) << values[3];
   }
   std::vector<float> gradient(24);
   for (std::size_t at = 0; at < gradient.size(); ++at) gradient[at] = static_cast<float>(at);
   const Outcome outcome = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(gradient)));
   EXPECT_EQ(samples_of<float>(outcome), gradient);
+}
+
+TEST(ForeignSamples, ThatAreNearlyLabelsAreRounded) {
+  // nibabel stores floats as scaled integers: -1, 0, 1 and 3 of a slope of a third, so to speak.
+  const Outcome scaled = regions<double>({0, 0.99999999977, 2.9999999993, 0});
+  EXPECT_EQ(scaled.volume.type, SampleType::kUint8);
+  EXPECT_EQ(scaled.canonical, regions<std::uint8_t>({0, 1, 3, 0}).canonical);
+  EXPECT_THAT(codes_of(scaled), ElementsAre("labels-rounded", "looks-like-labels"));
+  EXPECT_THAT(scaled.volume.notes[0].detail, HasSubstr("stored as float64"));
+  EXPECT_THAT(scaled.volume.notes[1].detail, HasSubstr("float64 in the file, are now uint8"));
+  const Outcome two = regions<float>({1, 1, 2, 2.0005F});
+  EXPECT_EQ(two.volume.type, SampleType::kUint8);
+  EXPECT_THAT(two.volume.notes[1].detail, HasSubstr("2 different whole values"));
 }
 
 TEST(ForeignSamples, Of64BitsBecomeIntegersThatFit) {
