@@ -380,7 +380,8 @@ SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   volume.dims = volume_dims(std::span(sizes).first(std::min<std::size_t>(sizes.size(), 3)));
   check_is_lattice(volume.dims);
   volume.layout = {type_of(header), header.big_endian, rescale_of(header)};
-  choose_volume(volumes_beyond(sizes), difference_of(header), options, volume);
+  const std::uint64_t volumes = volumes_of_frames(volumes_beyond(sizes), options, volume);
+  choose_volume(volumes, difference_of(header), options, volume);
   volume.are_labels = header.intent == kIntentLabel;
   volume.encoding = Encoding::kRaw;
   volume.geometry = lps_geometry(header, options, volume);
@@ -412,7 +413,7 @@ SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
   }
   const InputFile samples(companion(image, companions));
   if (is_gzip(samples.text(0, kSniffBytes))) volume.encoding = Encoding::kDeflate;
-  volume.data_files = data_files_of({image}, companions, payload_offset(header), volume);
+  volume.data_files = data_files_of({image}, companions, {.bytes = payload_offset(header)}, volume);
   return volume;
 }
 

@@ -52,20 +52,37 @@ TEST(ForeignNrrd, SpacingFollowsFromMinsAndMaxs) {
   EXPECT_FALSE(import_bytes(nrrd(with(lines, "axis maxs", "0 19 30"), kSamples)).imported());
 }
 
-TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfSlicer) {
+TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfItsWriter) {
   Lines lines = without_space(small_nrrd());
   lines = with(with(lines, "dimension", "4"), "sizes", "4 3 2 1");
   lines.emplace_back("space dimension", "4");
   lines.emplace_back("space directions", "(-2,0,0,0) (0,-2,0,0) (0,0,3,0) (0,0,0,1)");
   lines.emplace_back("space origin", "(10,20,30,0)");
+  const std::array<double, 9> identity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const std::array<double, 9> turned = {-1, 0, 0, 0, -1, 0, 0, 0, 1};
+  const auto with_pair = [&](const std::string& pair, const std::string& kinds = "") {
+    std::string file = nrrd(with(lines, "kinds", kinds), kSamples);
+    file.insert(file.find("\n\n") + 1, pair);
+    const Outcome outcome = imported(import_bytes(file));
+    EXPECT_THAT(codes_of(outcome), testing::Contains("space-assumed"));
+    return outcome.volume.geometry;
+  };
+  const Geometry slicers = with_pair("Segment0_Name:=a\n");
+  EXPECT_EQ(slicers.origin, (Vector{-10, -20, 30}));
+  EXPECT_EQ(slicers.direction, identity);
+  EXPECT_EQ(with_pair("Segment0_Extent:=5 8 1 3 2 3\n").origin, (Vector{0, -18, 36}));
+  EXPECT_EQ(with_pair("Segmentation_Extent:=0 3 0 2 0 1\n", "domain domain domain domain").origin,
+            (Vector{-10, -20, 30}));
+  // ITK's is LPS, as in three dimensions.
+  const Geometry itks = with_pair("", "domain domain domain domain");
+  EXPECT_EQ(itks.origin, (Vector{10, 20, 30}));
+  EXPECT_EQ(itks.direction, turned);
+  // Others do not tell.
   const std::string file = nrrd(lines, kSamples);
-  const Outcome bare = imported(import_bytes(file));
-  EXPECT_THAT(codes_of(bare), ElementsAre("space-assumed"));
-  EXPECT_EQ(bare.volume.geometry.origin, (Vector{-10, -20, 30}));
-  EXPECT_EQ(bare.volume.geometry.direction, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
-  std::string extended = file;
-  extended.insert(extended.find("\n\n") + 1, "Segment0_Extent:=5 8 1 3 2 3\n");
-  EXPECT_EQ(import_bytes(extended).volume.geometry.origin, (Vector{0, -18, 36}));
+  EXPECT_EQ(import_bytes(file).remedy.overridable, "space-assumed");
+  const Outcome accepted = imported(import_bytes(file, {}, {.accept = {"space-assumed"}}));
+  EXPECT_THAT(codes_of(accepted), ElementsAre("space-assumed"));
+  EXPECT_EQ(accepted.volume.geometry, itks);
 }
 
 TEST(ForeignNrrd, AUnitThatCountsSamplesIsNoLength) {

@@ -229,6 +229,18 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
               HasSubstr("only volume 0"));
 }
 
+TEST(Nifti, OfFlatImagesInTimeIsNoVolume) {
+  const std::string file = nifti({.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, kSmallSamples);
+  const Outcome refused = import_bytes(file);
+  EXPECT_THAT(refused.error, HasSubstr("a sequence of 2 flat images of 4 x 3 samples"));
+  EXPECT_EQ(refused.remedy.overridable, "frames-as-slices");
+  const Outcome accepted = imported(import_bytes(file, {}, {.accept = {"frames-as-slices"}}));
+  EXPECT_EQ(accepted.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
+  EXPECT_EQ(accepted.sample_bytes(), kSmallSamples);
+  EXPECT_THAT(codes_of(accepted), testing::ElementsAre("frames-as-slices"));
+  EXPECT_THAT(import_bytes(file, {}, {.volume = 1}).error, HasSubstr("flat image"));
+}
+
 TEST(Nifti, PassesOverDimensionsOfOne) {
   EXPECT_TRUE(import_nifti({.dim = {7, 4, 3, 2, 1, 1, 1, 1}}).imported());
   // Sizes beyond the stated number of dimensions are ignored.
