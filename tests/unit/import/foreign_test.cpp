@@ -165,12 +165,19 @@ TEST(ForeignPairs, AreReadWithTheirImage) {
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
     EXPECT_THAT(codes_of(outcome), IsEmpty());
   }
-  const std::string version_2 = nifti({.version = 2, .magic = "ni2\0\r\n\032\n"s}, kSamples);
+  const std::string version_2 = nifti({.version = 2, .magic = "ni2\0\r\n\032\n"s}, "");
   for (const std::string& alone : {header, version_2}) {
     EXPECT_THAT(import_bytes(alone).error, HasSubstr("in an .img file, which is missing"));
   }
   EXPECT_THAT(import_bytes(zip({{"a.hdr", header}, {"b.img", kSamples}})).error,
               HasSubstr("in an .img file, which is missing"));
+  // The magic of a pair in a file that has its samples.
+  const std::string whole = nifti({.magic = "ni1\0"s}, kSamples);
+  for (const std::string& file : {whole, gzip(whole)}) {
+    const Outcome outcome = imported(import_bytes(file));
+    EXPECT_EQ(outcome.sample_bytes(), kSamples);
+    EXPECT_THAT(codes_of(outcome), ElementsAre("header-corrected"));
+  }
 }
 
 TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
@@ -188,6 +195,20 @@ TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{2, 2, 3}));
   EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3, 2, -1.5}));
   EXPECT_THAT(outcome.volume.notes[0].detail, Not(HasSubstr("orient")));
+  // SPM's origin, counted from 1; text of other programs is far from the volume.
+  const auto with_origin = [&](const std::vector<std::int16_t>& origin) {
+    std::string spms = header;
+    spms.replace(253, origin.size() * 2, bytes_of(origin));
+    return imported(import_bytes(zip({{"a.hdr", spms}, {"a.img", kSamples}}))).volume;
+  };
+  const Volume spms = with_origin({-3, 5, -1, 0, 0});
+  EXPECT_EQ(spms.geometry.origin, (Vector{8, 8, 6}));
+  EXPECT_EQ(spms.geometry.direction, outcome.volume.geometry.direction);
+  EXPECT_THAT(spms.notes[0].detail, HasSubstr("where SPM's field \"originator\" has it"));
+  for (const std::vector<std::int16_t>& text :
+       {std::vector<std::int16_t>{0x4f4a, 0x4e48, 0, 0, 0}, std::vector<std::int16_t>{1, -3, 1}}) {
+    EXPECT_EQ(with_origin(text).geometry, outcome.volume.geometry);
+  }
   header[252] = 2;
   const Outcome sagittal = import_bytes(zip({{"a.hdr", header}, {"a.img", kSamples}}));
   EXPECT_EQ(sagittal.volume.geometry, outcome.volume.geometry);
