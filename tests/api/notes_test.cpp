@@ -40,7 +40,7 @@ const std::string kSamples = "abcdefghijklmnopqrstuvwx";  // 4 x 3 x 2
 // --- Files that show a note each -----------------------------------------------------------------
 
 // Without a spacing a header gets a note.
-const std::string kSpaced = "spacings: 1 1 1\n";
+const std::string kSpaced = "space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n";
 
 std::string nrrd(const std::string& fields, const std::string& samples = kSamples) {
   return "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n" + fields + '\n' +
@@ -127,13 +127,13 @@ struct Shown {
   std::vector<std::string> options = {};
 };
 
-// By the note's name, so that whoever adds a note adds how it is shown.
 std::string nearly_whole() {
   std::vector<float> labels(24, 0);
   for (std::size_t at = 8; at < 16; ++at) labels[at] = 0.9999F;
-  return nifti({.datatype = 16, .bitpix = 32}, bytes_of(labels));
+  return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(labels));
 }
 
+// By the note's name, so that whoever adds a note adds how it is shown.
 const std::map<std::string, Shown>& shown() {
   static const std::map<std::string, Shown> all = {
       {"forms-differ", {{{"a.nii", nifti({.qform_code = 1, .qoffset = {3, 0, 0}}, kSamples)}}}},
