@@ -44,7 +44,8 @@ Vector3 spacing_of(const NiftiHeader& header, SourceVolume& volume) {
     } else if (spacing[axis] != said) {
       corrections += (corrections.empty() ? "" : " ") +
                      ("The voxel size along " + axis_name(axis)) + " is " + to_text(said) +
-                     " and was read as " + to_text(spacing[axis]) + ".";
+                     " and was read as " + to_text(spacing[axis]) +
+                     (said < 0 ? ". Some programs mirror the axis instead." : ".");
     }
   }
   if (!corrections.empty()) volume.notes.push_back(corrected_note(corrections));
