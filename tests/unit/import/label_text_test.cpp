@@ -9,6 +9,7 @@
 #include "server/import/labels/label_table.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
+#include "tests/unit/import/other_writers.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
@@ -222,10 +223,22 @@ TEST(LabelsBeside, DoNotMakeLabelsOfImages) {
   EXPECT_FALSE(is_image(samples, all));
 }
 
+TEST(LabelsBeside, AreThoseOfAStackOfPictures) {
+  const std::string picture = grey_png(4, std::string("\0\0\1\1\0\0\1\1\0\0\1\1", 12));
+  const Outcome outcome = imported(
+      import_bytes(zip({{"m/1.png", picture}, {"m/2.png", picture}, {"m/names.txt", "1 liver\n"}}),
+                   {}, {.spacing = std::array<double, 3>{1, 1, 1}}));
+  EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(1, "liver")));
+  EXPECT_THAT(outcome.volume.ignored, IsEmpty());
+}
+
 TEST(LabelsBeside, OfOtherLabelsAreNotUsed) {
   const Outcome outcome =
       imported(import_bytes(zip({{"a.nii", label_volume()}, {"a.txt", "7 heart\n0 air\n"}})));
   EXPECT_THAT(outcome.volume.labels, IsEmpty());
+  ASSERT_THAT(outcome.volume.ignored, SizeIs(1));
+  EXPECT_EQ(outcome.volume.ignored[0].name, "a.txt");
+  EXPECT_THAT(outcome.volume.ignored[0].reason, HasSubstr("were not used"));
   EXPECT_THAT(outcome.volume.notes[0].detail,
               HasSubstr("The table \"a.txt\" names none of the labels, so it was not used."));
 }
