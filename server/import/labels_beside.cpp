@@ -178,7 +178,7 @@ bool become_labels(const Table& table, const ImportTask& task, Volume& volume) {
                        ". So the samples were read as labels.";
   if (!is_integer(volume.type)) {
     const std::string stored(to_string(volume.type));
-    if (!numbers->is_exact) volume.notes.push_back(rounded_note(volume.type));
+    if (!numbers->is_exact) volume.notes.push_back(volume::rounded_note(volume.type));
     convert(samples, numbers->type, task, volume);
     detail += " The whole numbers, " + stored + " in the file, are now " +
               std::string(to_string(volume.type)) + '.';

@@ -251,18 +251,29 @@ void store_whole(std::span<const std::byte> samples, SampleType from, SampleType
   });
 }
 
+Note rounded_note(SampleType stored) {
+  return note_of(NoteCode::kLabelsRounded,
+                 "The labels are stored as " + std::string(to_string(stored)) +
+                     ", and some are not quite whole numbers. They were rounded; no sample changed "
+                     "by more than 0.001.");
+}
+
 template <class Sample>
-void round_labels(std::span<const Sample> samples, std::int32_t* target) {
+bool round_labels(std::span<const Sample> samples, std::int32_t* target) {
+  bool is_rounded = false;
   for (const Sample sample : samples) {
     const auto value = static_cast<double>(sample);
     constexpr double kMost = std::numeric_limits<std::int32_t>::max();
     if (!is_nearly_whole(value) || value > kMost) throw_no_label(value);
-    *target++ = static_cast<std::int32_t>(whole_number(value));
+    const auto whole = static_cast<std::int32_t>(whole_number(value));
+    is_rounded = is_rounded || static_cast<double>(whole) != value;
+    *target++ = whole;
   }
+  return is_rounded;
 }
 
-template void round_labels(std::span<const float> samples, std::int32_t* target);
-template void round_labels(std::span<const double> samples, std::int32_t* target);
+template bool round_labels(std::span<const float> samples, std::int32_t* target);
+template bool round_labels(std::span<const double> samples, std::int32_t* target);
 
 std::optional<std::int64_t> mask_value(std::span<const std::byte> samples, SampleType type,
                                        const std::array<double, 2>& range) {

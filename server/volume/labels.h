@@ -38,9 +38,13 @@ void store_whole(std::span<const std::byte> samples, SampleType from, SampleType
                  std::byte* target);
 
 // Rounds floats of which a job by labels was asked. Throws Error kUnusableVolume with the first
-// that is not nearly whole, or beyond 32 bits with a sign, and the way out. Thread safe.
+// that is not nearly whole, or beyond 32 bits with a sign, and the way out. Returns true if one had
+// to be rounded. Thread safe.
 template <class Sample>
-void round_labels(std::span<const Sample> samples, std::int32_t* target);
+bool round_labels(std::span<const Sample> samples, std::int32_t* target);
+
+// For labels that were stored as this type and had to be rounded.
+Note rounded_note(SampleType stored);
 
 // The number of distinct values if the volume looks like a label map; otherwise empty. A label map
 // has at least two but few values, and most neighbours along x are equal, not counting pairs of

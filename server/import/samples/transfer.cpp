@@ -97,7 +97,7 @@ bool store_whole_numbers(const SampleKind& kind, CanonicalWriter& writer, Volume
     return false;
   }
   volume::store_whole(samples, volume.type, numbers->type, samples.data());
-  if (!numbers->is_exact) volume.notes.push_back(rounded_note(volume.type));
+  if (!numbers->is_exact) volume.notes.push_back(volume::rounded_note(volume.type));
   volume.type = numbers->type;
   writer.shorten({volume.dims, volume.type, volume.geometry});
   return true;
@@ -280,13 +280,6 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
 }
 
 }  // namespace
-
-Note rounded_note(SampleType stored) {
-  return note_of(NoteCode::kLabelsRounded,
-                 "The labels are stored as " + std::string(to_string(stored)) +
-                     ", and some are not quite whole numbers. They were rounded; no sample changed "
-                     "by more than 0.001.");
-}
 
 void refuse_spacing(const ImportOptions& options) {
   if (!options.spacing) return;

@@ -32,9 +32,6 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
 // is invalid or its samples cannot be decoded, kTooLarge beyond the task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
-// For labels that were stored as this type and are not quite whole.
-Note rounded_note(SampleType stored);
-
 // Throws Error kInvalidParameter for the option `spacing` of a file that has its own.
 void refuse_spacing(const ImportOptions& options);
 

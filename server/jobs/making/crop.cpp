@@ -111,7 +111,7 @@ void CroppedSamples::round() {
     using Sample = decltype(sample);
     if constexpr (std::is_floating_point_v<Sample>) {
       const auto* first = reinterpret_cast<const Sample*>(array_.bytes);
-      volume::round_labels(std::span(first, count), rounded_.data());
+      is_rounded_ = volume::round_labels(std::span(first, count), rounded_.data());
     }
   });
   copy_.resize_for_overwrite(0);

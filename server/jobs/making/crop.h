@@ -36,7 +36,10 @@ class CroppedSamples {
 
   const SampleArray& array() const { return array_; }
 
-  // The memory of samples that were rounded.
+  // True if a sample was no whole number.
+  bool is_rounded() const { return is_rounded_; }
+
+  // The memory of floats that became integers.
   std::uint64_t rounded_bytes() const { return rounded_.size() * sizeof(std::int32_t); }
 
  private:
@@ -46,6 +49,7 @@ class CroppedSamples {
   SampleArray array_;
   mesh::Buffer<std::byte> copy_;
   mesh::Buffer<std::int32_t> rounded_;
+  bool is_rounded_ = false;
 };
 
 }  // namespace isomesh::jobs

@@ -216,6 +216,7 @@ TEST_F(LabelJobsTest, OfFloatsAreThoseOfTheirWholeNumbers) {
   const auto meshes = [&](const Volume& volume, std::optional<Box> crop) {
     JobParameters parameters = label_parameters({});
     parameters.crop = crop;
+    parameters.formats = {MeshFormat::kGlb};
     return run(volume, settled(volume, parameters)).mesh;
   };
   for (const std::optional<Box>& crop :
@@ -226,6 +227,11 @@ TEST_F(LabelJobsTest, OfFloatsAreThoseOfTheirWholeNumbers) {
     EXPECT_EQ(mesh.labels[0].label, 3);
     EXPECT_EQ(mesh.labels[0].voxels, expected.labels[0].voxels);
     EXPECT_EQ(mesh.labels[0].volume_mm3, expected.labels[0].volume_mm3);
+    const auto tells = [&](const MeshSummary& of) {
+      return blob(of.files.at(MeshFormat::kGlb).sha256).find("labels-rounded") != std::string::npos;
+    };
+    EXPECT_FALSE(tells(expected));
+    EXPECT_TRUE(tells(mesh));
   }
   floats.samples[7] = 0.25;
   const Volume fractions = add(floats, SampleType::kFloat32);
