@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,7 +14,10 @@
 #include "server/import/labels/label_table.h"
 #include "server/import/labels/label_text.h"
 #include "server/import/readers.h"
+#include "server/import/samples/transfer.h"
 #include "server/import/source/reader.h"
+#include "server/volume/canonical.h"
+#include "server/volume/labels.h"
 
 namespace isomesh::import {
 namespace {
@@ -107,25 +111,117 @@ std::vector<Table> tables_beside(const Companions& companions) {
   return tables;
 }
 
+auto labels_note_of(Volume& volume) {
+  return std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
+}
+
+bool names(const Table& table, std::int64_t value) {
+  const auto found = std::ranges::lower_bound(table.labels, value, {}, &LabelEntry::label);
+  return found != table.labels.end() && found->label == value;
+}
+
+// How many of the values a table names. 0 is the background, which needs no name.
+struct Naming {
+  std::size_t named = 0;
+  std::size_t values = 0;  // without 0
+
+  bool is_any() const { return named > 0; }
+  bool is_most() const { return is_any() && named * 2 >= values; }
+  std::string text() const {
+    return std::to_string(named) + " of the " + std::to_string(values) +
+           (values == 1 ? " value" : " different values") + " other than 0";
+  }
+};
+
+Naming naming_of(const Table& table, const std::vector<std::int64_t>& values) {
+  Naming naming;
+  for (const std::int64_t value : values) {
+    if (value == 0) continue;
+    ++naming.values;
+    if (names(table, value)) ++naming.named;
+  }
+  return naming;
+}
+
+// A table lies beside images, too, and large ones name each value of a byte. So the samples must be
+// few different values, or at least lie in small regions, which hardly any neighbours of an image
+// do.
+bool could_be_labels(std::span<const std::byte> samples, const Volume& volume, std::size_t values) {
+  constexpr std::size_t kFew = 64;
+  constexpr double kSmallRegions = 0.3;
+  return values <= kFew ||
+         volume::share_of_equal_neighbours(samples, volume.type, volume.dims) >= kSmallRegions;
+}
+
+// Replaces the volume's canonical file, which stays mapped as `samples`, by one of integers.
+void convert(std::span<const std::byte> samples, SampleType type, const ImportTask& task,
+             Volume& volume) {
+  const SampleType stored = std::exchange(volume.type, type);
+  std::filesystem::remove(task.target);
+  CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
+  volume::store_whole(samples, stored, type, writer.samples().data());
+  volume = finish(writer, std::move(volume));
+}
+
+// Makes labels of the volume in the task's target if its samples could be those that the table
+// names: whole numbers, none negative, most of them named. Adds a note then. Returns false if not.
+bool become_labels(const Table& table, const ImportTask& task, Volume& volume) {
+  const volume::CanonicalVolume canonical(task.target);
+  const std::span<const std::byte> samples = canonical.samples();
+  const auto numbers = volume::whole_numbers(samples, volume.type);
+  if (!numbers || numbers->low < 0) return false;
+  const auto values = volume::distinct_values(samples, volume.type, Volume::kMostLabels + 1);
+  if (!values) return false;
+  const Naming naming = naming_of(table, *values);
+  if (!naming.is_most() || !could_be_labels(samples, volume, values->size())) return false;
+  std::string detail = "A table of names is beside the file, and it names " + naming.text() +
+                       ". So the samples were read as labels.";
+  if (!is_integer(volume.type)) {
+    const std::string stored(to_string(volume.type));
+    if (!numbers->is_exact) volume.notes.push_back(volume::rounded_note(volume.type));
+    convert(samples, numbers->type, task, volume);
+    detail += " The whole numbers, " + stored + " in the file, are now " +
+              std::string(to_string(volume.type)) + '.';
+  }
+  volume.notes.push_back(note_of(NoteCode::kLooksLikeLabels, detail));
+  return true;
+}
+
+// The values of a volume that looks like labels.
+Naming naming_in(const Table& table, const ImportTask& task, const Volume& volume) {
+  const volume::CanonicalVolume canonical(task.target);
+  const auto values =
+      volume::distinct_values(canonical.samples(), volume.type, Volume::kMostLabels + 1);
+  return values ? naming_of(table, *values) : Naming{};
+}
+
 }  // namespace
 
 bool is_label_table(const std::filesystem::path& path) { return !labels_of(path).empty(); }
 
-void take_labels_beside(const Companions& companions, Volume& volume) {
-  if (!is_integer(volume.type)) return;
-  const auto note =
-      std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
-  if (!volume.labels.empty() || note == volume.notes.end()) return;
+void take_labels_beside(const Companions& companions, const ImportTask& task, Volume& volume) {
+  if (!volume.labels.empty()) return;
   std::vector<Table> tables = tables_beside(companions);
   if (tables.empty()) return;
   if (tables.size() > 1) {
+    const auto note = labels_note_of(volume);
+    if (note == volume.notes.end()) return;
     note->detail +=
         " Several tables of label names fit, so none was used: " + in_quotes(tables[0].name) +
         " and " + in_quotes(tables[1].name) + (tables.size() > 2 ? ", among others." : ".");
     return;
   }
-  volume.labels = std::move(tables.front().labels);
-  note->detail += " The names of the labels are from " + in_quotes(tables.front().name) + '.';
+  Table& table = tables.front();
+  if (labels_note_of(volume) == volume.notes.end()) {
+    if (!become_labels(table, task, volume)) return;
+  } else if (!naming_in(table, task, volume).is_any()) {
+    labels_note_of(volume)->detail +=
+        " The table " + in_quotes(table.name) + " names none of the labels, so it was not used.";
+    return;
+  }
+  labels_note_of(volume)->detail +=
+      " The names of the labels are from " + in_quotes(table.name) + '.';
+  volume.labels = std::move(table.labels);
 }
 
 }  // namespace isomesh::import

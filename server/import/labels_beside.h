@@ -8,11 +8,16 @@
 
 namespace isomesh::import {
 
-// Adds labels from a text table among the companions to a volume whose samples look like labels and
-// whose own file names none. A table belongs to the volume whose name it begins with; a table
-// without a volume belongs to all. If several tables fit, none is used: no name is better than a
-// wrong one. The note on labels lists the table, or the candidates.
-void take_labels_beside(const Companions& companions, Volume& volume);
+// Adds labels from a text table among the companions to a volume whose own file names none, and
+// whose canonical file is the task's target. The volume must look like labels, of which the table
+// names one at least. Other volumes become labels if the table says so: all samples are whole or
+// nearly whole numbers, none is negative, the table names at least half of their values other than
+// 0, and these are few or lie in regions. Floats then become integers. So a table beside an image
+// changes nothing.
+// A table belongs to the volume whose name it begins with; a table without a volume belongs to all.
+// If several tables fit, none is used: no name is better than a wrong one. The note on labels lists
+// the table, or the candidates.
+void take_labels_beside(const Companions& companions, const ImportTask& task, Volume& volume);
 
 bool is_label_table(const std::filesystem::path& path);
 

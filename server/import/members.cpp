@@ -64,7 +64,7 @@ class Members {
 
   const std::vector<ArchiveMember>& all() const { return all_; }
 
-  Companions companions_of(const ArchiveMember& header) const { return {files_, header.name}; }
+  Companions companions_of(const std::string& name) const { return {files_, name}; }
 
   // The files with a header's samples. Throws Error kUnusableVolume if they are missing.
   std::vector<std::filesystem::path> data_of(const FoundVolume& found) const;
@@ -82,7 +82,7 @@ class Members {
 std::vector<std::filesystem::path> Members::data_of(const FoundVolume& found) const {
   std::vector<std::filesystem::path> data;
   const auto& [member, reader, doubles] = found;
-  const Companions companions = companions_of(member);
+  const Companions companions = companions_of(member.name);
   for (const std::string& name :
        data_names_of(*reader, InputFile(member.path), companions, input_.task)) {
     data.push_back(companion(name, companions));
@@ -303,9 +303,11 @@ void ignore(const Contents& contents, Volume& volume) {
   }
   for (const ArchiveMember& other : contents.others) {
     if (volume.ignored.size() >= kMostNamed) return;
-    if (is_label_table(other.path)) continue;
-    volume.ignored.push_back(
-        {printable(base_of(other.name)), "it is not a volume in a supported format"});
+    const bool is_table = is_label_table(other.path);
+    if (is_table && !volume.labels.empty()) continue;
+    volume.ignored.push_back({printable(base_of(other.name)),
+                              is_table ? "its names of labels were not used for this volume"
+                                       : "it is not a volume in a supported format"});
   }
 }
 
@@ -314,7 +316,7 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   const auto& [member, reader, doubles] = found;
   members.complete(found);
   Volume volume = read_input(*reader, {.path = member.path,
-                                       .companions = members.companions_of(member),
+                                       .companions = members.companions_of(member.name),
                                        .task = input.task,
                                        .listener = input.listener});
   volume.name = std::string(base_of(member.name));
@@ -326,10 +328,12 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
   return volume;
 }
 
-Volume read_stack(const Stack& stack, const Contents& contents, const Input& input) {
+Volume read_stack(const Stack& stack, const Contents& contents, const Members& members,
+                  const Input& input) {
   if (input.listener) input.listener(stack.reader->name);
   Volume volume = import_images(stack.files, input.task);
   volume.format = stack.reader->name;
+  take_labels_beside(members.companions_of(stack.files.front().name), input.task, volume);
   if (stack.files.size() == 1) volume.name = std::string(base_of(stack.name));
   ignore(contents, volume);
   return volume;
@@ -381,7 +385,7 @@ Volume read_members(Members& members, const Input& input) {
   const auto stack = std::ranges::find_if(contents.stacks, [&](const Stack& each) {
     return asked.empty() ? count == 1 : each.name == asked;
   });
-  if (stack != contents.stacks.end()) return read_stack(*stack, contents, input);
+  if (stack != contents.stacks.end()) return read_stack(*stack, contents, members, input);
   if (asked.empty() && count == 1) {
     return read_file(contents.volumes.front(), contents, members, input);
   }

@@ -71,7 +71,9 @@ Volume parse(const Reader& reader, const Input& input) {
   } else {
     volume = reader.parse(input);
   }
-  if (reader.content == Content::kVolume) take_labels_beside(input.companions, volume);
+  if (reader.content == Content::kVolume) {
+    take_labels_beside(input.companions, input.task, volume);
+  }
   if (reader.content != Content::kFiles) volume.format = reader.name;
   return volume;
 }

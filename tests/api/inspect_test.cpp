@@ -98,10 +98,14 @@ TEST_F(InspectTest, LabelsHaveTheNamesOfTheUpload) {
 }
 
 TEST_F(InspectTest, FractionsHaveNoLabels) {
-  const Volume fractions = volume_from_json(
-      daemon_.send("POST", "/v1/volumes?dims=2,2,2&type=float32", std::string(32, '\0')).body);
-  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/" + fractions.id + "/labels"),
-                         ErrorCode::kUnusableVolume));
+  // Samples of 0.5.
+  std::string samples;
+  for (int at = 0; at < 8; ++at) samples += std::string("\0\0\0\x3f", 4);
+  const Volume fractions =
+      volume_from_json(daemon_.send("POST", "/v1/volumes?dims=2,2,2&type=float32", samples).body);
+  const Answer answer = daemon_.get("/v1/volumes/" + fractions.id + "/labels");
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kUnusableVolume));
+  EXPECT_THAT(answer.body, testing::HasSubstr("one of the samples is 0.5"));
 }
 
 TEST_F(InspectTest, ASliceIsTheSamplesOfTheUpload) {

@@ -40,7 +40,7 @@ const std::string kSamples = "abcdefghijklmnopqrstuvwx";  // 4 x 3 x 2
 // --- Files that show a note each -----------------------------------------------------------------
 
 // Without a spacing a header gets a note.
-const std::string kSpaced = "spacings: 1 1 1\n";
+const std::string kSpaced = "space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n";
 
 std::string nrrd(const std::string& fields, const std::string& samples = kSamples) {
   return "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n" + fields + '\n' +
@@ -148,17 +148,24 @@ struct Shown {
   std::vector<std::string> options = {};
 };
 
+std::string nearly_whole() {
+  std::vector<float> labels(24, 0);
+  for (std::size_t at = 8; at < 16; ++at) labels[at] = 0.9999F;
+  return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(labels));
+}
+
 // By the note's name, so that whoever adds a note adds how it is shown.
 const std::map<std::string, Shown>& shown() {
   static const std::map<std::string, Shown> all = {
       {"forms-differ", {{{"a.nii", nifti({.qform_code = 1, .qoffset = {3, 0, 0}}, kSamples)}}}},
       {"pixdim-differs", {{{"a.nii", nifti({.pixdim = {1, 2, 2, 2, 1, 1, 1, 1}}, kSamples)}}}},
       {"volume-chosen", {{{"a.nii", two_times()}}, {"--volume", "1"}}},
-      {"space-assumed",
-       {{{"a.nrrd",
-          "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 4 3 2 1\nencoding: raw\nspace "
-          "dimension: 4\nspace directions: (1,0,0,0) (0,1,0,0) (0,0,1,0) (0,0,0,1)\n\n" +
-              kSamples}}}},
+      {"space-assumed", {{{"a.nrrd", nrrd("")}}}},
+      {"frames-as-slices",
+       {{{"a.nrrd", nrrd("kinds: domain domain time\n")}}, {"--accept", "frames-as-slices"}}},
+      {"header-corrected", {{{"a.nii", nifti({.bitpix = 16}, kSamples)}}}},
+      {"rescale-ignored", {{{"a.nii", nifti({.intercept = 5}, kSamples)}}}},
+      {"labels-rounded", {{{"a.nii", nearly_whole()}}}},
       {"unit-unknown",
        {{{"a.nrrd",
           nrrd("space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace units: \"pixel\" "

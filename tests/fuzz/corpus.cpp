@@ -38,6 +38,14 @@ std::string layered_nrrd() {
                      "Segment0_Color:=1 0.5 0\nSegment1_LabelValue:=1\nSegment1_Layer:=1\n");
 }
 
+std::string nrrd_of_mitk() {
+  std::string file = nrrd(small_nrrd(), kSamples);
+  return file.insert(file.find("\n\n") + 1,
+                     "modality:=org.mitk.multilabel.segmentation\n"
+                     "org.mitk.multilabel.segmentation.labelgroups:=[{\"labels\": [{\"value\": 97, "
+                     "\"name\": \"a\", \"color\": {\"value\": [1, 0, 0]}}]}]\n");
+}
+
 std::vector<std::string> nifti_files() {
   return {
       labelled_nifti(),
@@ -65,6 +73,7 @@ std::vector<std::string> nrrd_files() {
   for (int at = 0; at < 24; ++at) digits += std::to_string(at) + " ";
   return {nrrd(small_nrrd(), kSamples),
           layered_nrrd(),
+          nrrd_of_mitk(),
           encoded("gzip", gzip(kSamples)),
           encoded("ascii", digits),
           encoded("hex", std::string(48, 'a')),
@@ -165,7 +174,13 @@ std::vector<std::string> other_files(std::string_view name) {
 std::vector<std::string> archive_files() {
   const std::string mhd = metaimage(with(small_metaimage(), "ElementDataFile", "a.raw"), "");
   const std::string nhdr = nrrd(with(small_nrrd(), "data file", "a.raw"), "");
+  const std::string skips = nrrd(
+      with(with(with(small_nrrd(), "data file", "a.raw"), "line skip", "1"), "byte skip", "2"), "");
+  const std::vector<float> labels(24, 2);
   return {zip({{"a.mhd", mhd}, {"a.raw", kSamples}}),
+          zip({{"a.nhdr", skips}, {"a.raw", "a line\n##" + kSamples}}),
+          zip({{"a.nii", nifti({.datatype = 16, .bitpix = 32}, bytes_of(labels))},
+               {"a.txt", "2 liver\n"}}),
           tar({{"a.nhdr", nhdr}, {"a.raw", kSamples}}),
           gzip(tar({{"a.nii", nifti({}, kSamples)}})),
           without_name(tar({{"a.nii", nifti({}, kSamples)}, {"b", "text"}}), "b"),

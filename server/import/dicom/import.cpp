@@ -145,7 +145,7 @@ std::optional<Volume> write_image(const Stack& stack, Volume volume, OpenFile& f
   if (!write_samples(stack, volume.type, file, writer.samples(), padding)) return std::nullopt;
   const std::uint64_t left_out =
       padding.is_empty() ? 0 : leave_out_padding(padding, task.options, writer.samples(), volume);
-  return finish(writer, std::move(volume), left_out);
+  return finish(writer, std::move(volume), {.left_out = left_out});
 }
 
 // As write_image, with the labels found in the samples.

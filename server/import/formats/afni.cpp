@@ -171,7 +171,7 @@ SourceVolume parse_afni(const InputFile& file, const Companions& companions,
   SourceVolume volume = describe(attributes, options);
   if (name.ends_with(".gz")) volume.encoding = Encoding::kDeflate;
   if (name.ends_with(".bz2")) volume.encoding = Encoding::kBzip2;
-  volume.data_files = data_files_of({name}, companions, 0, volume);
+  volume.data_files = data_files_of({name}, companions, {}, volume);
   return volume;
 }
 

@@ -286,6 +286,16 @@ Difference difference_of(const HeaderTexts& fields, const std::vector<std::uint6
           .title = [&](std::uint64_t index) { return place_of(fields, sizes, index); }};
 }
 
+// PLUS and 3D Slicer write tracked ultrasound so: one of the three axes counts images. Older
+// versions only add a field for each image.
+bool are_frames(const HeaderTexts& fields) {
+  const std::string lowered = lower(value_of(fields, "Kinds"));
+  const auto kinds = words(lowered);
+  return std::ranges::any_of(kinds, [](auto kind) { return kind == "list" || kind == "time"; }) ||
+         std::ranges::any_of(
+             fields, [](const auto& field) { return field.first.starts_with("Seq_Frame"); });
+}
+
 // Sets dims, type and encoding, and selects one of several volumes.
 SourceVolume samples_of(const HeaderTexts& fields, const std::vector<std::uint64_t>& sizes,
                         const ImportOptions& options) {
@@ -301,7 +311,9 @@ SourceVolume samples_of(const HeaderTexts& fields, const std::vector<std::uint64
                 "The samples were changed by the slope and offset of the MetaImage header. "
                 "Programs that ignore these show other values."));
   }
-  choose_volume(volumes_beyond(sizes), difference_of(fields, sizes), options, volume);
+  if (sizes.size() == 3 && are_frames(fields)) accept_frames(sizes[2], options, volume);
+  const std::uint64_t volumes = volumes_of_frames(volumes_beyond(sizes), options, volume);
+  choose_volume(volumes, difference_of(fields, sizes), options, volume);
   return volume;
 }
 
@@ -329,7 +341,7 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   SourceVolume volume = samples_of(fields, sizes, options);
   if (is_detached(fields)) {
     volume.data_files =
-        data_files_of(data_names(file, header), companions, data_skip(fields), volume);
+        data_files_of(data_names(file, header), companions, {.bytes = data_skip(fields)}, volume);
   } else {
     volume.payload = payload_of(file, header, volume);
   }

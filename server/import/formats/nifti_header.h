@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -21,10 +22,11 @@ inline constexpr std::size_t kNiftiHeaderBytes = 540;
 // In this machine's byte order.
 struct NiftiHeader {
   bool big_endian = false;
-  bool is_analyze = false;   // an Analyze header, without a position in space
-  int analyze_orient = 0;    // the slices' direction in an Analyze header, by its manual
-  bool is_detached = false;  // the samples are in another file
-  std::int64_t bytes = 0;    // of the header
+  bool is_analyze = false;  // an Analyze header, without a position in space
+  int analyze_orient = 0;   // the slices' direction in an Analyze header, by its manual
+  std::array<std::int64_t, 3> spm_origin = {};  // SPM's in an Analyze header, counted from 1; or 0
+  bool is_detached = false;                     // the samples are in another file
+  std::int64_t bytes = 0;                       // of the header
   std::array<std::int64_t, 8> dim = {};
   std::array<double, 8> pixdim = {};
   int intent = 0;
@@ -39,14 +41,17 @@ struct NiftiHeader {
   std::array<double, 3> quaternion = {};
   Vector3 qoffset = {};
   std::array<double, 12> srow = {};  // row-major, 3 x 4
+  // Fields without a meaning that were read as nibabel and ITK read them: a sentence each.
+  std::vector<std::string> corrections;
 };
 
 // True if a file of one of the three begins so. Analyze's header, without a magic number, is
 // recognised by its size field and by fields with few possible values, or by a size of 348 bytes.
+// A NIfTI-1 header may have another size field.
 // So `head` must have more bytes of a larger file.
 bool begins_as_nifti(std::string_view head);
 
-// Throws Error kUnusableVolume.
+// Corrects single fields that contradict the others. Throws Error kUnusableVolume.
 NiftiHeader read_nifti_header(std::string_view head);
 
 // The labels of one of the file's volumes, as label_table() returns them: from Caret's LabelTable,

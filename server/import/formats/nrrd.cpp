@@ -2,7 +2,6 @@
 #include <array>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,8 +11,8 @@
 #include "proto/samples.h"
 #include "server/import/formats/file_pattern.h"
 #include "server/import/formats/format_readers.h"
+#include "server/import/formats/nrrd_segments.h"
 #include "server/import/formats/nrrd_space.h"
-#include "server/import/labels/label_table.h"
 #include "server/import/source/line_reader.h"
 #include "server/import/source/reader.h"
 
@@ -129,19 +128,6 @@ bool is_big_endian(const NrrdFields& fields, StoredType type, Encoding encoding)
   return false;
 }
 
-// Lines of another format, which may be of any number and length, so they are never held whole.
-std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t count) {
-  LineReader lines(file, {}, offset);
-  while (count > 0) {
-    const std::string_view piece = lines.view();
-    if (piece.empty()) throw_unusable("The file ends within the lines that its header skips.");
-    const std::size_t end = piece.find('\n');
-    if (end != piece.npos) --count;
-    lines.drop(end == piece.npos ? piece.size() : end + 1);
-  }
-  return lines.offset();
-}
-
 std::int64_t skip_field(const NrrdFields& fields, std::string_view name) {
   const std::string_view text = value_of(fields, name);
   if (text.empty()) return 0;
@@ -151,6 +137,12 @@ std::int64_t skip_field(const NrrdFields& fields, std::string_view name) {
                    ", not a whole number of -1 or more.");
   }
   return *count;
+}
+
+std::uint64_t line_skip(const NrrdFields& fields) {
+  const std::int64_t lines = skip_field(fields, "lineskip");
+  if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
+  return static_cast<std::uint64_t>(lines);
 }
 
 bool is_stream(const SourceVolume& volume) {
@@ -170,8 +162,7 @@ Skip byte_skip(const NrrdFields& fields, const SourceVolume& volume) {
 
 std::uint64_t payload_offset(const InputFile& file, const NrrdHeader& header,
                              SourceVolume& volume) {
-  const std::int64_t lines = skip_field(header.fields, "lineskip");
-  if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
+  const std::uint64_t lines = line_skip(header.fields);
   const Skip skip = byte_skip(header.fields, volume);
   if (!skip && volume.encoding == Encoding::kRaw) {
     if (file.size() < header.bytes + volume.stored_bytes()) {
@@ -179,7 +170,7 @@ std::uint64_t payload_offset(const InputFile& file, const NrrdHeader& header,
     }
     return file.size() - volume.stored_bytes();
   }
-  const std::uint64_t begin = skip_lines(file, header.bytes, static_cast<std::uint64_t>(lines));
+  const std::uint64_t begin = skip_lines(file, header.bytes, lines);
   if (is_stream(volume)) volume.decoded_skip = skip;
   const std::uint64_t offset = is_stream(volume) ? begin : begin + *skip;
   if (offset > file.size()) throw_unusable("The file ends before its samples begin.");
@@ -205,135 +196,33 @@ bool has_own_header(const std::string& name, const Companions& companions) {
 
 std::vector<DataFile> data_files(const InputFile& file, const NrrdHeader& header,
                                  const Companions& companions, SourceVolume& volume) {
-  if (skip_field(header.fields, "lineskip") != 0) {
-    throw_unusable("The NRRD header skips lines in a data file, which is not supported.");
-  }
+  const std::uint64_t lines = line_skip(header.fields);
   const std::vector<std::string> names = data_names(file, header);
   Skip skip = byte_skip(header.fields, volume);
-  if (skip == Skip(0) && names.size() == 1 && has_own_header(names.front(), companions)) {
+  if (skip == Skip(0) && lines == 0 && names.size() == 1 &&
+      has_own_header(names.front(), companions)) {
     skip.reset();
     volume.notes.push_back(note_of(NoteCode::kTrailingBytes,
                                    "The data file has a header of its own, which was ignored. The "
                                    "samples were read from the end of the file."));
   }
-  return data_files_of(names, companions, skip, volume);
-}
-
-// --- Segments ------------------------------------------------------------------------------------
-
-// 3D Slicer's, in private keys
-// (https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html).
-struct Segment {
-  std::uint64_t layer = 0;
-  std::int64_t value = 1;
-  LabelEntry entry;  // its label is not set yet
-};
-
-// Returns an empty text if the header does not have it.
-std::string_view own_value(const NrrdFields& fields, std::size_t segment, std::string_view key) {
-  return value_of(fields, own_key("Segment" + std::to_string(segment) + '_' + std::string(key)));
-}
-
-bool is_told(const NrrdFields& fields, std::size_t segment) {
-  return std::ranges::any_of(
-      std::initializer_list<std::string_view>{"ID", "Name", "LabelValue", "Layer"},
-      [&](std::string_view key) { return !own_value(fields, segment, key).empty(); });
-}
-
-std::int64_t number_of(const NrrdFields& fields, std::size_t segment, std::string_view key,
-                       std::int64_t otherwise) {
-  const std::string_view text = own_value(fields, segment, key);
-  if (text.empty()) return otherwise;
-  if (const auto number = parse_int64(text)) return *number;
-  throw_unusable("The NRRD header's \"Segment" + std::to_string(segment) + '_' + std::string(key) +
-                 "\" is " + in_quotes(text) + ", not a whole number.");
-}
-
-// Three numbers, 0..1.
-std::optional<std::string> color_of(std::string_view text) {
-  const std::vector<std::string_view> parts = words(text);
-  std::array<double, 3> color = {};
-  if (parts.size() != color.size()) return std::nullopt;
-  for (std::size_t at = 0; at < color.size(); ++at) {
-    const auto part = parse_double(parts[at]);
-    if (!part) return std::nullopt;
-    color[at] = *part;
-  }
-  return label_color(color);
-}
-
-// Segments without layers and values are those of old versions: one segment per layer if there are
-// several.
-std::vector<Segment> segments_of(const NrrdFields& fields, std::uint64_t layers) {
-  std::vector<Segment> segments;
-  for (std::size_t at = 0; is_told(fields, at); ++at) {
-    const std::int64_t usual = at < layers ? static_cast<std::int64_t>(at) : 0;
-    const std::int64_t layer = number_of(fields, at, "Layer", usual);
-    if (layer < 0 || static_cast<std::uint64_t>(layer) >= layers) {
-      throw_unusable("The NRRD header's segment " + std::to_string(at) + " is in layer " +
-                     std::to_string(layer) + ", but the file has " + std::to_string(layers) +
-                     " layers.");
-    }
-    segments.push_back({.layer = static_cast<std::uint64_t>(layer),
-                        .value = number_of(fields, at, "LabelValue", 1),
-                        .entry = {.name = label_name(own_value(fields, at, "Name")),
-                                  .color = color_of(own_value(fields, at, "Color"))}});
-  }
-  return segments;
-}
-
-void set_own_values(std::vector<Segment> segments, std::uint64_t layer, SourceVolume& volume) {
-  std::vector<LabelEntry> entries;
-  for (Segment& segment : segments) {
-    if (segment.layer != layer) continue;
-    segment.entry.label = segment.value;
-    entries.push_back(std::move(segment.entry));
-  }
-  volume.labels = label_table(std::move(entries));
-}
-
-bool is_label(std::int64_t value) {
-  return value > 0 && value <= static_cast<std::int64_t>(Volume::kMostLabels);
-}
-
-void set_layers(std::vector<Segment> segments, bool is_interleaved, SourceVolume& volume) {
-  SegmentLayers layers = {.is_interleaved = is_interleaved, .labels = {}};
-  std::int64_t next = 1;
-  for (const Segment& segment : segments) {
-    if (is_label(segment.value)) next = std::max(next, segment.value + 1);
-  }
-  std::set<std::int64_t> taken;
-  std::vector<LabelEntry> entries;
-  for (Segment& segment : segments) {
-    if (segment.value == 0 || layers.labels.contains({segment.layer, segment.value})) continue;
-    const bool keeps = is_label(segment.value) && taken.insert(segment.value).second;
-    const std::int64_t label = keeps ? segment.value : next++;
-    if (!is_label(label))
-      throw_unusable("The segmentation needs labels above 65535, the largest that is supported.");
-    layers.labels[{segment.layer, segment.value}] = static_cast<std::uint32_t>(label);
-    segment.entry.label = label;
-    entries.push_back(std::move(segment.entry));
-  }
-  volume.labels = label_table(std::move(entries));
-  volume.layers = std::move(layers);
-}
-
-bool has_segments(const NrrdFields& fields) { return is_told(fields, 0); }
-
-// Sets `volume.labels`, and `volume.layers` if the file's volumes are layers of integers and
-// `is_layer_chosen` is false. A selected layer has only its own segments. A label is a segment's
-// value; if another layer uses the same value, it is a free number above all. Throws Error
-// kUnusableVolume.
-void set_segments(const NrrdFields& fields, bool is_interleaved, bool is_layer_chosen,
-                  SourceVolume& volume) {
-  std::vector<Segment> segments = segments_of(fields, volume.chosen.count);
-  if (volume.chosen.count == 1 || is_layer_chosen) {
-    return set_own_values(std::move(segments), volume.chosen.index, volume);
-  }
-  set_layers(std::move(segments), is_interleaved, volume);
+  return data_files_of(names, companions, {.lines = lines, .bytes = skip}, volume);
 }
 
 // --- The volume ----------------------------------------------------------------------------------
+
+// Tracked ultrasound has pairs for each image.
+bool has_frames(const NrrdFields& fields) {
+  const auto first = fields.lower_bound("Seq_Frame");
+  return first != fields.end() && first->first.starts_with("Seq_Frame");
+}
+
+// The images of a sequence take turns with each sample or row, or follow each other.
+StoredAxes axes_of_frames(std::uint64_t run, std::uint32_t row) {
+  if (run == 1) return {2, 0, 1};
+  if (run == row) return {0, 2, 1};
+  return kXFastest;
+}
 
 // Sets dims, type and encoding, and selects one of several volumes.
 SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
@@ -358,9 +247,12 @@ SourceVolume samples_of(const NrrdFields& fields, const NrrdSizes& sizes,
     return volume;
   }
   const std::string& kind = sizes.volume_kind;
-  choose_volume(sizes.volumes, numbered(kind == "time" ? kind : "their " + kind, kind), options,
-                volume);
-  if (sizes.volumes > 1 && !is_consecutive) volume.chosen.run = sizes.run;
+  if (sizes.volumes == 1 && has_frames(fields)) accept_frames(volume.dims[2], options, volume);
+  const std::uint64_t count =
+      kind == "vector" ? sizes.volumes : volumes_of_frames(sizes.volumes, options, volume);
+  if (count < sizes.volumes) volume.stored_axes = axes_of_frames(sizes.run, volume.dims[0]);
+  choose_volume(count, numbered(kind == "time" ? kind : "their " + kind, kind), options, volume);
+  if (count > 1 && !is_consecutive) volume.chosen.run = sizes.run;
   set_segments(fields, is_interleaved, true, volume);
   return volume;
 }
@@ -403,7 +295,8 @@ MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task) {
   const std::uint64_t samples =
       static_cast<std::uint64_t>(skipped) + volume.most_encoded_bytes() + kHeadroomBytes;
   const std::uint64_t list = kMostTextHeaderBytes + kHeadroomBytes;  // of names
-  if (fields.contains(kDataFile)) return {.file = list, .data = samples};
+  const std::uint64_t lines = line_skip(fields) > 0 ? kMostSkipped : 0;
+  if (fields.contains(kDataFile)) return {.file = list, .data = lines + samples};
   return {.file = header.bytes + samples};
 }
 

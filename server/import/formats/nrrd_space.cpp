@@ -191,7 +191,8 @@ std::vector<Axis> lattice_axes(const NrrdFields& fields, std::span<const std::ui
     throw_unusable("The NRRD header has " + std::to_string(components) +
                    " axes of components. At most one is supported.");
   }
-  if (dimension != 0 && dimension != axes.size()) {
+  const bool is_plane = dimension == 3 && axes.size() == 2;
+  if (dimension != 0 && dimension != axes.size() && !is_plane) {
     throw_unusable("The NRRD header's space has " + std::to_string(dimension) +
                    " dimensions, but its samples lie on " + std::to_string(axes.size()) + " axes.");
   }
@@ -295,6 +296,14 @@ void turn_into_lps(Geometry& geometry, const Space& space) {
   }
 }
 
+// A plane in space: the third axis, along which images follow each other, is perpendicular.
+void set_normal(Geometry& geometry) {
+  auto& m = geometry.direction;
+  m[2] = m[3] * m[7] - m[6] * m[4];
+  m[5] = m[6] * m[1] - m[0] * m[7];
+  m[8] = m[0] * m[4] - m[3] * m[1];
+}
+
 // The unit of all axes of the lattice; empty if the header has none. Components may have others.
 std::string unit_of(const NrrdFields& fields, const std::vector<std::string>& kinds) {
   const bool in_space = fields.contains("spaceunits");
@@ -380,15 +389,57 @@ void place_as_slicer(const NrrdFields& fields, const std::vector<std::uint64_t>&
     }
   }
   turn_into_lps(geometry, {"ras", {-1, -1, 1}});
-  notes.push_back(
-      note_of(NoteCode::kSpaceAssumed,
-              std::string("The NRRD header's space has four dimensions and no name. It "
-                          "was read as RAS, as 3D Slicer does") +
-                  (first ? ". The samples begin where the segment's extent begins." : ".")));
+  notes.push_back(note_of(
+      NoteCode::kSpaceAssumed,
+      std::string("The NRRD header's space has four dimensions and no name. It has segments "
+                  "of 3D Slicer, so it was read as RAS, as 3D Slicer does") +
+          (first ? ". The samples begin where the segment's extent begins." : ".")));
 }
 
-bool is_unnamed_4d(const NrrdFields& fields, std::size_t dimension) {
-  return dimension == 4 && !space_of(fields);
+bool has_pairs_of_slicer(const NrrdFields& fields) {
+  return std::ranges::any_of(fields, [](const auto& field) {
+    return field.first.starts_with("Segment0_") || field.first.starts_with("Segmentation_");
+  });
+}
+
+// ITK gives each axis of samples this kind, and names only spaces of three dimensions.
+bool has_kinds_of_itk(const std::vector<std::string>& kinds) {
+  return std::ranges::all_of(
+      kinds, [](const std::string& kind) { return kind == "domain" || kind == "vector"; });
+}
+
+// The space has four dimensions and no name. The headers of two programs have that. ITK's space is
+// LPS as elsewhere, and old versions of 3D Slicer wrote RAS.
+void place_unnamed_4d(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
+                      const ImportOptions& options, Geometry& geometry, std::vector<Note>& notes) {
+  if (has_pairs_of_slicer(fields)) return place_as_slicer(fields, sizes, geometry, notes);
+  const bool is_of_itk = has_kinds_of_itk(kinds_of(fields, sizes.size()));
+  const std::string reason = "The NRRD header's space has four dimensions and no name";
+  if (!is_of_itk && !options.accepts(NoteCode::kSpaceAssumed)) {
+    throw_overridable(NoteCode::kSpaceAssumed,
+                      reason +
+                          ". Programs that write it so differ: ITK means LPS, old versions of 3D "
+                          "Slicer mean RAS. If accepted, it is read as LPS.");
+  }
+  notes.push_back(note_of(
+      NoteCode::kSpaceAssumed,
+      reason + (is_of_itk ? ". All axes are of the kind \"domain\", as ITK writes them, so it was "
+                            "read as LPS, as ITK does."
+                          : ". It was read as LPS, as ITK does.")));
+}
+
+// A space without a name, or one that is not the patient's.
+void note_space(const NrrdFields& fields, std::vector<Note>& notes) {
+  const std::string_view name = value_of(fields, "space");
+  const std::string lowered = lower(name);
+  if (!name.empty() && lowered != "scanner-xyz" && lowered != "3d-right-handed") return;
+  const std::string reason = name.empty() ? "The NRRD header does not name the space of its axes"
+                                          : "The NRRD header's space, " + in_quotes(name) +
+                                                ", does not say how its axes lie in the patient";
+  notes.push_back(note_of(NoteCode::kSpaceAssumed,
+                          reason +
+                              ". They were read as those of LPS, as ITK reads them. Some other "
+                              "programs read them as RAS."));
 }
 
 void check_handedness(const NrrdFields& fields, const ImportOptions& options,
@@ -421,10 +472,15 @@ Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t
   for (std::size_t at = 0; at < std::min<std::size_t>(axes.size(), 3); ++at) {
     set_step(geometry, at, axes[at], dimension != 0);
   }
+  if (dimension == 3 && axes.size() == 2) set_normal(geometry);
   set_space_origin(geometry, fields, dimension);
   if (dimension == 0 && !axes.empty()) set_origin_from_mins(geometry, axes);
   if (const auto space = space_of(fields)) turn_into_lps(geometry, *space);
-  if (is_unnamed_4d(fields, dimension)) place_as_slicer(fields, sizes, geometry, notes);
+  if (dimension == 4 && !space_of(fields)) {
+    place_unnamed_4d(fields, sizes, options, geometry, notes);
+  } else {
+    note_space(fields, notes);
+  }
   scale_to_millimetres(geometry, unit_of(fields, kinds), notes);
   return geometry;
 }

@@ -76,38 +76,30 @@ void replace_non_finite(std::span<std::byte> samples, SampleType type, double sm
   });
 }
 
-// Converts in place, from the front: samples of the new type are no larger.
-void convert_whole(std::span<std::byte> samples, SampleType from, SampleType to) {
-  with_sample(from, [&](auto stored) {
-    with_sample(to, [&](auto whole) {
-      std::byte* target = samples.data();
-      for (std::size_t at = 0; at < samples.size(); at += sizeof(stored)) {
-        std::memcpy(&stored, samples.data() + at, sizeof(stored));
-        whole = static_cast<decltype(whole)>(stored);
-        std::memcpy(target, &whole, sizeof(whole));
-        target += sizeof(whole);
-      }
-    });
-  });
-}
-
 bool is_wide_integer(const SampleLayout& layout) {
   return !layout.rescale &&
          (layout.type == StoredType::kUint64 || layout.type == StoredType::kInt64);
 }
 
+// Floats that look like labels are a mask, or have few values in flat regions.
+bool are_like_labels(std::span<const std::byte> samples, const Volume& volume) {
+  return volume::mask_value(samples, volume.type, volume.range) ||
+         volume::label_count(samples, volume.type, volume.dims);
+}
+
 // Labels are integers: labels of floats become some, and so do 64-bit integers that fit. Returns
-// true if the samples were converted.
-bool store_whole_numbers(const PlainSamples& plain, std::span<std::byte> samples, Volume& volume) {
+// true if the samples were converted. `volume` has their range.
+bool store_whole_numbers(const SampleKind& kind, std::span<std::byte> samples, Volume& volume) {
   if (is_integer(volume.type)) return false;
-  const auto type = volume::whole_type(samples, volume.type);
-  if (!type) return false;
-  if (!is_wide_integer(plain.layout) && !plain.are_labels && volume.labels.empty() &&
-      !volume::label_count(samples, volume.type, volume.dims)) {
+  const auto numbers = volume::whole_numbers(samples, volume.type);
+  if (!numbers) return false;
+  if (!kind.are_wide && !kind.are_labels && volume.labels.empty() &&
+      !are_like_labels(samples, volume)) {
     return false;
   }
-  convert_whole(samples, volume.type, *type);
-  volume.type = *type;
+  volume::store_whole(samples, volume.type, numbers->type, samples.data());
+  if (!numbers->is_exact) volume.notes.push_back(volume::rounded_note(volume.type));
+  volume.type = numbers->type;
   return true;
 }
 
@@ -123,35 +115,29 @@ Note labels_note(const std::string& reason) {
 }
 
 // Completes the note on labels, if there is one.
-void note_stored_type(const SampleLayout& layout, Volume& volume) {
+void note_stored_type(const std::string& stored, Volume& volume) {
   const auto note = find_labels_note(volume);
   if (note == volume.notes.end()) return;
-  const std::string stored =
-      is_wide_integer(layout) ? "64-bit integers" : std::string(to_string(canonical_type(layout)));
   note->detail += " The whole numbers, " + stored + " in the file, are now " +
                   std::string(to_string(volume.type)) + '.';
 }
 
 // A mask has no grey values that would tell where between two samples its surface lies.
-Note mask_note(std::int64_t value, SampleType type) {
-  const std::string what =
-      "The samples are a mask: each is 0 or " + std::to_string(value) +
-      ". At an iso-value, small structures lose volume. With \"labels\": \"all\" they keep it";
-  return note_of(
-      NoteCode::kLooksLikeLabels,
-      what + (is_integer(type) ? "."
-                               : ", but the samples are " + std::string(to_string(type)) +
-                                     ". Labels need a file of whole numbers."));
+Note mask_note(std::int64_t value) {
+  return note_of(NoteCode::kLooksLikeLabels,
+                 "The samples are a mask: each is 0 or " + std::to_string(value) +
+                     ". At an iso-value, small structures lose volume. With \"labels\": \"all\" "
+                     "they keep it.");
 }
 
 // Declared labels are certain; otherwise the samples may look like labels. Only integers are
 // labels.
 void note_labels(std::span<const std::byte> samples, Volume& volume) {
+  if (!is_integer(volume.type)) return;
   const std::size_t told = volume.labels.size();
   const auto mask =
       told > 0 ? std::nullopt : volume::mask_value(samples, volume.type, volume.range);
-  if (mask) volume.notes.push_back(mask_note(*mask, volume.type));
-  if (mask || !is_integer(volume.type)) return;
+  if (mask) return volume.notes.push_back(mask_note(*mask));
   const auto values = volume::label_count(samples, volume.type, volume.dims);
   if (told == 0 && !values) return;
   const std::string what =
@@ -306,16 +292,11 @@ Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportT
   const std::span<std::byte> stored =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   read_samples(samples.file, samples.offset, samples.layout, stored);
-  const bool is_converted = store_whole_numbers(samples, stored, volume);
-  if (samples.is_segmentation) {
-    close_ends(writer, volume);
-  } else if (is_converted) {
-    writer.shorten({volume.dims, volume.type, volume.geometry});
-  }
+  volume = finish(writer, std::move(volume),
+                  {.are_labels = samples.are_labels,
+                   .are_wide = is_wide_integer(samples.layout),
+                   .is_segmentation = samples.is_segmentation});
   if (!is_integer(volume.type)) volume.labels.clear();
-  volume = finish(writer, std::move(volume));
-  if (samples.are_labels) note_declared_labels(volume);
-  if (is_converted) note_stored_type(samples.layout, volume);
   return volume;
 }
 
@@ -341,22 +322,39 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
                          std::move(volume), task);
 }
 
-Volume finish(CanonicalWriter& writer, Volume volume, std::uint64_t left_out) {
-  volume::Statistics statistics = volume::measure(writer.samples(), volume.type, left_out);
+Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind) {
+  const auto samples =
+      writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
+  std::uint64_t left_out = kind.left_out;
+  volume::Statistics statistics = volume::measure(samples, volume.type, left_out);
   if (statistics.non_finite > 0) {
     const std::string count = std::to_string(statistics.non_finite) + " of the " +
                               std::to_string(volume.sample_count()) +
                               " samples are not finite numbers";
     if (statistics.non_finite == volume.sample_count()) throw_unusable(count + ".");
-    replace_non_finite(writer.samples(), volume.type, statistics.range[0]);
+    replace_non_finite(samples, volume.type, statistics.range[0]);
     left_out += statistics.non_finite;
-    statistics = volume::measure(writer.samples(), volume.type, left_out);
+    statistics = volume::measure(samples, volume.type, left_out);
     volume.notes.push_back(
         note_of(NoteCode::kNonFiniteSamples,
                 count + ". At iso-values above the smallest sample they lie outside the surface."));
   }
   volume.range = statistics.range;
+  const std::string stored =
+      kind.are_wide ? "64-bit integers" : std::string(to_string(volume.type));
+  const bool is_converted = store_whole_numbers(kind, samples, volume);
+  if (kind.is_segmentation) {
+    close_ends(writer, volume);
+  } else if (is_converted) {
+    writer.shorten({volume.dims, volume.type, volume.geometry});
+  }
+  if (kind.is_segmentation || is_converted) {
+    statistics = volume::measure(writer.samples(), volume.type, left_out);
+    volume.range = statistics.range;
+  }
   note_labels(writer.samples(), volume);
+  if (kind.are_labels) note_declared_labels(volume);
+  if (is_converted) note_stored_type(stored, volume);
   volume.suggested_iso = statistics.otsu;
   volume.bytes = writer.samples().size();
   return volume;

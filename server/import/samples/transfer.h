@@ -20,12 +20,9 @@ struct PlainSamples {
 };
 
 // Writes the canonical file of `volume`, whose dims and geometry are set and valid, to the task's
-// target. Closes the ends of a segmentation (labels/closed_ends.h).
-// Returns it with type, range, suggested iso-value and bytes set. Floats that are labels, declared
-// in `volume`, by their header or as volume::label_count() finds them, become integers of the
-// smallest type, and so do 64-bit integers that fit into 32 bits or are labels (wide_labels.h).
-// Other floats lose the volume's labels. Throws Error kUnusableVolume if no sample is finite,
-// kTooLarge if there is no room for the ends, kOutOfSpace, kInternal.
+// target. Returns it as finish() does. Integers of 64 bits that are labels are numbered anew
+// (wide_labels.h). Floats that are no labels lose the volume's labels. Throws Error kUnusableVolume
+// if no sample is finite, kTooLarge if there is no room for the ends, kOutOfSpace, kInternal.
 Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportTask& task);
 
 // Writes the canonical file of the volume `source`, whose samples are in `file` or in the data
@@ -35,11 +32,22 @@ Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportT
 // task's limits.
 Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task);
 
-// Completes a canonical file: measures and flushes the samples. `volume` has dims, type and
-// geometry; returns it with range, suggested iso-value and bytes set. Samples that are not finite
-// get the smallest sample's value. So do `left_out` samples, which the caller has given it because
-// they are not part of the image. The suggested iso-value leaves both out. Throws Error
+struct SampleKind {
+  bool are_labels = false;  // by their header
+  bool are_wide = false;    // stored as integers of 64 bits
+  // The ends are closed: the file was made with_room() (labels/closed_ends.h).
+  bool is_segmentation = false;
+  // Samples that are not part of the image, to which the caller gave the smallest sample's value.
+  std::uint64_t left_out = 0;
+};
+
+// Completes a canonical file, which begins with the samples of `volume`: measures and flushes them.
+// `volume` has dims, type and geometry; returns it with range, suggested iso-value and bytes set.
+// Samples that are not finite get the smallest sample's value; the suggested iso-value leaves them
+// and `left_out` samples out. Floats that are labels become integers of the smallest type: those
+// that `volume` or `kind` declares, and those that volume::mask_value() or label_count()
+// recognises, if all are nearly whole. So do wide integers that fit into 32 bits. Throws Error
 // kUnusableVolume if no sample is finite, kOutOfSpace, kInternal.
-Volume finish(CanonicalWriter& writer, Volume volume, std::uint64_t left_out = 0);
+Volume finish(CanonicalWriter& writer, Volume volume, const SampleKind& kind = {});
 
 }  // namespace isomesh::import

@@ -7,6 +7,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/import/source/line_reader.h"
 
 namespace isomesh::import {
 namespace {
@@ -166,8 +167,20 @@ std::string reason_of_double(std::string_view first_name) {
   return "it is the same as " + in_quotes(first_name);
 }
 
+std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t count) {
+  LineReader lines(file, {}, offset);
+  while (count > 0) {
+    const std::string_view piece = lines.view();
+    if (piece.empty()) throw_unusable("The file ends within the lines that its header skips.");
+    const std::size_t end = piece.find('\n');
+    if (end != piece.npos) --count;
+    lines.drop(end == piece.npos ? piece.size() : end + 1);
+  }
+  return lines.offset();
+}
+
 std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
-                                    const Companions& companions, const Skip& skip,
+                                    const Companions& companions, const DataSkip& skip,
                                     SourceVolume& volume) {
   if (names.empty()) throw_unusable("The header names no data file.");
   if (volume.sample_count() * volume.chosen.count % names.size() != 0) {
@@ -175,16 +188,24 @@ std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
                    " data files. The samples cannot be divided equally among them.");
   }
   const bool is_raw = volume.encoding == Encoding::kRaw;
-  if (!is_raw && names.size() > 1 && skip != Skip(0)) {
-    throw_unusable("The header skips bytes in several encoded data files, which is not supported.");
+  const bool is_stream =
+      volume.encoding == Encoding::kDeflate || volume.encoding == Encoding::kBzip2;
+  if (is_stream && names.size() > 1 && skip.bytes != Skip(0)) {
+    throw_unusable(
+        "The header skips bytes in several compressed data files, which is not supported.");
   }
-  if (!is_raw) volume.decoded_skip = skip;
+  if (is_stream) volume.decoded_skip = skip.bytes;
   const std::uint64_t part = volume.stored_bytes() / names.size();
   std::vector<DataFile> files;
   for (const std::string& name : names) {
     const std::filesystem::path& path = companion(name, companions);
-    const std::uint64_t size = InputFile(path).size();
-    const std::uint64_t first = !is_raw ? 0 : skip ? *skip : size - std::min(size, part);
+    const InputFile file(path);
+    const std::uint64_t size = file.size();
+    const bool is_at_end = is_raw && !skip.bytes;
+    const std::uint64_t begin =
+        is_at_end ? size - std::min(size, part) : skip_lines(file, 0, skip.lines);
+    const std::uint64_t bytes = is_stream || is_at_end ? 0 : skip.bytes.value_or(0);
+    const std::uint64_t first = bytes > size - begin ? size + 1 : begin + bytes;
     if (first > size)
       throw_unusable("The data file " + in_quotes(name) + " ends before its samples begin.");
     files.push_back({path, {first, size - first}});
@@ -244,6 +265,32 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
   throw_choice(
       reason + none + "Choose one with volume=0 to volume=" + std::to_string(count - 1) + ".",
       std::move(choices));
+}
+
+void accept_frames(std::uint64_t frames, const ImportOptions& options, SourceVolume& volume) {
+  const std::string images = std::to_string(frames) + " flat images of " +
+                             std::to_string(volume.dims[0]) + " x " +
+                             std::to_string(volume.dims[1]) + " samples";
+  if (!options.accepts(NoteCode::kFramesAsSlices)) {
+    throw_overridable(NoteCode::kFramesAsSlices,
+                      "The file is a sequence of " + images +
+                          ", which follow each other in time or are a list. They do not lie side "
+                          "by side as the slices of a volume do. If accepted, they are read as "
+                          "evenly spaced slices.");
+  }
+  volume.notes.push_back(note_of(NoteCode::kFramesAsSlices,
+                                 "The file is a sequence of " + images +
+                                     " in time or of a list. They were read as the slices of a "
+                                     "volume. The distance between them is not from a scan."));
+}
+
+std::uint64_t volumes_of_frames(std::uint64_t count, const ImportOptions& options,
+                                SourceVolume& volume) {
+  const auto& [x, y, z] = volume.dims;
+  if (count < 2 || z != 1 || x == 1 || y == 1 || options.volume) return count;
+  accept_frames(count, options, volume);
+  volume.dims[2] = static_cast<std::uint32_t>(count);
+  return 1;
 }
 
 std::string begin_remedy(const ImportOptions& options, const std::string& verb) {

@@ -170,12 +170,22 @@ void refuse_spacing(const ImportOptions& options);
 // an image has no cells, so no surface at any iso-value.
 void refuse_flat(std::string_view what, const std::array<std::uint32_t, 3>& dims);
 
+// The offset behind so many lines from `offset` on, which may be of any length. Throws Error
+// kUnusableVolume if the file ends before.
+std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t count);
+
+// The beginning of a data file: lines of the file as it is, and then bytes of its decoded content.
+struct DataSkip {
+  std::uint64_t lines = 0;
+  Skip bytes = 0;  // empty: the samples are at the end, whatever is before them
+};
+
 // A header's data files, in its order. Each has the same part of `volume`'s samples, after skipping
 // `skip`. A single file may have less than a slice of trailing bytes, with a note in `volume`.
 // Throws Error kUnusableVolume for a missing companion, for a wrong size, and if the samples'
 // position is ambiguous.
 std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
-                                    const Companions& companions, const Skip& skip,
+                                    const Companions& companions, const DataSkip& skip,
                                     SourceVolume& volume);
 
 // True if that many trailing bytes may be ignored: some programs pad their last block. A whole
@@ -203,6 +213,16 @@ std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes);
 // with the choices if the options select none or one that does not exist.
 void choose_volume(std::uint64_t count, const Difference& difference, const ImportOptions& options,
                    SourceVolume& volume);
+
+// For so many flat images that follow each other in time or are a list. Throws Error
+// kUnusableVolume, which `accept` overrides. If the options accept it, adds a note, and the images
+// are the slices of a volume.
+void accept_frames(std::uint64_t frames, const ImportOptions& options, SourceVolume& volume);
+
+// The same if the volumes of the file are flat images, which have `volume.dims`, and the options
+// select none. Returns how many volumes are left: one, whose slices they are, or `count`.
+std::uint64_t volumes_of_frames(std::uint64_t count, const ImportOptions& options,
+                                SourceVolume& volume);
 
 // The words, with a space before them, between the reason of an error and the parameter of a client
 // that resolves it: `verb`, such as "Add". An order has no such parameter, so its series must be

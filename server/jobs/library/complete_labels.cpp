@@ -18,16 +18,8 @@ void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t,
 
 }  // namespace
 
-void throw_no_labels(SampleType type) {
-  throw invalid_parameter("labels", "need a volume of integers; this one has samples of type " +
-                                        std::string(to_string(type)));
-}
-
 JobParameters complete_labels(JobParameters parameters, const store::Viewer& viewer,
                               const Volume& volume, LabelLists& lists) {
-  if (!is_integer(volume.type)) {
-    throw_no_labels(volume.type);
-  }
   if (std::ranges::min(volume.dims) < 2) {
     throw Error(ErrorCode::kUnusableVolume,
                 "labels need a volume with at least two samples along each axis; this one is " +

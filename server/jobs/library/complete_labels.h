@@ -7,15 +7,11 @@
 
 namespace isomesh::jobs {
 
-// Throws Error kInvalidParameter: samples of this type, which are not integers, have no labels.
-[[noreturn]] void throw_no_labels(SampleType type);
-
 // Completes parameters that have labels: the names, colours and values of the chosen labels from
 // the volume, unless given, and the default displacement limit of Laplacian and Taubin smoothing,
 // half the smallest spacing. Equivalent requests therefore get equal parameters, and share one
-// result. Throws Error kInvalidParameter, field "labels", if the samples are not integers;
-// kUnusableVolume if an axis has fewer than two samples, if chosen labels are missing (naming them)
-// or if there are none; and as LabelLists::counts does.
+// result. Throws Error kUnusableVolume if an axis has fewer than two samples, if chosen labels are
+// missing (naming them) or if there are none; and as LabelLists::counts does.
 JobParameters complete_labels(JobParameters parameters, const store::Viewer& viewer,
                               const Volume& volume, LabelLists& lists);
 

@@ -11,7 +11,7 @@
 #include "server/mesh/lattice/lattice.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
-#include "server/volume/unusable.h"
+#include "server/volume/labels.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -71,12 +71,29 @@ void add_to(Table& table, const LabelVoxels& label) {
   if (table.size() > kMostValues) mesh::throw_too_many_labels();
 }
 
+// The type in which labels are counted.
+template <class Sample>
+using Counted = std::conditional_t<std::is_integral_v<Sample>, Sample, std::int32_t>;
+
+// Reads samples; rounds floats. Throws if one is not nearly whole.
+template <class Sample>
+void read_labels(const volume::CanonicalFile& canonical, std::uint64_t place,
+                 std::vector<Counted<Sample>>& labels) {
+  if constexpr (std::is_integral_v<Sample>) {
+    canonical.read(place * sizeof(Sample), std::as_writable_bytes(std::span(labels)));
+  } else {
+    std::vector<Sample> samples(labels.size());
+    canonical.read(place * sizeof(Sample), std::as_writable_bytes(std::span(samples)));
+    volume::round_labels(std::span<const Sample>(samples), labels.data());
+  }
+}
+
 template <class Sample>
 void count_block(const volume::CanonicalFile& canonical, std::uint64_t place, const Block& block,
-                 std::vector<Sample>& samples, Table& table) {
+                 std::vector<Counted<Sample>>& samples, Table& table) {
   samples.resize(block.samples());
-  canonical.read(place * sizeof(Sample), std::as_writable_bytes(std::span(samples)));
-  const mesh::Lattice<Sample> lattice = {
+  read_labels<Sample>(canonical, place, samples);
+  const mesh::Lattice<Counted<Sample>> lattice = {
       samples.data(), {block.dims[0], block.dims[1], block.dims[2]}, {}};
   for (LabelVoxels label : mesh::count_labels(lattice, {})) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -101,10 +118,10 @@ std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
       std::min(blocks.count(), static_cast<std::size_t>(mesh::thread_count()));
   std::vector<Table> tables(parts);
   mesh::parallel_for({}, parts, [&](std::size_t part) {
-    std::vector<Sample> samples;
+    std::vector<Counted<Sample>> samples;
     for (std::size_t at = part; at < blocks.count(); at += parts) {
       const Block block = blocks[at];
-      count_block(canonical, blocks.place(block), block, samples, tables[part]);
+      count_block<Sample>(canonical, blocks.place(block), block, samples, tables[part]);
     }
   });
   for (std::size_t part = 1; part < parts; ++part) {
@@ -126,15 +143,8 @@ std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
 
 std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
                                       const Volume& volume) {
-  return with_sample(volume.type, [&](auto sample) -> std::vector<LabelVoxels> {
-    using Sample = decltype(sample);
-    if constexpr (std::is_integral_v<Sample>) {
-      return count_labels<Sample>(canonical, volume);
-    } else {
-      volume::throw_unusable("The volume's samples are " + std::string(to_string(volume.type)) +
-                             ", but labels are whole numbers.");
-    }
-  });
+  return with_sample(
+      volume.type, [&](auto sample) { return count_labels<decltype(sample)>(canonical, volume); });
 }
 
 // Corners of the bounding box of these voxels, in millimetres. A voxel extends half a step around

@@ -28,9 +28,10 @@ class LabelLists {
  public:
   explicit LabelLists(const store::BlobStore& blobs) : blobs_(blobs) {}
 
-  // Samples of the value `background` belong to no label. Labels without voxels are omitted. Throws
-  // Error kUnusableVolume if the samples are damaged, not integers, or have more than
-  // Volume::kMostLabels labels; kUnavailable if too many callers wait already; kInternal otherwise.
+  // Samples of the value `background` belong to no label. Labels without voxels are omitted. Floats
+  // that are nearly whole numbers count as these. Throws Error kUnusableVolume if the samples are
+  // damaged, not whole numbers (naming one), or have more than Volume::kMostLabels labels;
+  // kUnavailable if too many callers wait already; kInternal otherwise.
   VolumeLabels of(const store::Viewer& viewer, const Volume& volume, std::int64_t background);
 
   // All distinct values of the samples with their voxels, ascending, including the background.

@@ -5,9 +5,13 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <string>
+#include <type_traits>
 
+#include "proto/samples.h"
 #include "server/mesh/lattice/lattice.h"
+#include "server/volume/labels.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -74,8 +78,11 @@ SampleRange samples_in(const Box& box, const Geometry& geometry,
 
 CroppedSamples::CroppedSamples(const SampleArray& samples, const MeshParameters& parameters)
     : array_(samples) {
-  if (!parameters.crop) return;
-  const SampleRange range = samples_in(*parameters.crop, samples.geometry, samples.dims);
+  if (parameters.crop) crop(samples, samples_in(*parameters.crop, samples.geometry, samples.dims));
+  if (parameters.labels && !is_integer(samples.type)) round();
+}
+
+void CroppedSamples::crop(const SampleArray& samples, const SampleRange& range) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     array_.dims[axis] = range.end[axis] - range.begin[axis];
     const double way = samples.geometry.spacing[axis] * range.begin[axis];
@@ -95,6 +102,21 @@ CroppedSamples::CroppedSamples(const SampleArray& samples, const MeshParameters&
     }
   }
   array_.bytes = copy_.data();
+}
+
+void CroppedSamples::round() {
+  const std::uint64_t count = std::uint64_t{array_.dims[0]} * array_.dims[1] * array_.dims[2];
+  rounded_.resize_for_overwrite(count);
+  with_sample(array_.type, [&](auto sample) {
+    using Sample = decltype(sample);
+    if constexpr (std::is_floating_point_v<Sample>) {
+      const auto* first = reinterpret_cast<const Sample*>(array_.bytes);
+      is_rounded_ = volume::round_labels(std::span(first, count), rounded_.data());
+    }
+  });
+  copy_.resize_for_overwrite(0);
+  array_.type = SampleType::kInt32;
+  array_.bytes = reinterpret_cast<const std::byte*>(rounded_.data());
 }
 
 }  // namespace isomesh::jobs

@@ -27,17 +27,29 @@ struct SampleRange {
 SampleRange samples_in(const Box& box, const Geometry& geometry,
                        const std::array<std::uint32_t, 3>& dims);
 
-// A volume, or a copy of the part that the parameters crop it to, as a volume of its own. `samples`
-// must outlive it. Throws as samples_in.
+// A volume, or a copy of the part that the parameters crop it to, as a volume of its own. For
+// labels it is a copy of integers if the samples are floats. `samples` must outlive it. Throws as
+// samples_in and volume::round_labels.
 class CroppedSamples {
  public:
   CroppedSamples(const SampleArray& samples, const MeshParameters& parameters);
 
   const SampleArray& array() const { return array_; }
 
+  // True if a sample was no whole number.
+  bool is_rounded() const { return is_rounded_; }
+
+  // The memory of floats that became integers.
+  std::uint64_t rounded_bytes() const { return rounded_.size() * sizeof(std::int32_t); }
+
  private:
+  void crop(const SampleArray& samples, const SampleRange& range);
+  void round();
+
   SampleArray array_;
   mesh::Buffer<std::byte> copy_;
+  mesh::Buffer<std::int32_t> rounded_;
+  bool is_rounded_ = false;
 };
 
 }  // namespace isomesh::jobs

@@ -31,6 +31,7 @@
 #include "server/process/passing.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
+#include "server/volume/labels.h"
 
 namespace {
 
@@ -99,8 +100,9 @@ struct Task {
   Descriptor file;
 };
 
-MeshRequest request_of(const JobOrder& order) {
-  return {.volume = order.volume,
+// `volume` is the order's, maybe with more notes. Both must outlive the request.
+MeshRequest request_of(const JobOrder& order, const Volume& volume) {
+  return {.volume = volume,
           .parameters = order.parameters,
           .iso = order.iso,
           .certify = order.certify,
@@ -195,9 +197,12 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
   MadeMesh made;
-  const MeshRequest request = request_of(order);
   const CroppedSamples cropped(array_of(canonical), order.parameters);
+  Volume volume = order.volume;
+  if (cropped.is_rounded()) volume.notes.push_back(volume::rounded_note(canonical.header().type));
+  MeshRequest request = request_of(order, volume);
   const SampleArray& samples = cropped.array();
+  request.memory_bytes -= std::min(request.memory_bytes, cropped.rounded_bytes());
   made.summary = order.parameters.labels
                      ? make_labels(samples, request, sinks, progress, workspace.walls)
                      : make_mesh(samples, request, sinks, progress, workspace.mesh);
@@ -214,7 +219,7 @@ CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
   const CroppedSamples cropped(array_of(canonical), parameters);
   const SampleArray& samples = cropped.array();
   if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
-  return count_surface(samples, request_of(task.order), {stop, nullptr});
+  return count_surface(samples, request_of(task.order, task.order.volume), {stop, nullptr});
 }
 
 struct Ending {

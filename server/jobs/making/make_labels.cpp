@@ -8,7 +8,6 @@
 #include "proto/samples.h"
 #include "server/codec/formats.h"
 #include "server/codec/label_zip.h"
-#include "server/jobs/library/complete_labels.h"
 #include "server/jobs/making/certify_stage.h"
 #include "server/jobs/making/error_budget.h"
 #include "server/jobs/making/mesh_cost.h"
@@ -20,8 +19,8 @@
 namespace isomesh::jobs {
 namespace {
 
-// Calls use(a sample of the type) and returns its result. Throws Error kInvalidParameter for the
-// two types that are no integers.
+// Calls use(a sample of the type) and returns its result. The samples are integers: those of floats
+// were rounded (crop.h).
 template <class Use>
 auto with_label(SampleType type, const Use& use) {
   using Result = decltype(use(std::uint8_t{}));
@@ -29,7 +28,7 @@ auto with_label(SampleType type, const Use& use) {
     if constexpr (std::is_integral_v<decltype(sample)>) {
       return use(sample);
     } else {
-      throw_no_labels(type);
+      throw Error(ErrorCode::kInternal, "Labels were not rounded.");
     }
   });
 }

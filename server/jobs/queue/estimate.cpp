@@ -128,6 +128,9 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.vertices = surface.vertices;
   const std::uint64_t samples = std::uint64_t{volume.dims[0]} * volume.dims[1] * volume.dims[2];
   estimate.memory_bytes = estimate_memory(surface, samples, parameters, parameters.certify);
+  if (parameters.labels && !is_integer(volume.type)) {
+    estimate.memory_bytes += samples * sizeof(std::int32_t);  // rounded
+  }
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model(viewer);
   const VolumeSize size = VolumeSize::of(volume);

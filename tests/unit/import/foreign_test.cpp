@@ -52,20 +52,37 @@ TEST(ForeignNrrd, SpacingFollowsFromMinsAndMaxs) {
   EXPECT_FALSE(import_bytes(nrrd(with(lines, "axis maxs", "0 19 30"), kSamples)).imported());
 }
 
-TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfSlicer) {
+TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfItsWriter) {
   Lines lines = without_space(small_nrrd());
   lines = with(with(lines, "dimension", "4"), "sizes", "4 3 2 1");
   lines.emplace_back("space dimension", "4");
   lines.emplace_back("space directions", "(-2,0,0,0) (0,-2,0,0) (0,0,3,0) (0,0,0,1)");
   lines.emplace_back("space origin", "(10,20,30,0)");
+  const std::array<double, 9> identity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const std::array<double, 9> turned = {-1, 0, 0, 0, -1, 0, 0, 0, 1};
+  const auto with_pair = [&](const std::string& pair, const std::string& kinds = "") {
+    std::string file = nrrd(with(lines, "kinds", kinds), kSamples);
+    file.insert(file.find("\n\n") + 1, pair);
+    const Outcome outcome = imported(import_bytes(file));
+    EXPECT_THAT(codes_of(outcome), testing::Contains("space-assumed"));
+    return outcome.volume.geometry;
+  };
+  const Geometry slicers = with_pair("Segment0_Name:=a\n");
+  EXPECT_EQ(slicers.origin, (Vector{-10, -20, 30}));
+  EXPECT_EQ(slicers.direction, identity);
+  EXPECT_EQ(with_pair("Segment0_Extent:=5 8 1 3 2 3\n").origin, (Vector{0, -18, 36}));
+  EXPECT_EQ(with_pair("Segmentation_Extent:=0 3 0 2 0 1\n", "domain domain domain domain").origin,
+            (Vector{-10, -20, 30}));
+  // ITK's is LPS, as in three dimensions.
+  const Geometry itks = with_pair("", "domain domain domain domain");
+  EXPECT_EQ(itks.origin, (Vector{10, 20, 30}));
+  EXPECT_EQ(itks.direction, turned);
+  // Others do not tell.
   const std::string file = nrrd(lines, kSamples);
-  const Outcome bare = imported(import_bytes(file));
-  EXPECT_THAT(codes_of(bare), ElementsAre("space-assumed"));
-  EXPECT_EQ(bare.volume.geometry.origin, (Vector{-10, -20, 30}));
-  EXPECT_EQ(bare.volume.geometry.direction, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
-  std::string extended = file;
-  extended.insert(extended.find("\n\n") + 1, "Segment0_Extent:=5 8 1 3 2 3\n");
-  EXPECT_EQ(import_bytes(extended).volume.geometry.origin, (Vector{0, -18, 36}));
+  EXPECT_EQ(import_bytes(file).remedy.overridable, "space-assumed");
+  const Outcome accepted = imported(import_bytes(file, {}, {.accept = {"space-assumed"}}));
+  EXPECT_THAT(codes_of(accepted), ElementsAre("space-assumed"));
+  EXPECT_EQ(accepted.volume.geometry, itks);
 }
 
 TEST(ForeignNrrd, AUnitThatCountsSamplesIsNoLength) {
@@ -148,12 +165,19 @@ TEST(ForeignPairs, AreReadWithTheirImage) {
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
     EXPECT_THAT(codes_of(outcome), IsEmpty());
   }
-  const std::string version_2 = nifti({.version = 2, .magic = "ni2\0\r\n\032\n"s}, kSamples);
+  const std::string version_2 = nifti({.version = 2, .magic = "ni2\0\r\n\032\n"s}, "");
   for (const std::string& alone : {header, version_2}) {
     EXPECT_THAT(import_bytes(alone).error, HasSubstr("in an .img file, which is missing"));
   }
   EXPECT_THAT(import_bytes(zip({{"a.hdr", header}, {"b.img", kSamples}})).error,
               HasSubstr("in an .img file, which is missing"));
+  // The magic of a pair in a file that has its samples.
+  const std::string whole = nifti({.magic = "ni1\0"s}, kSamples);
+  for (const std::string& file : {whole, gzip(whole)}) {
+    const Outcome outcome = imported(import_bytes(file));
+    EXPECT_EQ(outcome.sample_bytes(), kSamples);
+    EXPECT_THAT(codes_of(outcome), ElementsAre("header-corrected"));
+  }
 }
 
 TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
@@ -171,6 +195,20 @@ TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{2, 2, 3}));
   EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3, 2, -1.5}));
   EXPECT_THAT(outcome.volume.notes[0].detail, Not(HasSubstr("orient")));
+  // SPM's origin, counted from 1; text of other programs is far from the volume.
+  const auto with_origin = [&](const std::vector<std::int16_t>& origin) {
+    std::string spms = header;
+    spms.replace(253, origin.size() * 2, bytes_of(origin));
+    return imported(import_bytes(zip({{"a.hdr", spms}, {"a.img", kSamples}}))).volume;
+  };
+  const Volume spms = with_origin({-3, 5, -1, 0, 0});
+  EXPECT_EQ(spms.geometry.origin, (Vector{8, 8, 6}));
+  EXPECT_EQ(spms.geometry.direction, outcome.volume.geometry.direction);
+  EXPECT_THAT(spms.notes[0].detail, HasSubstr("where SPM's field \"originator\" has it"));
+  for (const std::vector<std::int16_t>& text :
+       {std::vector<std::int16_t>{0x4f4a, 0x4e48, 0, 0, 0}, std::vector<std::int16_t>{1, -3, 1}}) {
+    EXPECT_EQ(with_origin(text).geometry, outcome.volume.geometry);
+  }
   header[252] = 2;
   const Outcome sagittal = import_bytes(zip({{"a.hdr", header}, {"a.img", kSamples}}));
   EXPECT_EQ(sagittal.volume.geometry, outcome.volume.geometry);
@@ -243,15 +281,27 @@ TEST(ForeignSamples, OfAMaskLookLikeOneLabel) {
   EXPECT_THAT(codes_of(outcome({'\0', '\xff'}, {.datatype = 256})), IsEmpty());
 }
 
-// Labels need integers, and the note must not advise what is rejected.
-TEST(ForeignSamples, OfAMaskOfFloatsStayFloats) {
+// As nibabel and MONAI write masks.
+TEST(ForeignSamples, OfAMaskOfFloatsBecomeIntegers) {
   std::vector<float> samples(24, 0);
   samples[7] = samples[8] = 1;
   const Outcome mask = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)));
-  EXPECT_EQ(mask.volume.type, SampleType::kFloat32);
+  EXPECT_EQ(mask.volume.type, SampleType::kUint8);
+  EXPECT_EQ(samples_of<std::uint8_t>(mask),
+            std::vector<std::uint8_t>(samples.begin(), samples.end()));
+  EXPECT_EQ(mask.volume.range, (std::array<double, 2>{0, 1}));
   ASSERT_THAT(codes_of(mask), ElementsAre("looks-like-labels"));
   EXPECT_THAT(mask.volume.notes[0].detail,
-              HasSubstr("but the samples are float32. Labels need a file of whole numbers."));
+              HasSubstr("The whole numbers, float32 in the file, are now uint8."));
+  const std::vector<double> wide(samples.begin(), samples.end());
+  EXPECT_EQ(import_bytes(nifti({.datatype = 64, .bitpix = 64}, bytes_of(wide))).canonical,
+            mask.canonical);
+  // A sample that is not a number is outside of the mask.
+  samples[3] = std::numeric_limits<float>::quiet_NaN();
+  const Outcome gap = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)));
+  EXPECT_EQ(gap.canonical, mask.canonical);
+  EXPECT_THAT(codes_of(gap), ElementsAre("non-finite-samples", "looks-like-labels"));
+  samples[3] = 0;
   samples[9] = 0.5;
   EXPECT_THAT(codes_of(import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)))),
               IsEmpty());
@@ -290,13 +340,26 @@ TEST(ForeignSamples, ThatAreLabelsBecomeIntegers) {
 
 TEST(ForeignSamples, ThatAreNoLabelsStayFloats) {
   for (const std::vector<float>& values : std::vector<std::vector<float>>{
-           {0, 1, 2, 2.5F}, {0, 1, 2, 1e10F}, {0, 0, 1, 1}, {-1, 0, 1, 3e9F}}) {
+           {0, 1, 2, 2.5F}, {0, 1, 2, 1e10F}, {0, 1, 2, 1.002F}, {-1, 0, 1, 3e9F}}) {
     EXPECT_EQ(regions(values).volume.type, SampleType::kFloat32) << values[3];
   }
   std::vector<float> gradient(24);
   for (std::size_t at = 0; at < gradient.size(); ++at) gradient[at] = static_cast<float>(at);
   const Outcome outcome = import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(gradient)));
   EXPECT_EQ(samples_of<float>(outcome), gradient);
+}
+
+TEST(ForeignSamples, ThatAreNearlyLabelsAreRounded) {
+  // nibabel stores floats as scaled integers: -1, 0, 1 and 3 of a slope of a third, so to speak.
+  const Outcome scaled = regions<double>({0, 0.99999999977, 2.9999999993, 0});
+  EXPECT_EQ(scaled.volume.type, SampleType::kUint8);
+  EXPECT_EQ(scaled.canonical, regions<std::uint8_t>({0, 1, 3, 0}).canonical);
+  EXPECT_THAT(codes_of(scaled), ElementsAre("labels-rounded", "looks-like-labels"));
+  EXPECT_THAT(scaled.volume.notes[0].detail, HasSubstr("stored as float64"));
+  EXPECT_THAT(scaled.volume.notes[1].detail, HasSubstr("float64 in the file, are now uint8"));
+  const Outcome two = regions<float>({1, 1, 2, 2.0005F});
+  EXPECT_EQ(two.volume.type, SampleType::kUint8);
+  EXPECT_THAT(two.volume.notes[1].detail, HasSubstr("2 different whole values"));
 }
 
 TEST(ForeignSamples, Of64BitsBecomeIntegersThatFit) {

@@ -137,7 +137,7 @@ TEST(Formats, TakeASpacingIfTheyHaveNone) {
     } else {
       EXPECT_EQ(alone.volume.geometry.spacing, assumed);
       EXPECT_THAT(codes_of(alone), is_unknown);
-      EXPECT_THAT(alone.volume.notes.at(0).detail, HasSubstr("spacing=X,Y,Z"));
+      EXPECT_THAT(alone.volume.notes.back().detail, HasSubstr("spacing=X,Y,Z"));
     }
     const Outcome given = imported(import_bytes(none, {}, spaced));
     EXPECT_EQ(given.volume.geometry.spacing, (Vector3{1, 2, 3}));

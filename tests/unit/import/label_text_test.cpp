@@ -9,6 +9,7 @@
 #include "server/import/labels/label_table.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
+#include "tests/unit/import/other_writers.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
@@ -163,14 +164,83 @@ TEST(LabelsBeside, AreThoseOfTheTableInItsFolder) {
               HasSubstr("The names of the labels are from \"seg.txt\"."));
 }
 
-TEST(LabelsBeside, AreThoseOfAMaskOfWholeNumbers) {
+TEST(LabelsBeside, AreThoseOfAMask) {
   std::vector<float> samples(24, 0);
   samples[7] = samples[8] = 1;
   const std::vector<std::uint8_t> whole(samples.begin(), samples.end());
   const Member table = {"mask.txt", "1 liver\n"};
   EXPECT_THAT(labels_in({{"mask.nii", nifti({}, bytes_of(whole))}, table}), SizeIs(1));
   const std::string floats = nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples));
-  EXPECT_THAT(labels_in({{"mask.nii", floats}, table}), IsEmpty());
+  EXPECT_THAT(labels_in({{"mask.nii", floats}, table}), SizeIs(1));
+}
+
+// The samples alone do not look like labels: no two neighbours are equal.
+TEST(LabelsBeside, MakeLabelsOfSamples) {
+  std::vector<float> floats;
+  for (int at = 0; at < 24; ++at) floats.push_back(static_cast<float>(at * 2 % 5));
+  const std::vector<std::uint8_t> whole(floats.begin(), floats.end());
+  floats[3] += 0.0005F;
+  const Member table = {"x.txt", "1 liver\n2 spleen\n3 kidney\n"};
+  const auto with_table = [&](const std::string& nifti_file) {
+    return imported(import_bytes(zip({{"x.nii", nifti_file}, table})));
+  };
+  EXPECT_THAT(codes_of(import_bytes(nifti({}, bytes_of(whole)))), IsEmpty());
+  const Outcome bytes = with_table(nifti({}, bytes_of(whole)));
+  EXPECT_THAT(bytes.volume.labels, SizeIs(3));
+  ASSERT_THAT(codes_of(bytes), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(bytes.volume.notes[0].detail,
+              HasSubstr("it names 3 of the 4 different values other than 0"));
+  const Outcome rounded = with_table(nifti({.datatype = 16, .bitpix = 32}, bytes_of(floats)));
+  EXPECT_THAT(codes_of(rounded), ElementsAre("labels-rounded", "looks-like-labels"));
+  EXPECT_THAT(rounded.volume.notes[1].detail, HasSubstr("float32 in the file, are now uint8"));
+  EXPECT_EQ(rounded.volume.labels, bytes.volume.labels);
+  EXPECT_EQ(rounded.canonical, bytes.canonical);
+  EXPECT_EQ(rounded.volume.range, bytes.volume.range);
+  EXPECT_EQ(rounded.volume.suggested_iso, bytes.volume.suggested_iso);
+  EXPECT_EQ(rounded.volume.bytes, bytes.volume.bytes);
+}
+
+// A table beside an image, which may name each value of a byte, is not about the image.
+TEST(LabelsBeside, DoNotMakeLabelsOfImages) {
+  std::string all;
+  for (int value = 0; value < 4096; ++value) all += std::to_string(value) + " x\n";
+  const NiftiFields fields = {.dim = {3, 40, 20, 10, 1, 1, 1, 1}, .datatype = 4, .bitpix = 16};
+  const auto is_image = [&](const std::vector<std::int16_t>& samples, const std::string& table) {
+    const Outcome outcome = imported(
+        import_bytes(zip({{"ct.nii", nifti(fields, bytes_of(samples))}, {"ct.txt", table}})));
+    return outcome.volume.labels.empty() && codes_of(outcome).empty();
+  };
+  std::vector<std::int16_t> samples;
+  for (int at = 0; at < 8000; ++at) samples.push_back(static_cast<std::int16_t>(at * 7 % 1000));
+  EXPECT_TRUE(is_image(samples, all)) << "hundreds of values, no two neighbours alike";
+  EXPECT_TRUE(is_image(samples, std::string(kTable))) << "few of the values have a name";
+  for (std::size_t at = 0; at < samples.size(); ++at) {
+    samples[at] = static_cast<std::int16_t>(at * 3 % 10);
+  }
+  samples[0] = -1;
+  EXPECT_TRUE(is_image(samples, all)) << "a negative value";
+  samples[0] = 0;
+  EXPECT_FALSE(is_image(samples, all));
+}
+
+TEST(LabelsBeside, AreThoseOfAStackOfPictures) {
+  const std::string picture = grey_png(4, std::string("\0\0\1\1\0\0\1\1\0\0\1\1", 12));
+  const Outcome outcome = imported(
+      import_bytes(zip({{"m/1.png", picture}, {"m/2.png", picture}, {"m/names.txt", "1 liver\n"}}),
+                   {}, {.spacing = std::array<double, 3>{1, 1, 1}}));
+  EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(1, "liver")));
+  EXPECT_THAT(outcome.volume.ignored, IsEmpty());
+}
+
+TEST(LabelsBeside, OfOtherLabelsAreNotUsed) {
+  const Outcome outcome =
+      imported(import_bytes(zip({{"a.nii", label_volume()}, {"a.txt", "7 heart\n0 air\n"}})));
+  EXPECT_THAT(outcome.volume.labels, IsEmpty());
+  ASSERT_THAT(outcome.volume.ignored, SizeIs(1));
+  EXPECT_EQ(outcome.volume.ignored[0].name, "a.txt");
+  EXPECT_THAT(outcome.volume.ignored[0].reason, HasSubstr("were not used"));
+  EXPECT_THAT(outcome.volume.notes[0].detail,
+              HasSubstr("The table \"a.txt\" names none of the labels, so it was not used."));
 }
 
 TEST(LabelsBeside, AreNotThoseOfAnotherVolume) {

@@ -143,8 +143,8 @@ TEST(MetaImage, RefusesWhatIsNoVolumeOfNumbers) {
   Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
   lines = with(with(lines, "TransformMatrix", ""), "Offset", "");
   lines = with(lines, "ElementSpacing", "");
-  EXPECT_THAT(import_metaimage(lines).error, HasSubstr("2 volumes"));
   const std::string two = metaimage(with(lines, "DimSize", "2 3 2 2"), kSmallSamples);
+  EXPECT_THAT(import_bytes(two).error, HasSubstr("2 volumes"));
   EXPECT_EQ(import_bytes(two, {}, {.volume = 1}).sample_bytes(), kSmallSamples.substr(12));
   EXPECT_TRUE(import_metaimage(with(lines, "DimSize", "4 3 2 1")).imported());
 }
@@ -157,8 +157,31 @@ std::vector<std::string> titles_of(const Lines& lines) {
   return titles;
 }
 
+// PLUS writes tracked ultrasound so.
+TEST(MetaImage, OfFlatImagesInTimeIsNoVolume) {
+  const auto with_accepted = [](const Lines& lines) {
+    return import_bytes(metaimage(lines, kSmallSamples), {}, {.accept = {"frames-as-slices"}});
+  };
+  Lines four = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
+  four = with(with(with(four, "TransformMatrix", ""), "Offset", ""), "ElementSpacing", "1 1 4 2");
+  Lines old = small_metaimage();
+  old.insert(old.end() - 1, {"Seq_Frame0000_Timestamp", "7.25"});
+  for (const Lines& lines : {with(small_metaimage(), "Kinds", "domain domain list"),
+                             with(small_metaimage(), "Kinds", "domain domain time"), old, four}) {
+    const Outcome refused = import_metaimage(lines);
+    EXPECT_THAT(refused.error, HasSubstr("a sequence of 2 flat images of 4 x 3 samples"));
+    EXPECT_EQ(refused.remedy.overridable, "frames-as-slices");
+    const Outcome accepted = imported(with_accepted(lines));
+    EXPECT_EQ(accepted.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
+    EXPECT_EQ(accepted.sample_bytes(), kSmallSamples);
+    EXPECT_THAT(codes_of(accepted), testing::ElementsAre("frames-as-slices"));
+  }
+  EXPECT_EQ(with_accepted(four).volume.geometry.spacing, (Vector3{1, 1, 4}));
+  EXPECT_TRUE(import_with("Kinds", "domain domain domain").imported());
+}
+
 TEST(MetaImage, ItsVolumesAreToldByWhatTheHeaderSays) {
-  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
+  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "2 3 2 2");
   lines = with(with(lines, "TransformMatrix", ""), "Offset", "");
   const Lines plain = with(lines, "ElementSpacing", "1 1 1 1");
   EXPECT_THAT(titles_of(plain), testing::ElementsAre("volume 0", "volume 1"));
@@ -169,7 +192,7 @@ TEST(MetaImage, ItsVolumesAreToldByWhatTheHeaderSays) {
                {{"Seq_Frame0000_Timestamp", "7.25"}, {"Seq_Frame0001_Timestamp", "8"}});
   times.insert(times.begin(), {"ObjectSubType", "Sequence"});
   EXPECT_THAT(titles_of(times), testing::ElementsAre("time 7.25 s", "time 8 s"));
-  Lines five = with(with(plain, "NDims", "5"), "DimSize", "2 3 1 2 2");
+  Lines five = with(with(plain, "NDims", "5"), "DimSize", "2 3 2 2 2");
   five = with(five, "ElementSpacing", "1 1 1 1 1");
   EXPECT_THAT(titles_of(five),
               testing::ElementsAre("axis 4 at 0, axis 5 at 0", "axis 4 at 1, axis 5 at 0",

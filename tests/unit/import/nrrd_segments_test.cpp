@@ -146,6 +146,65 @@ TEST(NrrdSegments, ValuesOfNoSegmentAreLabelsWithoutAName) {
               ElementsAre(entry(1, "liver"), entry(2, "tumour"), entry(3, "")));
 }
 
+// --- MITK's --------------------------------------------------------------------------------------
+
+std::string of_mitk(const Lines& lines, const std::string& groups, std::string_view samples) {
+  std::string file = nrrd(lines, samples);
+  return file.insert(file.find("\n\n") + 1,
+                     "modality:=org.mitk.multilabel.segmentation\n"
+                     "org.mitk.multilabel.segmentation.labelgroups:=" +
+                         groups + '\n');
+}
+
+TEST(NrrdSegments, OfMitkHaveNamesAndColors) {
+  const std::string groups =
+      R"([{"labels": [{"value": 2, "name": "liver", "color": {"type": "ColorProperty", )"
+      R"("value": [1, 0, 0]}}, {"value": 5, "name": "tumour", "color": [0, 0.5, 0]}, )"
+      R"({"value": 0, "name": "none"}, {"value": -1}, {"value": 7}, 8]}])";
+  const std::string samples(24, '\5');
+  const Outcome outcome = imported(import_bytes(of_mitk(small_nrrd(), groups, samples)));
+  EXPECT_EQ(outcome.sample_bytes(), samples);
+  EXPECT_THAT(outcome.volume.labels,
+              ElementsAre(LabelEntry{.label = 2, .name = "liver", .color = "#ff0000"},
+                          LabelEntry{.label = 5, .name = "tumour", .color = "#008000"},
+                          LabelEntry{.label = 7}));
+}
+
+// The format writes a backslash twice; some writers do not.
+TEST(NrrdSegments, OfMitkMayHaveEscapes) {
+  for (const std::string name : {R"(a \"b\" \u00fc)", R"(a \\"b\\" \\u00fc)"}) {
+    const std::string groups = R"([{"labels": [{"value": 1, "name": ")" + name + R"("}]}])";
+    const Outcome outcome =
+        imported(import_bytes(of_mitk(small_nrrd(), groups, std::string(24, '\1'))));
+    EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(1, "a \"b\" \xc3\xbc"))) << name;
+  }
+}
+
+TEST(NrrdSegments, OfMitksGroupsMayOverlap) {
+  const std::string groups = R"([{"labels": [{"value": 1, "name": "liver"}]}, )"
+                             R"({"name": "x", "labels": [{"value": 2, "name": "tumour"}]}])";
+  const std::string samples("\1\0\1\2\0\2\0\0\0\0\0\0\0\0\0\0", 16);
+  const Lines lines = layers_first("2 2 2 2", "vector");
+  const Outcome outcome = imported(import_bytes(of_mitk(lines, groups, samples)));
+  EXPECT_THAT(outcome.volume.labels,
+              ElementsAre(entry(1, "liver", {1, 3}), entry(2, "tumour", {2, 3})));
+  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(1, 3, 2, 0, 0, 0, 0, 0));
+  const Outcome second = imported(import_bytes(of_mitk(lines, groups, samples), {}, {.volume = 1}));
+  EXPECT_THAT(second.volume.labels, ElementsAre(entry(2, "tumour")));
+  EXPECT_THAT(samples_of<std::uint8_t>(second), ElementsAre(0, 2, 2, 0, 0, 0, 0, 0));
+}
+
+TEST(NrrdSegments, OfMitkThatAreDamagedAreNone) {
+  const std::string deep(100'000, '[');
+  for (const std::string& groups : {std::string("[{"), std::string("{}"), std::string("[1, {}]"),
+                                    std::string(R"([{"labels": null}])"), deep}) {
+    const Outcome outcome =
+        imported(import_bytes(of_mitk(small_nrrd(), groups, std::string(24, '\1'))));
+    EXPECT_THAT(outcome.volume.labels, testing::IsEmpty());
+    EXPECT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
+  }
+}
+
 // Nine segments of which every combination is somewhere.
 TEST(NrrdSegments, WithManyCombinationsHaveWiderValues) {
   std::string samples;

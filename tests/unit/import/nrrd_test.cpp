@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/volume/geometry.h"
+#include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/writers.h"
 
@@ -205,9 +206,42 @@ TEST(Nrrd, RefusesComponentsAndSeries) {
   lines = with(lines, "space directions", "none (1,0,0) (0,1,0) (0,0,1)");
   EXPECT_THAT(import_nrrd(with(lines, "kinds", "RGB-color domain domain domain")).error,
               HasSubstr("3 components"));
-  EXPECT_THAT(import_with("kinds", "domain domain time").error,
-              HasSubstr("2 volumes that differ in time"));
   EXPECT_THAT(import_with("type", "block").error, HasSubstr("block"));
+}
+
+TEST(Nrrd, OfFlatImagesInTimeIsNoVolume) {
+  const auto both = [](const Lines& lines) {
+    const std::string file = nrrd(lines, kSmallSamples);
+    const Outcome refused = import_bytes(file);
+    EXPECT_THAT(refused.error, HasSubstr("flat images of 4 x 3 samples"));
+    EXPECT_EQ(refused.remedy.overridable, "frames-as-slices");
+    const Outcome accepted = imported(import_bytes(file, {}, {.accept = {"frames-as-slices"}}));
+    EXPECT_EQ(accepted.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
+    EXPECT_THAT(codes_of(accepted), testing::Contains("frames-as-slices"));
+    return accepted;
+  };
+  Lines lines = with(small_nrrd(), "kinds", "domain domain time");
+  EXPECT_EQ(both(lines).sample_bytes(), kSmallSamples);
+  lines = with(with(lines, "space directions", "(0,2,0) (0,0,3) none"), "space origin", "(7,8,9)");
+  const Geometry placed = both(lines).volume.geometry;
+  EXPECT_EQ(placed.spacing, (Vector3{2, 3, 1}));
+  EXPECT_EQ(placed.origin, (Vector3{7, 8, 9}));
+  EXPECT_EQ(placed.direction, (std::array<double, 9>{0, 0, 1, 1, 0, 0, 0, 1, 0}));
+  // Sample by sample, and row by row.
+  lines = with(with(lines, "sizes", "2 4 3"), "kinds", "list domain domain");
+  lines = with(lines, "space directions", "none (1,0,0) (0,1,0)");
+  EXPECT_EQ(both(lines).sample_bytes(), "acegikmoqsuwbdfhjlnprtvx");
+  lines = with(with(lines, "sizes", "4 2 3"), "kinds", "domain list domain");
+  lines = with(lines, "space directions", "(1,0,0) none (0,1,0)");
+  EXPECT_EQ(both(lines).sample_bytes(), "abcdijklqrstefghmnopuvwx");
+  // Images with a third axis.
+  lines = with(with(small_nrrd(), "dimension", "4"), "sizes", "4 3 1 2");
+  lines = with(lines, "space directions", "(1,0,0) (0,1,0) (0,0,5) none");
+  EXPECT_EQ(both(with(lines, "kinds", "domain domain domain list")).volume.geometry.spacing,
+            (Vector3{1, 1, 5}));
+  std::string tracked = nrrd(small_nrrd(), kSmallSamples);
+  tracked.insert(tracked.find("\n\n") + 1, "Seq_Frame0000_Timestamp:=1.5\n");
+  EXPECT_EQ(import_bytes(tracked).remedy.overridable, "frames-as-slices");
 }
 
 TEST(Nrrd, TakesASingleComponentForNone) {
@@ -240,6 +274,55 @@ TEST(Nrrd, SkipsWhatItsHeaderSays) {
   EXPECT_FALSE(import_with("byte skip", "1").imported());
   EXPECT_FALSE(import_with("byte skip", "-2").imported());
   EXPECT_FALSE(import_with("byte skip", "9223372036854775807").imported());
+}
+
+// Lines are those of the file, and bytes those of the decoded samples.
+TEST(Nrrd, SkipsInItsDataFiles) {
+  const std::string text = "a line\nanother\n";
+  const std::string skipped = "#####" + std::string(kSmallSamples);
+  Lines lines = with(with(small_nrrd(), "line skip", "2"), "byte skip", "5");
+  const auto import_data = [](const Lines& header, const std::vector<std::string>& data) {
+    std::vector<Member> members = {{"a.nhdr", nrrd(header, "")}};
+    for (std::size_t at = 0; at < data.size(); ++at) {
+      members.push_back({std::to_string(at), data[at]});
+    }
+    return import_bytes(zip(members));
+  };
+  lines = with(lines, "data file", "0");
+  EXPECT_EQ(imported(import_data(lines, {text + skipped})).sample_bytes(), kSmallSamples);
+  for (const std::string encoding : {"gzip", "bzip2"}) {
+    const std::string packed = encoding == "gzip" ? gzip(skipped) : bzip2(skipped);
+    const Lines encoded = with(lines, "encoding", encoding);
+    EXPECT_EQ(imported(import_data(encoded, {text + packed})).sample_bytes(), kSmallSamples);
+    EXPECT_EQ(imported(import_nrrd(with(encoded, "data file", ""), text + packed)).sample_bytes(),
+              kSmallSamples);
+  }
+  const Lines numbers_as_text = with(with(lines, "encoding", "ascii"), "sizes", "2 2 2");
+  EXPECT_EQ(imported(import_data(numbers_as_text, {text + "12345 1 2 3 4 5 6 7 8"})).sample_bytes(),
+            "\1\2\3\4\5\6\7\10");
+  const Lines parts = with(lines, "data file", "%d 0 1 1");
+  const std::string half = text + "#####";
+  EXPECT_EQ(imported(import_data(parts, {half + std::string(kSmallSamples.substr(0, 12)),
+                                         half + std::string(kSmallSamples.substr(12))}))
+                .sample_bytes(),
+            kSmallSamples);
+  // From the end, whatever the lines are.
+  EXPECT_EQ(imported(import_data(with(lines, "byte skip", "-1"), {skipped})).sample_bytes(),
+            kSmallSamples);
+  EXPECT_THAT(import_data(lines, {"one line\n"}).error, HasSubstr("lines that its header skips"));
+  EXPECT_THAT(import_data(with(lines, "byte skip", "9223372036854775807"), {text + skipped}).error,
+              HasSubstr("ends before its samples begin"));
+}
+
+TEST(Nrrd, WithoutTheNameOfItsSpaceIsReadAsLpsWithANote) {
+  Lines lines = with(with(small_nrrd(), "space", ""), "space dimension", "3");
+  for (const Lines& each : {lines, with(small_nrrd(), "space", "scanner-xyz"),
+                            with(small_nrrd(), "space", "3D-right-handed")}) {
+    const Outcome outcome = imported(import_nrrd(each));
+    EXPECT_EQ(outcome.volume.geometry, import_nrrd(small_nrrd()).volume.geometry);
+    EXPECT_THAT(codes_of(outcome), testing::ElementsAre("space-assumed"));
+  }
+  EXPECT_THAT(codes_of(import_nrrd(small_nrrd())), testing::IsEmpty());
 }
 
 TEST(Nrrd, KeysMayHaveColons) {

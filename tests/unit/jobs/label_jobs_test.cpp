@@ -192,7 +192,9 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   const auto [code, text] = reason_of(volume, {{3, 4, 5}});
   EXPECT_EQ(code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(text, HasSubstr("4, 5"));
-  EXPECT_EQ(reason_of(add_sphere(), {}).first, ErrorCode::kInvalidParameter);  // floats
+  const auto [float_code, float_text] = reason_of(add_sphere(), {});
+  EXPECT_EQ(float_code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(float_text, HasSubstr("Use an iso-value instead of labels"));
   const Volume empty = add(test::constant<std::uint8_t>(0, {4, 4, 4}), SampleType::kUint8);
   EXPECT_EQ(reason_of(empty, {}).first, ErrorCode::kUnusableVolume);
 
@@ -201,6 +203,47 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   unsettled.volume = volume.id;
   const Error error = test::error_of([&] { run(volume, unsettled); });
   EXPECT_EQ(error.code(), ErrorCode::kUnusableVolume);
+}
+
+// As float masks that nothing else recognised.
+TEST_F(LabelJobsTest, OfFloatsAreThoseOfTheirWholeNumbers) {
+  auto whole = test::constant<std::uint8_t>(0, {8, 8, 8});
+  auto floats = test::constant<float>(0, {8, 8, 8});
+  for (std::size_t n = 100; n < 300; ++n) {
+    whole.samples[n] = static_cast<std::uint8_t>(n % 8 < 5 ? 3 : 0);
+    floats.samples[n] = static_cast<float>(whole.samples[n]) + (n % 2 == 0 ? 0.0005F : -0.0005F);
+  }
+  const auto meshes = [&](const Volume& volume, std::optional<Box> crop) {
+    JobParameters parameters = label_parameters({});
+    parameters.crop = crop;
+    parameters.formats = {MeshFormat::kGlb};
+    return run(volume, settled(volume, parameters)).mesh;
+  };
+  for (const std::optional<Box>& crop :
+       {std::optional<Box>(), std::optional<Box>(Box{{{0, 0, 1}, {7, 7, 4}}})}) {
+    const MeshSummary expected = meshes(add(whole, SampleType::kUint8), crop);
+    const MeshSummary mesh = meshes(add(floats, SampleType::kFloat32), crop);
+    ASSERT_EQ(mesh.labels.size(), 1U);
+    EXPECT_EQ(mesh.labels[0].label, 3);
+    EXPECT_EQ(mesh.labels[0].voxels, expected.labels[0].voxels);
+    EXPECT_EQ(mesh.labels[0].volume_mm3, expected.labels[0].volume_mm3);
+    const auto tells = [&](const MeshSummary& of) {
+      return blob(of.files.at(MeshFormat::kGlb).sha256).find("labels-rounded") != std::string::npos;
+    };
+    EXPECT_FALSE(tells(expected));
+    EXPECT_TRUE(tells(mesh));
+  }
+  floats.samples[7] = 0.25;
+  const Volume fractions = add(floats, SampleType::kFloat32);
+  const Error error = test::error_of([&] {
+    run(fractions, [&] {
+      JobParameters parameters = label_parameters({});
+      parameters.volume = fractions.id;
+      return parameters;
+    }());
+  });
+  EXPECT_EQ(error.code(), ErrorCode::kUnusableVolume);
+  EXPECT_THAT(error.what(), HasSubstr("one of the samples is 0.25"));
 }
 
 TEST_F(LabelJobsTest, MayBeThousands) {

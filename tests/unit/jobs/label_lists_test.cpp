@@ -169,7 +169,15 @@ TEST_F(LabelListsTest, ComeInPages) {
 }
 
 TEST_F(LabelListsTest, FractionsAreNoLabels) {
-  const Volume volume = add_samples(std::vector<float>(24, 1), {4, 3, 2}, SampleType::kFloat32);
+  std::vector<float> samples(24, 1);
+  samples[7] = 2.9995F;
+  const auto add_floats = [&] { return add_samples(samples, {4, 3, 2}, SampleType::kFloat32); };
+  const VolumeLabels list = lists_.of("", add_floats(), 0);
+  ASSERT_EQ(list.labels.size(), 2U);
+  EXPECT_EQ(list.labels[1].label, 3);
+  EXPECT_EQ(list.labels[1].voxels, 1U);
+  samples[8] = 0.5;
+  const Volume volume = add_floats();
   EXPECT_EQ(test::code_thrown_by([&] { lists_.of("", volume, 0); }), ErrorCode::kUnusableVolume);
 }
 

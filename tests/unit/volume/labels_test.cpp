@@ -48,7 +48,7 @@ std::optional<std::size_t> reference(const std::vector<Sample>& samples, const D
     if (samples[at] == samples[at - 1]) ++same;
   }
   const std::size_t values = std::set(samples.begin(), samples.end()).size();
-  if (values < 3 || values > 1024 || 10 * same < 6 * pairs) return std::nullopt;
+  if (values < 2 || values > 1024 || 10 * same < 6 * pairs) return std::nullopt;
   return values;
 }
 
@@ -100,11 +100,15 @@ TEST(Labels, FlatImagesOfTooManyValuesAreNone) {
   EXPECT_EQ(labels_of(samples, {8, 1025, 1}), std::nullopt);
 }
 
-TEST(Labels, OfFloatsAreWholeNumbers) {
-  std::vector<float> samples = {0, 0, 0, 1, 1, 1, 2, 2, 2};
+TEST(Labels, OfFloatsAreCountedAsTheirWholeNumbers) {
+  const std::vector<float> samples = {0, 0.0005F, 0, 1, 0.9995F, 1.0005F, 2, 2, 1.9995F};
   EXPECT_EQ(labels_of(samples, {9, 1, 1}), 3U);
-  samples[8] = 2.5;
-  EXPECT_EQ(labels_of(samples, {9, 1, 1}), std::nullopt);
+}
+
+TEST(Labels, MayBeTwo) {
+  const std::vector<std::uint8_t> samples = {1, 1, 1, 1, 2, 2, 2, 2};
+  EXPECT_EQ(labels_of(samples, {8, 1, 1}), 2U);
+  EXPECT_EQ(labels_of(std::vector<std::uint8_t>(8, 1), {8, 1, 1}), std::nullopt);
 }
 
 template <class Sample>
@@ -133,6 +137,8 @@ TYPED_TEST(LabelCount, AMaskIsZeroAndOneLargerValue) {
 TEST(Mask, OfFloatsHasAWholeValue) {
   EXPECT_EQ(mask_of(std::vector<float>{0, 1, -0.0F, 1}), 1);
   EXPECT_EQ(mask_of(std::vector<float>{0, 255}), 255);
+  EXPECT_EQ(mask_of(std::vector<float>{0, 0.9999F, -1e-7F, 1.0005F}), 1) << "nearly whole";
+  EXPECT_EQ(mask_of(std::vector<float>{0, 0.998F}), std::nullopt);
   EXPECT_EQ(mask_of(std::vector<float>{0, 0.5}), std::nullopt);
   EXPECT_EQ(mask_of(std::vector<float>{0, 1, 0.5}), std::nullopt);
   EXPECT_EQ(mask_of(std::vector<float>{0, 1e30F}), std::nullopt);
@@ -141,7 +147,9 @@ TEST(Mask, OfFloatsHasAWholeValue) {
 
 template <class Sample>
 std::optional<SampleType> whole_type_of(const std::vector<Sample>& samples) {
-  return whole_type(std::as_bytes(std::span(samples)), sample_type<Sample>());
+  const auto found = whole_numbers(std::as_bytes(std::span(samples)), sample_type<Sample>());
+  if (!found) return std::nullopt;
+  return found->type;
 }
 
 TEST(WholeType, IsTheSmallestThatHoldsAllSamples) {
@@ -165,10 +173,35 @@ TEST(WholeType, IsTheSmallestThatHoldsAllSamples) {
 TEST(WholeType, IsNoneOfOtherNumbers) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  for (const double bad : {0.5, -1e-300, 0x1p32, -0x1p31 - 1, 1e300, kInfinity, -kInfinity, kNan}) {
+  for (const double bad : {0.5, 1.0011, 0x1p32, -0x1p31 - 1, 1e300, kInfinity, -kInfinity, kNan}) {
     EXPECT_EQ(whole_type_of<double>({1, bad, 2}), std::nullopt) << bad;
   }
   EXPECT_EQ(whole_type_of<double>({-1, 0x1p31}), std::nullopt);
+}
+
+// As nibabel scales labels.
+TEST(WholeNumbers, MayHaveToBeRounded) {
+  const std::vector<double> samples = {-1.0005, 0, 0.99999999977, 2.9999999993};
+  const auto bytes = std::as_bytes(std::span(samples));
+  const auto found = whole_numbers(bytes, SampleType::kFloat64);
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->is_exact);
+  EXPECT_EQ(std::pair(found->low, found->high), std::pair(-1L, 3L));
+  std::array<std::int8_t, 4> whole = {};
+  store_whole(bytes, SampleType::kFloat64, found->type, reinterpret_cast<std::byte*>(whole.data()));
+  EXPECT_EQ(whole, (std::array<std::int8_t, 4>{-1, 0, 1, 3}));
+  const std::vector<double> exact = {-0.0, 7};
+  EXPECT_TRUE(whole_numbers(std::as_bytes(std::span(exact)), SampleType::kFloat64)->is_exact);
+}
+
+TEST(DistinctValues, AreAscendingAndBounded) {
+  const std::vector<float> samples = {7, -2, 7, 0.9995F, 1};
+  const auto bytes = std::as_bytes(std::span(samples));
+  EXPECT_EQ(distinct_values(bytes, SampleType::kFloat32, 3), (std::vector<std::int64_t>{-2, 1, 7}));
+  EXPECT_EQ(distinct_values(bytes, SampleType::kFloat32, 2), std::nullopt);
+  const std::vector<std::int8_t> small = {5, -128, 127, 5};
+  EXPECT_EQ(distinct_values(std::as_bytes(std::span(small)), SampleType::kInt8, 9),
+            (std::vector<std::int64_t>{-128, 5, 127}));
 }
 
 TEST(LabelTable, IsAscendingAndPlain) {

@@ -124,7 +124,7 @@ describe('notes and what was left out', () => {
 
 describe('a volume', () => {
   it('that was there already says what its new file showed', async ({ daemon, page }) => {
-    const fields = ['spacings: 1 1 4'];
+    const fields = ['space: LPS', 'space directions: (1,0,0) (0,1,0) (0,0,4)'];
     const bytes = Buffer.concat([smallNrrd(fields), Buffer.from('more')]);
     await daemon.upload(smallNrrd(fields));
     const body = new Blob([new Uint8Array(bytes)]);
