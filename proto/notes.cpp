@@ -41,7 +41,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
      .meaning = "Some samples are infinite or not a number. They got the smallest sample's value, "
-                "so they lie outside the surface at any larger iso-value.",
+                "or 0 if all others are larger whole numbers, so they lie outside the surface at "
+                "any larger iso-value.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",
