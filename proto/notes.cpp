@@ -41,8 +41,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
      .meaning = "Some samples are infinite or not a number. They got the smallest sample's value, "
-                "so they lie outside the surface at any larger iso-value. The suggested iso-value "
-                "leaves them out.",
+                "or 0 if all others are larger whole numbers, so they lie outside the surface at "
+                "any larger iso-value. The suggested iso-value leaves them out.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",

@@ -62,18 +62,25 @@ Geometry usable_geometry(const SourceVolume& source, const ImportOptions& option
   return geometry;
 }
 
-// The smallest sample is outside for every iso-value above it, and keeps the adjacent surface in
-// place.
-void replace_non_finite(std::span<std::byte> samples, SampleType type, double smallest) {
+template <class IsReplaced>
+void replace(std::span<std::byte> samples, SampleType type, double value,
+             const IsReplaced& is_replaced) {
   with_sample(type, [&](auto sample) {
     using Sample = decltype(sample);
     if constexpr (std::is_floating_point_v<Sample>) {
       auto* first = reinterpret_cast<Sample*>(samples.data());
-      std::replace_if(
-          first, first + samples.size() / sizeof(Sample),
-          [](Sample value) { return !std::isfinite(value); }, static_cast<Sample>(smallest));
+      std::replace_if(first, first + samples.size() / sizeof(Sample), is_replaced,
+                      static_cast<Sample>(value));
     }
   });
+}
+
+// The smallest sample is outside for every iso-value above it, and keeps the adjacent surface in
+// place. Labels above 0 have the background 0 instead: the smallest is a label of its own.
+void replace_non_finite(std::span<std::byte> samples, SampleType type, double smallest) {
+  replace(samples, type, std::min(smallest, 0.0), [](auto value) { return !std::isfinite(value); });
+  if (smallest <= 0 || volume::whole_numbers(samples, type)) return;
+  replace(samples, type, smallest, [](auto value) { return value == 0; });
 }
 
 bool is_wide_integer(const SampleLayout& layout) {

@@ -302,6 +302,18 @@ TEST(ForeignSamples, OfAMaskOfFloatsBecomeIntegers) {
   EXPECT_EQ(gap.canonical, mask.canonical);
   EXPECT_THAT(codes_of(gap), ElementsAre("non-finite-samples", "looks-like-labels"));
   samples[3] = 0;
+  // Labels without a background have one then.
+  std::vector<float> labels(24, 2);
+  labels[0] = labels[1] = std::numeric_limits<float>::quiet_NaN();
+  const auto of = [](const std::vector<float>& values) {
+    return imported(import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(values))));
+  };
+  const Outcome outside = of(labels);
+  EXPECT_THAT(codes_of(outside), ElementsAre("non-finite-samples", "looks-like-labels"));
+  EXPECT_EQ(samples_of<std::uint8_t>(outside)[0], 0);
+  EXPECT_EQ(samples_of<std::uint8_t>(outside)[2], 2);
+  labels[5] = 2.5;
+  EXPECT_EQ(samples_of<float>(of(labels))[0], 2) << "the smallest";
   samples[9] = 0.5;
   EXPECT_THAT(codes_of(import_bytes(nifti({.datatype = 16, .bitpix = 32}, bytes_of(samples)))),
               IsEmpty());
