@@ -9,6 +9,7 @@
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/other_writers.h"
+#include "tests/unit/import/pictures.h"
 #include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
 
@@ -123,6 +124,22 @@ std::vector<std::string> numpy_files() {
           npy(npy_header(">f2", true, "(2, 1, 3, 2)"), kSamples)};
 }
 
+// Indices of 4 bits, colours and one bit: each 4 x 3 pixels.
+const PictureFields kIndexed = {.bits = 4, .palette = {{0, 0, 0}, {255, 0, 0}, {9, 9, 9}}};
+const PictureFields kWithOpacity = {.components = 4, .has_opacity = true};
+const PictureFields kBits = {.bits = 1};
+
+std::vector<std::string> png_files() {
+  return {grey_png(4, kSamples), png_picture(kIndexed, kSamples.substr(0, 6)),
+          png_picture(kWithOpacity, std::string(48, '\xff')),
+          png_picture(kBits, kSamples.substr(0, 3))};
+}
+
+std::vector<std::string> bmp_files() {
+  return {grey_bmp(4, kSamples), bmp_picture(kIndexed, kSamples.substr(0, 6)),
+          bmp_picture(kWithOpacity, std::string(48, '\xff'))};
+}
+
 std::vector<std::string> tiff_files() {
   const std::vector<std::string> pages = {kSamples.substr(0, 12), kSamples.substr(12)};
   std::vector<std::string> files = {
@@ -138,6 +155,9 @@ std::vector<std::string> tiff_files() {
         "SCIFIO=0.41.0\naxes=X,Y,Z\nlengths=4,3,2\nscales=1,1,1\nunits=mm,mm,mm\n"}) {
     files.push_back(tiff(pages, description));
   }
+  files.push_back(tiff_picture(kIndexed, {kSamples.substr(0, 6), kSamples.substr(6, 6)}));
+  files.push_back(tiff_picture(kWithOpacity, {std::string(48, '\xff')}));
+  files.push_back(tiff_picture({.bits = 16, .format = 3}, {kSamples}));
   return files;
 }
 
@@ -157,8 +177,8 @@ std::vector<std::string> other_files(std::string_view name) {
   if (name == "cube") return cube_files();
   if (name == "numpy") return numpy_files();
   if (name == "tiff") return tiff_files();
-  if (name == "png") return {grey_png(4, kSamples)};
-  if (name == "bmp") return {grey_bmp(4, kSamples)};
+  if (name == "png") return png_files();
+  if (name == "bmp") return bmp_files();
   return {};
 }
 

@@ -111,6 +111,13 @@ bool store_whole_numbers(const PlainSamples& plain, CanonicalWriter& writer, Vol
   return true;
 }
 
+// A palette colours pictures, too. These have many colours.
+bool may_be_labels(CanonicalWriter& writer, const Volume& volume) {
+  constexpr std::size_t kFew = 16;
+  return volume.labels.size() <= kFew ||
+         volume::label_count(writer.samples(), volume.type, volume.dims);
+}
+
 auto find_labels_note(Volume& volume) {
   return std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
 }
@@ -307,7 +314,9 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
   CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
   read_samples(samples.file, samples.offset, samples.layout, writer.samples());
   const bool is_converted = store_whole_numbers(samples, writer, volume);
-  if (!is_integer(volume.type)) volume.labels.clear();
+  if (!is_integer(volume.type) || (samples.labels_if_flat && !may_be_labels(writer, volume))) {
+    volume.labels.clear();
+  }
   volume = finish(writer, std::move(volume));
   if (samples.are_labels) note_declared_labels(volume);
   if (is_converted) note_stored_type(samples.layout, volume);
@@ -331,7 +340,8 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
     return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
                         std::move(volume), task.target);
   volume.labels = source.labels;
-  return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels},
+  return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels,
+                          source.labels_if_flat},
                          std::move(volume), task.target);
 }
 

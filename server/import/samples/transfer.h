@@ -16,7 +16,8 @@ struct PlainSamples {
   const InputFile& file;
   std::uint64_t offset = 0;
   SampleLayout layout;
-  bool are_labels = false;  // by their header
+  bool are_labels = false;      // by their header
+  bool labels_if_flat = false;  // see SourceVolume
 };
 
 // Writes the canonical file `target` of `volume`, whose dims and geometry are set and valid.

@@ -144,8 +144,10 @@ struct SourceVolume {
   bool assumes_spacing = false;
   Geometry geometry;
   std::vector<Note> notes;
-  std::vector<LabelEntry> labels;       // see label_table()
-  bool are_labels = false;              // by the header, even without a table
+  std::vector<LabelEntry> labels;  // see label_table()
+  bool are_labels = false;         // by the header, even without a table
+  // Many labels are those of the samples only if these look like labels.
+  bool labels_if_flat = false;
   std::optional<SegmentLayers> layers;  // then all volumes are read, and `chosen` is the first
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
