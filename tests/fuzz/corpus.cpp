@@ -166,6 +166,11 @@ std::vector<std::string> afni_files() {
                                   {"BRICK_FLOAT_FACS", "float", "2"}})};
 }
 
+constexpr std::string_view kZarrGroup =
+    R"({"multiscales": [{"axes": ["z", "y", "x"], "datasets": [{"path": "0",)"
+    R"( "coordinateTransformations": [{"type": "scale", "scale": [3, 2, 1]}]}]}],)"
+    R"( "image-label": {"colors": [{"label-value": 97, "rgba": [255, 0, 0, 255]}]}})";
+
 // Files of the formats whose writers need no more than one line.
 std::vector<std::string> other_files(std::string_view name) {
   if (name == "vtk") return vtk_files();
@@ -176,6 +181,9 @@ std::vector<std::string> other_files(std::string_view name) {
   if (name == "mrc") return mrc_files();
   if (name == "cube") return cube_files();
   if (name == "numpy") return numpy_files();
+  if (name == "gipl") return {gipl({}, kSamples), gipl({.sizes = {4, 3, 1, 2}}, kSamples)};
+  if (name == "mif") return {mif({}, kSamples), mif({.layout = "+2,-1,+0"}, kSamples)};
+  if (name == "zarr") return {std::string(kZarrGroup)};
   if (name == "tiff") return tiff_files();
   if (name == "png") return png_files();
   if (name == "bmp") return bmp_files();
@@ -192,6 +200,12 @@ std::vector<std::string> archive_files() {
           tar({{"1", kSamples.substr(0, 12)},
                {"2", kSamples.substr(12)},
                {"a.mhd", metaimage(with(small_metaimage(), "ElementDataFile", "%01d 1 2 1"), "")}}),
+          tar({{".zattrs", std::string(kZarrGroup)},
+               {"0/.zarray",
+                R"({"zarr_format": 2, "shape": [2, 3, 4], "chunks": [1, 3, 4], "dtype": "|u1",)"
+                R"( "order": "C", "fill_value": 0, "compressor": {"id": "zlib"}})"},
+               {"0/0.0.0", zlib(kSamples.substr(0, 12))},
+               {"0/1.0.0", zlib(kSamples.substr(12))}}),
           zip({{"a.hdr", nifti({.magic = "ni1", .vox_offset = 0}, "")}, {"a.img", kSamples}}),
           zip({{"a.nii", nifti({}, kSamples)}, {"b.nii", nifti({}, kSamples)}}),
           zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};

@@ -75,9 +75,9 @@ std::vector<std::string> zarr_data_names(const InputFile& file, const Companions
   for (const Json& scales : at(ome_of(group), "multiscales")) {
     for (const std::string& path : dataset_paths(scales)) paths.push_back(path + "/");
   }
-  constexpr std::array<std::string_view, 7> kBeside = {
-      ".zgroup",          ".zmetadata",          ".zattrs", "labels/.zattrs", "labels/.zgroup",
-      "labels/zarr.json", "OME/METADATA.ome.xml"};
+  constexpr std::array<std::string_view, 6> kBeside = {".zgroup",          ".zattrs",
+                                                       "labels/.zattrs",   "labels/.zgroup",
+                                                       "labels/zarr.json", "OME/METADATA.ome.xml"};
   std::vector<std::string> names;
   for (const auto& [name, path] : companions.all()) {
     const bool is_of_array = std::ranges::any_of(
