@@ -317,12 +317,12 @@ void ignore(const Contents& contents, Volume& volume) {
   }
 }
 
-// A Zarr's name is that of its folder; at the top it has none, and gets that of the upload.
-std::string volume_name(const ArchiveMember& member, const Reader& reader) {
+// A Zarr's name is that of its folder. At the top it has none, and gets that of the upload.
+std::optional<std::string> volume_name(const ArchiveMember& member, const Reader& reader) {
   if (reader.name != "zarr") return std::string(base_of(member.name));
-  std::string_view folder = folder_of(member.name);
-  if (!folder.empty()) folder.remove_suffix(1);
-  return std::string(base_of(folder));
+  const std::string_view folder = folder_of(member.name);
+  if (folder.empty()) return std::nullopt;
+  return std::string(base_of(folder.substr(0, folder.size() - 1)));
 }
 
 Volume read_file(const FoundVolume& found, const Contents& contents, Members& members,
