@@ -75,6 +75,12 @@ bool is_interfile(std::string_view head) {
   return lower(trimmed(head).substr(0, 10)) == "!interfile";
 }
 
+// DICOM's predecessor has no preamble, and this code near its beginning.
+bool is_acr_nema(std::string_view head) {
+  constexpr std::size_t kNear = 256;
+  return head.substr(0, kNear).find("ACR-NEMA") != std::string_view::npos;
+}
+
 // JSON, or the same in CBOR.
 bool is_itk_wasm(std::string_view head) {
   return head.find("imageType") != std::string_view::npos &&
@@ -93,6 +99,7 @@ struct Recognised {
 
 constexpr Recognised kRecognised[] = {
     {is_interfile, "an Interfile header"},
+    {is_acr_nema, "an ACR-NEMA file"},
     {is_itk_wasm, "an image of itk-wasm (.iwi)"},
     {is_zarr, "a Zarr without the `multiscales` of OME"},
     {is_bio_rad, "a PIC file of Bio-Rad"},

@@ -118,6 +118,7 @@ TEST(OtherFormats, AreNamed) {
       {pic, "Bio-Rad"},
       {"!INTERFILE :=\n!imaging modality := nucmed\n", "Interfile"},
       {"MATRIX72v" + std::string(100, '\0'), "ECAT"},
+      {bytes_of(std::vector<std::uint16_t>{8, 16, 12, 0}) + "ACR-NEMA 2.0", "ACR-NEMA"},
       {"<nifti_image\n  nifti_type = 'NIFTI-1A'\n", "NIfTI file in ASCII"},
       {R"({"imageType": {"dimension": 3, "componentType": "int16"}})", "itk-wasm"}};
   for (const auto& [file, name] : files) {
