@@ -51,7 +51,7 @@ class Folder {
     const fs::path real = fs::canonical(folder, error);
     if (error) fail(folder, error.message());
     if (std::ranges::find(above_, real) != above_.end()) {
-      fail(folder, "is a link to a folder that it is in. Remove the link");
+      fail(folder, "leads back to a folder that it is in, by a link. Remove the link");
     }
     above_.push_back(real);
     fs::directory_iterator at(folder, error);

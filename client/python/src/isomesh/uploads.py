@@ -105,7 +105,7 @@ def _files_below(folder: Path) -> List[Tuple[str, Path]]:
         at, above = waiting.pop()
         real = os.path.realpath(at)
         if real in above:
-            raise ValueError(f"{at} is a link to a folder that it is in; remove the link")
+            raise ValueError(f"{at} leads back to a folder that it is in, by a link; remove the link")
         for file in at.iterdir():
             if file.name == ".git":  # the objects of a dataset, which the links beside it name
                 continue
