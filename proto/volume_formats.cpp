@@ -69,8 +69,8 @@ constexpr VolumeFormat kVolumeFormats[] = {
     {.name = "mif",
      .title = "MIF",
      .suffixes = ".mif .mif.gz .mih",
-     .content = "images of MRtrix, all types except bits and complex numbers; `volume=N` chooses "
-                "along the fourth axis"},
+     .content = "images of MRtrix, all types except complex numbers; `volume=N` chooses along the "
+                "fourth axis"},
     {.name = "zarr",
      .title = "OME-Zarr",
      .suffixes = ".zarr",

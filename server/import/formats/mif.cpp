@@ -63,25 +63,35 @@ MifHeader read_mif_header(const InputFile& file) {
   throw_unusable("The MIF header has no end.");
 }
 
-SampleLayout mif_layout(std::string_view name) {
+void set_type(std::string_view name, SourceVolume& volume) {
   struct Row {
     std::string_view name;
     StoredType type;
+    Encoding encoding = Encoding::kRaw;
   };
-  static constexpr Row kTypes[] = {
-      {"int8", StoredType::kInt8},       {"uint8", StoredType::kUint8},
-      {"int16", StoredType::kInt16},     {"uint16", StoredType::kUint16},
-      {"int32", StoredType::kInt32},     {"uint32", StoredType::kUint32},
-      {"int64", StoredType::kInt64},     {"uint64", StoredType::kUint64},
-      {"float32", StoredType::kFloat32}, {"float64", StoredType::kFloat64}};
+  static constexpr Row kTypes[] = {{"bit", StoredType::kUint8, Encoding::kBits},
+                                   {"int8", StoredType::kInt8},
+                                   {"uint8", StoredType::kUint8},
+                                   {"int16", StoredType::kInt16},
+                                   {"uint16", StoredType::kUint16},
+                                   {"int32", StoredType::kInt32},
+                                   {"uint32", StoredType::kUint32},
+                                   {"int64", StoredType::kInt64},
+                                   {"uint64", StoredType::kUint64},
+                                   {"float16", StoredType::kFloat32, Encoding::kHalf},
+                                   {"float32", StoredType::kFloat32},
+                                   {"float64", StoredType::kFloat64}};
   const std::string found = lower(name);
   std::string_view plain = found;
   const bool big_endian = plain.ends_with("be");
   if (big_endian || plain.ends_with("le")) plain.remove_suffix(2);
   const auto* row = std::ranges::find(kTypes, plain, &Row::name);
-  if (row != std::end(kTypes)) return {row->type, big_endian, std::nullopt};
-  throw_unusable("The MIF file's datatype " + in_quotes(name) +
-                 " is not supported. Convert it, for example with mrconvert -datatype uint8.");
+  if (row == std::end(kTypes)) {
+    throw_unusable("The MIF file's datatype " + in_quotes(name) +
+                   " is not supported. Convert it, for example with mrconvert -datatype float32.");
+  }
+  volume.layout = {row->type, big_endian, std::nullopt};
+  volume.encoding = row->encoding;
 }
 
 // An axis as it is stored: 0 varies fastest.
@@ -178,7 +188,7 @@ SourceVolume described(const MifHeader& header, const ImportOptions& options) {
   const std::vector<StoredAxis> axes = axes_of(header, sizes.size());
   SourceVolume volume;
   volume.dims = volume_dims(std::span(sizes).first(3));
-  volume.layout = mif_layout(required(header.fields, kMifTitle, "datatype"));
+  set_type(required(header.fields, kMifTitle, "datatype"), volume);
   const std::string_view scaling = value_of(header.fields, "scaling");
   if (!scaling.empty()) {
     const std::vector<double> numbers = finite_numbers_of(parts_of(scaling));

@@ -182,6 +182,23 @@ void decode_half(const Part& part, bool big_endian, ScratchFile& scratch) {
   }
 }
 
+void decode_bits(const Part& part, ScratchFile& scratch) {
+  std::vector<std::byte> packed(kPieceBytes);
+  std::vector<std::byte> samples;
+  const std::uint64_t stored = part.bytes / 8 + (part.bytes % 8 > 0 ? 1 : 0);
+  for (std::uint64_t done = 0; done < stored; done += packed.size()) {
+    packed.resize(std::min<std::uint64_t>(packed.size(), stored - done));
+    const std::size_t found = part.file.read(part.range.offset + done, packed);
+    if (found < packed.size()) throw_short(stored, done + found);
+    samples.clear();
+    for (const std::byte byte : packed) {
+      for (int bit = 7; bit >= 0; --bit) samples.push_back(byte >> bit & std::byte{1});
+    }
+    samples.resize(std::min<std::uint64_t>(samples.size(), part.bytes - done * 8));
+    scratch.write(samples);
+  }
+}
+
 void decode_hex(const Part& part, ScratchFile& scratch) {
   Decoded decoded(part.bytes, scratch);
   unsigned value = 0;
@@ -235,6 +252,8 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
       return decode_hex(part, scratch);
     case Encoding::kHalf:
       return decode_half(part, volume.layout.big_endian, scratch);
+    case Encoding::kBits:
+      return decode_bits(part, scratch);
     case Encoding::kVtk:
       return decode_vtk(part.file, part.range, part.bytes, volume.vtk, folder, scratch);
   }

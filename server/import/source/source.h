@@ -43,6 +43,7 @@ enum class Encoding {
   kHex,           // pairs of hexadecimal digits; white space is ignored
   kVtk,           // see VtkEncoding
   kHalf,          // floats of 16 bits, which become float32
+  kBits,          // one bit a sample, the first highest in its byte, which become uint8
 };
 
 // VTK's encoding of an array: a header of counts, then the bytes, optionally compressed in blocks;

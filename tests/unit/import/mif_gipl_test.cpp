@@ -71,8 +71,21 @@ TEST(Mif, ScalingByteOrderAndDataFilesAreRead) {
   EXPECT_THAT(import_bytes(mif(fields, "")).error, HasSubstr("a b.dat"));
 }
 
+// As mrthreshold writes masks: the last byte is not full.
+TEST(Mif, BitsAndHalfFloatsAreRead) {
+  const MifFields bits = {.dim = "3,2,2", .datatype = "Bit"};
+  EXPECT_EQ(samples_of<std::uint8_t>(imported(import_bytes(mif(bits, "\x4b\x90")))),
+            (std::vector<std::uint8_t>{0, 1, 0, 0, 1, 0, 1, 1, 1, 0, 0, 1}));
+  EXPECT_THAT(import_bytes(mif(bits, "\x4b")).error, HasSubstr("2 bytes of samples"));
+  const std::vector<std::uint16_t> halves = {0x3c00, 0xc100, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(samples_of<float>(imported(
+                import_bytes(mif({.dim = "2,2,2", .datatype = "Float16LE"}, bytes_of(halves))))),
+            (std::vector<float>{1, -2.5F, 0, 0, 0, 0, 0, 0}));
+}
+
 TEST(Mif, DamagedAndUnsupportedOnesAreNamed) {
-  EXPECT_THAT(import_bytes(mif({.datatype = "Bit"}, kSamples)).error, HasSubstr("mrconvert"));
+  EXPECT_THAT(import_bytes(mif({.datatype = "CFloat32LE"}, kSamples)).error,
+              HasSubstr("mrconvert"));
   EXPECT_THAT(import_bytes(mif({.layout = "+0,+0,+2"}, kSamples)).error, HasSubstr("layout"));
   EXPECT_THAT(import_bytes(mif({.layout = "+0,+1"}, kSamples)).error, HasSubstr("layout"));
   EXPECT_THAT(import_bytes(mif({.dim = "2,3"}, kSamples)).error, HasSubstr("axes"));
