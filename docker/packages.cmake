@@ -81,6 +81,8 @@ if(ISOMESH_DAEMON)
   isomesh_find(libmeshoptimizer-dev meshoptimizer)
   isomesh_find_module(libpq-dev libpq libpq)
   isomesh_find_module(liblz4-dev lz4 liblz4)
+  isomesh_find_module(libblosc-dev blosc blosc)
+  isomesh_find_module(libzstd-dev zstd libzstd)
   # Debian's `hdf5` is the MPI build where that is installed, too.
   isomesh_find_module(libhdf5-dev hdf5 hdf5-serial hdf5)
   isomesh_find_module(libarchive-dev archive libarchive)

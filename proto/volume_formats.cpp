@@ -62,6 +62,21 @@ constexpr VolumeFormat kVolumeFormats[] = {
      .suffixes = ".npy .npz",
      .content = "arrays with the axes z, y and x in C or Fortran order; a first of four axes holds "
                 "several volumes; needs `spacing`"},
+    {.name = "gipl",
+     .title = "GIPL",
+     .suffixes = ".gipl .gipl.gz",
+     .content = "integers of 8 to 32 bits and floats; `volume=N` chooses a frame"},
+    {.name = "mif",
+     .title = "MIF",
+     .suffixes = ".mif .mif.gz .mih",
+     .content = "images of MRtrix, all types except complex numbers; `volume=N` chooses along the "
+                "fourth axis"},
+    {.name = "zarr",
+     .title = "OME-Zarr",
+     .suffixes = ".zarr",
+     .content = "a folder, ZIP or TAR of OME-Zarr 0.4 or 0.5 at full resolution, also its labels "
+                "with their colours; chunks of Blosc, Zstandard, gzip or zlib, without shards; "
+                "`volume=N` chooses a channel or time"},
     {.name = "hdf5",
      .title = "HDF5",
      .suffixes = ".h5 .hdf5 .mnc .mnc2",
@@ -73,15 +88,20 @@ constexpr VolumeFormat kVolumeFormats[] = {
          "several pages, or a folder or archive of single pages; OME-TIFF and ImageJ's TIFF with "
          "their spacing, ImageJ's with calibrated values, both also in folders; Zeiss LSM of one "
          "channel with its spacing; others need `spacing`; `volume=N` chooses a channel or time; "
-         "strips and tiles, BigTIFF, grey of 8 to 32 bits and floats, without loss compressed"},
+         "strips and tiles, BigTIFF, integers of 1 to 64 bits, floats, palettes and grey colours, "
+         "compressed without loss"},
     {.name = "png",
      .title = "PNG",
      .suffixes = ".png",
-     .content = "a folder or archive of grey images of 8 or 16 bits; needs `spacing`"},
+     .content =
+         "a folder or archive of images: grey of 1 to 16 bits, indices of a palette, or colours "
+         "that are grey; needs `spacing`"},
     {.name = "bmp",
      .title = "BMP",
      .suffixes = ".bmp",
-     .content = "a folder or archive of grey images of 8 bits; needs `spacing`"},
+     .content =
+         "a folder or archive of images: indices of a palette, or colours that are grey; needs "
+         "`spacing`"},
     {.name = "dicom",
      .title = "DICOM",
      .suffixes = ".dcm .ima",

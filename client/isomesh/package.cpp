@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 20000;  // the server's limit
+constexpr std::size_t kMostLinks = 1000;   // to folders
 constexpr std::size_t kBlock = 512;
 
 // --- Which files ---------------------------------------------------------------------------------
@@ -32,20 +33,66 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(status);
 }
 
-std::vector<PackedFile> files_below(const fs::path& folder) {
-  std::vector<PackedFile> files;
-  std::error_code error;
-  fs::recursive_directory_iterator at(folder, error);
-  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
-    std::error_code unknown;
-    if (!fs::is_regular_file(at->symlink_status(unknown))) continue;
-    files.push_back({at->path().lexically_relative(folder).generic_string(), at->path()});
-    if (files.size() > kMostFiles) {
-      throw Error(ErrorCode::kInvalidParameter, folder.string() + ": contains more than " +
-                                                    std::to_string(kMostFiles) + " files");
+// The files below a folder. Links are followed: in DataLad's datasets all files are links to
+// objects outside of the folder that a person names.
+class Folder {
+ public:
+  explicit Folder(const fs::path& root) : root_(root) { visit(root); }
+
+  std::vector<PackedFile> files() && { return std::move(files_); }
+
+ private:
+  [[noreturn]] void fail(const fs::path& path, const std::string& reason) const {
+    throw Error(ErrorCode::kInvalidParameter, path.string() + ": " + reason);
+  }
+
+  void visit(const fs::path& folder) {
+    std::error_code error;
+    const fs::path real = fs::canonical(folder, error);
+    if (error) fail(folder, error.message());
+    if (std::ranges::find(above_, real) != above_.end()) {
+      fail(folder, "leads back to a folder that it is in, by a link. Remove the link");
+    }
+    above_.push_back(real);
+    fs::directory_iterator at(folder, error);
+    for (; !error && at != fs::directory_iterator(); at.increment(error)) take(at->path());
+    if (error) fail(folder, error.message());
+    above_.pop_back();
+  }
+
+  void take(const fs::path& path) {
+    // The objects of a dataset, which the links beside it name.
+    if (path.filename() == ".git") return;
+    std::error_code error;
+    const fs::file_status status = fs::status(path, error);
+    const bool is_link = fs::is_symlink(fs::symlink_status(path, error));
+    if (is_link && !fs::exists(status)) {
+      fail(path,
+           "is a link to a file that is not there. Get the file, in a dataset with `datalad get`, "
+           "or remove the link");
+    }
+    if (fs::is_directory(status)) {
+      // Links can multiply folders without files.
+      if (is_link && ++links_ > kMostLinks) {
+        fail(root_, "contains more than " + std::to_string(kMostLinks) + " links to folders");
+      }
+      return visit(path);
+    }
+    if (!fs::is_regular_file(status)) return;
+    files_.push_back({path.lexically_relative(root_).generic_string(), path});
+    if (files_.size() > kMostFiles) {
+      fail(root_, "contains more than " + std::to_string(kMostFiles) + " files");
     }
   }
-  if (error) throw Error(ErrorCode::kInvalidParameter, folder.string() + ": " + error.message());
+
+  const fs::path& root_;
+  std::vector<fs::path> above_;  // the real paths of the folders that are being visited
+  std::size_t links_ = 0;        // to folders
+  std::vector<PackedFile> files_;
+};
+
+std::vector<PackedFile> files_below(const fs::path& folder) {
+  std::vector<PackedFile> files = Folder(folder).files();
   if (files.empty()) {
     throw Error(ErrorCode::kInvalidParameter, folder.string() + ": contains no files");
   }

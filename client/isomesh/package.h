@@ -19,12 +19,13 @@ struct PackedFile {
   std::filesystem::path path;
 };
 
-// The files to upload for `path`. Of a folder: all regular files below it, without links, sorted by
-// name (the server skips files that are not part of a volume). Of a MetaImage or NRRD header (.mhd,
-// .nhdr): it and the files beside it that it names, or that may match its pattern. Of a NIfTI or
-// Analyze header (.hdr) or its image (.img), also gzipped, and of AFNI's .HEAD and .BRIK or
-// Philips' .PAR and .REC: both. Of any other file: itself. Throws Error kInvalidParameter for a
-// folder without files or with more than 20000, and for a path that cannot be looked at.
+// The files to upload for `path`. Of a folder: all regular files below it, sorted by name (the
+// server skips files that are not part of a volume); links are followed, `.git` is left out. Of a
+// MetaImage or NRRD header (.mhd, .nhdr): it and the files beside it that it names, or that may
+// match its pattern. Of a NIfTI or Analyze header (.hdr) or its image (.img), also gzipped, and of
+// AFNI's .HEAD and .BRIK or Philips' .PAR and .REC: both. Of any other file: itself. Throws Error
+// kInvalidParameter for a folder without files or with more than 20000, for a link to nothing or to
+// a folder around it, and for a path that cannot be looked at.
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path);
 // The same for several paths that are sent together, as if in one folder. Throws also for two files
 // with the same name.

@@ -18,6 +18,7 @@
 #include "server/import/images/natural_order.h"
 #include "server/import/images/stack.h"
 #include "server/import/labels_beside.h"
+#include "server/import/other_formats.h"
 #include "server/import/readers.h"
 #include "server/import/source/scratch_folder.h"
 
@@ -133,9 +134,16 @@ std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& memb
     throw_unusable("The archive contains another archive, " + in_quotes(member.name) +
                    ". Send that one by itself.");
   }
+  std::string known;
+  for (const ArchiveMember& member : members) {
+    const auto name = name_of_other_format(InputFile(member.path).text(0, kSniffBytes));
+    if (!name) continue;
+    known = ' ' + in_quotes(member.name) + " is " + std::string(*name) + ", which cannot be read.";
+    break;
+  }
   throw Error(ErrorCode::kUnsupportedMedia,
               "None of the " + std::to_string(members.size()) +
-                  " files in the archive is a volume in a supported format.");
+                  " files in the archive is a volume in a supported format." + known);
 }
 
 // The data files among the volumes found. A damaged header names none here; it is reported when its
@@ -311,6 +319,14 @@ void ignore(const Contents& contents, Volume& volume) {
   }
 }
 
+// A Zarr's name is that of its folder. At the top it has none, and gets that of the upload.
+std::optional<std::string> volume_name(const ArchiveMember& member, const Reader& reader) {
+  if (reader.name != "zarr") return std::string(base_of(member.name));
+  const std::string_view folder = folder_of(member.name);
+  if (folder.empty()) return std::nullopt;
+  return std::string(base_of(folder.substr(0, folder.size() - 1)));
+}
+
 Volume read_file(const FoundVolume& found, const Contents& contents, Members& members,
                  const Input& input) {
   const auto& [member, reader, doubles] = found;
@@ -319,7 +335,7 @@ Volume read_file(const FoundVolume& found, const Contents& contents, Members& me
                                        .companions = members.companions_of(member.name),
                                        .task = input.task,
                                        .listener = input.listener});
-  volume.name = std::string(base_of(member.name));
+  volume.name = volume_name(member, *reader);
   if (!doubles.empty()) volume.notes.push_back(duplicate_note(doubles.size()));
   for (std::size_t at = 0; at < std::min(kMostNamed, doubles.size()); ++at) {
     volume.ignored.push_back({std::string(base_of(doubles[at])), reason_of_double(member.name)});

@@ -39,7 +39,7 @@ constexpr Reader kArchiveReader = {
 constexpr const Reader* kReaders[] = {
     &kRawReader, &kNiftiReader, &kNrrdReader, &kMetaImageReader, &kVtiReader, &kVtkLegacyReader,
     &kMghReader, &kAfniReader, &kParReader, &kIsqReader, &kMrcReader, &kCubeReader, &kNumpyReader,
-    &kHdf5Reader,
+    &kGiplReader, &kMifReader, &kZarrReader, &kHdf5Reader,
     // Before images: the preamble of a DICOM file may be the header of a TIFF file (PS3.10, 7.1).
     &kDicomReader, &kTiffReader, &kPngReader, &kBmpReader, &kArchiveReader};
 

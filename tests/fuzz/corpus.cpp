@@ -9,6 +9,7 @@
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/other_writers.h"
+#include "tests/unit/import/pictures.h"
 #include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
 
@@ -132,6 +133,22 @@ std::vector<std::string> numpy_files() {
           npy(npy_header(">f2", true, "(2, 1, 3, 2)"), kSamples)};
 }
 
+// Indices of 4 bits, colours and one bit: each 4 x 3 pixels.
+const PictureFields kIndexed = {.bits = 4, .palette = {{0, 0, 0}, {255, 0, 0}, {9, 9, 9}}};
+const PictureFields kWithOpacity = {.components = 4, .has_opacity = true};
+const PictureFields kBits = {.bits = 1};
+
+std::vector<std::string> png_files() {
+  return {grey_png(4, kSamples), png_picture(kIndexed, kSamples.substr(0, 6)),
+          png_picture(kWithOpacity, std::string(48, '\xff')),
+          png_picture(kBits, kSamples.substr(0, 3))};
+}
+
+std::vector<std::string> bmp_files() {
+  return {grey_bmp(4, kSamples), bmp_picture(kIndexed, kSamples.substr(0, 6)),
+          bmp_picture(kWithOpacity, std::string(48, '\xff'))};
+}
+
 std::vector<std::string> tiff_files() {
   const std::vector<std::string> pages = {kSamples.substr(0, 12), kSamples.substr(12)};
   std::vector<std::string> files = {
@@ -147,6 +164,9 @@ std::vector<std::string> tiff_files() {
         "SCIFIO=0.41.0\naxes=X,Y,Z\nlengths=4,3,2\nscales=1,1,1\nunits=mm,mm,mm\n"}) {
     files.push_back(tiff(pages, description));
   }
+  files.push_back(tiff_picture(kIndexed, {kSamples.substr(0, 6), kSamples.substr(6, 6)}));
+  files.push_back(tiff_picture(kWithOpacity, {std::string(48, '\xff')}));
+  files.push_back(tiff_picture({.bits = 16, .format = 3}, {kSamples}));
   return files;
 }
 
@@ -154,6 +174,11 @@ std::vector<std::string> afni_files() {
   return {afni_head(), afni_head({{"IJK_TO_DICOM_REAL", "float", "2 0 0 7 0 2 0 8 0 0 2 9"},
                                   {"BRICK_FLOAT_FACS", "float", "2"}})};
 }
+
+constexpr std::string_view kZarrGroup =
+    R"({"multiscales": [{"axes": ["z", "y", "x"], "datasets": [{"path": "0",)"
+    R"( "coordinateTransformations": [{"type": "scale", "scale": [3, 2, 1]}]}]}],)"
+    R"( "image-label": {"colors": [{"label-value": 97, "rgba": [255, 0, 0, 255]}]}})";
 
 // Files of the formats whose writers need no more than one line.
 std::vector<std::string> other_files(std::string_view name) {
@@ -165,9 +190,12 @@ std::vector<std::string> other_files(std::string_view name) {
   if (name == "mrc") return mrc_files();
   if (name == "cube") return cube_files();
   if (name == "numpy") return numpy_files();
+  if (name == "gipl") return {gipl({}, kSamples), gipl({.sizes = {4, 3, 1, 2}}, kSamples)};
+  if (name == "mif") return {mif({}, kSamples), mif({.layout = "+2,-1,+0"}, kSamples)};
+  if (name == "zarr") return {std::string(kZarrGroup)};
   if (name == "tiff") return tiff_files();
-  if (name == "png") return {grey_png(4, kSamples)};
-  if (name == "bmp") return {grey_bmp(4, kSamples)};
+  if (name == "png") return png_files();
+  if (name == "bmp") return bmp_files();
   return {};
 }
 
@@ -187,6 +215,12 @@ std::vector<std::string> archive_files() {
           tar({{"1", kSamples.substr(0, 12)},
                {"2", kSamples.substr(12)},
                {"a.mhd", metaimage(with(small_metaimage(), "ElementDataFile", "%01d 1 2 1"), "")}}),
+          tar({{".zattrs", std::string(kZarrGroup)},
+               {"0/.zarray",
+                R"({"zarr_format": 2, "shape": [2, 3, 4], "chunks": [1, 3, 4], "dtype": "|u1",)"
+                R"( "order": "C", "fill_value": 0, "compressor": {"id": "zlib"}})"},
+               {"0/0.0.0", zlib(kSamples.substr(0, 12))},
+               {"0/1.0.0", zlib(kSamples.substr(12))}}),
           zip({{"a.hdr", nifti({.magic = "ni1", .vox_offset = 0}, "")}, {"a.img", kSamples}}),
           zip({{"a.nii", nifti({}, kSamples)}, {"b.nii", nifti({}, kSamples)}}),
           zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};

@@ -72,6 +72,24 @@ class Files(DaemonTest):
         chosen = self.client.upload(folder, member="b.mhd", name="the second")
         self.assertEqual(chosen["id"], answers[1]["volume"]["id"])
 
+    def test_links_in_a_folder_are_followed(self):
+        folder = self.folder / "dataset" / "sub"
+        objects = self.folder / "dataset" / ".git"
+        for each in (folder, objects):
+            each.mkdir(parents=True)
+        self.write_meta_image(objects, "ball.raw", ["ball.raw"])
+        for name in ("ball.mhd", "ball.raw"):
+            (folder / name).symlink_to(f"../.git/{name}")
+        volume = self.client.upload(folder)
+        self.assertEqual(self.client.upload(folder.parent)["id"], volume["id"])
+        (folder / "up").symlink_to("..")
+        with self.assertRaisesRegex(ValueError, "up/sub leads back to a folder"):
+            self.client.upload(folder)
+        (folder / "up").unlink()
+        (folder / "gone").symlink_to("absent")
+        with self.assertRaisesRegex(FileNotFoundError, "gone is a link to a file that is not there"):
+            self.client.upload(folder)
+
     def test_an_upload_that_is_too_large_is_refused_with_the_reason(self):
         with self.assertRaises(isomesh.Refused) as refused:
             self.client.upload(numpy.zeros((200, 200, 200)))

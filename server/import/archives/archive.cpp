@@ -45,10 +45,12 @@ std::uint64_t octal(std::string_view text) {
 }
 
 // True for members that are hidden or in a hidden folder, such as those of version control, and for
-// the files that macOS adds to archives.
+// the files that macOS adds to archives. A Zarr's metadata are hidden files, too, but needed.
 bool is_hidden(std::string_view name) {
+  constexpr std::array<std::string_view, 3> kOfZarr = {".zarray", ".zattrs", ".zgroup"};
   while (!name.empty()) {
     const std::string_view part = name.substr(0, name.find('/'));
+    if (part == name && std::ranges::find(kOfZarr, part) != kOfZarr.end()) return false;
     if (part == "__MACOSX" || (part.starts_with('.') && part != "." && part != "..")) return true;
     name.remove_prefix(std::min(part.size() + 1, name.size()));
   }

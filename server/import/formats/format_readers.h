@@ -83,6 +83,20 @@ extern const Reader kCubeReader;
 // a first of four axes holds several volumes. An array has neither a spacing nor a position.
 extern const Reader kNumpyReader;
 
+// GIPL, .gipl (the layout is that of ITK's reader). Volumes are along the fourth axis. The file
+// gives an origin and no directions.
+extern const Reader kGiplReader;
+
+// MRtrix' images, .mif, and .mih with data files
+// (https://mrtrix.readthedocs.io/en/latest/getting_started/image_data.html). Volumes are along the
+// fourth axis. Reversed axes begin at their other end, so samples stay as they are stored.
+extern const Reader kMifReader;
+
+// OME-Zarr 0.4 and 0.5, and older ones (https://ngff.openmicroscopy.org), as a folder or archive.
+// The header is the metadata of a group with `multiscales`; its first dataset is read, which has
+// the full resolution. Volumes are times and channels. See zarr_array.h for what is decoded.
+extern const Reader kZarrReader;
+
 // Images in HDF5: those of ITK and MINC 2 (https://en.wikibooks.org/wiki/MINC/Reference). Volumes
 // are instants. MINC's integers become real values by the range of each slice; they stay integers
 // if that changes nothing. Throws Error kUnsupportedMedia for HDF5 files of other programs. The

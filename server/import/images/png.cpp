@@ -10,6 +10,7 @@
 #include <png.h>
 
 #include "server/import/images/page.h"
+#include "server/import/images/pixels.h"
 #include "server/import/source/header_fields.h"
 #include "server/import/source/names.h"
 
@@ -90,23 +91,44 @@ struct PngDecoder {
   png_info* info = nullptr;
 };
 
-PageLayout layout_of(std::string_view head) {
+constexpr std::uint8_t kPalette = 3;  // a type of colours, of which bits say more
+constexpr std::uint8_t kColours = 2;
+constexpr std::uint8_t kOpacity = 4;
+
+PixelForm form_of(std::string_view head) {
+  const auto type = static_cast<std::uint8_t>(head[25]);
+  PixelForm form = {.bits = static_cast<unsigned char>(head[24])};
+  form.has_opacity = (type & kOpacity) != 0;
+  form.components = (type != kPalette && (type & kColours) != 0 ? 3 : 1) + form.has_opacity;
+  return form;
+}
+
+PageLayout layout_of(std::string_view head, const PixelForm& form) {
   const HeaderBytes header(head, true);
-  const auto bits = static_cast<unsigned char>(head[24]);
-  if (head[25] != 0) {
-    throw_unusable("The PNG image has colours, a palette or transparency. Only grey is supported.");
-  }
-  if ((bits != 8 && bits != 16) || head[28] != 0) {
-    throw_unusable("The PNG image has " + std::to_string(bits) +
-                   " bits or is interlaced. 8 and 16 bits, not interlaced, are supported.");
+  const bool is_packed = form.bits == 1 || form.bits == 2 || form.bits == 4;
+  if (!is_packed && form.bits != 8 && form.bits != 16) throw_damaged_png();
+  if (is_packed && form.components > 1) throw_damaged_png();
+  if (head[28] != 0) {
+    throw_unusable("The PNG image is interlaced, which is not supported. Save it without that.");
   }
   const PageLayout layout = {header.at<std::uint32_t>(16), header.at<std::uint32_t>(20),
-                             bits == 8 ? StoredType::kUint8 : StoredType::kUint16};
+                             integer_type(form)};
   if (layout.width == 0 || layout.height == 0 || layout.width > kMostPixels ||
       layout.height > kMostPixels) {
     throw_unusable("The size of the PNG image is not plausible.");
   }
   return layout;
+}
+
+std::vector<Colour> palette_of(const PngDecoder& decoder) {
+  png_color* colours = nullptr;
+  int count = 0;
+  if (png_get_PLTE(decoder.png, decoder.info, &colours, &count) == 0) throw_damaged_png();
+  std::vector<Colour> palette;
+  for (const png_color& colour : std::span(colours, static_cast<std::size_t>(count))) {
+    palette.push_back({colour.red, colour.green, colour.blue});
+  }
+  return palette;
 }
 
 }  // namespace
@@ -118,8 +140,10 @@ bool is_png(std::string_view head) {
 void read_png(const InputFile& file, const PageCheck& check, const PageSink& sink) {
   const std::string head = file.text(0, 33);
   if (!is_png(head)) throw_damaged_png();
-  const PageLayout layout = layout_of(head);
-  check(layout);
+  const PixelForm form = form_of(head);
+  PageLayout layout = layout_of(head, form);
+  const bool is_indexed = head[25] == kPalette;
+  if (!is_indexed) check(layout);
   PngSource source = {.file = file, .at = 0, .failure = {}};
   PngDecoder reader(source);
   const auto expect = [&](bool is_read) {
@@ -127,11 +151,16 @@ void read_png(const InputFile& file, const PageCheck& check, const PageSink& sin
     if (!is_read) throw_damaged_png();
   };
   expect(reader.begin());
-  std::vector<png_byte> row(layout.width * bytes_per_sample(layout.type));
+  if (is_indexed) {
+    layout.palette = palette_of(reader);
+    check(layout);
+  }
+  std::vector<std::byte> row(form.row_bytes(layout.width));
   if (png_get_rowbytes(reader.png, reader.info) != row.size()) throw_damaged_png();
+  Pixels pixels(form, layout.width);
   for (std::uint32_t y = 0; y < layout.height; ++y) {
-    expect(reader.read(row.data()));
-    sink(std::as_bytes(std::span(row)));
+    expect(reader.read(reinterpret_cast<png_byte*>(row.data())));
+    sink(pixels.samples(row));
   }
   expect(reader.end());
 }

@@ -12,6 +12,7 @@
 #include "server/import/formats/placing.h"
 #include "server/import/images/natural_order.h"
 #include "server/import/images/page.h"
+#include "server/import/images/palettes.h"
 #include "server/import/images/tiff.h"
 #include "server/import/samples/transfer.h"
 
@@ -28,23 +29,32 @@ class Pages {
     return [this](const PageLayout& layout) { take(layout); };
   }
   PageSink sink() {
-    return [this](std::span<const std::byte> samples) { samples_.write(samples); };
+    return [this](std::span<const std::byte> samples) {
+      samples_.write(samples);
+      palettes_.use(samples);
+    };
   }
 
-  // `source` has everything but dims and type.
+  // `source` has everything but dims, type and labels.
   Volume write(SourceVolume source) const {
     source.dims = described_.dims;
     source.layout.type = described_.layout.type;
     source.chosen = {};
-    return write_canonical(InputFile(samples_.path()), source, task_);
+    source.labels = palettes_.labels();
+    source.labels_if_flat = true;
+    if (!palettes_.replaces()) return write_canonical(InputFile(samples_.path()), source, task_);
+    ScratchFile greys(task_.scratch, ".greys");
+    write_greys(greys);
+    return write_canonical(InputFile(greys.path()), source, task_);
   }
 
  private:
   void take(const PageLayout& layout) {
-    if (layout_ && *layout_ != layout) {
+    if (layout_ && !layout_->is_like(layout)) {
       throw_unusable("The pages differ: one has " + text_of(*layout_) + ", another has " +
                      text_of(layout) + ".");
     }
+    palettes_.begin(layout);
     if (layout_) return;
     layout_ = layout;
     const std::array<std::uint64_t, 3> sizes = {layout.width, layout.height, count_};
@@ -52,6 +62,17 @@ class Pages {
     refuse_flat("The file", described_.dims);
     described_.layout.type = layout.type;
     check_limits(described_, task_.limits);
+  }
+
+  // The pages with the greys of their palettes.
+  void write_greys(ScratchFile& greys) const {
+    const InputFile indices(samples_.path());
+    std::vector<std::byte> row(layout_->bytes() / layout_->height);
+    for (std::uint64_t at = 0; at < count_ * layout_->height; ++at) {
+      indices.read_exactly(at * row.size(), row);
+      palettes_.replace(at / layout_->height, row);
+      greys.write(row);
+    }
   }
 
   static std::string text_of(const PageLayout& layout) {
@@ -63,6 +84,7 @@ class Pages {
   std::uint64_t count_;
   std::optional<PageLayout> layout_;
   SourceVolume described_;
+  Palettes palettes_;
   ScratchFile samples_;
 };
 

@@ -1,12 +1,14 @@
 #include "server/import/images/tiff.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 #include <vector>
 
 #include <tiffio.h>
 
+#include "server/import/images/pixels.h"
 #include "server/import/source/names.h"
 
 namespace isomesh::import {
@@ -81,54 +83,114 @@ Value field(TIFF* tiff, std::uint32_t tag) {
 
 void check_compression(TIFF* tiff) {
   static constexpr std::uint16_t kLossless[] = {
-      COMPRESSION_NONE,     COMPRESSION_LZW,  COMPRESSION_ADOBE_DEFLATE, COMPRESSION_DEFLATE,
-      COMPRESSION_PACKBITS, COMPRESSION_LZMA, COMPRESSION_ZSTD};
+      COMPRESSION_NONE,      COMPRESSION_LZW,      COMPRESSION_ADOBE_DEFLATE, COMPRESSION_DEFLATE,
+      COMPRESSION_PACKBITS,  COMPRESSION_LZMA,     COMPRESSION_ZSTD,          COMPRESSION_CCITTRLE,
+      COMPRESSION_CCITTFAX3, COMPRESSION_CCITTFAX4};
   const auto found = field<std::uint16_t>(tiff, TIFFTAG_COMPRESSION);
   const bool is_lossless = std::ranges::find(kLossless, found) != std::end(kLossless);
   if (is_lossless && TIFFIsCODECConfigured(found) != 0) return;
   throw_unusable("The TIFF image's compression " + std::to_string(found) +
-                 " is not supported. LZW, deflate, PackBits, LZMA and Zstandard are.");
+                 " is not supported. LZW, deflate, PackBits, LZMA, Zstandard and those of fax "
+                 "are.");
 }
 
-StoredType type_of(TIFF* tiff) {
-  const auto bits = field<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE);
-  const auto format = field<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT);
-  if (format == SAMPLEFORMAT_IEEEFP && bits == 32) return StoredType::kFloat32;
-  if (format == SAMPLEFORMAT_IEEEFP && bits == 64) return StoredType::kFloat64;
-  const bool is_signed = format == SAMPLEFORMAT_INT;
-  if (is_signed || format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID) {
-    if (bits == 8) return is_signed ? StoredType::kInt8 : StoredType::kUint8;
-    if (bits == 16) return is_signed ? StoredType::kInt16 : StoredType::kUint16;
-    if (bits == 32) return is_signed ? StoredType::kInt32 : StoredType::kUint32;
-  }
-  throw_unusable("The TIFF image's samples are " +
-                 std::string(format == SAMPLEFORMAT_IEEEFP ? "floats of " : "of ") +
-                 std::to_string(bits) +
-                 " bits, which is not supported. Integers of 8, 16 and 32 bits, and floats of 32 "
-                 "and 64 bits are.");
-}
-
-PageLayout layout_of(TIFF* tiff) {
+// Colours with or without an opacity, or grey with one.
+void set_components(TIFF* tiff, PixelForm& form) {
   const auto photometric = field<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC);
-  const auto components = field<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
-  if (components != 1 &&
-      field<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) == PLANARCONFIG_SEPARATE) {
+  form.components = field<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
+  std::uint16_t count = 0;
+  const std::uint16_t* kinds = nullptr;
+  const bool has_kinds = TIFFGetField(tiff, TIFFTAG_EXTRASAMPLES, &count, &kinds) == 1;
+  form.has_opacity = has_kinds && count == 1 && kinds[0] != EXTRASAMPLE_UNSPECIFIED;
+  const bool is_grey =
+      photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
+  const unsigned colours = photometric == PHOTOMETRIC_RGB ? 3 : 1;
+  if (!is_grey && photometric != PHOTOMETRIC_PALETTE && photometric != PHOTOMETRIC_RGB) {
+    throw_coloured();
+  }
+  if (form.components == 1 && colours == 1) return;
+  const bool has_rest = form.components == colours + (form.has_opacity ? 1 : 0);
+  const bool is_separate =
+      field<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG) == PLANARCONFIG_SEPARATE;
+  if (!has_rest || is_separate || photometric == PHOTOMETRIC_PALETTE) {
     throw_unusable(
-        "The TIFF image has several channels in a page, which is not supported. Save "
-        "one channel, or each as pages of its own.");
+        "The TIFF image has several channels in a page, which is not supported. Save one channel, "
+        "or each as pages of its own.");
   }
-  if (components != 1 ||
-      (photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE)) {
-    throw_unusable("The TIFF image has colours or a palette. Only grey images are supported.");
+}
+
+// Throws unless the samples are of one of these kinds.
+void check_type(std::uint16_t format, const PixelForm& form) {
+  const unsigned bits = form.bits;
+  const bool is_float = format == SAMPLEFORMAT_IEEEFP;
+  const bool is_packed = format != SAMPLEFORMAT_INT && (bits == 1 || bits == 2 || bits == 4);
+  const bool is_whole = bits == 8 || bits == 16;
+  const bool is_wide = bits == 32 || bits == 64;
+  const bool is_known = is_float || format == SAMPLEFORMAT_INT || format == SAMPLEFORMAT_UINT ||
+                        format == SAMPLEFORMAT_VOID;
+  const bool is_possible = form.components > 1 ? is_whole && !is_float
+                           : is_float          ? bits == 16 || is_wide
+                                               : is_packed || is_whole || is_wide;
+  if (is_known && is_possible) return;
+  throw_unusable("The TIFF image's samples are " + std::string(is_float ? "floats of " : "of ") +
+                 std::to_string(bits) +
+                 " bits, which is not supported. Integers of 1, 2, 4, 8, 16, 32 and 64 bits, and "
+                 "floats of 16, 32 and 64 bits are.");
+}
+
+PixelForm form_of(TIFF* tiff) {
+  const auto format = field<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT);
+  PixelForm form = {.bits = field<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE)};
+  set_components(tiff, form);
+  check_type(format, form);
+  form.is_half = format == SAMPLEFORMAT_IEEEFP && form.bits == 16;
+  return form;
+}
+
+StoredType type_of(TIFF* tiff, const PixelForm& form) {
+  const auto format = field<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT);
+  if (format == SAMPLEFORMAT_IEEEFP) {
+    return form.bits == 64 ? StoredType::kFloat64 : StoredType::kFloat32;
   }
+  const bool is_signed = format == SAMPLEFORMAT_INT;
+  if (form.bits == 64) return is_signed ? StoredType::kInt64 : StoredType::kUint64;
+  if (form.bits == 32) return is_signed ? StoredType::kInt32 : StoredType::kUint32;
+  if (form.bits == 16) return is_signed ? StoredType::kInt16 : StoredType::kUint16;
+  return is_signed ? StoredType::kInt8 : StoredType::kUint8;
+}
+
+// The colours have 16 bits; some programs write 8.
+std::vector<Colour> palette_of(TIFF* tiff, const PixelForm& form) {
+  std::array<std::uint16_t*, 3> parts = {};
+  if (form.bits > 16 ||
+      TIFFGetField(tiff, TIFFTAG_COLORMAP, &parts[0], &parts[1], &parts[2]) != 1) {
+    throw_damaged_tiff();
+  }
+  const std::size_t count = std::size_t{1} << form.bits;
+  const bool is_narrow = std::ranges::all_of(parts, [&](const std::uint16_t* part) {
+    return std::all_of(part, part + count, [](std::uint16_t value) { return value < 256; });
+  });
+  std::vector<Colour> palette(count);
+  for (std::size_t at = 0; at < count; ++at) {
+    for (std::size_t part = 0; part < 3; ++part) {
+      palette[at][part] = static_cast<std::uint8_t>(parts[part][at] >> (is_narrow ? 0 : 8));
+    }
+  }
+  return palette;
+}
+
+PageLayout layout_of(TIFF* tiff, const PixelForm& form) {
   if (field<std::uint32_t>(tiff, TIFFTAG_IMAGEDEPTH) > 1) {
     throw_unusable(
         "The TIFF image has several planes in a page (ImageDepth), which is not "
         "supported. Save each plane as a page.");
   }
-  const PageLayout layout = {field<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH),
-                             field<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH), type_of(tiff)};
+  PageLayout layout = {field<std::uint32_t>(tiff, TIFFTAG_IMAGEWIDTH),
+                       field<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH), type_of(tiff, form)};
   if (layout.width == 0 || layout.height == 0) throw_damaged_tiff();
+  if (field<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC) == PHOTOMETRIC_PALETTE) {
+    layout.palette = palette_of(tiff, form);
+  }
   return layout;
 }
 
@@ -173,50 +235,68 @@ void turn(std::span<std::byte> rows, const PageLayout& layout, const Corner& cor
   });
 }
 
-void read_strips(TIFF* tiff, const PageLayout& layout, const Corner& corner, const PageSink& sink) {
-  check_block(TIFFStripSize64(tiff));
-  std::vector<std::byte> strip(TIFFStripSize64(tiff));
-  const std::uint64_t strips = (layout.bytes() + strip.size() - 1) / strip.size();
+// Of blocks of rows or tiles as the library decodes them.
+void check_blocks(std::uint64_t bytes, std::uint64_t rows, const PageLayout& layout) {
+  check_block(bytes);
+  check_block(layout.bytes() / layout.height);
+  if (rows > kMostBlockBytes / (layout.bytes() / layout.height)) check_block(kMostBlockBytes + 1);
+}
+
+void read_strips(TIFF* tiff, const PixelForm& form, const PageLayout& layout, const Corner& corner,
+                 const PageSink& sink) {
+  const std::uint64_t row_bytes = form.row_bytes(layout.width);
+  std::vector<std::byte> strip;
+  const std::uint64_t strip_bytes = TIFFStripSize64(tiff);
+  check_blocks(strip_bytes, strip_bytes / row_bytes, layout);
+  if (strip_bytes % row_bytes != 0) throw_damaged_tiff();
+  strip.resize(strip_bytes);
+  const std::uint64_t bytes = row_bytes * layout.height;
+  const std::uint64_t strips = (bytes + strip_bytes - 1) / strip_bytes;
   if (strips > TIFFNumberOfStrips(tiff)) throw_damaged_tiff();
+  Pixels pixels(form, layout.width);
   for (std::uint64_t next = 0; next < strips; ++next) {
     const std::uint64_t at = corner.is_bottom ? strips - 1 - next : next;
-    const std::span rows =
-        std::span(strip).first(std::min(layout.bytes() - at * strip.size(), strip.size()));
-    const auto size = static_cast<tmsize_t>(rows.size());
-    if (TIFFReadEncodedStrip(tiff, static_cast<std::uint32_t>(at), rows.data(), size) != size) {
+    const std::span stored =
+        std::span(strip).first(std::min(bytes - at * strip_bytes, strip_bytes));
+    const auto size = static_cast<tmsize_t>(stored.size());
+    if (TIFFReadEncodedStrip(tiff, static_cast<std::uint32_t>(at), stored.data(), size) != size) {
       throw_damaged_tiff();
     }
+    const std::span rows = pixels.samples(stored);
     turn(rows, layout, corner);
     sink(rows);
   }
 }
 
-void read_tiles(TIFF* tiff, const PageLayout& layout, const Corner& corner, const PageSink& sink) {
+void read_tiles(TIFF* tiff, const PixelForm& form, const PageLayout& layout, const Corner& corner,
+                const PageSink& sink) {
   const auto width = field<std::uint32_t>(tiff, TIFFTAG_TILEWIDTH);
   const auto height = field<std::uint32_t>(tiff, TIFFTAG_TILELENGTH);
   const std::uint64_t row_bytes = layout.bytes() / layout.height;
   const std::uint64_t tile_row = std::uint64_t{width} * bytes_per_sample(layout.type);
-  check_block(TIFFTileSize64(tiff));
-  check_block(row_bytes);
-  if (height > kMostBlockBytes / row_bytes) check_block(kMostBlockBytes + 1);
-  if (TIFFTileSize64(tiff) != tile_row * height) throw_damaged_tiff();
-  std::vector<std::byte> tile(TIFFTileSize64(tiff));
+  check_blocks(TIFFTileSize64(tiff), height, layout);
+  if (TIFFTileSize64(tiff) != form.row_bytes(width) * height) throw_damaged_tiff();
+  check_block(tile_row);
+  if (height > kMostBlockBytes / tile_row) check_block(kMostBlockBytes + 1);
+  std::vector<std::byte> stored(TIFFTileSize64(tiff));
   std::vector<std::byte> rows(row_bytes * height);
+  Pixels pixels(form, width);
   const std::uint32_t bands = layout.height / height + (layout.height % height > 0 ? 1 : 0);
   for (std::uint32_t next = 0; next < bands; ++next) {
     const std::uint32_t y = (corner.is_bottom ? bands - 1 - next : next) * height;
+    const auto band_rows = std::min<std::uint64_t>(height, layout.height - y);
     for (std::uint64_t x = 0; x < layout.width; x += width) {
       const std::uint32_t at = TIFFComputeTile(tiff, static_cast<std::uint32_t>(x), y, 0, 0);
-      const auto size = static_cast<tmsize_t>(tile.size());
-      if (TIFFReadEncodedTile(tiff, at, tile.data(), size) != size) throw_damaged_tiff();
+      const auto size = static_cast<tmsize_t>(stored.size());
+      if (TIFFReadEncodedTile(tiff, at, stored.data(), size) != size) throw_damaged_tiff();
+      const std::span tile = pixels.samples(stored);
       const std::uint64_t begin = x * bytes_per_sample(layout.type);
       const std::uint64_t count = std::min(tile_row, row_bytes - begin);
-      for (std::uint64_t row = 0; row < height; ++row) {
+      for (std::uint64_t row = 0; row < band_rows; ++row) {
         std::memcpy(rows.data() + row * row_bytes + begin, tile.data() + row * tile_row, count);
       }
     }
-    const std::span band =
-        std::span(rows).first(std::min<std::uint64_t>(height, layout.height - y) * row_bytes);
+    const std::span band = std::span(rows).first(band_rows * row_bytes);
     turn(band, layout, corner);
     sink(band);
   }
@@ -282,14 +362,17 @@ class TiffFile::Library {
   bool has_planes() const { return planes_ > 1; }
 
   // `page` is below pages().
-  void read_plane(std::uint64_t page, const PageLayout& layout, const PageSink& sink) const {
-    std::vector<std::byte> piece(std::min<std::uint64_t>(kPieceBytes, layout.bytes()));
-    const std::uint64_t begin = TIFFGetStrileOffset(tiff_, 0) + page * layout.bytes();
-    for (std::uint64_t at = 0; at < layout.bytes(); at += piece.size()) {
-      piece.resize(std::min<std::uint64_t>(piece.size(), layout.bytes() - at));
-      if (position_.file.read(begin + at, piece) != piece.size()) throw_damaged_tiff();
-      if (TIFFIsByteSwapped(tiff_) != 0) swap_bytes(piece, bytes_per_sample(layout.type));
-      sink(piece);
+  void read_plane(std::uint64_t page, const PixelForm& form, const PageLayout& layout,
+                  const PageSink& sink) const {
+    const std::uint64_t row_bytes = form.row_bytes(layout.width);
+    check_block(row_bytes);
+    std::vector<std::byte> row(row_bytes);
+    Pixels pixels(form, layout.width);
+    const std::uint64_t begin = TIFFGetStrileOffset(tiff_, 0) + page * row_bytes * layout.height;
+    for (std::uint64_t y = 0; y < layout.height; ++y) {
+      if (position_.file.read(begin + y * row_bytes, row) != row.size()) throw_damaged_tiff();
+      if (TIFFIsByteSwapped(tiff_) != 0 && form.bits > 8) swap_bytes(row, form.bits / 8);
+      sink(pixels.samples(row));
     }
   }
 
@@ -309,7 +392,11 @@ class TiffFile::Library {
     }
     const std::uint64_t begin = TIFFGetStrileOffset(tiff_, 0);
     const std::uint64_t size = position_.file.size();
-    return begin < size && images <= (size - begin) / layout_of(tiff_).bytes() ? images : 0;
+    const PixelForm form = form_of(tiff_);
+    const PageLayout layout = layout_of(tiff_, form);
+    return begin < size && images <= (size - begin) / form.row_bytes(layout.width) / layout.height
+               ? images
+               : 0;
   }
 
   bool is_reduced() const {
@@ -348,16 +435,17 @@ void TiffFile::read(std::uint64_t page, const PageCheck& check, const PageSink& 
   library_->go_to(library_->has_planes() ? 0 : page);
   TIFF* tiff = library_->tiff();
   check_compression(tiff);
-  const PageLayout layout = layout_of(tiff);
+  const PixelForm form = form_of(tiff);
+  const PageLayout layout = layout_of(tiff, form);
   const Corner corner = corner_of(tiff);
   library_->check_corner(corner);
   check(layout);
   if (library_->has_planes()) {
-    library_->read_plane(page, layout, sink);
+    library_->read_plane(page, form, layout, sink);
   } else if (TIFFIsTiled(tiff) != 0) {
-    read_tiles(tiff, layout, corner, sink);
+    read_tiles(tiff, form, layout, corner, sink);
   } else {
-    read_strips(tiff, layout, corner, sink);
+    read_strips(tiff, form, layout, corner, sink);
   }
 }
 

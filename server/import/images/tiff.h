@@ -1,5 +1,5 @@
-// TIFF images of grey samples (https://www.itu.int/itudoc/itu-t/com16/tiff-fx/docs/tiff6.pdf), also
-// BigTIFF.
+// TIFF images of grey samples or indices
+// (https://www.itu.int/itudoc/itu-t/com16/tiff-fx/docs/tiff6.pdf), also BigTIFF.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +30,8 @@ class TiffFile {
   // The meaning of these pages.
   TiffMeaning meaning();
 
-  // Reads a page below pages(), from its top left. Throws Error kUnusableVolume, also for
-  // colours, palettes and lossy compression.
+  // Reads a page below pages(), from its top left. Stored samples are not inverted if 0 is white.
+  // Throws Error kUnusableVolume, also for colours without a palette and lossy compression.
   void read(std::uint64_t page, const PageCheck& check, const PageSink& sink);
 
  private:

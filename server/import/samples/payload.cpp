@@ -164,22 +164,6 @@ void decode_text(const Part& part, ScratchFile& scratch,
   decoded.finish();
 }
 
-// The value of a float of 16 bits (IEEE 754 binary16).
-float float_of_half(std::uint16_t half) {
-  constexpr int kBias = 15;
-  constexpr int kFractionBits = 10;
-  const int exponent = half >> kFractionBits & 0x1f;
-  const int fraction = half & 0x3ff;
-  const float sign = (half & 0x8000) != 0 ? -1.0F : 1.0F;
-  if (exponent == 0x1f) {
-    return fraction != 0 ? std::numeric_limits<float>::quiet_NaN()
-                         : sign * std::numeric_limits<float>::infinity();
-  }
-  if (exponent == 0)
-    return sign * std::ldexp(static_cast<float>(fraction), 1 - kBias - kFractionBits);
-  return sign * std::ldexp(static_cast<float>(fraction + 1024), exponent - kBias - kFractionBits);
-}
-
 void decode_half(const Part& part, bool big_endian, ScratchFile& scratch) {
   std::vector<std::uint16_t> halves(kPieceBytes);
   std::vector<float> floats;
@@ -192,10 +176,26 @@ void decode_half(const Part& part, bool big_endian, ScratchFile& scratch) {
     if (found < bytes.size()) throw_short(stored, done + found);
     if (big_endian) swap_bytes(bytes, sizeof(std::uint16_t));
     floats.resize(count);
-    std::transform(halves.begin(), halves.begin() + static_cast<std::ptrdiff_t>(count),
-                   floats.begin(), float_of_half);
+    floats_of_halves(std::span(halves).first(count), floats);
     scratch.write(std::as_bytes(std::span(floats)));
     done += found;
+  }
+}
+
+void decode_bits(const Part& part, ScratchFile& scratch) {
+  std::vector<std::byte> packed(kPieceBytes);
+  std::vector<std::byte> samples;
+  const std::uint64_t stored = part.bytes / 8 + (part.bytes % 8 > 0 ? 1 : 0);
+  for (std::uint64_t done = 0; done < stored; done += packed.size()) {
+    packed.resize(std::min<std::uint64_t>(packed.size(), stored - done));
+    const std::size_t found = part.file.read(part.range.offset + done, packed);
+    if (found < packed.size()) throw_short(stored, done + found);
+    samples.clear();
+    for (const std::byte byte : packed) {
+      for (int bit = 7; bit >= 0; --bit) samples.push_back(byte >> bit & std::byte{1});
+    }
+    samples.resize(std::min<std::uint64_t>(samples.size(), part.bytes - done * 8));
+    scratch.write(samples);
   }
 }
 
@@ -252,6 +252,8 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
       return decode_hex(part, scratch);
     case Encoding::kHalf:
       return decode_half(part, volume.layout.big_endian, scratch);
+    case Encoding::kBits:
+      return decode_bits(part, scratch);
     case Encoding::kVtk:
       return decode_vtk(part.file, part.range, part.bytes, volume.vtk, folder, scratch);
   }

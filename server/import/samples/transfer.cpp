@@ -110,6 +110,13 @@ bool store_whole_numbers(const SampleKind& kind, std::span<std::byte> samples, V
   return true;
 }
 
+// A palette colours pictures, too. These have many colours.
+bool may_be_labels(std::span<const std::byte> samples, const Volume& volume) {
+  constexpr std::size_t kFew = 16;
+  return volume.labels.size() <= kFew ||
+         volume::label_count(samples, volume.type, volume.dims);
+}
+
 auto find_labels_note(Volume& volume) {
   return std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
 }
@@ -299,6 +306,7 @@ Volume write_canonical(const PlainSamples& samples, Volume volume, const ImportT
   const std::span<std::byte> stored =
       writer.samples().first(volume.sample_count() * bytes_per_sample(volume.type));
   read_samples(samples.file, samples.offset, samples.layout, stored);
+  if (samples.labels_if_flat && !may_be_labels(stored, volume)) volume.labels.clear();
   volume = finish(writer, std::move(volume),
                   {.are_labels = samples.are_labels,
                    .are_wide = is_wide_integer(samples.layout),
@@ -325,7 +333,7 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
                         std::move(volume), task);
   volume.labels = source.labels;
   return write_canonical({payload.file(), payload.offset(), payload.layout(), source.are_labels,
-                          source.is_segmentation},
+                          source.is_segmentation, source.labels_if_flat},
                          std::move(volume), task);
 }
 

@@ -17,6 +17,7 @@ struct PlainSamples {
   SampleLayout layout;
   bool are_labels = false;       // by their header
   bool is_segmentation = false;  // see SourceVolume
+  bool labels_if_flat = false;   // see SourceVolume
 };
 
 // Writes the canonical file of `volume`, whose dims and geometry are set and valid, to the task's

@@ -61,6 +61,8 @@ std::uint64_t SourceVolume::most_encoded_bytes() const {
       return stored_bytes() * kHexPerByte;
     case Encoding::kHalf:
       return stored_bytes() / 2;
+    case Encoding::kBits:
+      return stored_bytes() / 8 + 1;
     case Encoding::kRaw:
     case Encoding::kDeflate:
     case Encoding::kBzip2:

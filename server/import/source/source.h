@@ -43,6 +43,7 @@ enum class Encoding {
   kHex,           // pairs of hexadecimal digits; white space is ignored
   kVtk,           // see VtkEncoding
   kHalf,          // floats of 16 bits, which become float32
+  kBits,          // one bit a sample, the first highest in its byte, which become uint8
 };
 
 // VTK's encoding of an array: a header of counts, then the bytes, optionally compressed in blocks;
@@ -144,9 +145,11 @@ struct SourceVolume {
   bool assumes_spacing = false;
   Geometry geometry;
   std::vector<Note> notes;
-  std::vector<LabelEntry> labels;       // see label_table()
-  bool are_labels = false;              // by the header, even without a table
-  bool is_segmentation = false;         // whole numbers; nothing lies beyond its ends
+  std::vector<LabelEntry> labels;  // see label_table()
+  bool are_labels = false;         // by the header, even without a table
+  bool is_segmentation = false;    // whole numbers; nothing lies beyond its ends
+  // Many labels are those of the samples only if these look like labels.
+  bool labels_if_flat = false;
   std::optional<SegmentLayers> layers;  // then all volumes are read, and `chosen` is the first
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }

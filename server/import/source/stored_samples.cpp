@@ -73,6 +73,21 @@ void read_exactly(const InputFile& file, std::uint64_t offset, std::span<std::by
   }
 }
 
+float float_of_half(std::uint16_t half) {
+  constexpr int kBias = 15;
+  constexpr int kFractionBits = 10;
+  const int exponent = half >> kFractionBits & 0x1f;
+  const int fraction = half & 0x3ff;
+  const float sign = (half & 0x8000) != 0 ? -1.0F : 1.0F;
+  if (exponent == 0x1f) {
+    return fraction != 0 ? std::numeric_limits<float>::quiet_NaN()
+                         : sign * std::numeric_limits<float>::infinity();
+  }
+  if (exponent == 0)
+    return sign * std::ldexp(static_cast<float>(fraction), 1 - kBias - kFractionBits);
+  return sign * std::ldexp(static_cast<float>(fraction + 1024), exponent - kBias - kFractionBits);
+}
+
 }  // namespace
 
 std::size_t bytes_per_sample(StoredType type) {
@@ -90,6 +105,10 @@ SampleType canonical_type(const SampleLayout& layout) {
     if (!kIsWideInteger && !layout.rescale) return static_cast<SampleType>(layout.type);
     return kFitsFloat ? SampleType::kFloat32 : SampleType::kFloat64;
   });
+}
+
+void floats_of_halves(std::span<const std::uint16_t> halves, std::span<float> target) {
+  std::ranges::transform(halves, target.begin(), float_of_half);
 }
 
 void swap_bytes(std::span<std::byte> bytes, std::size_t bytes_per_sample) {

@@ -57,6 +57,9 @@ SampleType canonical_type(const SampleLayout& layout);
 void read_samples(const InputFile& file, std::uint64_t offset, const SampleLayout& layout,
                   std::span<std::byte> target);
 
+// The values of floats of 16 bits (IEEE 754 binary16). `target` has as many samples.
+void floats_of_halves(std::span<const std::uint16_t> halves, std::span<float> target);
+
 // Reverses the bytes of each sample; `bytes` holds whole samples.
 void swap_bytes(std::span<std::byte> bytes, std::size_t bytes_per_sample);
 

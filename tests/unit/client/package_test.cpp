@@ -77,7 +77,6 @@ TEST(UploadBody, OfAFolderIsATarOfAllItsFiles) {
   test::write_file(root / "b" / ".hidden" / "c", "hidden");
   test::write_file(root / "notes.txt", "text");
   test::write_file(root / "old.stl", "");
-  fs::create_symlink("/etc/passwd", root / "link");
   const std::string tar = read_all(UploadBody(root), 100'000);
   EXPECT_EQ(tar.size() % 512, 0U);
   EXPECT_THAT(members_of(tar),
@@ -88,6 +87,52 @@ TEST(UploadBody, OfAFolderIsATarOfAllItsFiles) {
   for (const std::size_t piece : {1U, 7U, 512U, 513U}) {
     EXPECT_EQ(read_all(UploadBody(root), piece), tar) << piece;
   }
+}
+
+// As DataLad has them: the named folder has only links, to objects outside of it.
+TEST(UploadBody, LinksInAFolderAreFollowed) {
+  const test::TemporaryFolder folder;
+  fs::create_directories(folder / ".git" / "objects" / "deep");
+  fs::create_directories(folder / "sub");
+  test::write_file(folder / ".git" / "objects" / "X1", "one");
+  test::write_file(folder / ".git" / "objects" / "deep" / "X2", "two");
+  fs::create_symlink("../.git/objects/X1", folder / "sub" / "a.nii");
+  fs::create_directory_symlink("../.git/objects/deep", folder / "sub" / "more");
+  const auto files = ElementsAre(Pair("a.nii", "one"), Pair("more/X2", "two"));
+  EXPECT_THAT(members_of(read_all(UploadBody(folder / "sub"), 4096)), files);
+  EXPECT_THAT(names_of(folder / ""), ElementsAre("sub/a.nii", "sub/more/X2"));
+}
+
+TEST(UploadBody, LinksToNothingAndLoopsAreNamed) {
+  const test::TemporaryFolder folder;
+  const auto fault = [&](const char* name) {
+    return std::string(test::error_of([&] { files_of_upload(folder / name); }).what());
+  };
+  for (const char* name : {"broken", "loop", "self"}) {
+    fs::create_directories(folder / name / "in");
+    test::write_file(folder / name / "a.nii", "one");
+  }
+  fs::create_symlink("absent", folder / "broken" / "in" / "gone.nii");
+  fs::create_directory_symlink("..", folder / "loop" / "in" / "up");
+  fs::create_symlink("round", folder / "self" / "round");
+  EXPECT_THAT(fault("broken"), HasSubstr("in/gone.nii: is a link to a file that is not there"));
+  EXPECT_THAT(fault("loop"), HasSubstr("in/up: leads back to a folder"));
+  EXPECT_THAT(fault("self"), HasSubstr("self/round: is a link"));
+}
+
+// Each folder has two links to the next.
+TEST(UploadBody, LinksThatMultiplyFoldersAreBounded) {
+  const test::TemporaryFolder folder;
+  for (int at = 0; at < 30; ++at) {
+    const fs::path one = folder / std::to_string(at);
+    fs::create_directories(one);
+    for (const char* name : {"a", "b"}) {
+      fs::create_directory_symlink(fs::path("..") / std::to_string(at + 1), one / name);
+    }
+  }
+  fs::create_directories(folder / "30");
+  const Error error = test::error_of([&] { files_of_upload(folder / "0"); });
+  EXPECT_THAT(error.what(), HasSubstr("more than 1000 links to folders"));
 }
 
 TEST(UploadBody, OfAnEmptyFolderIsRefused) {

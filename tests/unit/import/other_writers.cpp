@@ -104,6 +104,29 @@ std::string isq(const IsqFields& fields, std::string_view samples) {
   return header + std::string(skipped, '\0') + std::string(samples);
 }
 
+std::string mif(const MifFields& fields, std::string_view samples) {
+  const std::string header = "mrtrix image\ndim: " + fields.dim +
+                             "\nvox: 2,3,4,nan\nlayout: " + fields.layout +
+                             "\ndatatype: " + fields.datatype + "\n" +
+                             "transform: 1,0,0,10\ntransform: 0,1,0,20\ntransform: 0,0,1,30\n" +
+                             "command_history: x: y\n" + fields.more;
+  if (!fields.file.empty()) return header + "file: " + fields.file + "\nEND\n";
+  constexpr std::size_t kOffset = 512;
+  std::string file = header + "file: . " + std::to_string(kOffset) + "\nEND\n";
+  file.resize(kOffset, '\0');
+  return file + std::string(samples);
+}
+
+std::string gipl(const GiplFields& fields, std::string_view samples) {
+  std::string header(256, '\0');
+  put(header, 0, bytes_of(fields.sizes, true));
+  put(header, 8, one(fields.type, true));
+  put(header, 10, bytes_of(fields.spacing, true));
+  put(header, 204, bytes_of(fields.origin, true));
+  put(header, 252, one<std::uint32_t>(0xefffe9b0, true));
+  return header + std::string(samples);
+}
+
 std::string par(const std::vector<ParImage>& images) {
   std::string file =
       "# === DATA DESCRIPTION FILE ===\n"

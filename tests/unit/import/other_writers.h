@@ -67,6 +67,24 @@ struct IsqFields {
 };
 std::string isq(const IsqFields& fields, std::string_view samples);
 
+// MRtrix' header lines, with x and y stored backwards, and 4 x 3 x 2 samples.
+struct MifFields {
+  std::string dim = "4,3,2";
+  std::string layout = "-0,-1,+2";
+  std::string datatype = "UInt8";
+  std::string more = {};
+  std::string file = {};  // empty: behind the header
+};
+std::string mif(const MifFields& fields, std::string_view samples);
+
+struct GiplFields {
+  std::vector<std::uint16_t> sizes = {4, 3, 2, 1};
+  std::uint16_t type = 8;
+  std::vector<float> spacing = {1, 1, 1, 1};
+  std::vector<double> origin = {0, 0, 0, 0};
+};
+std::string gipl(const GiplFields& fields, std::string_view samples);
+
 // A PAR of version 4.2 with images of 4 x 3 samples of one byte.
 struct ParImage {
   int slice = 1;

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _PIECE = 1 << 20
 _MOST_FILES = 20000  # as many as the server unpacks
+_MOST_LINKS = 1000  # to folders, which links can multiply
 _LONGEST_HEADER = 1 << 20
 # The suffixes of a header and of its samples. A program writes one of each.
 _PAIRS = (
@@ -96,18 +97,34 @@ def _one_of(path: Path, stem: str, suffixes: Sequence[str]) -> List[Path]:
 
 
 def _files_below(folder: Path) -> List[Tuple[str, Path]]:
-    found = []
-    for at, folders, files in os.walk(folder):
-        folders.sort()
-        for name in files:
-            file = Path(at, name)
-            if file.is_symlink() or not file.is_file():
+    """All files; links are followed, as all files of a DataLad dataset are links to objects elsewhere."""
+    found: List[Tuple[str, Path]] = []
+    waiting: List[Tuple[Path, Tuple[str, ...]]] = [(folder, ())]
+    links = 0
+    while waiting:
+        at, above = waiting.pop()
+        real = os.path.realpath(at)
+        if real in above:
+            raise ValueError(f"{at} leads back to a folder that it is in, by a link; remove the link")
+        for file in at.iterdir():
+            if file.name == ".git":  # the objects of a dataset, which the links beside it name
                 continue
-            found.append((file.relative_to(folder).as_posix(), file))
+            if file.is_symlink() and not file.exists():
+                raise FileNotFoundError(
+                    f"{file} is a link to a file that is not there; get the file, in a dataset with 'datalad get', "
+                    "or remove the link"
+                )
+            if file.is_dir():
+                links += file.is_symlink()
+                if links > _MOST_LINKS:
+                    raise ValueError(f"{folder} has more than {_MOST_LINKS} links to folders")
+                waiting.append((file, (*above, real)))
+            elif file.is_file():
+                found.append((file.relative_to(folder).as_posix(), file))
+        if len(found) > _MOST_FILES:
+            raise ValueError(f"{folder} has more than {_MOST_FILES} files")
     if not found:
         raise ValueError(f"{folder} has no files to upload")
-    if len(found) > _MOST_FILES:
-        raise ValueError(f"{folder} has more than {_MOST_FILES} files")
     return sorted(found)
 
 

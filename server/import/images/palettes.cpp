@@ -1,0 +1,115 @@
+#include "server/import/images/palettes.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "server/import/source/names.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::uint64_t kMostColours = std::uint64_t{1} << 23;  // of all palettes
+constexpr std::size_t kIndices = std::size_t{1} << 16;
+
+bool is_grey(const Colour& colour) { return colour[0] == colour[1] && colour[0] == colour[2]; }
+
+std::string text_of(const Colour& colour) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text = "#";
+  for (const std::uint8_t part : colour) {
+    text += kDigits[part / 16];
+    text += kDigits[part % 16];
+  }
+  return text;
+}
+
+// Calls `use` with each sample, which it may change.
+template <class Bytes, class Use>
+void for_each_index(Bytes samples, StoredType type, Use use) {
+  const auto visit = [&](auto index) {
+    for (std::size_t at = 0; at + sizeof(index) <= samples.size(); at += sizeof(index)) {
+      std::memcpy(&index, samples.data() + at, sizeof(index));
+      use(index, samples.data() + at);
+    }
+  };
+  if (type == StoredType::kUint8) {
+    visit(std::uint8_t{});
+  } else {
+    visit(std::uint16_t{});
+  }
+}
+
+}  // namespace
+
+void Palettes::begin(const PageLayout& layout) {
+  const std::uint64_t page = pages_++;
+  if (!runs_.empty() && runs_.back().palette == layout.palette) return;
+  colours_ += layout.palette.size();
+  if (colours_ > kMostColours) throw_unusable("The pages have too many different palettes.");
+  runs_.push_back({.first_page = page, .palette = layout.palette, .type = layout.type});
+  if (!layout.palette.empty()) runs_.back().used.resize(kIndices);
+}
+
+void Palettes::use(std::span<const std::byte> samples) {
+  Run& run = runs_.back();
+  if (run.palette.empty()) return;
+  for_each_index(samples, run.type,
+                 [&](auto index, const std::byte* /*place*/) { run.used[index] = true; });
+}
+
+bool Palettes::are_grey() const {
+  return std::ranges::all_of(
+      runs_, [](const Run& run) { return std::ranges::all_of(run.palette, is_grey); });
+}
+
+bool Palettes::replaces() const {
+  return are_grey() && std::ranges::any_of(runs_, [](const Run& run) {
+           for (std::size_t index = 0; index < run.used.size(); ++index) {
+             if (run.used[index] && run.colour(index)[0] != index) return true;
+           }
+           return false;
+         });
+}
+
+void Palettes::replace(std::uint64_t page, std::span<std::byte> samples) const {
+  const auto behind = std::ranges::upper_bound(runs_, page, {}, &Run::first_page);
+  const Run& run = *(behind - 1);
+  if (run.palette.empty()) return;
+  for_each_index(samples, run.type, [&](auto index, std::byte* place) {
+    index = run.colour(index)[0];
+    std::memcpy(place, &index, sizeof(index));
+  });
+}
+
+std::vector<LabelEntry> Palettes::labels() const {
+  if (are_grey()) return {};
+  std::map<std::size_t, Colour> colours;
+  for (const Run& run : runs_) {
+    if (run.palette.empty()) {
+      throw_unusable(
+          "Some pages are indexed pictures with a palette of colours, and others are grey. Save "
+          "all of them in one way.");
+    }
+    for (std::size_t index = 0; index < run.used.size(); ++index) {
+      if (!run.used[index]) continue;
+      const Colour colour = run.colour(index);
+      const auto [found, is_new] = colours.try_emplace(index, colour);
+      if (is_new || found->second == colour) continue;
+      throw_unusable("The pages have different palettes: index " + std::to_string(index) + " is " +
+                     text_of(found->second) + " in one page, and " + text_of(colour) +
+                     " in another, so it is not clear which label it is. Save all pages with one "
+                     "palette, or as grey pictures of the labels' numbers.");
+    }
+  }
+  std::vector<LabelEntry> labels;
+  for (const auto& [index, colour] : colours) {
+    if (index != 0)
+      labels.push_back({.label = static_cast<std::int64_t>(index), .color = text_of(colour)});
+  }
+  return labels;
+}
+
+}  // namespace isomesh::import
