@@ -133,10 +133,24 @@ PlaneDistance plane_distance(const std::vector<double>& gaps, const Segmentation
                  " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
-// The thickness of a segmentation's only plane.
+// The distance of the planes of the whole object; empty for one plane.
+std::optional<PlaneDistance> distance_in_object(const Slice& slice) {
+  std::vector<Slice> all;
+  for (const Frame& frame : slice.image->frames) {
+    all.push_back({.image = slice.image, .frame = &frame, .file = slice.file});
+  }
+  const std::vector<Placed> placed = placed_along_normal(all);
+  const std::vector<std::size_t> starts = position_starts(placed);
+  if (starts.size() == 1) return std::nullopt;
+  return plane_distance(gaps_of(placed, starts), *slice.image->segmentation);
+}
+
+// The thickness of the only plane of a segmentation, or of one of its segments.
 PlaneDistance plane_thickness(const Slice& slice, const ImportOptions& options) {
   const Segmentation& told = *slice.image->segmentation;
-  if (told.slice_distance || told.thickness) refuse_spacing(options);
+  const auto distance = distance_in_object(slice);
+  if (distance || told.slice_distance || told.thickness) refuse_spacing(options);
+  if (distance) return *distance;
   if (told.slice_distance) return {*told.slice_distance};
   if (told.thickness) return {*told.thickness, true};
   if (options.spacing) return {(*options.spacing)[2]};

@@ -27,8 +27,9 @@ std::string segment_name(const Image& image, std::uint64_t number);
 // As make_stack, for the frames of one segmentation: frames of different segments may share a
 // position, and positions may be missing. The lattice follows from the positions and the object's
 // slice distance. That distance is used if it divides the distances of all positions, otherwise the
-// smallest gap. A single plane has the thickness of a slice: its distance, or the object's slice
-// thickness, or that of the option `spacing`, which other segmentations reject.
+// smallest gap. A single plane is as thick as the planes of the whole object are apart, or, if it
+// has no others, as the object's slice distance or slice thickness, or that of the option
+// `spacing`, which other segmentations reject.
 Stack make_label_stack(std::vector<Slice> slices, const ImportOptions& options);
 
 // True if the samples are the fractions of one segment, which are stored unchanged.

@@ -382,6 +382,9 @@ TEST(DicomSegmentation, OfOnePlaneIsAsThickAsItsSlice) {
   EXPECT_EQ(import({.spacing = {{1, 1, 4}}}).code, ErrorCode::kInvalidParameter);
   object = two_segments();
   EXPECT_EQ(import({.spacing = {{1, 1, 4}}}).code, ErrorCode::kInvalidParameter);
+  // The only plane of a segment is as thick as the planes of all are apart.
+  object.frames.pop_back();
+  EXPECT_EQ(imported(import({.volume = 1})).volume.geometry.spacing[2], 2);
 }
 
 // PS3.3, C.8.20.2: samples of no segment have the padding value.
