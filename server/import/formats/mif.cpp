@@ -246,7 +246,7 @@ SourceVolume parse_mif(const InputFile& file, const Companions& companions,
     volume.payload = range_from(file, data.front().offset);
   } else {
     volume.data_files =
-        data_files_of(mif_data_names(file, companions), companions, data.front().offset, volume);
+        data_files_of(mif_data_names(file, companions), companions, {.bytes = data.front().offset}, volume);
   }
   return volume;
 }

@@ -205,6 +205,10 @@ void set_layers(std::vector<Segment> segments, bool is_interleaved, SourceVolume
 
 bool has_segments(const NrrdFields& fields) { return is_of_mitk(fields) || is_told(fields, 0); }
 
+bool has_cropped_segments(const NrrdFields& fields) {
+  return is_told(fields, 0) && !is_of_mitk(fields);
+}
+
 void set_segments(const NrrdFields& fields, bool is_interleaved, bool is_layer_chosen,
                   SourceVolume& volume) {
   volume.are_labels = is_of_mitk(fields);

@@ -10,6 +10,10 @@ namespace isomesh::import {
 // True if the header names segments, or says that it is a segmentation.
 bool has_segments(const NrrdFields& fields);
 
+// True for those of 3D Slicer, which may leave out the empty part of the lattice. MITK keeps that of
+// the image.
+bool has_cropped_segments(const NrrdFields& fields);
+
 // Sets `volume.labels`, and `volume.layers` if the file's volumes are layers of integers and
 // `is_layer_chosen` is false. A selected layer has only its own segments. A label is a segment's
 // value; if another layer uses the same value, it is a free number above all. Throws Error

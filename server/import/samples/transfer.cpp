@@ -274,8 +274,9 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
                     const ImportTask& task) {
   for (const SampleType type : {SampleType::kUint8, SampleType::kUint16}) {
     volume.type = type;
-    const auto room = with_room(volume.dims, type, task.limits);
-    CanonicalWriter writer(task.target, {room, type, volume.geometry});
+    const auto dims =
+        source.is_segmentation ? with_room(volume.dims, type, task.limits) : volume.dims;
+    CanonicalWriter writer(task.target, {dims, type, volume.geometry});
     const auto combinations = with_sample(
         canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
           using Sample = decltype(sample);
@@ -289,8 +290,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
     if (!combinations) continue;
     volume.labels = combinations->entries(source.labels);
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
-    close_ends(writer, volume);
-    return finish(writer, std::move(volume));
+    return finish(writer, std::move(volume), {.is_segmentation = source.is_segmentation});
   }
   throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a segmentation.");
 }

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -58,7 +59,8 @@ TYPED_TEST(NiftiOfType, IsReadInBothByteOrdersAndVersionsPlainAndCompressed) {
 
 TEST(Nifti, Keeps64BitIntegersThatAreExactAndRefusesOthers) {
   NiftiFields fields{.datatype = 1024, .bitpix = 64};
-  std::vector<std::int64_t> samples(24, -(std::int64_t{1} << 53));
+  std::vector<std::int64_t> samples(24);
+  std::iota(samples.begin(), samples.end(), -(std::int64_t{1} << 53));  // no flat regions
   samples[1] = std::numeric_limits<std::int64_t>::min();
   const Outcome outcome = import_bytes(nifti(fields, bytes_of(samples)));
   EXPECT_EQ(outcome.volume.type, SampleType::kFloat64);
