@@ -24,7 +24,7 @@ Json zarr_json(const std::filesystem::path& path);
 enum class ZarrCodec { kDeflate, kZstd, kBlosc, kCrc32c };
 
 struct ZarrArray {
-  // Of all axes, the slowest first. At most kMostAxes.
+  // The sizes along all axes, the slowest first; at most kMostAxes.
   static constexpr std::size_t kMostAxes = 16;
   std::vector<std::uint64_t> shape;
   std::vector<std::uint64_t> chunk;
