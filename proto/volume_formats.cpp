@@ -75,7 +75,7 @@ constexpr VolumeFormat kVolumeFormats[] = {
      .title = "OME-Zarr",
      .suffixes = ".zarr",
      .content = "a folder, ZIP or TAR of OME-Zarr 0.4 or 0.5 at full resolution, also its labels "
-                "with their colours; chunks of Blosc, Zstandard, gzip or zlib, without shards; "
+                "with their colours; chunks of Blosc, Zstandard, gzip or zlib, also in shards; "
                 "`volume=N` chooses a channel or time"},
     {.name = "hdf5",
      .title = "HDF5",

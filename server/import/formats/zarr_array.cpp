@@ -34,8 +34,8 @@ using Bytes = std::vector<std::byte>;
 
 [[noreturn]] void throw_unsupported(const std::string& what) {
   throw_unusable("The Zarr uses " + what +
-                 ", which is not supported. Blosc, Zstandard, gzip and zlib are, without filters "
-                 "and shards.");
+                 ", which is not supported. Blosc, Zstandard, gzip and zlib are, without "
+                 "filters.");
 }
 
 // Null for a missing member.
@@ -168,6 +168,36 @@ void transpose(const Json& order, ZarrArray& array) {
   array.order = axes;
 }
 
+void read_codecs(const Json& codecs, ZarrArray& array);
+
+constexpr std::uint64_t kMostInnerChunks = 1'000'000;
+
+// The chunks in the shards that `array` has as chunks.
+void read_shards(const Json& configuration, ZarrArray& array) {
+  ZarrArray inner = array;
+  inner.shape = array.chunk;
+  inner.chunk = sizes_of(member(configuration, "chunk_shape"), "chunk_shape of shards");
+  if (inner.chunk.size() != inner.shape.size()) throw_damaged("chunk_shape of shards");
+  std::uint64_t count = 1;
+  for (std::size_t axis = 0; axis < inner.chunk.size(); ++axis) {
+    if (inner.shape[axis] % inner.chunk[axis] != 0) throw_damaged("chunk_shape of shards");
+    const std::uint64_t along = inner.shape[axis] / inner.chunk[axis];
+    if (along > kMostInnerChunks / count)
+      throw_unsupported("more than a million chunks in a shard");
+    count *= along;
+  }
+  read_codecs(member(configuration, "codecs"), inner);
+  if (inner.inner) throw_unsupported("shards in shards");
+  ZarrArray index;
+  read_codecs(member(configuration, "index_codecs"), index);
+  array.index_has_sum = index.decoders == std::vector{ZarrCodec::kCrc32c};
+  if (index.big_endian || (!index.decoders.empty() && !array.index_has_sum)) {
+    throw_unsupported("an unusual index of shards");
+  }
+  array.index_is_first = text_of(member(configuration, "index_location")) == "start";
+  array.inner = std::make_shared<ZarrArray>(std::move(inner));
+}
+
 void read_codecs(const Json& codecs, ZarrArray& array) {
   if (!codecs.is_array() || codecs.size() > kMostCodecs) throw_damaged("codecs");
   for (const Json& codec : codecs) {
@@ -178,7 +208,8 @@ void read_codecs(const Json& codecs, ZarrArray& array) {
     } else if (name == "bytes") {
       array.big_endian = text_of(member(configuration, "endian")) == "big";
     } else if (name == "sharding_indexed") {
-      throw_unsupported("shards (sharding_indexed)");
+      if (codecs.size() != 1) throw_unsupported("another codec around shards");
+      read_shards(configuration, array);
     } else {
       add_codec(name, array);
     }
@@ -324,22 +355,109 @@ ZarrArray zarr_array(const Json& metadata) {
   return array;
 }
 
-std::vector<std::byte> decode_chunk(const ZarrArray& array, const std::filesystem::path& path) {
+namespace {
+
+Bytes decode_bytes(const ZarrArray& array, Bytes bytes) {
   const std::size_t sample_bytes = array.is_half ? 2 : bytes_per_sample(array.type);
   const std::uint64_t expected = array.chunk_samples() * sample_bytes;
-  const InputFile file(path);
-  // Compression never adds as much.
-  if (file.size() > expected + expected / 8 + kSlack) {
-    throw_unusable("A chunk of the Zarr is longer than its samples.");
-  }
-  Bytes bytes(file.size());
-  file.read_exactly(0, bytes);
   for (const ZarrCodec codec : array.decoders) {
     bytes = decoded(codec, std::move(bytes), expected + kSlack);
   }
   if (bytes.size() != expected) throw_unusable("A chunk of the Zarr is damaged or truncated.");
   if (array.big_endian && sample_bytes > 1) swap_bytes(bytes, sample_bytes);
   return array.is_half ? widened(bytes) : bytes;
+}
+
+std::vector<std::uint64_t> strides_of(const std::vector<std::uint64_t>& sizes,
+                                      const std::vector<std::size_t>& order) {
+  std::vector<std::uint64_t> strides(sizes.size());
+  std::uint64_t stride = 1;
+  for (std::size_t each = order.size(); each-- > 0;) {
+    strides[order[each]] = stride;
+    stride *= sizes[order[each]];
+  }
+  return strides;
+}
+
+// Calls `use` with each place in a box of these sizes, the last axis fastest.
+template <class Use>
+void for_each_place(const std::vector<std::uint64_t>& sizes, Use use) {
+  std::vector<std::uint64_t> place(sizes.size());
+  for (;;) {
+    use(place);
+    std::size_t axis = sizes.size();
+    while (axis > 0 && ++place[axis - 1] == sizes[axis - 1]) place[--axis] = 0;
+    if (axis == 0) return;
+  }
+}
+
+std::uint64_t dot(const std::vector<std::uint64_t>& one, const std::vector<std::uint64_t>& other) {
+  return std::inner_product(one.begin(), one.end(), other.begin(), std::uint64_t{0});
+}
+
+Bytes decode_shard(const ZarrArray& array, const Bytes& bytes) {
+  constexpr std::uint64_t kMissing = ~std::uint64_t{0};
+  const ZarrArray& inner = *array.inner;
+  std::vector<std::uint64_t> counts;
+  for (std::size_t axis = 0; axis < inner.chunk.size(); ++axis) {
+    counts.push_back(inner.shape[axis] / inner.chunk[axis]);
+  }
+  const std::uint64_t count = array.chunk_samples() / inner.chunk_samples();
+  const std::uint64_t index_bytes = count * 16 + (array.index_has_sum ? 4 : 0);
+  if (bytes.size() < index_bytes) throw_unusable("A shard of the Zarr is damaged or truncated.");
+  const auto first =
+      array.index_is_first ? bytes.begin() : bytes.end() - static_cast<std::ptrdiff_t>(index_bytes);
+  Bytes index(first, first + static_cast<std::ptrdiff_t>(index_bytes));
+  if (array.index_has_sum) index = checked(std::move(index));
+  if (index.size() != count * 16) throw_unusable("A shard of the Zarr is damaged or truncated.");
+
+  std::vector<std::size_t> plain(inner.shape.size());
+  std::iota(plain.begin(), plain.end(), 0);
+  const std::vector<std::uint64_t> to = strides_of(inner.shape, plain);
+  const std::vector<std::uint64_t> from = strides_of(inner.chunk, inner.order);
+  const std::size_t size = array.fill.size();
+  Bytes result(array.chunk_samples() * size);
+  for (std::size_t at = 0; at < result.size(); at += size) {
+    std::memcpy(result.data() + at, array.fill.data(), size);
+  }
+  const std::byte* entry = index.data();
+  for_each_place(counts, [&](const std::vector<std::uint64_t>& chunk) {
+    std::uint64_t range[2] = {};
+    std::memcpy(range, entry, sizeof(range));
+    entry += sizeof(range);
+    if (range[0] == kMissing && range[1] == kMissing) return;
+    if (range[0] > bytes.size() || range[1] > bytes.size() - range[0]) {
+      throw_unusable("A shard of the Zarr is damaged or truncated.");
+    }
+    const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(range[0]);
+    const Bytes samples =
+        decode_bytes(inner, {begin, begin + static_cast<std::ptrdiff_t>(range[1])});
+    std::uint64_t corner = 0;
+    for (std::size_t axis = 0; axis < chunk.size(); ++axis) {
+      corner += chunk[axis] * inner.chunk[axis] * to[axis];
+    }
+    for_each_place(inner.chunk, [&](const std::vector<std::uint64_t>& place) {
+      std::memcpy(result.data() + (corner + dot(place, to)) * size,
+                  samples.data() + dot(place, from) * size, size);
+    });
+  });
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::byte> decode_chunk(const ZarrArray& array, const std::filesystem::path& path) {
+  const std::size_t sample_bytes = array.is_half ? 2 : bytes_per_sample(array.type);
+  const std::uint64_t expected = array.chunk_samples() * sample_bytes;
+  constexpr std::uint64_t kIndexBytes = kMostInnerChunks * 16;
+  const InputFile file(path);
+  // Compression never adds as much.
+  if (file.size() > expected + expected / 8 + kSlack + (array.inner ? kIndexBytes : 0)) {
+    throw_unusable("A chunk of the Zarr is longer than its samples.");
+  }
+  Bytes bytes(file.size());
+  file.read_exactly(0, bytes);
+  return array.inner ? decode_shard(array, bytes) : decode_bytes(array, std::move(bytes));
 }
 
 }  // namespace isomesh::import

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,7 +24,7 @@ Json zarr_json(const std::filesystem::path& path);
 enum class ZarrCodec { kDeflate, kZstd, kBlosc, kCrc32c };
 
 struct ZarrArray {
-  // Of all axes, the slowest first. At most kMostAxes.
+  // The sizes along all axes, the slowest first; at most kMostAxes.
   static constexpr std::size_t kMostAxes = 16;
   std::vector<std::uint64_t> shape;
   std::vector<std::uint64_t> chunk;
@@ -35,6 +36,10 @@ struct ZarrArray {
   std::vector<std::byte> fill;      // a sample of a missing chunk
   std::string prefix;               // of the names of chunks
   char separator = '.';
+  // Not null: a chunk is a shard of such chunks, behind or in front of an index.
+  std::shared_ptr<const ZarrArray> inner = {};
+  bool index_is_first = false;
+  bool index_has_sum = false;
 
   std::uint64_t chunk_samples() const;
   // The name of a chunk below the array.
@@ -42,11 +47,11 @@ struct ZarrArray {
 };
 
 // From `.zarray` or from an array's `zarr.json`. Throws Error kUnusableVolume that names what is
-// damaged or not supported: filters, shards, other codecs, chunks above 256 MiB.
+// damaged or not supported: filters, other codecs, shards in shards, chunks above 256 MiB.
 ZarrArray zarr_array(const Json& metadata);
 
-// The samples of a chunk as they are stored, in the byte order of this machine. Throws Error
-// kUnusableVolume.
+// The samples of a chunk as they are stored, or of a shard, the last axis fastest, in the byte
+// order of this machine. Throws Error kUnusableVolume.
 std::vector<std::byte> decode_chunk(const ZarrArray& array, const std::filesystem::path& path);
 
 }  // namespace isomesh::import

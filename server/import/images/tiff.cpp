@@ -235,7 +235,7 @@ void turn(std::span<std::byte> rows, const PageLayout& layout, const Corner& cor
   });
 }
 
-// Of blocks of rows or tiles as the library decodes them.
+// Checks a strip or row of tiles as the library decodes it, and as samples.
 void check_blocks(std::uint64_t bytes, std::uint64_t rows, const PageLayout& layout) {
   check_block(bytes);
   check_block(layout.bytes() / layout.height);

@@ -202,8 +202,37 @@ TEST(Zarr, Version3IsRead) {
     return packed;
   };
   EXPECT_THAT(import_bytes(zip(zarr_3(turned, damaged, true, true))).error, HasSubstr("damaged"));
-  EXPECT_THAT(import_bytes(zip(zarr_3(R"({"name": "sharding_indexed"})", plain))).error,
-              HasSubstr("shards"));
+}
+
+// Each shard has a chunk for each z; the last of them all is missing and has the fill value 0.
+TEST(Zarr, ShardsAreRead) {
+  const std::string sharding =
+      R"({"name": "sharding_indexed", "configuration": {"chunk_shape": [1, 1, 2], "codecs":
+          [{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "zstd"}],
+          "index_codecs": [{"name": "bytes", "configuration": {"endian": "little"}},
+          {"name": "crc32c"}], "index_location": "end"}})";
+  const auto pack = [](const std::string& chunk) {
+    const std::string first = zstd(chunk.substr(0, 4));
+    const std::string second = zstd(chunk.substr(4));
+    const bool is_last = chunk == chunk_at(1, 1);
+    const std::uint64_t none = ~std::uint64_t{0};
+    const std::string index = bytes_of(std::vector<std::uint64_t>{
+        0, first.size(), is_last ? none : first.size(), is_last ? none : second.size()});
+    return first + second + with_sum(index);
+  };
+  Shorts right = right_samples();
+  right[11] = 0;
+  EXPECT_EQ(samples_of<std::int16_t>(imported(import_bytes(zip(zarr_3(sharding, pack))))), right);
+  for (const std::size_t at : {0, 30, 50}) {
+    const auto damaged = [&](const std::string& chunk) {
+      std::string packed = pack(chunk);
+      packed[at] = static_cast<char>(packed[at] ^ 0x41);
+      return packed;
+    };
+    EXPECT_THAT(import_bytes(zip(zarr_3(sharding, damaged))).error, HasSubstr("damaged")) << at;
+  }
+  const auto cut = [](const std::string& chunk) { return chunk.substr(0, 5); };
+  EXPECT_THAT(import_bytes(zip(zarr_3(sharding, cut))).error, HasSubstr("shard"));
 }
 
 TEST(Zarr, TimesAndChannelsAreChosen) {
