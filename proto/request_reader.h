@@ -90,6 +90,12 @@ class RequestReader {
       const bool is_long = number && (*number < -kMostExactNumber || *number > kMostExactNumber);
       return is_long ? number : std::nullopt;
     }
+    if (json.is_number_float()) {
+      const double number = json.get<double>();
+      const bool is_whole =
+          std::floor(number) == number && std::abs(number) <= static_cast<double>(kMostExactNumber);
+      return is_whole ? std::optional(static_cast<std::int64_t>(number)) : std::nullopt;
+    }
     const bool is_too_large =
         json.is_number_unsigned() && !std::in_range<std::int64_t>(json.get<std::uint64_t>());
     if (!json.is_number_integer() || is_too_large) return std::nullopt;
@@ -150,11 +156,12 @@ class RequestReader {
                    std::integral auto& value) {
     using Number = std::remove_reference_t<decltype(value)>;
     if constexpr (std::is_same_v<Number, std::int64_t>) {
-      if (const auto whole = long_number(json);
-          whole && fits(parameter, static_cast<double>(*whole))) {
-        value = *whole;
-        return;
+      const auto whole = long_number(json);
+      if (!whole || !fits(parameter, static_cast<double>(*whole))) {
+        return add(path, must_be(parameter, true));
       }
+      value = *whole;
+      return;
     }
     const double number = json.is_number() ? json.get<double>() : std::nan("");
     if (std::floor(number) != number || !fits(parameter, number)) {

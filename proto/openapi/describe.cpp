@@ -156,7 +156,7 @@ void write_jobs(Yaml& yaml, const Parameter& parameter) {
   }
 }
 
-std::string label_list(const Parameter& parameter) {
+std::string value_list(const Parameter& parameter) {
   return "{ type: array, minItems: 1, items: { type: integer, minimum: " +
          number_text(*parameter.minimum) + ", maximum: " + number_text(*parameter.maximum) + " } }";
 }
@@ -173,7 +173,7 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
   } else if constexpr (std::is_same_v<T, std::optional<LabelChoice>>) {
     yaml.under("oneOf", [&] {
       yaml.line("- const: all");
-      yaml.line("- " + label_list(parameter));
+      yaml.line("- { type: array, minItems: 1, items: { " + reference("schemas", "Label") + " } }");
     });
   } else if constexpr (std::is_same_v<T, std::vector<double>>) {
     yaml.line("type: array");
@@ -199,7 +199,7 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
     const std::string text = is_color ? "{ type: string, pattern: '^#[0-9a-fA-F]{6}$' }"
                                       : "{ type: string, minLength: 1, maxLength: " +
                                             std::to_string(LabelEntry::kMostNameBytes) + " }";
-    yaml.line("additionalProperties: " + (is_list ? label_list(parameter) : text));
+    yaml.line("additionalProperties: " + (is_list ? value_list(parameter) : text));
     yaml.line("default: {}");
   } else if (parameter.when_empty != nullptr) {
     yaml.under("oneOf", [&] {

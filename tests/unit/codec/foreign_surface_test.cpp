@@ -53,7 +53,7 @@ TEST(PythonReaderOfProvenance, VtpSaysItInFieldData) {
   auto told = read_with_python(encoded(mesh, MeshFormat::kVtp, provenance), MeshFormat::kVtp).told;
   EXPECT_EQ(told["SPACE"], "LPS");
   auto json = nlohmann::json::parse(told["isomesh:provenance"].get<std::string>());
-  EXPECT_EQ(json["parameters"]["volume"], "abc");
+  EXPECT_EQ(json["samples"], "abc");
   EXPECT_EQ(json["iso"], 42);
   EXPECT_EQ(json["notes"][0]["detail"], "a < b & c ]]> d");
   provenance.parameters.space = Space::kRas;
@@ -67,7 +67,7 @@ TEST(PythonReaderOfProvenance, GiftiSaysItInItsMetadata) {
       read_with_python(encoded(mesh, MeshFormat::kGii, known()), MeshFormat::kGii).told;
   EXPECT_EQ(told["dataspace"], "NIFTI_XFORM_SCANNER_ANAT");
   const auto json = nlohmann::json::parse(told["isomesh:provenance"].get<std::string>());
-  EXPECT_EQ(json["parameters"]["volume"], "abc");
+  EXPECT_EQ(json["samples"], "abc");
   EXPECT_EQ(json["notes"][0]["detail"], "a < b & c ]]> d");
 }
 

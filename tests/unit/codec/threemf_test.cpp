@@ -64,7 +64,7 @@ TEST(ThreeMf, SaysWhereItComesFrom) {
     if (key.ends_with("provenance")) text = value;
   }
   const auto json = nlohmann::json::parse(text);
-  EXPECT_EQ(json["parameters"]["volume"], "abc");
+  EXPECT_EQ(json["samples"], "abc");
   EXPECT_EQ(json["parameters"]["passes"], 9);
   EXPECT_EQ(json["iso"], 60.5);
   EXPECT_EQ(json["notes"][0]["detail"], "Less than < & \"quotes\"");

@@ -68,7 +68,7 @@ TEST(Usd, SaysWhereItComesFrom) {
   const UsdStage stage =
       read_usda(encoded(test::meshes_to_encode().front().mesh, MeshFormat::kUsda, provenance));
   const auto json = nlohmann::json::parse(stage.provenance);
-  EXPECT_EQ(json["parameters"]["volume"], "abc");
+  EXPECT_EQ(json["samples"], "abc");
   EXPECT_EQ(json["iso"], 60.5);
   EXPECT_EQ(json["notes"][0]["detail"], provenance.notes[0].detail);
 }

@@ -71,7 +71,7 @@ TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfItsWriter) {
   // Closed by a plane at each end.
   EXPECT_EQ(slicers.origin, (Vector{-12, -22, 27}));
   EXPECT_EQ(slicers.direction, identity);
-  EXPECT_EQ(with_pair("Segment0_Extent:=5 8 1 3 2 3\n").origin, (Vector{-2, -20, 33}));
+  EXPECT_EQ(with_pair("Segment0_Extent:=5 8 1 3 2 3\n").origin, (Vector{0, -18, 36}));
   EXPECT_EQ(with_pair("Segmentation_Extent:=0 3 0 2 0 1\n", "domain domain domain domain").origin,
             (Vector{-10, -20, 30}));
   // ITK's is LPS, as in three dimensions.
