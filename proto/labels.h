@@ -11,11 +11,11 @@
 
 namespace isomesh {
 
-// A label as a file describes it. Segments are named after organs, so names may be shown wherever
-// the volume is.
 // Whole numbers beyond it, either way, are strings in JSON: many programs would round them.
 inline constexpr std::int64_t kMostExactNumber = (std::int64_t{1} << 53) - 1;
 
+// A label as a file describes it. Segments are named after organs, so names may be shown wherever
+// the volume is.
 struct LabelEntry {
   static constexpr std::size_t kMostNameBytes = 255;
 

@@ -140,8 +140,7 @@ struct DicomIdentity {
 enum class NiftiForm { kSform, kQform };
 
 struct Volume {
-  // Hex digest of what the upload says, samples and all else. Its name counts only if the request
-  // gave it; a file's own name does not.
+  // Hex digest of what the upload says: samples and all else but name, format and what was ignored.
   std::string id;
   // Hex SHA-256 of samples and geometry. Volumes with the same ones share their bytes and meshes.
   std::string samples;

@@ -130,7 +130,7 @@ class Client {
   Client& operator=(Client&&) noexcept;
 
   // Uploads a file from disk in pieces. A folder, or a header (.mhd, .nhdr) with its data files, is
-  // sent as a TAR generated on the fly. Equal samples give the same volume. Throws kUnusableVolume
+  // sent as a TAR generated on the fly. The same upload gives the same volume. Throws kUnusableVolume
   // with the choices if the upload has several volumes, which are stored nevertheless.
   Volume upload(const std::filesystem::path& path, const UploadOptions& options = {});
   // The same for an upload that may have several volumes: returns a result for each. A single one
@@ -146,7 +146,7 @@ class Client {
   void erase_volume(const std::string& id);
   Histogram histogram(const std::string& id, std::uint32_t bins = 256);
   // The labels of the samples, except the background. Throws kUnusableVolume if samples are not
-  // integers.
+  // whole numbers.
   VolumeLabels labels(const std::string& id, std::int64_t background = 0);
   // Writes the slice as a PNG to `target`.
   void slice(const std::string& id, const SliceOptions& options,

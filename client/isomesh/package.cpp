@@ -66,6 +66,7 @@ class Folder {
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
     const bool is_link = fs::is_symlink(fs::symlink_status(path, error));
+    if (status.type() == fs::file_type::none) fail(path, error.message());
     if (is_link && !fs::exists(status)) {
       fail(path,
            "is a link to a file that is not there. Get the file, in a dataset with `datalad get`, "
@@ -74,7 +75,8 @@ class Folder {
     if (fs::is_directory(status)) {
       // Links can multiply folders without files.
       if (is_link && ++links_ > kMostLinks) {
-        fail(root_, "contains more than " + std::to_string(kMostLinks) + " links to folders");
+        fail(root_, "contains more than " + std::to_string(kMostLinks) +
+                        " links to folders. Upload its folders one by one");
       }
       return visit(path);
     }

@@ -9,13 +9,24 @@
 namespace isomesh::codec {
 namespace {
 
+// The fractional part of that many golden sections.
+double golden_part(std::int64_t label) {
+  constexpr double kGoldenSection = 0.6180339887498949;
+  constexpr std::int64_t kMostExact = std::int64_t{1} << 32;
+  if (label >= -kMostExact && label <= kMostExact) {
+    const double turns = static_cast<double>(label) * kGoldenSection;
+    return turns - std::floor(turns);
+  }
+  // A double would lose the fraction. This is it in units of 2^-64, modulo 1.
+  constexpr std::uint64_t kGoldenPart = 0x9E3779B97F4A7C15;
+  return static_cast<double>((static_cast<std::uint64_t>(label) * kGoldenPart) >> 11) * 0x1p-53;
+}
+
 // Consecutive labels are a golden section of the hue circle apart.
 std::array<double, 3> series_color(std::int64_t label) {
-  constexpr double kGoldenSection = 0.6180339887498949;
   constexpr double kSaturation = 0.5;
   constexpr double kValue = 0.9;
-  const double turns = static_cast<double>(label) * kGoldenSection;
-  const double hue = 6 * (turns - std::floor(turns));
+  const double hue = 6 * golden_part(label);
   std::array<double, 3> color;
   for (std::size_t channel = 0; channel < 3; ++channel) {
     // A. R. Smith's hexcone (1978), in the form without case distinctions.

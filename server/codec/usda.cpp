@@ -57,6 +57,11 @@ std::string usd_string(std::string_view text) {
 
 std::string material_of(const std::string& prim) { return prim + "_material"; }
 
+std::string digits_of(std::int64_t label) {
+  const std::string text = std::to_string(label);
+  return label < 0 ? text.substr(1) : text;
+}
+
 // A unique identifier in ASCII: other names need a reader of USD 24.03 or later. So is the name of
 // its material, which stands beside it.
 std::string prim_of(const LabelSummary& label, std::set<std::string>& taken) {
@@ -65,8 +70,7 @@ std::string prim_of(const LabelSummary& label, std::set<std::string>& taken) {
   if (title.empty() || (title[0] >= '0' && title[0] <= '9')) title.insert(0, 1, '_');
   std::string prim = title;
   for (int more = 0; taken.contains(prim) || taken.contains(material_of(prim)); ++more) {
-    prim = title + '_' + std::to_string(label.label < 0 ? -label.label : label.label) +
-           (more == 0 ? "" : '_' + std::to_string(more));
+    prim = title + '_' + digits_of(label.label) + (more == 0 ? "" : '_' + std::to_string(more));
   }
   taken.insert({prim, material_of(prim)});
   return prim;

@@ -36,7 +36,7 @@ std::string result_key(const Volume& volume, const JobParameters& parameters,
                        const std::string& mesher_version) {
   std::string text = mesher_version + '\n' + volume.samples + '\n' +
                      to_json(static_cast<const MeshParameters&>(parameters));
-  if (!parameters.iso) text += "\niso " + to_text(volume.suggested_iso);
+  if (!parameters.iso && !parameters.labels) text += "\niso " + to_text(volume.suggested_iso);
   if (parameters.certify) text += "\ncertified";
   for (const Note& note : notes_in_mesh(volume.notes))
     text += '\n' + note.code + ": " + note.detail;

@@ -25,11 +25,11 @@ JobParameters drc_of(const std::string& volume) {
 }
 
 // A volume whose last sample is that one.
-std::string upload(const Daemon& daemon, std::uint8_t sample) {
+Volume upload(const Daemon& daemon, std::uint8_t sample) {
   std::string bytes(8 * 8 * 8, '\0');
   bytes[300] = static_cast<char>(200);
   bytes.back() = static_cast<char>(sample);
-  return volume_from_json(daemon.send("POST", "/v1/volumes?dims=8,8,8&type=uint8", bytes).body).id;
+  return volume_from_json(daemon.send("POST", "/v1/volumes?dims=8,8,8&type=uint8", bytes).body);
 }
 
 Finished isomeshd(const std::string& verb, const std::string& folder, const std::string& data) {
@@ -39,7 +39,7 @@ Finished isomeshd(const std::string& verb, const std::string& folder, const std:
 TEST(Backup, IsWholeAlthoughTheDaemonWorks) {
   const TemporaryFolder folder;
   const Daemon daemon(folder / "data", "127.0.0.1:0");
-  const std::string kept = upload(daemon, 1);
+  const std::string kept = upload(daemon, 1).id;
   Client client = daemon.client();
   const Job job = client.wait(client.submit(drc_of(kept)).id);
   client.fetch(job.id, MeshFormat::kDrc, folder / "before.drc");
@@ -49,7 +49,7 @@ TEST(Backup, IsWholeAlthoughTheDaemonWorks) {
   std::jthread busy([&] {
     Client other = daemon.client();
     for (std::uint8_t sample = 2; !is_over; sample = sample < 250 ? sample + 1 : 2) {
-      const std::string volume = upload(daemon, sample);
+      const std::string volume = upload(daemon, sample).id;
       other.wait(other.submit(drc_of(volume)).id);
       if (sample % 2 == 0) other.erase_volume(volume);
     }
@@ -87,8 +87,8 @@ TEST(Backup, IsWholeAlthoughTheDaemonWorks) {
 
 TEST(Backup, SaysWhatIsDamagedOrMissing) {
   const TemporaryFolder folder;
-  std::string damaged;
-  std::string missing;
+  Volume damaged;
+  Volume missing;
   {
     Daemon daemon(folder / "data", "127.0.0.1:0");
     damaged = upload(daemon, 1);
@@ -97,16 +97,16 @@ TEST(Backup, SaysWhatIsDamagedOrMissing) {
     EXPECT_EQ(daemon.stop(), 0);
   }
   const std::filesystem::path blobs = folder / "data/blobs";
-  write_file(blobs / damaged.substr(0, 2) / damaged, "spoilt");
-  std::filesystem::remove(blobs / missing.substr(0, 2) / missing);
+  write_file(blobs / damaged.samples.substr(0, 2) / damaged.samples, "spoilt");
+  std::filesystem::remove(blobs / missing.samples.substr(0, 2) / missing.samples);
   const Finished made = isomeshd("backup", folder / "backup", folder / "data");
   EXPECT_EQ(made.status, 1);
   EXPECT_THAT(made.output, HasSubstr("copied 2 files"));
-  EXPECT_THAT(made.errors, HasSubstr("the volume " + damaged + " is damaged"));
-  EXPECT_THAT(made.errors, HasSubstr("the volume " + missing + " is missing"));
+  EXPECT_THAT(made.errors, HasSubstr("the volume " + damaged.id + " is damaged"));
+  EXPECT_THAT(made.errors, HasSubstr("the volume " + missing.id + " is missing"));
   const Finished restored = isomeshd("restore", folder / "backup", folder / "restored");
   EXPECT_EQ(restored.status, 1);
-  EXPECT_THAT(restored.errors, HasSubstr("the volume " + missing + " is missing"));
+  EXPECT_THAT(restored.errors, HasSubstr("the volume " + missing.id + " is missing"));
 }
 
 TEST(Backup, ARestoreThatFailsLeavesNothing) {

@@ -62,6 +62,15 @@ std::string not_finite() {
   return nifti({.datatype = 16, .bitpix = 32}, import::test::bytes_of(samples));
 }
 
+// A label of 2^40 in half of 2 x 2 x 2 samples.
+std::string wide_labels() {
+  const std::string background(32, '\0');
+  std::string label;
+  for (int n = 0; n < 4; ++n) label += std::string("\0\0\0\0\0\1\0\0", 8);
+  return "NRRD0004\ntype: uint64\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n" +
+         kSpaced + '\n' + background + label;
+}
+
 // A CT of 4 x 4 samples, 1 mm apart.
 const DicomSeries kCt = {.columns = 4,
                          .rows = 4,
@@ -180,6 +189,7 @@ const std::map<std::string, Shown>& shown() {
       {"looks-like-labels",
        {{{"a.nrrd",
           nrrd("", std::string(8, '\0') + std::string(8, '\1') + std::string(8, '\5'))}}}},
+      {"labels-renumbered", {{{"a.nrrd", wide_labels()}}}},
       {"overlapping-segments",
        {{{"a.seg.nrrd",
           "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: list domain domain "

@@ -258,10 +258,10 @@ void probe_orders(Statuses& statuses, const Order& order, const std::string& bod
 
 // Requests about a volume whose samples are damaged on the disk.
 void probe_damaged(Statuses& statuses, const Daemon& daemon) {
-  const std::string id =
-      volume_from_json(daemon.send("POST", "/v1/volumes?dims=2,2,2&type=uint8", "87654321").body)
-          .id;
-  write_file(daemon.data() / "blobs" / id.substr(0, 2) / id, "spoilt");
+  const Volume volume =
+      volume_from_json(daemon.send("POST", "/v1/volumes?dims=2,2,2&type=uint8", "87654321").body);
+  const std::string& id = volume.id;
+  write_file(daemon.data() / "blobs" / volume.samples.substr(0, 2) / volume.samples, "spoilt");
   for (const std::string part : {"/histogram", "/labels", "/slice.png", "/preview"}) {
     statuses.probe("GET /v1/volumes/{id}" + part, "/v1/volumes/" + id + part);
   }

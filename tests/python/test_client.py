@@ -71,6 +71,7 @@ class Files(DaemonTest):
         self.assertEqual(len(refused.exception.choices), 2)
         chosen = self.client.upload(folder, member="b.mhd", name="the second")
         self.assertEqual(chosen["id"], answers[1]["volume"]["id"])
+        self.assertEqual(chosen["name"], "the second")
 
     def test_links_in_a_folder_are_followed(self):
         folder = self.folder / "dataset" / "sub"

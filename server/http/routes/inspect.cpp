@@ -84,7 +84,6 @@ void preview(App& app, const Request& request, Response& response) {
                      .length = reduced->size()};
 }
 
-// Names are in the volume's record, which may change, so the list is not immutable.
 void labels(App& app, const Request& request, Response& response) {
   constexpr const char* kCursor = "volume labels";
   check_known(request, {"background", "cursor"});

@@ -90,11 +90,7 @@ std::string json_body(App& app, const Request& request) {
 JobParameters complete_parameters(const App& app, const Request& request,
                                   JobParameters parameters) {
   if (!parameters.labels && !parameters.crop) return parameters;
-  store::Viewer viewer = viewer_of(request);
-  // The own record of an admin has the names that he gave; others' may have other names.
-  if (!viewer && app.services.volumes.contains(owner_of(request), parameters.volume)) {
-    viewer = owner_of(request);
-  }
+  const store::Viewer viewer = viewer_of(request);
   const Volume volume = app.services.volumes.get(viewer, parameters.volume);
   if (parameters.crop) jobs::samples_in(*parameters.crop, volume.geometry, volume.dims);
   if (!parameters.labels) return parameters;

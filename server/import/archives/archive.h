@@ -46,10 +46,10 @@ using MemberBound = std::function<std::optional<std::uint64_t>(const std::filesy
 
 // Unpacks the regular files of a ZIP or a plain TAR, large ones as far as `bound` permits. Each
 // gets its own folder below `folder`, which must exist and be empty. Skips links, devices, empty
-// files, hidden files except a Zarr's, and files in hidden folders. Throws Error kUnusableVolume if the archive is
-// damaged, truncated or encrypted, if it has no such file, if bytes follow its end, if two members
-// have one name, if a member exceeds its bound, or if all together exceed most_unpacked_bytes;
-// kTooLarge beyond the limits.
+// files, hidden files except a Zarr's, and files in hidden folders. Throws Error kUnusableVolume if
+// the archive is damaged, truncated or encrypted, if it has no such file, if bytes follow its end,
+// if two members have one name, if a member exceeds its bound, or if all together exceed
+// most_unpacked_bytes; kTooLarge beyond the limits.
 std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
                                   const std::filesystem::path& folder, const ArchiveLimits& limits,
                                   const MemberBound& bound);

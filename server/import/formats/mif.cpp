@@ -245,8 +245,8 @@ SourceVolume parse_mif(const InputFile& file, const Companions& companions,
   if (data.front().name == ".") {
     volume.payload = range_from(file, data.front().offset);
   } else {
-    volume.data_files =
-        data_files_of(mif_data_names(file, companions), companions, {.bytes = data.front().offset}, volume);
+    volume.data_files = data_files_of(mif_data_names(file, companions), companions,
+                                      {.bytes = data.front().offset}, volume);
   }
   return volume;
 }

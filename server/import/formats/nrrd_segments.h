@@ -10,8 +10,8 @@ namespace isomesh::import {
 // True if the header names segments, or says that it is a segmentation.
 bool has_segments(const NrrdFields& fields);
 
-// True for those of 3D Slicer, which may leave out the empty part of the lattice. MITK keeps that of
-// the image.
+// True for those of 3D Slicer, which may leave out the empty part of the lattice. MITK keeps that
+// of the image.
 bool has_cropped_segments(const NrrdFields& fields);
 
 // Sets `volume.labels`, and `volume.layers` if the file's volumes are layers of integers and

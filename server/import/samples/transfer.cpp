@@ -113,8 +113,7 @@ bool store_whole_numbers(const SampleKind& kind, std::span<std::byte> samples, V
 // A palette colours pictures, too. These have many colours.
 bool may_be_labels(std::span<const std::byte> samples, const Volume& volume) {
   constexpr std::size_t kFew = 16;
-  return volume.labels.size() <= kFew ||
-         volume::label_count(samples, volume.type, volume.dims);
+  return volume.labels.size() <= kFew || volume::label_count(samples, volume.type, volume.dims);
 }
 
 auto find_labels_note(Volume& volume) {

@@ -30,9 +30,10 @@ template <class Stored>
 double to_double(Stored stored) {
   const auto value = static_cast<double>(stored);
   if (!is_exact(stored, value)) {
-    throw_unusable("The 64-bit sample " + std::to_string(stored) +
-                   " is too large to be stored exactly. Labels of 64 bits are read if there are at most "
-                   "65535.");
+    throw_unusable(
+        "The 64-bit sample " + std::to_string(stored) +
+        " is too large to be stored exactly. Labels of 64 bits are read if there are at most "
+        "65535.");
   }
   return value;
 }

@@ -26,6 +26,7 @@ JobParameters complete_labels(JobParameters parameters, const store::Viewer& vie
                     std::to_string(volume.dims[0]) + " x " + std::to_string(volume.dims[1]) +
                     " x " + std::to_string(volume.dims[2]));
   }
+  check_background(volume, parameters.background);
   for (const auto& [label, values] : values_of(volume)) {
     parameters.label_values.try_emplace(label, values);
   }

@@ -206,15 +206,26 @@ std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::
   });
 }
 
+void check_background(const Volume& volume, std::int64_t background) {
+  const std::string_view code = describe(NoteCode::kLabelsRenumbered).name;
+  if (background == 0 || std::ranges::find(volume.notes, code, &Note::code) == volume.notes.end()) {
+    return;
+  }
+  throw invalid_parameter(
+      "background",
+      "must be 0, because the labels of this volume have 64 bits: its samples have other numbers");
+}
+
 VolumeLabels LabelLists::of(const store::Viewer& viewer, const Volume& volume,
                             std::int64_t background) {
+  check_background(volume, background);
   return list_of(*counts(viewer, volume), volume, background);
 }
 
 VolumeLabels LabelLists::page_of(const store::Viewer& viewer, const Volume& volume,
                                  std::int64_t background, std::optional<std::int64_t> after) {
-  const auto list = lists_.get({viewer, volume.id, volume.created, background},
-                               [&] { return of(viewer, volume, background); });
+  const auto list =
+      lists_.get({viewer, volume.id, background}, [&] { return of(viewer, volume, background); });
   const auto& all = list->labels;
   const auto begin =
       after ? std::ranges::upper_bound(all, *after, {}, &VolumeLabel::label) : all.begin();

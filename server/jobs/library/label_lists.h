@@ -21,6 +21,10 @@ namespace isomesh::jobs {
 // Labels of the volume that stand for other values than their own number.
 LabelValues values_of(const Volume& volume);
 
+// Throws Error kInvalidParameter for a background other than 0 of a volume whose labels were
+// renumbered: it would be neither a label nor a sample that anybody knows.
+void check_background(const Volume& volume, std::int64_t background);
+
 // Lists the labels in stored volumes. The first list of a volume reads all samples. The results of
 // the last volumes are cached for each viewer, for the reason given at Histograms. Thread
 // safe; `blobs` must outlive it.
@@ -50,9 +54,7 @@ class LabelLists {
   const store::BlobStore& blobs_;
   Cache<std::pair<store::Viewer, std::string>, Counts> counts_{limits::kLabelCounts,
                                                                limits::kMostWaitingForAnswers};
-  // The key has the record's creation time, because the same samples may be uploaded again with
-  // other names.
-  Cache<std::tuple<store::Viewer, std::string, std::string, std::int64_t>, VolumeLabels> lists_{
+  Cache<std::tuple<store::Viewer, std::string, std::int64_t>, VolumeLabels> lists_{
       limits::kLabelLists, limits::kMostWaitingForAnswers};
 };
 

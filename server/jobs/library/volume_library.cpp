@@ -9,21 +9,29 @@
 namespace isomesh::jobs {
 namespace {
 
+constexpr std::size_t kLongestName = 255;
+
 // True if the upload was rejected only because it has several volumes.
 bool leaves_members_open(const Error& error, const ImportOptions& options) {
   const std::vector<Choice>& choices = error.remedy().choices;
   return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
 }
 
-// The id of a volume: the digest of its record, with a key for what may concern persons. Without
-// it, anyone who sees an id, for instance in a log, could test whose it is.
+// The id of a volume: the digest of what its upload says. It has a key, because much of that may
+// concern persons: without one, anyone who sees an id, for instance in a log, could test whose it
+// is. The format and the names of files say nothing of the volume.
 std::string id_of(Volume volume, const std::string& key) {
-  Volume persons;
-  persons.dicom = std::exchange(volume.dicom, {});
-  persons.name = std::exchange(volume.name, {});
-  persons.ignored = std::exchange(volume.ignored, {});
-  const std::string text = to_record(volume);
-  return sha256_of(text + to_hex(hmac_sha256(key, to_record(persons))));
+  volume.name.reset();
+  volume.format.clear();
+  volume.ignored.clear();
+  return to_hex(hmac_sha256(key, to_record(volume)));
+}
+
+// One name for several volumes needs the member's beside it.
+UploadName name_of_member(const UploadName& name, const std::string& member) {
+  if (!name.is_chosen) return name;
+  std::string both = name.text + ": " + member;
+  return {both.size() <= kLongestName ? std::move(both) : name.text, true};
 }
 
 std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
@@ -39,7 +47,11 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
   const store::ScratchFolder scratch(folder_.scratch());
   Volume volume = import_file(upload, options, party, scratch, control.cancelled);
   if (!name.text.empty() && (name.is_chosen || !volume.name)) volume.name = name.text;
-  return keep(owner, std::move(volume), scratch, control);
+  auto [stored, is_new] = keep(owner, std::move(volume), scratch, control);
+  if (name.is_chosen && stored.name != name.text) {
+    stored.name = volumes_.rename(owner, stored.id, name.text).name;
+  }
+  return {std::move(stored), is_new};
 }
 
 Volume VolumeLibrary::add_peers(const std::string& owner, const std::filesystem::path& response,
@@ -89,10 +101,13 @@ std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume vol
   volume.samples = blob.key;
   volume.id = id_of(volume, volumes_.key());
   volume.created = timestamp();
-  auto stored = volumes_.add(owner, volume);
+  auto [stored, is_new] = volumes_.add(owner, volume);
   if (control.stored) control.stored(volume.id);
   blobs_.mark_named(blob.key);
-  return stored;
+  // These are of the files of this upload.
+  stored.format = std::move(volume.format);
+  stored.ignored = std::move(volume.ignored);
+  return {std::move(stored), is_new};
 }
 
 std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
@@ -115,11 +130,8 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
   for (const Choice& member : members) {
     ImportOptions how = options;
     how.member = member.value;
-    // One name for several volumes needs the member's beside it.
-    const UploadName called =
-        name.is_chosen ? UploadName{name.text + ": " + member.value, true} : name;
     try {
-      volumes.push_back(add_one(how, called));
+      volumes.push_back(add_one(how, name_of_member(name, member.value)));
     } catch (const Error& error) {
       if (error.code() == ErrorCode::kCancelled || describe(error.code()).status >= 500) throw;
       const Problem problem = to_problem(error, "");

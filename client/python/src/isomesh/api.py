@@ -26,9 +26,11 @@ class Volume(TypedDict):
     """A stored volume. The sample (i,j,k) lies at origin + direction * diag(spacing) * (i,j,k),
     in millimetres, in DICOM's patient space (LPS)."""
 
-    #: A digest of all that the upload says: the samples and their geometry, and everything else
-    #: here but created. So the same upload is the same volume. The same samples with other names
-    #: of labels, or of another patient, are another volume.
+    #: A digest of what the upload says: the samples and their geometry, patient, modality,
+    #: presets, notes, names and colours of labels. So the same upload is the same volume on this
+    #: server, whatever its file is called. The same samples with other names of labels, or of
+    #: another patient, are another volume. A newer server may say more of a file, and then make
+    #: another volume of it.
     id: str
     #: The SHA-256 of the samples and their geometry, which a GLB repeats in asset.extras.samples.
     #: Volumes of the same owner with the same samples share their bytes and, where nothing else
@@ -38,7 +40,7 @@ class Volume(TypedDict):
     #: until the volume is renamed. It is not part of any mesh or of any log. Null if nothing gave
     #: a name.
     name: Optional[str]
-    #: The format of the upload.
+    #: The format of the first upload of this volume.
     format: VolumeFormat
     #: The number of samples along x, y and z.
     dims: Sequence[int]

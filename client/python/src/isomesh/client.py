@@ -155,8 +155,8 @@ class Client:
         accept: Sequence[str] = (),
         nifti_form: str = "",
     ) -> api.Volume:
-        """Stores a volume and returns the server's description of it. The same samples and geometry
-        always get the same id.
+        """Stores a volume and returns the server's description of it. The same upload
+        gets the same id.
 
         source    one of: a path of a file, of a folder of DICOM slices, or of a header with its data
                   beside it; a list of paths that belong together; the bytes of a file; a numpy array

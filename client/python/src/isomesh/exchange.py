@@ -102,17 +102,25 @@ class Exchange:
             raise WrongAnswer("the downloaded mesh does not match the job's SHA-256")
 
 
-def _with_whole_label(members: Dict[str, Any]) -> Dict[str, Any]:
+def _whole(label: Any) -> Any:
+    with contextlib.suppress(ValueError, TypeError):
+        return int(label)
+    return label
+
+
+def _with_whole_labels(members: Dict[str, Any]) -> Dict[str, Any]:
     """Labels of 64 bits are strings in JSON, because other languages would round the number."""
     if isinstance(members.get("label"), str):
-        with contextlib.suppress(ValueError):
-            members["label"] = int(members["label"])
+        members["label"] = _whole(members["label"])
+    labels = members.get("labels")
+    if isinstance(labels, list) and any(isinstance(label, str) for label in labels):
+        members["labels"] = [_whole(label) for label in labels]
     return members
 
 
 def _parsed(body: bytes, members: Members) -> Dict[str, Any]:
     try:
-        value = json.loads(body, object_hook=_with_whole_label)
+        value = json.loads(body, object_hook=_with_whole_labels)
     except (ValueError, RecursionError) as error:
         raise WrongAnswer("the server's response is not JSON") from error
     return answers.checked(value, members)

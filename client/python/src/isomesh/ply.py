@@ -87,10 +87,16 @@ def _long(numbers: Any, labels: List[int]) -> Any:
 
 
 def _numbered(labels: Any) -> Tuple[Any, str]:
-    """The inverse of `_long`: numbers and comments for labels that need more than 32 bits, and others unchanged."""
-    if labels is None or not len(labels) or (min(labels) >= -(1 << 31) and max(labels) < 1 << 32):
+    """The inverse of `_long`: numbers and comments for labels that need more than 32 bits. Others are unchanged, or of
+    32 bits."""
+    view = labels if isinstance(labels, memoryview) else getattr(labels, "dtype", None)
+    if labels is None or view is None or view.itemsize <= 4:
         return labels, ""
     found = sorted({int(label) for label in labels})
+    if not found or (found[0] >= -(1 << 31) and found[-1] < 1 << 31):
+        return memoryview(array("i", map(int, labels))), ""
+    if found[0] >= 0 and found[-1] < 1 << 32:
+        return memoryview(array("I", map(int, labels))), ""
     number = {label: at for at, label in enumerate(found, 1)}
     comments = "".join(f"comment label {at} is {label}\n" for label, at in number.items())
     return memoryview(array("I", (number[int(label)] for label in labels))), comments
@@ -111,7 +117,11 @@ def _header_of(text: bytes) -> Tuple[Dict[str, str], List[int]]:
         raise WrongAnswer("isomesh did not write this PLY file")
     space = "ras" if f"{_COMMENT}RAS" in lines else "lps"
     found = {**counts, "space": space, "begin": str(end + len(_HEADER_END))}
-    long_labels = [int(line.split()[4]) for line in lines if line.startswith("comment label ")]
+    told = [line.split() for line in lines if line.startswith("comment label ")]
+    try:
+        long_labels = [int(words[4]) for words in told]
+    except (ValueError, IndexError) as error:
+        raise WrongAnswer("the PLY file has a comment on a label that says none") from error
     return {**found, "label": labels[0]} if labels else found, long_labels
 
 

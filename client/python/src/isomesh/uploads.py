@@ -117,7 +117,7 @@ def _files_below(folder: Path) -> List[Tuple[str, Path]]:
             if file.is_dir():
                 links += file.is_symlink()
                 if links > _MOST_LINKS:
-                    raise ValueError(f"{folder} has more than {_MOST_LINKS} links to folders")
+                    raise ValueError(f"{folder} has more than {_MOST_LINKS} links to folders. Upload its folders one by one")
                 waiting.append((file, (*above, real)))
             elif file.is_file():
                 found.append((file.relative_to(folder).as_posix(), file))
