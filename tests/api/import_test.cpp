@@ -94,8 +94,8 @@ TEST(Import, AGreatUploadLeavesLittleInTheDaemon) {
   constexpr std::size_t kMost = std::size_t{24} << 20;
   const std::string samples(std::size_t{96} << 20, '\x07');
   const std::string header =
-      "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 512 512 384\nspacings: 1 1 1\n"
-      "encoding: raw\n\n";
+      "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 512 512 384\n"
+      "space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\n\n";
   const Daemon daemon;
   upload(daemon, sphere_upload());  // what the first one allocates for good
   const std::size_t before = resident_bytes(daemon.pid());
