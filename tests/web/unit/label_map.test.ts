@@ -37,6 +37,7 @@ describe('labels in pictures of eight bits', () => {
     expect(seriesColour(0)).toBe('#e67373');
     expect(seriesColour(1)).toMatch(/^#[0-9a-f]{6}$/);
     expect(new Set(Array.from({ length: 50 }, (_, label) => seriesColour(label))).size).toBe(50);
+    expect(new Set(['720575940618780781', '720575940618780782'].map(seriesColour)).size).toBe(2);
   });
 });
 

@@ -1,6 +1,6 @@
 // The labels of a job's mesh as a person looks at them: which are shown, and in which colours.
 import { client } from '../client';
-import type { Estimate, Job, LabelSummary, Label } from '../api/types';
+import type { Estimate, Job, Label, LabelSummary, Volume } from '../api/types';
 import { Signal } from '../ui/signal';
 import { LabelMap, seriesColour, type LabelLook } from '../volume/label_map';
 
@@ -32,6 +32,10 @@ export function labelCount({ mesh }: Job): number {
   return mesh?.labels_count ?? mesh?.labels?.length ?? 0;
 }
 
+export function isRenumbered({ notes }: Volume): boolean {
+  return notes.some(({ code }) => code === 'labels-renumbered');
+}
+
 // The triangles of each label's surface.
 export function trianglesOf(estimate: Estimate): ReadonlyMap<Label, number> {
   return new Map((estimate.labels ?? []).map(({ label, triangles }) => [label, triangles]));
@@ -45,14 +49,15 @@ export class LabelState {
   private map: LabelMap | null = null;
   private readonly byLabel: ReadonlyMap<Label, LabelSummary>;
 
-  constructor(readonly labels: readonly LabelSummary[]) {
+  // `isRenumbered`: the samples of the volume have other numbers than its labels.
+  constructor(readonly labels: readonly LabelSummary[], private readonly isRenumbered = false) {
     this.byLabel = new Map(labels.map((one) => [one.label, one]));
     this.colours.value = new Map(labels.flatMap(({ label, color }) => (color ? [[label, color]] : [])));
   }
 
-  // How slices show them; null for a surface without labels.
+  // How slices show them; null for a surface without labels, and if samples do not tell them.
   look(): LabelLook | null {
-    if (this.labels.length === 0) return null;
+    if (this.labels.length === 0 || this.isRenumbered) return null;
     this.map ??= new LabelMap(this.labels);
     const colours = this.colours.value;
     return { map: this.map, colourOf: (label) => colours.get(label) ?? seriesColour(label), isShown: (label) => this.isShown(label) };

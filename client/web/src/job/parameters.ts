@@ -1,5 +1,5 @@
 // A job's parameters as the page keeps them, in the form and in addresses, and as it sends them.
-import type { JobParameters, JobRequest, MeshFormat } from '../api/types';
+import type { JobParameters, JobRequest, Label, MeshFormat } from '../api/types';
 import { formatIso } from '../ui/format';
 import {
   applies,
@@ -77,6 +77,12 @@ function numbersFrom(text: string): number[] {
   return text.split(',').map(Number);
 }
 
+// One with too many digits for a number stays as it is.
+export function labelFrom(text: string): Label {
+  const number = Number(text);
+  return Number.isInteger(number) && !Number.isSafeInteger(number) ? text : number;
+}
+
 const readers: Record<Parameter['kind'], (text: string, values: Parameter['values']) => Value> = {
   number: Number,
   integer: Number,
@@ -84,7 +90,7 @@ const readers: Record<Parameter['kind'], (text: string, values: Parameter['value
   choice: (text, values) => values?.find((value) => String(value) === text) ?? text,
   choices: (text, values) => text.split(',').filter((one) => values?.includes(one)),
   text: String,
-  labels: (text) => (text === 'all' ? text : numbersFrom(text)),
+  labels: (text) => (text === 'all' ? text : text.split(',').map(labelFrom)),
   numbers: numbersFrom,
   places: placesFrom,
   'by label': fromJson,

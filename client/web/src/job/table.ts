@@ -7,7 +7,7 @@ import type { JobParameters, MeshFormat, Priority } from '../api/types';
 export type ByLabel = Readonly<Record<string, string | readonly number[]>>;
 // A place is x, y and z in millimetres, LPS.
 export type Places = readonly (readonly number[])[];
-export type Value = string | number | boolean | readonly string[] | readonly number[] | Places | ByLabel | null;
+export type Value = string | number | boolean | readonly string[] | readonly (number | string)[] | Places | ByLabel | null;
 
 // Empty for no value.
 export function asText(value: Value | undefined): string {
@@ -172,7 +172,7 @@ function areSome(value: unknown): value is unknown[] {
 }
 
 function areLabels(value: unknown): boolean {
-  return areSome(value) && value.every(Number.isInteger);
+  return areSome(value) && value.every((one) => Number.isInteger(one) || (typeof one === 'string' && /^-?\d+$/.test(one)));
 }
 
 function isOfLabel(label: string, value: unknown): boolean {

@@ -62,10 +62,18 @@ export function windowsOf(labels: readonly number[]): Window[] {
   return windows;
 }
 
+const goldenPart64 = 0x9e3779b97f4a7c15n;
+
+// The fractional part of that many golden sections. A number would lose it beyond 32 bits: there it is in units of 2^-64.
+function goldenPart(label: Label): number {
+  const turns = Number(label) * 0.6180339887498949;
+  if (Math.abs(Number(label)) <= 2 ** 32) return turns - Math.floor(turns);
+  return Number(BigInt.asUintN(64, BigInt(label) * goldenPart64) >> 11n) / 2 ** 53;
+}
+
 // A golden section of the circle of hues from one label to the next: the series of the surfaces' files.
 export function seriesColour(label: Label): string {
-  const turns = Number(label) * 0.6180339887498949;
-  const hue = 6 * (turns - Math.floor(turns));
+  const hue = 6 * goldenPart(label);
   const digits = [0, 1, 2].map((channel) => {
     const k = (5 - 2 * channel + hue) % 6;
     const part = 0.9 * (1 - 0.5 * Math.max(0, Math.min(k, 4 - k, 1)));

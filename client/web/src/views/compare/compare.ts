@@ -4,7 +4,7 @@ import { ApiError, asApiError, errorOfProblem } from '../../api/problem';
 import { isFinal, type Job, type LabelSummary } from '../../api/types';
 import { changeOf } from '../../job/changes';
 import { titlesOf } from '../../job/differences';
-import { LabelState, labelsOfMesh } from '../../job/labels';
+import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
 import type { SurfaceStyle } from '../../scene/style';
 import { placeOfText, type CameraPlace } from '../../scene/views';
 import { button, definitions, h } from '../../ui/dom';
@@ -176,13 +176,14 @@ class Comparison {
   // A surface whose camera moves those of the others.
   private addPane(job: Job, labels: readonly LabelSummary[]): SurfacePane {
     const camera = this.panes[0]?.camera ?? this.camera;
+    const volume = this.volumes.get(job.volume);
     const pane = new SurfacePane(this.scope, job, {
       hasKeys: false,
       onSlices: null,
       look: this.look,
       camera,
-      volume: this.volumes.get(job.volume),
-      labels: new LabelState(labels),
+      volume,
+      labels: new LabelState(labels, volume !== undefined && volume !== null && isRenumbered(volume)),
     });
     this.panes.push(pane);
     pane.onCamera = (place) => {

@@ -4,7 +4,7 @@ import { client } from '../../client';
 import { asApiError, errorOfProblem } from '../../api/problem';
 import { isFinal, type Job, type JobParameters, type Volume } from '../../api/types';
 import { emptyReason } from '../../job/empty';
-import { LabelState, labelsOfMesh } from '../../job/labels';
+import { isRenumbered, LabelState, labelsOfMesh } from '../../job/labels';
 import { inWords, surfaceInWords } from '../../job/parameters';
 import { changeLink } from '../../job/variants';
 import { surfaceDrawing } from '../../scene/graphics';
@@ -121,7 +121,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
     nameTab(job);
     if (job.state !== 'succeeded' || !job.mesh) return showFailure(job, volume, stageArea, panel);
     const labels = await labelsOfMesh(job);
-    if (!scope.isOver) showSurface(scope, route, job, new LabelState(labels), volume, stageArea, panel);
+    if (!scope.isOver) showSurface(scope, route, job, new LabelState(labels, volume !== null && volume !== undefined && isRenumbered(volume)), volume, stageArea, panel);
   };
   if (isFinal(first.state)) {
     await showEnd(first);

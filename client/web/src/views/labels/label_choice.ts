@@ -1,8 +1,8 @@
 // The choice of labels to mesh: all labels of a volume, or some of a list.
 import { client } from '../../client';
 import { asApiError } from '../../api/problem';
-import type { JobParameters, VolumeLabel, Label } from '../../api/types';
-import { labelTitle } from '../../job/labels';
+import type { JobParameters, Label, Volume, VolumeLabel } from '../../api/types';
+import { isRenumbered, labelTitle } from '../../job/labels';
 import { button, checkbox, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
@@ -37,7 +37,7 @@ export class LabelChoice {
   // `onChange` gets undefined labels while none is chosen. `onLook`: other labels are to be seen, see `look`.
   constructor(
     scope: Scope,
-    private readonly volume: string,
+    private readonly volume: Volume,
     start: Choice,
     private readonly onChange: (choice: Choice) => void,
     private readonly onLook: () => void,
@@ -75,7 +75,7 @@ export class LabelChoice {
     this.chosen.clear();
     this.boxes.clear();
     this.search = null;
-    client.labelsOf(this.volume, this.background, asking.signal).then(
+    client.labelsOf(this.volume.id, this.background, asking.signal).then(
       ({ labels }) => {
         if (!asking.signal.aborted) this.show(labels, wanted);
       },
@@ -106,7 +106,7 @@ export class LabelChoice {
     );
     this.search.fill();
     const colours = new Map(labels.map((one) => [one.label, colourOf(one)]));
-    this.shown = {
+    this.shown = isRenumbered(this.volume) ? null : {
       map: new LabelMap(labels),
       colourOf: (label) => colours.get(label) ?? seriesColour(label),
       isShown: (label) => this.chosen.has(label),
@@ -114,7 +114,7 @@ export class LabelChoice {
     this.onLook();
   }
 
-  // The chosen labels, which slices and preview show. Null until labels are counted.
+  // The chosen labels, which slices and preview show. Null until labels are counted, and if samples do not tell them.
   look(): LabelLook | null {
     return this.shown;
   }

@@ -207,7 +207,7 @@ class Prepare {
     this.isoPart.hidden = byLabels;
     this.labelPart.hidden = !byLabels;
     if (byLabels && !this.labelChoice) {
-      this.labelChoice = new LabelChoice(this.scope, this.volume.id, this.parameters, (choice) => this.setLabels(choice), () => this.update());
+      this.labelChoice = new LabelChoice(this.scope, this.volume, this.parameters, (choice) => this.setLabels(choice), () => this.update());
       this.labelPart.append(this.labelChoice.element);
     }
     this.faulty.clear();

@@ -1,5 +1,6 @@
 // How a surface is looked at, as texts for the address: its style, what is measured, which labels are hidden.
-import type { Vec3, Label } from '../../api/types';
+import type { Label, Vec3 } from '../../api/types';
+import { labelFrom } from '../../job/parameters';
 import { defaultStyle, type Ruler, type SurfaceStyle } from '../../scene/style';
 
 const mostRulers = 32;
@@ -45,5 +46,5 @@ export function rulersOfText(text: string): Ruler[] {
 }
 
 export function labelsOfText(text: string): Set<Label> {
-  return new Set(text.split(',').filter((one) => /^-?\d+$/.test(one)).map((one) => (Number.isSafeInteger(Number(one)) ? Number(one) : one)));
+  return new Set(text.split(',').filter((one) => /^-?\d+$/.test(one)).map(labelFrom));
 }
