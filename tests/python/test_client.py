@@ -27,7 +27,7 @@ class Files(DaemonTest):
             (folder / name).write_bytes(data[number * piece : (number + 1) * piece])
         header = folder / "ball.mhd"
         header.write_text(
-            "ObjectType = Image\nNDims = 3\nDimSize = 40 32 24\nElementType = MET_FLOAT\n"
+            "ObjectType = Image\nNDims = 3\nDimSize = 40 32 24\nElementSpacing = 1 1 1\nElementType = MET_FLOAT\n"
             f"ElementByteOrderMSB = False\nElementDataFile = {element}\n"
         )
         return header
