@@ -331,5 +331,20 @@ TEST(SignedDistances, AreThoseOfAllPairs) {
   }
 }
 
+// The structures lie where the images do, so what is said of these holds for them.
+TEST(DicomStructures, HaveTheNotesOnTheGeometryOfTheirImages) {
+  DicomSeries images = kImages;
+  images.step = {0, 0, 2.5};
+  NamedFiles files = changed(images, [](DicomObject& object, std::uint32_t k) {
+    object.text(kFrameOfReferenceUid, "UI", "1.2.3.frame")
+        .text(kImagePosition, "DS", "0\\0\\" + std::to_string((k * 5 + 1) / 2));
+  });
+  const DicomObject structures = structure_set({{.contours = {{box(1.5, 1.5, 6.5, 6.5, 5)}}}});
+  files.emplace_back("RS", structures.file(kImplicit));
+  const ImportOptions options = {.series = "1.2.9"};
+  const Outcome outcome = imported(import_objects(files, options));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kPositionsRounded), HasSubstr("rounded to 1 mm"));
+}
+
 }  // namespace
 }  // namespace isomesh::import::test
