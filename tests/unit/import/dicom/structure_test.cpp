@@ -151,7 +151,14 @@ TEST(DicomStructures, AreInterpolatedBetweenTheirContours) {
   EXPECT_EQ(sample(outcome, 6, 6, 0), 0);
   EXPECT_EQ(sample(outcome, 6, 6, 1), 1);
   EXPECT_EQ(sample(outcome, 6, 6, 7), 0);
-  EXPECT_THAT(note_detail(outcome, NoteCode::kContoursInterpolated), HasSubstr("2 times"));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kContoursInterpolated),
+              AllOf(HasSubstr("2 times"), HasSubstr("The ends of 1 structure lie on slices")));
+  // With contours 6 mm apart the ends lie between slices.
+  const Outcome even = imported(
+      draw({{.name = "box",
+             .contours = {{box(4.5, 4.5, 8.5, 10.5, 4)}, {box(4.5, 4.5, 8.5, 10.5, 10)}}}}));
+  EXPECT_EQ(note_detail(even, NoteCode::kContoursInterpolated).find("ends"), std::string::npos);
+  EXPECT_NE(note_detail(even, NoteCode::kContoursInterpolated), "");
 }
 
 // 4 x 6 samples of a contour in each of four planes, between the slices at 4 mm and 12 mm.
