@@ -36,6 +36,7 @@ std::vector<std::span<Placed>> positions_of(std::span<Placed> placed) {
 struct Duplicates {
   std::size_t same = 0;
   std::size_t different = 0;
+  std::size_t doubled = 0;        // positions with several slices
   std::size_t doubtful = 0;       // positions with slices that differ
   std::size_t positions = 0;      // all
   const Placed* first = nullptr;  // of those that differ
@@ -48,9 +49,11 @@ std::string share_of(const Duplicates& found) {
          " positions";
 }
 
-// If half of the positions have several slices, these are rather two volumes, one of which lacks
-// some. One slice of each position would mix both.
-bool may_be_mixed(const Duplicates& found) { return found.doubtful * 2 >= found.positions; }
+// If half of the positions have several slices, and half of these differ, they are rather two
+// volumes, one of which lacks some. One slice of each position would mix both.
+bool may_be_mixed(const Duplicates& found) {
+  return found.doubled * 2 >= found.positions && found.doubtful * 2 >= found.doubled;
+}
 
 [[noreturn]] void throw_different(const Duplicates& found, const ImportOptions& options) {
   const std::string first = place_of(found.first->slice);
@@ -105,6 +108,7 @@ DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& 
     const Placed& first = position.front();
     distinct.slices.push_back(first.slice);
     const std::size_t different_before = found.different;
+    const std::size_t left_out_before = distinct.left_out.size();
     for (const Placed& other : position.subspan(1)) {
       // Beside the first one in its plane; make_stack refuses it.
       if (length(difference(other.position(), first.position())) > kSamePlaceMm) {
@@ -122,6 +126,7 @@ DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& 
       }
     }
     if (found.different > different_before) ++found.doubtful;
+    if (distinct.left_out.size() > left_out_before) ++found.doubled;
   }
   if (found.different > 0 && (may_be_mixed(found) || !options.accepts(NoteCode::kDuplicateSlice))) {
     throw_different(found, options);

@@ -22,7 +22,7 @@ struct DistinctSlices {
 // the same samples: others are several volumes.
 //
 // Throws Error kUnusableVolume as refuse_mixtures does, and if slices at one place have different
-// values: overridable if that is so at fewer than half of the places.
+// values: overridable unless at least half of the places have several slices, half of which differ.
 DistinctSlices without_duplicates(std::vector<Slice> slices, const SameSamples& same_samples,
                                   const ImportOptions& options, std::vector<Note>& notes);
 
